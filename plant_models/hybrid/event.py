@@ -1,0 +1,66 @@
+"""Events: the declared instants at which a hybrid system jumps.
+
+Triggered events come from outside with a payload (a balise). Periodic events happen at instants given by parameters
+(a sampled odometer) and may draw noise. This file imports only the signal vocabulary.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from plant_models.hybrid.signal import Signal
+
+
+@dataclass(frozen=True, slots=True)
+class TriggeredEvent:
+    """An event that arrives from outside, at any time.
+
+    Args:
+        name: identifier; in FMI 3 the name of a triggered input clock, in FMI 2 the stem of ``<name>_count`` and ``<name>_time``.
+        payload: discrete inputs that arrive with the event; each name starts with ``<name>_``. Only the jump at this event
+            may read them: before it they are not known. What is needed later belongs into memory.
+        description: one line for the user.
+
+    Raises:
+        ValueError: a payload has another prefix, is not a discrete input, or takes the name of the count or the stamp.
+    """
+
+    name: str
+    payload: tuple[Signal, ...] = ()
+    description: str = ""
+
+    def __post_init__(self) -> None:
+        for signal in self.payload:
+            if not signal.name.startswith(f"{self.name}_"):
+                raise ValueError(f"Payload {signal.name!r} of event {self.name!r} must be named '{self.name}_...'.")
+            if signal.causality != "input" or signal.variability != "discrete":
+                raise ValueError(f"Payload {signal.name!r} of event {self.name!r} must be a discrete input.")
+            if signal.name in self.implied_names:
+                raise ValueError(f"Payload {signal.name!r} of event {self.name!r} takes a name that every event has itself.")
+
+    @property
+    def implied_names(self) -> tuple[str, str]:
+        """Names of the count and of the stamp that every triggered event has in an FMU."""
+        return f"{self.name}_count", f"{self.name}_time"
+
+
+@dataclass(frozen=True, slots=True)
+class PeriodicEvent:
+    """An event at the instants ``start_time + offset + k * period``, k = 0, 1, 2, ...
+
+    Args:
+        name: identifier.
+        period: name of the parameter that holds the period [s].
+        offset: name of the parameter that holds the offset [s], or None for zero.
+        noises: standard normal numbers drawn afresh at every instant and handed to `jump` as inputs.
+        description: one line for the user.
+    """
+
+    name: str
+    period: str
+    offset: str | None = None
+    noises: tuple[Signal, ...] = ()
+    description: str = ""
+
+
+Event = TriggeredEvent | PeriodicEvent

@@ -1,0 +1,162 @@
+"""Kernels: how the functions of a hybrid system are evaluated at run time.
+
+A kernel works in place on three arrays (state, inputs, parameters). `TracedKernel` calls CasADi functions through
+preset buffers, `NumpyKernel` calls the Python functions themselves; both have the same face and `runtime` cannot tell them
+apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import casadi as ca
+import numpy as np
+
+from plant_models.hybrid import integration
+from plant_models.hybrid.system import HybridSystem
+from plant_models.hybrid.tracing import TracedSystem
+
+BATCH_OF_STEPS = 10
+
+
+class Kernel(Protocol):
+    """In-place evaluation of one system.
+
+    Attributes:
+        x: state, shape (n,). u: inputs, payloads and noises, shape (m,). p: parameters, shape (k,). y: outputs, shape (q,).
+        memory: x, u and p in one contiguous array of shape (n + m + k,), of which they are views.
+    """
+
+    x: np.ndarray
+    u: np.ndarray
+    p: np.ndarray
+    y: np.ndarray
+    memory: np.ndarray
+
+    def step(self, t: float, h: float) -> None:
+        """Advance `x` by one internal step of length `h` [s] from `t` [s]."""
+
+    def grid_steps(self, t0: float, k: int, count: int, h: float) -> None:
+        """Advance `x` by `count` full internal steps from grid point ``t0 + k*h``."""
+
+    def output(self, t: float) -> None:
+        """Compute `y` from `x`, `u`, `p` at `t` [s]."""
+
+    def jump(self, event: str, t: float) -> None:
+        """Replace `x` by its value after `event` at `t` [s]."""
+
+
+def make_kernel(system: HybridSystem) -> Kernel:
+    """The fastest kernel a system allows: traced where it can be traced, plain NumPy otherwise."""
+    return TracedKernel(system) if system.traceable else NumpyKernel(system)
+
+
+class _Arrays:
+    def __init__(self, system: HybridSystem) -> None:
+        parts = [system.start_state(), system.start_inputs(), system.start_parameters()]
+        self.memory = np.concatenate(parts)
+        n, m = len(parts[0]), len(parts[1])
+        self.x, self.u, self.p = self.memory[:n], self.memory[n : n + m], self.memory[n + m :]
+        self.y = np.zeros(sum(s.width for s in system.outputs))
+
+
+class NumpyKernel(_Arrays):
+    """Evaluation by the system's own Python functions."""
+
+    def __init__(self, system: HybridSystem) -> None:
+        super().__init__(system)
+        self.system = system
+        self._traced = TracedSystem(system) if system.method == "rosenbrock" else None
+
+    def step(self, t: float, h: float) -> None:  # noqa: D102 - see Kernel
+        jacobian = None if self._traced is None else self._jacobian
+        self.x[:] = integration.step(self.system, t, h, self.x, self.u, self.p, jacobian)
+
+    def grid_steps(self, t0: float, k: int, count: int, h: float) -> None:  # noqa: D102 - see Kernel
+        for i in range(count):
+            self.step(t0 + (k + i) * h, h)
+
+    def output(self, t: float) -> None:  # noqa: D102 - see Kernel
+        self.y[:] = self.system.output_vector(t, self.x, self.u, self.p)
+
+    def jump(self, event: str, t: float) -> None:  # noqa: D102 - see Kernel
+        self.x[:] = self.system.jump_vector(event, t, self.x, self.u, self.p)
+
+    def _jacobian(self, t: float, _continuous: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        assert self._traced is not None
+        by_x, by_t = self._traced.effective_jacobian(t, self.x, self.u, self.p)
+        return np.asarray(by_x), np.asarray(by_t).ravel()
+
+
+class TracedKernel(_Arrays):
+    """Evaluation by traced CasADi functions through preset buffers (a few microseconds a call, no allocation)."""
+
+    def __init__(self, system: HybridSystem) -> None:
+        super().__init__(system)
+        functions = _traced_functions(system)
+        self._t, self._h, self._t0, self._k = (np.zeros(1) for _ in range(4))
+        self._x_next = np.zeros_like(self.x)
+        x, u, p = self.x, self.u, self.p
+        self._step = _buffered(functions["step"], [self._t, self._h, x, u, p], self._x_next)
+        self._steps = _buffered(functions["steps"], [self._t0, self._k, self._h, x, u, p], self._x_next)
+        self._output = _buffered(functions["output"], [self._t, x, u, p], self.y)
+        self._jumps = {
+            event.name: _buffered(functions[f"jump_{event.name}"], [self._t, x, u, p], self._x_next) for event in system.events
+        }
+        self._flows = system.continuous_count > 0
+
+    def step(self, t: float, h: float) -> None:  # noqa: D102 - see Kernel
+        if self._flows:
+            self._t[0], self._h[0] = t, h
+            self._step()
+            self.x[:] = self._x_next
+
+    def grid_steps(self, t0: float, k: int, count: int, h: float) -> None:  # noqa: D102 - see Kernel
+        if not self._flows:
+            return
+        while count >= BATCH_OF_STEPS:
+            self._t0[0], self._k[0], self._h[0] = t0, k, h
+            self._steps()
+            self.x[:] = self._x_next
+            k += BATCH_OF_STEPS
+            count -= BATCH_OF_STEPS
+        for i in range(count):
+            self.step(t0 + (k + i) * h, h)
+
+    def output(self, t: float) -> None:  # noqa: D102 - see Kernel
+        self._t[0] = t
+        self._output()
+
+    def jump(self, event: str, t: float) -> None:  # noqa: D102 - see Kernel
+        self._t[0] = t
+        self._jumps[event]()
+        self.x[:] = self._x_next
+
+
+def _buffered(function: ca.Function, arguments: list[np.ndarray], result: np.ndarray) -> Callable[[], Any]:
+    buffer, evaluate = function.buffer()
+    for i, array in enumerate(arguments):
+        buffer.set_arg(i, memoryview(array))
+    buffer.set_res(0, memoryview(result))
+
+    def call(_alive: Any = (buffer, function)) -> None:  # the buffer and its function must outlive the call
+        evaluate()
+
+    return call
+
+
+def _traced_functions(system: HybridSystem) -> dict[str, ca.Function]:
+    cached: dict[str, ca.Function] | None = system.__dict__.get("_traced_functions")
+    if cached is None:
+        traced = TracedSystem(system)
+        cached = {"step": traced.step, "steps": traced.steps(BATCH_OF_STEPS), "output": traced.output}
+        cached |= {f"jump_{event.name}": traced.jump(event.name) for event in system.events}
+        cached = {name: _dense(function) for name, function in cached.items()}
+        system.__dict__["_traced_functions"] = cached
+    return cached
+
+
+def _dense(function: ca.Function) -> ca.Function:
+    arguments = [ca.SX.sym(function.name_in(i), function.size1_in(i), function.size2_in(i)) for i in range(function.n_in())]
+    return ca.Function(function.name(), arguments, [ca.densify(function(*arguments))])

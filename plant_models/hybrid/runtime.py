@@ -1,0 +1,155 @@
+"""Runtime: a hybrid system moving through time, events included.
+
+This is the reference for the C runtime: the same grid, the same order of events, the same numbers. It knows no FMI; the
+block (package `fmu_observer`) puts that face on it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import floor, inf, ulp
+
+import numpy as np
+
+from plant_models.hybrid.kernel import Kernel, make_kernel
+from plant_models.hybrid.noise import standard_normal
+from plant_models.hybrid.signal import scalar_names
+from plant_models.hybrid.system import HybridSystem
+
+GRID_TOLERANCE = 1e-9  # of an internal step: closer to a grid point than this is on it
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Everything that decides the future of a runtime; a value, never changed after it is taken."""
+
+    memory: np.ndarray
+    t: float
+    t0: float
+    ticks: tuple[int, ...]
+
+
+class Runtime:
+    """One instance of a hybrid system in time.
+
+    1. `x`, `u`, `p`, `y` are flat arrays in the declared order; write inputs into `u` before `advance`.
+    2. `advance(t_end)` integrates on the absolute grid ``t0 + k * internal_step``, so that splitting a step changes
+       nothing, and hits every periodic instant in ``(t, t_end]`` exactly, in the declared order.
+    3. `start(t0)` fires the periodic events that are due at ``t0``.
+    4. `trigger(event)` jumps now, with the payload that stands in `u`.
+    5. `snapshot` / `restore` are exact: what follows a restore is bit-identical to what followed the snapshot.
+
+    Args:
+        system: the hybrid system.
+        kernel: how it is evaluated; by default the fastest the system allows.
+    """
+
+    def __init__(self, system: HybridSystem, kernel: Kernel | None = None) -> None:
+        self.system = system
+        self._kernel = kernel if kernel is not None else make_kernel(system)
+        self.x, self.u, self.p, self.y = self._kernel.x, self._kernel.u, self._kernel.p, self._kernel.y
+        self.memory = self._kernel.memory
+        self.t = self.t0 = 0.0
+        self.ticks = [0] * len(system.periodic_events)
+        self._parameter_names = list(scalar_names(system.parameter_signals))
+        self._noise_offset = len(self.u) - sum(s.width for s in system.noises)
+        self._read_timing()
+
+    def reset(self) -> None:
+        """Back to the start values of states, inputs and parameters, at time zero."""
+        self.x[:] = self.system.start_state()
+        self.u[:] = self.system.start_inputs()
+        self.p[:] = self.system.start_parameters()
+        self.t = self.t0 = 0.0
+        self.ticks = [0] * len(self.ticks)
+
+    def start(self, t0: float) -> None:
+        """Begin at `t0` [s] and fire the periodic events due there."""
+        self.t = self.t0 = t0
+        self.ticks = [0] * len(self.ticks)
+        self._read_timing()
+        self._fire_due()
+
+    def advance(self, t_end: float) -> None:
+        """Integrate to `t_end` [s] and fire the periodic events on the way and at the end."""
+        while self._due <= t_end + self._tolerance(t_end):
+            self._integrate(self._due)
+            self._fire_due()
+        self._integrate(t_end)
+
+    def trigger(self, event: str) -> None:
+        """Jump at a triggered event now, with the payload in `u`."""
+        self._kernel.jump(event, self.t)
+
+    def update_outputs(self) -> np.ndarray:
+        """Compute and return `y`, shape (q,)."""
+        self._kernel.output(self.t)
+        return self.y
+
+    def snapshot(self) -> Snapshot:
+        """A copy of everything that decides the future."""
+        return Snapshot(self.memory.copy(), self.t, self.t0, tuple(self.ticks))
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Return to a snapshot, exactly."""
+        self.memory[:] = snapshot.memory
+        self.t, self.t0, self.ticks = snapshot.t, snapshot.t0, list(snapshot.ticks)
+        self._read_timing()
+
+    # -- internals --------------------------------------------------------------------------------------------------
+
+    def _timing(self, name: str | None) -> float:
+        return 0.0 if name is None else float(self.p[self._parameter_names.index(name)])
+
+    def _read_timing(self) -> None:
+        """Fetch what stays fixed between events; parameters may have been set or restored."""
+        self._periods = [self._timing(event.period) for event in self.system.periodic_events]
+        self._offsets = [self._timing(event.offset) for event in self.system.periodic_events]
+        self._h = self._timing("internal_step")
+        self._due = self._next_due()
+
+    def _tolerance(self, t: float) -> float:
+        return GRID_TOLERANCE * self._h + 4.0 * ulp(t)
+
+    def _instant(self, i: int) -> float:
+        return self.t0 + self._offsets[i] + self.ticks[i] * self._periods[i]
+
+    def _next_due(self) -> float:
+        return min((self._instant(i) for i in range(len(self.ticks))), default=inf)
+
+    def _fire_due(self) -> None:
+        position = self._noise_offset
+        for i, event in enumerate(self.system.periodic_events):
+            if self._instant(i) <= self.t + self._tolerance(self.t):
+                for j, _noise in enumerate(event.noises):
+                    signal = position - self._noise_offset + j
+                    self.u[position + j] = standard_normal(int(self._timing("seed")), signal, self.ticks[i])
+                self._kernel.jump(event.name, self.t)
+                self.ticks[i] += 1
+            position += len(event.noises)
+        self._due = self._next_due()
+
+    def _integrate(self, target: float) -> None:
+        """Move to `target` through whole cells of the grid, with a part of a cell at either end."""
+        h, tolerance = self._h, self._tolerance(target)
+        if target - self.t <= tolerance:
+            self.t = max(self.t, target)
+            return
+        cell = (self.t - self.t0) / h
+        k = floor(cell + tolerance / h)
+        if (cell - k) * h > tolerance:  # inside a cell: finish it, or stop within it
+            boundary = self.t0 + (k + 1) * h
+            if boundary >= target - tolerance:
+                self._kernel.step(self.t, target - self.t)
+                self.t = target
+                return
+            self._kernel.step(self.t, boundary - self.t)
+            k += 1
+        whole = floor((target - self.t0) / h + tolerance / h) - k
+        if whole > 0:
+            self._kernel.grid_steps(self.t0, k, whole, h)
+            k += whole
+        rest = target - (self.t0 + k * h)
+        if rest > tolerance:
+            self._kernel.step(self.t0 + k * h, rest)
+        self.t = target

@@ -1,0 +1,122 @@
+"""Signals: the names, units and attributes of everything that crosses a boundary.
+
+A `Signal` uses FMI's own words, so that a model description is a transcription and not a translation.
+This file imports nothing but the standard library.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from keyword import iskeyword
+from typing import Literal
+
+Causality = Literal["input", "output", "parameter", "local"]
+Variability = Literal["fixed", "tunable", "discrete", "continuous"]
+Start = float | tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """One variable of a hybrid system.
+
+    Args:
+        name: a legal identifier, unique within its system.
+        unit: unit in SI symbols, e.g. ``m/s``, ``kg.m2``; ``1`` for a pure number.
+        causality: FMI causality; states and memory are ``local``.
+        variability: FMI variability; ``continuous`` states flow, ``discrete`` ones change only in jumps.
+        start: start value [unit]; a tuple of `size` values for a vector.
+        min: smallest legal value [unit], or None.
+        max: largest legal value [unit], or None.
+        description: one line for the user.
+        size: None for a scalar, else the number of elements of a vector, named ``name[1]`` ... ``name[size]``.
+        display_unit: unit to show at the user's edge, e.g. ``km/h``.
+
+    Raises:
+        ValueError: the name is not an identifier or is a keyword, or the start does not fit the size.
+    """
+
+    name: str
+    unit: str = "1"
+    causality: Causality = "local"
+    variability: Variability = "continuous"
+    start: Start = 0.0
+    min: float | None = None
+    max: float | None = None
+    description: str = ""
+    size: int | None = None
+    display_unit: str | None = None
+
+    def __post_init__(self) -> None:
+        if not self.name.isidentifier():
+            raise ValueError(f"Signal name {self.name!r} is not a legal identifier: use letters, digits and '_'.")
+        if iskeyword(self.name) or self.name.startswith("_"):  # it becomes a field of the named tuples `u` and `p`
+            raise ValueError(f"Signal name {self.name!r} is a Python keyword or begins with '_'; choose another one.")
+        if self.size is None:
+            if isinstance(self.start, tuple):
+                raise ValueError(f"Signal {self.name!r} is a scalar but its start is {self.start!r}.")
+        elif not isinstance(self.start, tuple):
+            object.__setattr__(self, "start", (float(self.start),) * self.size)
+        elif len(self.start) != self.size:
+            raise ValueError(f"Signal {self.name!r} has size {self.size} but {len(self.start)} start values.")
+
+    @property
+    def width(self) -> int:
+        """Number of scalar variables this signal stands for."""
+        return 1 if self.size is None else self.size
+
+    @property
+    def scalar_names(self) -> tuple[str, ...]:
+        """FMI names of the scalar variables, ``name`` or ``name[1]`` ... ``name[size]``."""
+        if self.size is None:
+            return (self.name,)
+        return tuple(f"{self.name}[{i + 1}]" for i in range(self.size))
+
+    @property
+    def start_values(self) -> tuple[float, ...]:
+        """Start values, one for each scalar variable [unit]."""
+        return self.start if isinstance(self.start, tuple) else (float(self.start),)
+
+
+def state(name: str, unit: str, start: Start = 0.0, description: str = "", *, size: int | None = None) -> Signal:
+    """A continuous state: flows between events, may jump at them."""
+    return Signal(name, unit, "local", "continuous", start, description=description, size=size)
+
+
+def memory(name: str, unit: str, start: Start = 0.0, description: str = "", *, size: int | None = None) -> Signal:
+    """A discrete state: constant between events, changes only in jumps."""
+    return Signal(name, unit, "local", "discrete", start, description=description, size=size)
+
+
+def input_signal(
+    name: str, unit: str, start: Start = 0.0, description: str = "", *, size: int | None = None,
+    variability: Variability = "continuous", display_unit: str | None = None,
+) -> Signal:  # fmt: skip
+    """An input; `start` is used while nothing is connected to it."""
+    return Signal(name, unit, "input", variability, start, None, None, description, size, display_unit)
+
+
+def output_signal(
+    name: str, unit: str, description: str = "", *, variability: Variability = "continuous",
+    display_unit: str | None = None, size: int | None = None,
+) -> Signal:  # fmt: skip
+    """An output, computed from time, state, input and parameters."""
+    return Signal(name, unit, "output", variability, 0.0, None, None, description, size, display_unit)
+
+
+def parameter(
+    name: str, unit: str, start: Start, description: str = "", *, min: float | None = None, max: float | None = None,
+    variability: Variability = "fixed", size: int | None = None, display_unit: str | None = None,
+) -> Signal:  # fmt: skip
+    """A parameter: fixed after initialisation, or tunable between steps."""
+    return Signal(name, unit, "parameter", variability, start, min, max, description, size, display_unit)
+
+
+def scalar_names(signals: Sequence[Signal]) -> tuple[str, ...]:
+    """FMI names of all scalar variables of `signals`, in order."""
+    return tuple(name for signal in signals for name in signal.scalar_names)
+
+
+def width(signals: Sequence[Signal]) -> int:
+    """Number of scalar variables of `signals`."""
+    return sum(signal.width for signal in signals)

@@ -1,0 +1,281 @@
+"""The hybrid system: the one abstraction behind every plant, sensor, driver and observer.
+
+Continuous states flow, and jump at declared events. A system is written once in plain NumPy, without branching on
+values, and then lives three lives: it runs as Python, it is traced by CasADi, it is generated as C.
+This file knows signals and events, and nothing of FMI, masters or files.
+"""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from plant_models.hybrid.event import Event, PeriodicEvent, TriggeredEvent
+from plant_models.hybrid.signal import Signal, parameter, scalar_names, width
+
+Array = Any  # a NumPy array, or a symbolic array with NumPy's shapes and broadcasting
+Method = Literal["rk4", "rosenbrock"]
+
+RESERVED_NAMES = frozenset({"time", "internal_step", "seed"})
+
+
+def vector(*components: Array) -> Array:
+    """Stack scalars (or batches of them) into a vector, broadcasting constants.
+
+    Args:
+        components: n scalars, or arrays of one common shape ``(members,)``; plain numbers are broadcast.
+
+    Returns:
+        Array of shape (n,), or (n, members) for a batch.
+    """
+    if all(getattr(c, "ndim", 0) == 0 for c in components):
+        return np.stack([np.asarray(c) if isinstance(c, int | float) else c for c in components])
+    return np.stack(np.broadcast_arrays(*components))
+
+
+class HybridSystem:
+    """Base of all hybrid systems: ``dx/dt = flow(t, x, u, p)`` between events, ``x+ = jump(event, t, x, u, p)`` at them.
+
+    The contract:
+
+    1. A subclass sets `name`, `description`, `source`, `states`, `inputs`, `outputs`, `parameters`, `events`, as class
+       attributes, or as instance attributes before it calls ``super().__init__()`` when they depend on options.
+    2. `flow`, `output`, `jump` and `friction` are pure functions in plain NumPy, without branching on values
+       (``np.where``, not ``if``); nothing is kept on ``self`` between calls.
+    3. ``x`` is an array of shape (n,) (or (n, members) in a batch): the continuous states first, then the memory.
+       ``u`` and ``p`` are named tuples of the inputs (with event payloads and noises) and of the parameters.
+    4. `flow` returns the derivatives of the continuous states, shape (nc,); `jump` returns the whole new ``x``, shape (n,);
+       `output` returns a dictionary with every declared output.
+    5. Dry friction is declared, not regularised: a state named in `frictions` feels a resistance of magnitude
+       `friction(...)` against its sign. The integrator lets it stop exactly at zero and stay there while the flow is
+       smaller than the friction.
+    6. Numbers that shape the equations themselves (an order, a mode) are constructor arguments, listed in `options`.
+    7. A system that cannot be traced says ``traceable = False`` and may then use any Python.
+    """
+
+    name: str = ""
+    description: str = ""
+    source: str = ""
+    states: tuple[Signal, ...] = ()
+    inputs: tuple[Signal, ...] = ()
+    outputs: tuple[Signal, ...] = ()
+    parameters: tuple[Signal, ...] = ()
+    events: tuple[Event, ...] = ()
+    frictions: tuple[str, ...] = ()
+    presets: Mapping[str, Mapping[str, Any]] = {}
+    default_preset: str | None = None
+    method: Method = "rk4"
+    internal_step: float = 1e-3
+    traceable: bool = True
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {}
+
+    def __init__(self, **options: Any) -> None:
+        self.options: dict[str, Any] = options
+        self._check_declarations()
+
+    # -- what a subclass writes -------------------------------------------------------------------------------------
+
+    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Derivatives of the continuous states, shape (nc,)."""
+        return np.zeros((self.continuous_count, *x.shape[1:]))
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """Values of all outputs by name."""
+        return {}
+
+    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """State after the event, shape (n,)."""
+        raise NotImplementedError(f"{type(self).__name__} declares event {event!r} but has no jump for it.")
+
+    def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Magnitudes of the dry frictions in units of the derivatives, shape (len(frictions),)."""
+        return np.zeros(len(self.frictions))
+
+    # -- what follows from the declarations -------------------------------------------------------------------------
+
+    @cached_property
+    def continuous_count(self) -> int:
+        """Number of scalar continuous states."""
+        return width([s for s in self.states if s.variability == "continuous"])
+
+    @cached_property
+    def state_count(self) -> int:
+        """Number of scalar states, continuous and discrete."""
+        return width(self.states)
+
+    @cached_property
+    def triggered_events(self) -> tuple[TriggeredEvent, ...]:
+        """Events that arrive from outside."""
+        return tuple(e for e in self.events if isinstance(e, TriggeredEvent))
+
+    @cached_property
+    def periodic_events(self) -> tuple[PeriodicEvent, ...]:
+        """Events at periodic instants."""
+        return tuple(e for e in self.events if isinstance(e, PeriodicEvent))
+
+    @cached_property
+    def noises(self) -> tuple[Signal, ...]:
+        """Noise inputs of all periodic events."""
+        return tuple(s for e in self.periodic_events for s in e.noises)
+
+    @cached_property
+    def input_signals(self) -> tuple[Signal, ...]:
+        """Everything `u` holds, in order: inputs, payloads of triggered events, noises."""
+        payloads = tuple(s for e in self.triggered_events for s in e.payload)
+        return (*self.inputs, *payloads, *self.noises)
+
+    @cached_property
+    def parameter_signals(self) -> tuple[Signal, ...]:
+        """Everything `p` holds, in order: declared parameters, the internal step, and the seed where there is noise."""
+        step = parameter("internal_step", "s", self.internal_step, f"Internal step of the {self.method} integrator", min=1e-9)
+        seed = parameter("seed", "1", 0.0, "Seed of the noise, a whole number", min=0.0)
+        return (*self.parameters, step, *((seed,) if self.noises else ()))
+
+    def unpack_inputs(self, values: Array) -> Any:
+        """Named tuple `u` from the flat array, shape (m,) or (m, members)."""
+        return self._input_type(*_split(values, self.input_signals))
+
+    def unpack_parameters(self, values: Array) -> Any:
+        """Named tuple `p` from the flat array, shape (k,) or (k, members)."""
+        return self._parameter_type(*_split(values, self.parameter_signals))
+
+    def start_state(self, preset: str | None = None) -> np.ndarray:
+        """Start values of the states under a preset, shape (n,)."""
+        return self._starts_under(preset, self.states)
+
+    def start_inputs(self) -> np.ndarray:
+        """Start values of all that `u` holds, shape (m,)."""
+        return _starts(self.input_signals)
+
+    def start_parameters(self, preset: str | None = None) -> np.ndarray:
+        """Parameter values of a preset, shape (k,).
+
+        Args:
+            preset: name of a preset, or None for `default_preset` (the declared starts where there is none).
+
+        Raises:
+            ValueError: the preset is unknown.
+        """
+        return self._starts_under(preset, self.parameter_signals)
+
+    def preset_values(self, preset: str | None = None) -> dict[str, float]:
+        """Scalar values a preset sets, states and parameters, by FMI name.
+
+        Raises:
+            ValueError: the preset is unknown.
+        """
+        chosen = preset if preset is not None else self.default_preset
+        if chosen is None:
+            return {}
+        if chosen not in self.presets:
+            known = ", ".join(self.presets) or "none"
+            raise ValueError(f"{self.name}: unknown preset {chosen!r}; it has: {known}.")
+        signals = {s.name: s for s in (*self.parameter_signals, *self.states)}
+        values: dict[str, float] = {}
+        for name, value in self.presets[chosen].items():
+            elements = np.broadcast_to(np.asarray(value, dtype=float), (signals[name].width,))
+            values.update(zip(signals[name].scalar_names, map(float, elements), strict=True))
+        return values
+
+    def state_derivative(self, t: Array, x: Array, u: Array, p: Array) -> Array:
+        """`flow` on flat arrays: derivatives of the continuous states, shape (nc,)."""
+        derivative = self.flow(t, x, self.unpack_inputs(u), self.unpack_parameters(p))
+        return self._checked("flow()", derivative, self.continuous_count)
+
+    def output_vector(self, t: Array, x: Array, u: Array, p: Array) -> Array:
+        """`output` on flat arrays, stacked in the declared order, shape (q,)."""
+        values = self.output(t, x, self.unpack_inputs(u), self.unpack_parameters(p))
+        missing = [s.name for s in self.outputs if s.name not in values]
+        if missing or len(values) != len(self.outputs):
+            extra = sorted(set(values) - {s.name for s in self.outputs})
+            raise ValueError(f"{self.name}: output() leaves out {missing} and returns undeclared {extra}.")
+        parts: list[Array] = []
+        for signal in self.outputs:
+            value = values[signal.name]
+            parts.extend([value] if signal.size is None else [value[i] for i in range(signal.size)])
+        return vector(*parts) if parts else np.zeros(0)
+
+    def jump_vector(self, event: str, t: Array, x: Array, u: Array, p: Array) -> Array:
+        """`jump` on flat arrays: the state after the event, shape (n,)."""
+        after = self.jump(event, t, x, self.unpack_inputs(u), self.unpack_parameters(p))
+        return self._checked(f"jump({event!r})", after, self.state_count)
+
+    def friction_vector(self, t: Array, x: Array, u: Array, p: Array) -> Array:
+        """`friction` on flat arrays, shape (len(frictions),)."""
+        return self.friction(t, x, self.unpack_inputs(u), self.unpack_parameters(p))
+
+    def friction_indices(self) -> list[int]:
+        """Positions in `x` of the states with dry friction."""
+        names = scalar_names(self.states)
+        return [names.index(name) for name in self.frictions]
+
+    # -- internals --------------------------------------------------------------------------------------------------
+
+    def _starts_under(self, preset: str | None, signals: Sequence[Signal]) -> np.ndarray:
+        values = self.preset_values(preset)
+        pairs = (pair for s in signals for pair in zip(s.scalar_names, s.start_values, strict=True))
+        return np.array([values.get(name, start) for name, start in pairs], dtype=float)
+
+    @cached_property
+    def _input_type(self) -> Any:
+        return namedtuple("Inputs", [s.name for s in self.input_signals])
+
+    @cached_property
+    def _parameter_type(self) -> Any:
+        return namedtuple("Parameters", [s.name for s in self.parameter_signals])
+
+    def _check_declarations(self) -> None:
+        where = f"{type(self).__name__} ({self.name!r})"
+        if not self.name.isidentifier():
+            raise ValueError(f"{where}: the system's name must be a legal identifier.")
+        names = [s.name for s in (*self.states, *self.input_signals, *self.outputs, *self.parameters)]
+        names += [e.name for e in self.events]
+        names += [name for e in self.triggered_events for name in e.implied_names]
+        repeated = sorted({n for n in names if names.count(n) > 1} | (RESERVED_NAMES & set(names)))
+        if repeated:
+            raise ValueError(f"{where}: names used twice or reserved: {', '.join(repeated)}.")
+        self._check_event_prefixes(where)
+        variabilities = [s.variability for s in self.states]
+        if variabilities != sorted(variabilities):  # "continuous" sorts before "discrete"
+            raise ValueError(f"{where}: list continuous states before memory.")
+        known = {s.name for s in self.parameters}
+        for event in self.periodic_events:
+            for reference in filter(None, (event.period, event.offset)):
+                if reference not in known:
+                    raise ValueError(f"{where}: event {event.name!r} refers to unknown parameter {reference!r}.")
+        for preset, values in self.presets.items():
+            unknown = sorted(set(values) - known - {s.name for s in self.states} - {"internal_step", "seed"})
+            if unknown:
+                raise ValueError(f"{where}: preset {preset!r} sets unknown parameters {unknown}.")
+
+    def _check_event_prefixes(self, where: str) -> None:
+        """A master finds the payload of an event by its prefix; nothing else that it sees may begin so."""
+        for event in self.triggered_events:
+            payload = {s.name for s in event.payload}
+            others = [s.name for s in self.inputs] + [e.name for e in self.events]
+            others += [s.name for e in self.triggered_events for s in e.payload if s.name not in payload]
+            confusing = [name for name in others if name.startswith(f"{event.name}_")]
+            if confusing:
+                raise ValueError(f"{where}: {', '.join(confusing)} would be taken for payload of event {event.name!r}; rename.")
+
+    def _checked(self, function: str, values: Array, count: int) -> Array:
+        if values.shape[0] != count:  # a vector of one element would be broadcast in silence
+            raise ValueError(f"{self.name}: {function} returns {values.shape[0]} values, expected {count}.")
+        return values
+
+
+def _starts(signals: Sequence[Signal]) -> np.ndarray:
+    return np.array([value for s in signals for value in s.start_values], dtype=float)
+
+
+def _split(values: Array, signals: Sequence[Signal]) -> list[Array]:
+    parts: list[Array] = []
+    position = 0
+    for signal in signals:
+        parts.append(values[position] if signal.size is None else values[position : position + signal.size])
+        position += signal.width
+    return parts

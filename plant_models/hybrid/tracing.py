@@ -1,0 +1,162 @@
+"""Tracing: a hybrid system becomes CasADi functions, with exact Jacobians and sparsity.
+
+The same NumPy code is handed symbolic arrays once; what comes back is a graph that runs without Python (`kernel`), that is
+differentiated exactly (EKF, observability, directional derivatives) and from which C is generated (package `fmus`).
+"""
+
+from __future__ import annotations
+
+import traceback
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from plant_models.hybrid import integration
+from plant_models.hybrid.system import HybridSystem
+
+SYMBOLIC = ca.ArrayInterface.SX
+
+
+class TracingError(TypeError):
+    """A system's function uses something CasADi cannot trace; the message names the function and the line."""
+
+
+@dataclass(frozen=True)
+class _Symbols:
+    t: ca.SX
+    h: ca.SX
+    x: ca.SX
+    u: ca.SX
+    p: ca.SX
+
+
+class TracedSystem:
+    """The CasADi functions of a hybrid system, each built on first use.
+
+    Args:
+        system: a traceable hybrid system.
+
+    Raises:
+        TracingError: on first use of a function that cannot be traced.
+    """
+
+    def __init__(self, system: HybridSystem) -> None:
+        if not system.traceable:
+            raise TracingError(f"{system.name}: the system declares that it cannot be traced (traceable = False).")
+        self.system = system
+        self._symbols = _Symbols(
+            ca.SX.sym("t"),
+            ca.SX.sym("h"),
+            ca.SX.sym("x", system.state_count),
+            ca.SX.sym("u", len(system.start_inputs())),
+            ca.SX.sym("p", len(system.start_parameters())),
+        )
+
+    @cached_property
+    def step(self) -> ca.Function:
+        """One internal step: ``(t, h, x, u, p) -> x``."""
+        s = self._symbols
+        return ca.Function("step", [s.t, s.h, s.x, s.u, s.p], [self._step_expression()], ["t", "h", "x", "u", "p"], ["x_next"])
+
+    def steps(self, count: int) -> ca.Function:
+        """`count` full internal steps on the grid ``t0 + k*h`` in one call: ``(t0, k, h, x, u, p) -> x``."""
+        s = self._symbols
+        start, index = ca.SX.sym("t0"), ca.SX.sym("k")
+        x = s.x
+        for i in range(count):
+            x = self.step(start + (index + i) * s.h, s.h, x, s.u, s.p)
+        return ca.Function(f"steps_{count}", [start, index, s.h, s.x, s.u, s.p], [x], {"cse": True})
+
+    @cached_property
+    def output(self) -> ca.Function:
+        """Outputs: ``(t, x, u, p) -> y``."""
+        s = self._symbols
+        return ca.Function("output", [s.t, s.x, s.u, s.p], [self._trace("output_vector")], ["t", "x", "u", "p"], ["y"])
+
+    @cached_property
+    def flow(self) -> ca.Function:
+        """Derivatives of the continuous states without dry friction: ``(t, x, u, p) -> dx``."""
+        s = self._symbols
+        return ca.Function("flow", [s.t, s.x, s.u, s.p], [self._trace("state_derivative")], ["t", "x", "u", "p"], ["dx"])
+
+    def jump(self, event: str) -> ca.Function:
+        """State after an event: ``(t, x, u, p) -> x``."""
+        s = self._symbols
+        expression = self._trace("jump_vector", event)
+        return ca.Function(f"jump_{event}", [s.t, s.x, s.u, s.p], [expression], ["t", "x", "u", "p"], ["x_next"])
+
+    def jacobian(self, function: str, by: str) -> ca.Function:
+        """Exact Jacobian of `flow` or `output`: ``(t, x, u, p) -> d function / d by``.
+
+        Args:
+            function: ``flow`` or ``output``.
+            by: ``t``, ``x``, ``u`` or ``p``.
+        """
+        s = self._symbols
+        expression = self._trace("state_derivative" if function == "flow" else "output_vector")
+        derivative = ca.jacobian(expression, getattr(s, by))
+        return ca.Function(
+            f"{function}_by_{by}", [s.t, s.x, s.u, s.p], [ca.densify(derivative)], ["t", "x", "u", "p"], ["jacobian"]
+        )
+
+    def dependencies(self, function: str, by: str) -> np.ndarray:
+        """Structural dependence of `flow` or `output` on a variable group: boolean array, shape (rows, columns)."""
+        s = self._symbols
+        expression = self._trace("state_derivative" if function == "flow" else "output_vector")
+        pattern = ca.DM(ca.jacobian_sparsity(expression, getattr(s, by)), 1)
+        return np.asarray(ca.densify(pattern), dtype=float).reshape(expression.numel(), -1) != 0.0
+
+    @cached_property
+    def effective_jacobian(self) -> ca.Function:
+        """Jacobians of the flow with dry friction resolved: ``(t, x, u, p) -> (by continuous x, by t)``."""
+        s = self._symbols
+        by_x, by_t = self._effective_jacobian_expression()
+        return ca.Function("effective_jacobian", [s.t, s.x, s.u, s.p], [ca.densify(by_x), ca.densify(by_t)])
+
+    # -- internals --------------------------------------------------------------------------------------------------
+
+    def _arrays(self) -> tuple[Any, Any, Any, Any, Any]:
+        s = self._symbols
+        vectors = (SYMBOLIC(v, shape=(v.numel(),)) for v in (s.x, s.u, s.p))
+        return SYMBOLIC(s.t, shape=()), SYMBOLIC(s.h, shape=()), *vectors
+
+    def _trace(self, function: str, *arguments: str) -> ca.SX:
+        t, _, x, u, p = self._arrays()
+        method = getattr(self.system, function)
+        return self._guarded(function, lambda: method(*arguments, t, x, u, p))
+
+    def _step_expression(self) -> ca.SX:
+        t, h, x, u, p = self._arrays()
+
+        def jacobian(_time: Any, _state: Any) -> tuple[Any, Any]:
+            by_x, by_t = self._effective_jacobian_expression()
+            count = self.system.continuous_count
+            return SYMBOLIC(ca.densify(by_x), shape=(count, count)), SYMBOLIC(ca.densify(by_t), shape=(count,))
+
+        return self._guarded("flow", lambda: integration.step(self.system, t, h, x, u, p, jacobian))
+
+    def _effective_jacobian_expression(self) -> tuple[ca.SX, ca.SX]:
+        t, _, x, u, p = self._arrays()
+        indices = self.system.friction_indices()
+        sign = np.stack([np.sign(x[i]) for i in indices]) if indices else None
+        derivative = self._guarded("flow", lambda: integration.effective_flow(self.system, t, x, u, p, sign))
+        continuous = self._symbols.x[: self.system.continuous_count]
+        return ca.jacobian(derivative, continuous), ca.jacobian(derivative, self._symbols.t)
+
+    def _guarded(self, function: str, call: Any) -> ca.SX:
+        try:
+            value = call()
+        except Exception as error:
+            raise TracingError(self._explain(function, error)) from error
+        return ca.SX(value) if getattr(value, "size", 1) else ca.SX(0, 1)
+
+    def _explain(self, function: str, error: Exception) -> str:
+        own = [f for f in traceback.extract_tb(error.__traceback__) if "casadi" not in f.filename and "numpy" not in f.filename]
+        place = f"{own[-1].filename}:{own[-1].lineno}: {own[-1].line}" if own else "unknown place"
+        return (
+            f"{self.system.name}: cannot trace {function}: {error} (at {place}). "
+            "Write it without branching on values: np.where instead of 'if', vector(...) instead of np.array([...])."
+        )

@@ -1,0 +1,117 @@
+"""Units: what a unit name such as ``kg.m2/s3`` or ``km/h`` stands for in SI base units.
+
+Used by the model descriptions (BaseUnit) and by the master (conversion at connections). Standard library only.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+BASE_SYMBOLS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+
+
+class UnitError(ValueError):
+    """A unit name that cannot be understood, or two units that cannot be converted into each other."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """``value_in_SI = factor * value + offset`` with the exponents of the SI base units.
+
+    Args:
+        exponents: powers of kg, m, s, A, K, mol, cd, rad.
+        factor: scale to SI.
+        offset: shift to SI, for temperatures.
+    """
+
+    exponents: tuple[int, ...]
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+def _unit(factor: float, offset: float = 0.0, **powers: int) -> Unit:
+    return Unit(tuple(powers.get(symbol, 0) for symbol in BASE_SYMBOLS), factor, offset)
+
+
+_SYMBOLS: dict[str, Unit] = {
+    **{symbol: _unit(1.0, **{symbol: 1}) for symbol in BASE_SYMBOLS},
+    "1": _unit(1.0),
+    "-": _unit(1.0),
+    "%": _unit(1e-2),
+    "permille": _unit(1e-3),
+    "g": _unit(1e-3, kg=1),
+    "t": _unit(1e3, kg=1),
+    "km": _unit(1e3, m=1),
+    "cm": _unit(1e-2, m=1),
+    "mm": _unit(1e-3, m=1),
+    "ms": _unit(1e-3, s=1),
+    "min": _unit(60.0, s=1),
+    "h": _unit(3600.0, s=1),
+    "Hz": _unit(1.0, s=-1),
+    "N": _unit(1.0, kg=1, m=1, s=-2),
+    "kN": _unit(1e3, kg=1, m=1, s=-2),
+    "J": _unit(1.0, kg=1, m=2, s=-2),
+    "W": _unit(1.0, kg=1, m=2, s=-3),
+    "kW": _unit(1e3, kg=1, m=2, s=-3),
+    "MW": _unit(1e6, kg=1, m=2, s=-3),
+    "Pa": _unit(1.0, kg=1, m=-1, s=-2),
+    "kPa": _unit(1e3, kg=1, m=-1, s=-2),
+    "bar": _unit(1e5, kg=1, m=-1, s=-2),
+    "V": _unit(1.0, kg=1, m=2, s=-3, A=-1),
+    "deg": _unit(math.pi / 180.0, rad=1),
+    "rpm": _unit(math.pi / 30.0, rad=1, s=-1),
+    "degC": _unit(1.0, 273.15, K=1),
+    "mph": _unit(0.44704, m=1, s=-1),
+}
+_FACTOR = re.compile(r"^(.*?[A-Za-z%]|1|-)(?:\^?(-?\d+))?$")
+
+
+def parse_unit(name: str) -> Unit:
+    """The meaning of a unit name: products with ``.`` or ``*``, quotients with ``/``, integer powers behind a symbol.
+
+    Args:
+        name: e.g. ``m/s``, ``kg.m2``, ``N.s2/m2``, ``km/h``, ``1``.
+
+    Raises:
+        UnitError: a symbol is unknown.
+    """
+    numerator, *denominators = name.replace(" ", "").replace("(", "").replace(")", "").split("/")
+    exponents = [0] * len(BASE_SYMBOLS)
+    factor, offset = 1.0, 0.0
+    for sign, group in [(1, numerator), *((-1, d) for d in denominators)]:
+        for token in filter(None, re.split(r"[.*]", group)):
+            symbol, power = _symbol_and_power(token, name)
+            power *= sign
+            exponents = [e + power * s for e, s in zip(exponents, symbol.exponents, strict=True)]
+            factor *= symbol.factor**power
+            offset = symbol.offset
+    return Unit(tuple(exponents), factor, offset)
+
+
+def conversion(source: Unit, target: Unit) -> tuple[float, float]:
+    """``(factor, offset)`` with ``value_in_target = factor * value_in_source + offset``.
+
+    Angles in rad are treated as pure numbers, as SI does.
+
+    Raises:
+        UnitError: the units measure different things.
+    """
+    if source.exponents[:-1] != target.exponents[:-1]:
+        raise UnitError(f"different dimensions: {_dimension(source)} and {_dimension(target)}")
+    return source.factor / target.factor, (source.offset - target.offset) / target.factor
+
+
+def _symbol_and_power(token: str, name: str) -> tuple[Unit, int]:
+    if token in _SYMBOLS:
+        return _SYMBOLS[token], 1
+    match = _FACTOR.match(token)
+    if match is None or match[1] not in _SYMBOLS:
+        raise UnitError(f"unknown unit symbol {token!r} in {name!r}; known: {', '.join(sorted(_SYMBOLS))}")
+    return _SYMBOLS[match[1]], int(match[2] or 1)
+
+
+def _dimension(unit: Unit) -> str:
+    powers = [f"{s}{'' if e == 1 else e}" for s, e in zip(BASE_SYMBOLS, unit.exponents, strict=True) if e]
+    return ".".join(powers) or "1"

@@ -1,0 +1,103 @@
+"""The wheel odometer: a sampled reading of the wheel's speed, with noise and tooth quantisation.
+
+A sensor as a hybrid system of its own; knows only the hybrid foundation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from plant_models.hybrid import (
+    HybridSystem,
+    PeriodicEvent,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+    state,
+    vector,
+)
+from plant_models.hybrid.system import Array
+
+
+class Odometer(HybridSystem):
+    """Reading of the wheel speed at the instants ``start + sample_offset + k * sample_period``, held in between.
+
+    Without noise and teeth the reading is exactly `wheel_speed` at the instant. With `teeth` pulses a revolution it is the number
+    of pulses counted since the last instant, times the length of a pulse, over the period; the first reading, which has no window
+    behind it, is that of a wheel that had turned steadily. `noise_std` times a standard normal number, drawn afresh at every
+    instant, is added to it: the disturbance ``d`` of (3.16).
+
+    One pulse in one period is a speed of ``2 pi r / (teeth sample_period)``: 0.36 m/s for 100 teeth at 10 Hz, ten times that
+    at 100 Hz. The input is held between communication points, so the counted distance is the sum of wheel speed times
+    communication step. In slip, reading and distance are those of the wheel, not of the train.
+
+    Presets: `ideal` (default), `10_hz` (the sampled odometer of (3.50)), `pulses` (100 teeth at 10 Hz).
+
+    Source: Bouchama 2024, (3.16) and (3.50); the quantisation is ours.
+    """
+
+    name = "odometer"
+    description = "Wheel odometer: sampled wheel speed with noise and tooth quantisation"
+    source = "Bouchama 2024, (3.16), (3.50)"
+    internal_step = 1e-2  # the flow is exact for a held input, whatever the step
+    states = (
+        state("wheel_distance", "m", 0.0, "Distance run by the wheel's rim"),
+        memory("held_reading", "m/s", 0.0, "Last reading"),
+        memory("counted_pulses", "1", 0.0, "Pulses counted up to the last instant"),
+        memory("primed", "1", 0.0, "1 after the first instant"),
+    )
+    inputs = (input_signal("wheel_speed", "m/s", 0.0, "Circumferential speed of the wheel", display_unit="km/h"),)
+    outputs = (
+        output_signal("reading", "m/s", "Odometer speed, held between instants", variability="discrete", display_unit="km/h"),
+        output_signal("distance", "m", "Odometer distance since the start, in whole pulses where there are teeth"),
+    )
+    parameters = (
+        parameter("sample_period", "s", 0.01, "Time between two readings", min=1e-6),
+        parameter("sample_offset", "s", 0.0, "Time of the first reading after the start", min=0.0),
+        parameter("noise_std", "m/s", 0.0, "Standard deviation of the reading's noise", min=0.0, display_unit="km/h"),
+        parameter("teeth", "1", 0.0, "Pulses in one revolution; 0 for no quantisation", min=0.0),
+        parameter("wheel_radius", "m", 0.575, "Radius of the wheel", min=1e-3),
+    )
+    events = (
+        PeriodicEvent(
+            "sampling", "sample_period", "sample_offset",
+            noises=(input_signal("reading_noise", "1", 0.0, "Standard normal number of this reading", variability="discrete"),),
+            description="The odometer is read",
+        ),
+    )  # fmt: skip
+    presets: Mapping[str, Mapping[str, Any]] = {
+        "ideal": {},
+        "10_hz": {"sample_period": 0.1},
+        "pulses": {"sample_period": 0.1, "teeth": 100.0},
+    }
+    default_preset = "ideal"
+
+    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Derivative of the wheel's distance, shape (1,) or (1, members)."""
+        return vector(u.wheel_speed + 0.0 * x[0])
+
+    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Take a reading: new held reading and pulse count, shape (4,) or (4, members)."""
+        pulse = _pulse_length(p)
+        count = np.floor(x[0] / pulse)
+        # The first window is the one that a wheel of the present speed would have left behind.
+        window = np.where(x[3] == 0.0, np.floor(u.wheel_speed * p.sample_period / pulse), count - x[2])
+        speed = np.where(p.teeth > 0.0, window * pulse / p.sample_period, u.wheel_speed)
+        return vector(x[0], speed + p.noise_std * u.reading_noise, count, 1.0)
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """The held reading and the counted distance."""
+        pulse = _pulse_length(p)
+        return {
+            "reading": x[1],
+            "distance": np.where(p.teeth > 0.0, np.floor(x[0] / pulse) * pulse, x[0]),
+        }
+
+
+def _pulse_length(p: Any) -> Array:
+    """Rim distance of one pulse [m]; of a whole revolution where there are no teeth, so that nothing divides by zero."""
+    return 2.0 * np.pi * p.wheel_radius / np.maximum(p.teeth, 1.0)

@@ -1,0 +1,86 @@
+"""Running resistance and gravity: the forces on a train that do not come from its wheels' torque.
+
+Plain NumPy on numbers, batches and traced symbols. The constant part of the Davis formula is not here as a force: it is
+dry friction, which the plants declare and the integrator resolves, so that it can stop a train but never push one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+
+from plant_models.hybrid.system import Array
+
+GRAVITY = 9.81  # [m/s2], the value of Bouchama 2024, ch. 4
+
+
+def moving_resistance(speed: Array, davis_b: Array, davis_c: Array) -> Array:
+    """Speed-dependent part of the Davis resistance, ``b v + c v |v|`` [N], odd in the speed.
+
+    Args:
+        speed: [m/s], any shape.
+        davis_b: viscous coefficient [N.s/m].
+        davis_c: aerodynamic coefficient [N.s2/m2].
+
+    Source: Bouchama 2024, (3.14), which is written for ``v > 0`` only.
+    """
+    return davis_b * speed + davis_c * speed * np.abs(speed)
+
+
+def gradient_resistance(mass: Array, gravity: Array, gradient: Array) -> Array:
+    """Downhill pull of gravity as a resistance, ``M g i`` [N], positive uphill.
+
+    Args:
+        mass: [kg]. gravity: [m/s2].
+        gradient: sine of the slope angle [1]; 0.008 is 8 per mille uphill.
+
+    Source: Bouchama 2024, (4.1)-(4.5), ``F_d = M g sin(theta)``.
+    """
+    return mass * gravity * gradient
+
+
+@dataclass(frozen=True)
+class DavisCoefficients:
+    """Coefficients of ``F = a + b v + c v^2``: `a` [N], `b` [N.s/m], `c` [N.s2/m2]."""
+
+    a: float
+    b: float
+    c: float
+
+
+def davis_from_vehicle(
+    mass: float, axle_mass: float, cross_section: float, perimeter: float, length: float, *,
+    gamma: float = 1.5, k1: float = 9e-4, k2: float = 30e-6,
+) -> DavisCoefficients:  # fmt: skip
+    """Davis coefficients from the dimensions of a vehicle.
+
+    ``a = 1e-5 gamma M sqrt(1e4 / m)``, ``b = 3.6e-7 M``, ``c = 0.1296 (k1 S + k2 P L)``. The thesis does not name the units
+    of the result: they are kN, kN.s/m and kN.s2/m2 (independently derived); this function returns newtons.
+
+    Args:
+        mass: mass of the vehicle M [kg].
+        axle_mass: mass on one axle m [kg].
+        cross_section: frontal area S [m2].
+        perimeter: partial perimeter down to the rail P [m]. The 2.857 m tabulated for the BB27000 is its width; it is the value
+            that gives the tabulated coefficients.
+        length: length of the vehicle L [m].
+        gamma: quality of the bearings and the track, 0.9 to 1.5 [1].
+        k1: front and rear shape, 9e-4 (high-speed) to 20e-4 (conventional).
+        k2: condition of the surface, 20e-6 to 30e-6.
+
+    Raises:
+        ValueError: a mass or a length is not positive.
+
+    Source: Bouchama 2024, (3.15). The defaults are the values that give a, b, c of its Table 4.1 for the BB27000.
+    """
+    for name, value in {"mass": mass, "axle_mass": axle_mass, "cross_section": cross_section, "length": length}.items():
+        if value <= 0.0:
+            raise ValueError(f"davis_from_vehicle: {name} must be positive, got {value}.")
+    newtons = 1e3
+    return DavisCoefficients(
+        a=newtons * 1e-5 * gamma * mass * sqrt(1e4 / axle_mass),
+        b=newtons * 3.6e-7 * mass,
+        c=newtons * 0.1296 * (k1 * cross_section + k2 * perimeter * length),
+    )

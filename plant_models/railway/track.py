@@ -1,0 +1,87 @@
+"""The track under a train: zones of degraded adhesion and the gradient, as options of a plant.
+
+Brings the parameters and reads the tables; knows the signal vocabulary and the tables, and nothing of vehicles.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from plant_models.hybrid.signal import Signal, parameter
+from plant_models.hybrid.system import Array
+from plant_models.railway.table import inside_any, piecewise_constant, piecewise_linear
+
+ZoneAxis = Literal["time", "position"]
+GradientShape = Literal["constant", "linear"]
+
+UNUSED_POSITION = 1e9  # [m]; a gradient point that is not laid lies beyond the end of any track
+# Traction [10, 20] s and braking [70, 80] s are printed; the zone in the hold phase comes without times, [40, 50] s is ours.
+PUBLISHED_ZONES = ((10.0, 20.0), (40.0, 50.0), (70.0, 80.0))
+
+
+class Track:
+    """Adhesion zones by time or by position, and a gradient by position.
+
+    A zone is the half-open interval ``[zone_from, zone_to)``; equal ends switch it off. The gradient is the sine of the slope
+    angle, positive uphill; before its first point and after its last it stays at their values. By default only the first
+    point is on the track, so setting ``gradient[1]`` alone tilts the whole of it.
+
+    Args:
+        zones: what the zones are laid along, ``time`` or ``position``.
+        zone_count: number of zones.
+        gradient_shape: ``constant`` between the points (each point starts a section) or ``linear``.
+        gradient_count: number of gradient points.
+
+    Raises:
+        ValueError: an unknown option, or a count below one.
+
+    Source: the zones of Bouchama 2024, section 3.4.3; the gradient of (4.1)-(4.5).
+    """
+
+    def __init__(
+        self, zones: ZoneAxis = "time", zone_count: int = 3,
+        gradient_shape: GradientShape = "constant", gradient_count: int = 4,
+    ) -> None:  # fmt: skip
+        _check("zones", zones, ("time", "position"))
+        _check("gradient_shape", gradient_shape, ("constant", "linear"))
+        if min(zone_count, gradient_count) < 1:
+            raise ValueError(f"Track: zone_count and gradient_count must be at least 1, got {zone_count} and {gradient_count}.")
+        self.zones = zones
+        self.gradient_shape = gradient_shape
+        self.parameters = _parameters(zones, zone_count, gradient_count)
+
+    def degraded(self, t: Array, position: Array, p: Any) -> Array:
+        """1 in a zone of degraded adhesion, else 0 [1].
+
+        Args:
+            t: time [s]. position: of the train [m], a scalar or shape (members,). p: the plant's parameters.
+        """
+        at = position if self.zones == "position" else t + 0.0 * position
+        return inside_any(at, p.zone_from, p.zone_to)
+
+    def gradient(self, position: Array, p: Any) -> Array:
+        """Sine of the slope angle at the position [m], positive uphill [1]."""
+        read = piecewise_linear if self.gradient_shape == "linear" else piecewise_constant
+        return read(position, p.gradient_position, p.gradient)
+
+
+def _parameters(zones: ZoneAxis, zone_count: int, gradient_count: int) -> tuple[Signal, ...]:
+    unit = "s" if zones == "time" else "m"
+    # Published zones are in time; along the track there is nothing to repeat, so no zone is active until one is laid.
+    published = PUBLISHED_ZONES if zones == "time" else ()
+    ends = [*published[:zone_count], *[(0.0, 0.0)] * (zone_count - len(published))]
+    positions = (0.0, *[UNUSED_POSITION] * (gradient_count - 1))
+    starts, stops = (tuple(column) for column in zip(*ends, strict=True))
+    return (
+        parameter("zone_from", unit, starts, "Start of each zone of degraded adhesion", size=zone_count),
+        parameter("zone_to", unit, stops, "End of each zone of degraded adhesion", size=zone_count),
+        parameter("gradient_position", "m", positions, "Positions of the gradient points, ascending", size=gradient_count),
+        parameter(
+            "gradient", "1", 0.0, "Sine of the slope angle at each point, uphill positive", min=-1.0, max=1.0, size=gradient_count
+        ),
+    )
+
+
+def _check(option: str, value: str, allowed: tuple[str, ...]) -> None:
+    if value not in allowed:
+        raise ValueError(f"Unknown {option} {value!r}; choose one of: {', '.join(allowed)}.")
