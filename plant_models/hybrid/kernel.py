@@ -14,6 +14,7 @@ import casadi as ca
 import numpy as np
 
 from plant_models.hybrid import integration
+from plant_models.hybrid.signal import scalar_names
 from plant_models.hybrid.system import HybridSystem
 from plant_models.hybrid.tracing import TracedSystem
 
@@ -135,10 +136,13 @@ class TracedKernel(_Arrays):
 
 
 def _buffered(function: ca.Function, arguments: list[np.ndarray], result: np.ndarray) -> Callable[[], Any]:
+    if function.numel_out(0) != result.size:  # CasADi would write past the end of the array
+        raise ValueError(f"{function.name()} returns {function.numel_out(0)} values, expected {result.size}.")
+    buffer: Any  # CasADi's stubs ask for a size that its functions do not take
     buffer, evaluate = function.buffer()
     for i, array in enumerate(arguments):
-        buffer.set_arg(i, memoryview(array))
-    buffer.set_res(0, memoryview(result))
+        buffer.set_arg(i, array.data)
+    buffer.set_res(0, result.data)
 
     def call(_alive: Any = (buffer, function)) -> None:  # the buffer and its function must outlive the call
         evaluate()
@@ -152,9 +156,26 @@ def _traced_functions(system: HybridSystem) -> dict[str, ca.Function]:
         traced = TracedSystem(system)
         cached = {"step": traced.step, "steps": traced.steps(BATCH_OF_STEPS), "output": traced.output}
         cached |= {f"jump_{event.name}": traced.jump(event.name) for event in system.events}
+        _check_payloads(system, cached)
         cached = {name: _dense(function) for name, function in cached.items()}
         system.__dict__["_traced_functions"] = cached
     return cached
+
+
+def _check_payloads(system: HybridSystem, functions: dict[str, ca.Function]) -> None:
+    """Refuse a system that reads the payload of an event before or without that event: it would depend on when it was told."""
+    names = scalar_names(system.input_signals)
+    own = {f"jump_{e.name}": set(scalar_names(e.payload)) for e in system.triggered_events}
+    payloads = set().union(*own.values())
+    for function_name, function in functions.items():
+        if payloads and function_name not in ("steps", "output"):
+            _, columns = function.jac_sparsity(0, function.index_in("u")).get_triplet()
+            early = {names[column] for column in columns} & payloads - own.get(function_name, set())
+            if early:
+                raise ValueError(
+                    f"{system.name}: {function_name} reads {', '.join(sorted(early))}, which is known only at the event; "
+                    "keep it in memory in the jump at that event."
+                )
 
 
 def _dense(function: ca.Function) -> ca.Function:

@@ -7,7 +7,7 @@ block (package `fmu_observer`) puts that face on it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import floor, inf, ulp
+from math import floor, inf, isfinite, ulp
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from plant_models.hybrid.signal import scalar_names
 from plant_models.hybrid.system import HybridSystem
 
 GRID_TOLERANCE = 1e-9  # of an internal step: closer to a grid point than this is on it
+LARGEST_SEED = 2.0**53  # whole numbers below are exact
 
 
 @dataclass(frozen=True)
@@ -62,9 +63,15 @@ class Runtime:
         self.p[:] = self.system.start_parameters()
         self.t = self.t0 = 0.0
         self.ticks = [0] * len(self.ticks)
+        self._read_timing()
 
     def start(self, t0: float) -> None:
-        """Begin at `t0` [s] and fire the periodic events due there."""
+        """Begin at `t0` [s] with the values that stand in `x`, `u`, `p`, and fire the periodic events due there.
+
+        Raises:
+            ValueError: time cannot run with a parameter: the internal step, a period, an offset or the seed.
+        """
+        self._check_timing()
         self.t = self.t0 = t0
         self.ticks = [0] * len(self.ticks)
         self._read_timing()
@@ -72,10 +79,11 @@ class Runtime:
 
     def advance(self, t_end: float) -> None:
         """Integrate to `t_end` [s] and fire the periodic events on the way and at the end."""
-        while self._due <= t_end + self._tolerance(t_end):
-            self._integrate(self._due)
+        tolerance = self._tolerance(t_end)
+        while self._due <= t_end + tolerance:
+            self._integrate(self._due, self._tolerance(self._due))
             self._fire_due()
-        self._integrate(t_end)
+        self._integrate(t_end, tolerance)
 
     def trigger(self, event: str) -> None:
         """Jump at a triggered event now, with the payload in `u`."""
@@ -100,6 +108,19 @@ class Runtime:
 
     def _timing(self, name: str | None) -> float:
         return 0.0 if name is None else float(self.p[self._parameter_names.index(name)])
+
+    def _check_timing(self) -> None:
+        for name in ("internal_step", *(event.period for event in self.system.periodic_events)):
+            if not 0.0 < self._timing(name) < inf:
+                raise ValueError(self._illegal(name, "a positive number of seconds"))
+        for event in self.system.periodic_events:
+            if event.offset is not None and not isfinite(self._timing(event.offset)):
+                raise ValueError(self._illegal(event.offset, "a finite number of seconds"))
+        if self.system.noises and not 0.0 <= self._timing("seed") < LARGEST_SEED:
+            raise ValueError(self._illegal("seed", "a whole number from 0 to 2**53"))
+
+    def _illegal(self, name: str, expected: str) -> str:
+        return f"{self.system.name}: time cannot run with parameter {name} = {self._timing(name)!r}; expected {expected}."
 
     def _read_timing(self) -> None:
         """Fetch what stays fixed between events; parameters may have been set or restored."""
@@ -129,9 +150,9 @@ class Runtime:
             position += len(event.noises)
         self._due = self._next_due()
 
-    def _integrate(self, target: float) -> None:
+    def _integrate(self, target: float, tolerance: float) -> None:
         """Move to `target` through whole cells of the grid, with a part of a cell at either end."""
-        h, tolerance = self._h, self._tolerance(target)
+        h = self._h
         if target - self.t <= tolerance:
             self.t = max(self.t, target)
             return

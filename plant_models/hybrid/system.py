@@ -242,13 +242,16 @@ class HybridSystem:
         variabilities = [s.variability for s in self.states]
         if variabilities != sorted(variabilities):  # "continuous" sorts before "discrete"
             raise ValueError(f"{where}: list continuous states before memory.")
-        known = {s.name for s in self.parameters}
+        scalars = {s.name for s in self.parameters if s.size is None}
         for event in self.periodic_events:
             for reference in filter(None, (event.period, event.offset)):
-                if reference not in known:
-                    raise ValueError(f"{where}: event {event.name!r} refers to unknown parameter {reference!r}.")
+                if reference not in scalars:
+                    raise ValueError(
+                        f"{where}: event {event.name!r} refers to unknown parameter {reference!r}; expected a scalar one."
+                    )
+        known = {s.name for s in (*self.parameter_signals, *self.states)}
         for preset, values in self.presets.items():
-            unknown = sorted(set(values) - known - {s.name for s in self.states} - {"internal_step", "seed"})
+            unknown = sorted(set(values) - known)
             if unknown:
                 raise ValueError(f"{where}: preset {preset!r} sets unknown parameters {unknown}.")
 
@@ -256,7 +259,7 @@ class HybridSystem:
         """A master finds the payload of an event by its prefix; nothing else that it sees may begin so."""
         for event in self.triggered_events:
             payload = {s.name for s in event.payload}
-            others = [s.name for s in self.inputs] + [e.name for e in self.events]
+            others = [s.name for s in self.inputs] + [e.name for e in self.triggered_events]
             others += [s.name for e in self.triggered_events for s in e.payload if s.name not in payload]
             confusing = [name for name in others if name.startswith(f"{event.name}_")]
             if confusing:

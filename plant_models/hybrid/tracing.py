@@ -107,7 +107,8 @@ class TracedSystem:
         s = self._symbols
         expression = self._trace("state_derivative" if function == "flow" else "output_vector")
         pattern = ca.DM(ca.jacobian_sparsity(expression, getattr(s, by)), 1)
-        return np.asarray(ca.densify(pattern), dtype=float).reshape(expression.numel(), -1) != 0.0
+        dependent: np.ndarray = np.asarray(ca.densify(pattern), dtype=float).reshape(expression.numel(), -1) != 0.0
+        return dependent
 
     @cached_property
     def effective_jacobian(self) -> ca.Function:
@@ -120,8 +121,8 @@ class TracedSystem:
 
     def _arrays(self) -> tuple[Any, Any, Any, Any, Any]:
         s = self._symbols
-        vectors = (SYMBOLIC(v, shape=(v.numel(),)) for v in (s.x, s.u, s.p))
-        return SYMBOLIC(s.t, shape=()), SYMBOLIC(s.h, shape=()), *vectors
+        x, u, p = (SYMBOLIC(v, shape=(v.numel(),)) for v in (s.x, s.u, s.p))
+        return SYMBOLIC(s.t, shape=()), SYMBOLIC(s.h, shape=()), x, u, p
 
     def _trace(self, function: str, *arguments: str) -> ca.SX:
         t, _, x, u, p = self._arrays()

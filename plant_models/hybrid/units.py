@@ -65,29 +65,36 @@ _SYMBOLS: dict[str, Unit] = {
     "degC": _unit(1.0, 273.15, K=1),
     "mph": _unit(0.44704, m=1, s=-1),
 }
-_FACTOR = re.compile(r"^(.*?[A-Za-z%]|1|-)(?:\^?(-?\d+))?$")
+_SYMBOL_AND_POWER = re.compile(r"([A-Za-z]+)\^?(-?\d+)")
+_GROUP = r"(?:[^()/]+|\([^()/]+\))"
+_NAME = re.compile(rf"{_GROUP}(?:/{_GROUP})*")
 
 
 def parse_unit(name: str) -> Unit:
     """The meaning of a unit name: products with ``.`` or ``*``, quotients with ``/``, integer powers behind a symbol.
 
     Args:
-        name: e.g. ``m/s``, ``kg.m2``, ``N.s2/m2``, ``km/h``, ``1``.
+        name: e.g. ``m/s``, ``kg.m2``, ``N.s2/m2``, ``J/(kg.K)``, ``s-1``, ``km/h``, ``1``; empty for a pure number. After a
+            ``/`` everything up to the next ``/`` is divided by, with or without parentheses; no ``/`` within them.
 
     Raises:
-        UnitError: a symbol is unknown.
+        UnitError: a symbol is unknown, or the name is not such an expression.
     """
-    numerator, *denominators = name.replace(" ", "").replace("(", "").replace(")", "").split("/")
+    plain = name.replace(" ", "") or "1"
+    if _NAME.fullmatch(plain) is None:
+        raise UnitError(f"cannot read unit {name!r}: expected products and quotients of symbols, like 'kg.m2/s' or 'J/(kg.K)'")
+    if plain in _SYMBOLS:
+        return _SYMBOLS[plain]
     exponents = [0] * len(BASE_SYMBOLS)
-    factor, offset = 1.0, 0.0
+    factor = 1.0
+    numerator, *denominators = (group.strip("()") for group in plain.split("/"))
     for sign, group in [(1, numerator), *((-1, d) for d in denominators)]:
-        for token in filter(None, re.split(r"[.*]", group)):
+        for token in re.split(r"[.*]", group):
             symbol, power = _symbol_and_power(token, name)
             power *= sign
             exponents = [e + power * s for e, s in zip(exponents, symbol.exponents, strict=True)]
             factor *= symbol.factor**power
-            offset = symbol.offset
-    return Unit(tuple(exponents), factor, offset)
+    return Unit(tuple(exponents), factor)  # a shifted unit within a product or quotient is a difference, without the shift
 
 
 def conversion(source: Unit, target: Unit) -> tuple[float, float]:
@@ -106,10 +113,10 @@ def conversion(source: Unit, target: Unit) -> tuple[float, float]:
 def _symbol_and_power(token: str, name: str) -> tuple[Unit, int]:
     if token in _SYMBOLS:
         return _SYMBOLS[token], 1
-    match = _FACTOR.match(token)
+    match = _SYMBOL_AND_POWER.fullmatch(token)
     if match is None or match[1] not in _SYMBOLS:
         raise UnitError(f"unknown unit symbol {token!r} in {name!r}; known: {', '.join(sorted(_SYMBOLS))}")
-    return _SYMBOLS[match[1]], int(match[2] or 1)
+    return _SYMBOLS[match[1]], int(match[2])
 
 
 def _dimension(unit: Unit) -> str:

@@ -1,0 +1,26 @@
+"""The FMU-style block: any hybrid system with the face of an FMI 2 or FMI 3 co-simulation FMU."""
+
+from typing import Any, Literal
+
+from fmu_observer.block.face import BlockCallError, Face
+from fmu_observer.block.fmi2 import FMI2Block
+from fmu_observer.block.fmi3 import FMI3Block
+from fmu_observer.block.policy import LATE_POLICIES, LatePolicy
+from fmu_observer.block.variables import BlockError
+from plant_models.hybrid import HybridSystem
+
+__all__ = ["LATE_POLICIES", "BlockCallError", "BlockError", "FMI2Block", "FMI3Block", "Face", "LatePolicy", "make_block"]
+
+
+FACES: dict[int, type[FMI2Block] | type[FMI3Block]] = {2: FMI2Block, 3: FMI3Block}
+
+
+def make_block(system: HybridSystem, fmi_version: Literal[2, 3] = 3, **arguments: Any) -> FMI2Block | FMI3Block:
+    """A block with the FMI 2 or FMI 3 face; further arguments as for `Face`.
+
+    Raises:
+        ValueError: the version is neither 2 nor 3, or an argument is one that `Face` refuses.
+    """
+    if fmi_version not in FACES:
+        raise ValueError(f"{system.name}: FMI version {fmi_version!r} is unknown; use 2 or 3.")
+    return FACES[fmi_version](system, **arguments)

@@ -1,0 +1,114 @@
+"""The FMI 2 face of a block: the calls of fmpy's `FMU2Slave`, events by count, stamp and payload."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from fmpy.fmi2 import FMU2Slave, fmi2LastSuccessfulTime, fmi2Terminated
+
+from fmu_observer.block.face import Face, refused
+from fmu_observer.block.variables import BlockError
+
+
+class FMI2Block(Face, FMU2Slave):
+    """A hybrid system with the call surface of an FMI 2.0 co-simulation slave.
+
+    An event: set the payload, ``<event>_time`` (unset: the start of the step) and raise ``<event>_count`` by one before
+    `doStep`; a stamp inside the step is hit exactly, one after it waits, one before it goes by the late policy.
+    Arguments as for `Face`.
+    """
+
+    fmi_version = 2
+    real_type = "Real"
+
+    # -- life -------------------------------------------------------------------------------------------------------
+
+    def instantiate(self, visible: bool = False, callbacks: Any = None, loggingOn: bool = False) -> None:
+        """Start values."""
+        self.instance.reset()
+
+    @refused
+    def setupExperiment(self, tolerance: float | None = None, startTime: float = 0.0, stopTime: float | None = None) -> None:
+        """Fix the start time [s]."""
+        self.instance.require("instantiated")
+        self.instance.set_up(startTime)
+
+    @refused
+    def enterInitializationMode(self) -> None:
+        """Begin initialisation at the start time."""
+        self.instance.require("instantiated")
+        self.instance.mode = "initialization"
+
+    # -- time -------------------------------------------------------------------------------------------------------
+
+    @refused
+    def doStep(
+        self, currentCommunicationPoint: float, communicationStepSize: float,
+        noSetFMUStatePriorToCurrentPoint: bool = True,
+    ) -> None:  # fmt: skip
+        """Advance by one communication step [s], through the events announced since the last one."""
+        self.instance.step(currentCommunicationPoint, communicationStepSize)
+
+    def cancelStep(self) -> None:
+        """Nothing to cancel: steps are synchronous."""
+
+    @refused
+    def getRealStatus(self, kind: int) -> float:
+        """The last successful time [s]."""
+        if kind != fmi2LastSuccessfulTime:
+            raise BlockError(f"status {kind} is not a real one; only fmi2LastSuccessfulTime is known.")
+        return self.instance.runtime.t
+
+    @refused
+    def getBooleanStatus(self, kind: int) -> bool:
+        """Whether the block wants to end the run: never."""
+        if kind != fmi2Terminated:
+            raise BlockError(f"status {kind} is not a Boolean one; only fmi2Terminated is known.")
+        return False
+
+    # -- values -----------------------------------------------------------------------------------------------------
+
+    @refused
+    def getReal(self, vr: Sequence[int]) -> list[float]:
+        """Values of Real variables."""
+        return self.instance.get(vr)
+
+    @refused
+    def setReal(self, vr: Sequence[int], value: Sequence[float]) -> None:
+        """Set Real variables."""
+        self.instance.set(vr, value)
+
+    @refused
+    def getInteger(self, vr: Sequence[int]) -> list[int]:
+        """Values of event counts."""
+        self.instance.require_alive()
+        return [self.instance.counts[self.instance.variables.event_number(reference)] for reference in vr]
+
+    @refused
+    def setInteger(self, vr: Sequence[int], value: Sequence[int]) -> None:
+        """Set event counts."""
+        self.instance.require("instantiated", "initialization", "step")
+        numbers = [self.instance.variables.event_number(reference) for reference in vr]
+        for number, count in zip(numbers, value, strict=True):
+            self.instance.counts[number] = int(count)
+
+    def fmi2SetReal(self, _component: object, vr: Iterable[int], _n: int, values: Iterable[float]) -> None:
+        """The low-level setter used by fmpy's `Input`."""
+        self.setReal(list(vr), list(values))
+
+    def fmi2SetInteger(self, _component: object, vr: Iterable[int], _n: int, values: Iterable[int]) -> None:
+        """The low-level setter used by fmpy's `Input`."""
+        self.setInteger(list(vr), list(values))
+
+    def getTypesPlatform(self) -> str:
+        """Platform of the types."""
+        return "default"
+
+    # -- saved states: FMI 2 spells them so; fmpy knows both spellings ------------------------------------------------
+
+    getFMUstate = Face.getFMUState
+    setFMUstate = Face.setFMUState
+    freeFMUstate = Face.freeFMUState
+    serializeFMUstate = Face.serializeFMUState
+    deSerializeFMUstate = Face.deserializeFMUState

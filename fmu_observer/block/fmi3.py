@@ -1,0 +1,124 @@
+"""The FMI 3 face of a block: the calls of fmpy's `FMU3Slave`, event mode and triggered input clocks included."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from fmpy.fmi3 import FMU3Slave
+
+from fmu_observer.block.face import Face, refused
+from fmu_observer.block.variables import BlockError, Mode
+
+
+class FMI3Block(Face, FMU3Slave):
+    """A hybrid system with the call surface of an FMI 3.0 co-simulation slave.
+
+    An event: `enterEventMode`, `setClock`, payload and, where it happened earlier, ``<event>_time`` by `setFloat64`,
+    `updateDiscreteStates`, `enterStepMode`. A block on which `instantiate` was never called (fmpy's `simulate_fmu` does not)
+    uses event mode as soon as its caller does. Arguments as for `Face`.
+    """
+
+    fmi_version = 3
+    real_type = "Float64"
+    _event_mode_used: bool | None = None  # None: `instantiate` was never called
+
+    # -- life -------------------------------------------------------------------------------------------------------
+
+    def instantiate(
+        self, visible: bool = False, loggingOn: bool = False, eventModeUsed: bool = False, earlyReturnAllowed: bool = False,
+        logMessage: Any = None, intermediateUpdate: Any = None, requiredIntermediateVariables: Any = None,
+    ) -> None:  # fmt: skip
+        """Start values; `eventModeUsed` as in FMI 3."""
+        self.instance.reset()
+        self._event_mode_used = bool(eventModeUsed)
+
+    @refused
+    def enterInitializationMode(
+        self, tolerance: float | None = None, startTime: float = 0.0, stopTime: float | None = None
+    ) -> None:
+        """Begin initialisation at `startTime` [s]."""
+        self.instance.require("instantiated")
+        self.instance.set_up(startTime)
+        self.instance.mode = "initialization"
+
+    # -- events -----------------------------------------------------------------------------------------------------
+
+    @refused
+    def enterEventMode(self) -> None:
+        """From step mode to event mode."""
+        self.instance.require("step")
+        if self._event_mode_used is False:
+            raise BlockError("the block was instantiated with eventModeUsed = False.")
+        self.instance.mode, self._event_mode_used = "event", True
+
+    @refused
+    def enterStepMode(self) -> None:
+        """From event mode to step mode."""
+        self.instance.require("event")
+        if self.instance.active:
+            names = ", ".join(self.system.triggered_events[number].name for number in sorted(self.instance.active))
+            raise BlockError(f"clock {names} is active; call updateDiscreteStates first, or the event is lost.")
+        self.instance.mode = "step"
+
+    @refused
+    def setClock(self, vr: Sequence[int], values: Sequence[bool]) -> None:
+        """Activate triggered input clocks; the events happen in `updateDiscreteStates`."""
+        self.instance.require("event")
+        numbers = [self.instance.variables.event_number(reference) for reference in vr]
+        for number, value in zip(numbers, values, strict=True):
+            (self.instance.active.add if value else self.instance.active.discard)(number)
+
+    @refused
+    def getClock(self, vr: Sequence[int]) -> list[bool]:
+        """Whether clocks are active."""
+        self.instance.require_alive()
+        return [self.instance.variables.event_number(reference) in self.instance.active for reference in vr]
+
+    @refused
+    def updateDiscreteStates(self) -> tuple[bool, bool, bool, bool, bool, float]:
+        """Let the active clocks tick, in declared order.
+
+        Returns:
+            (discreteStatesNeedUpdate, terminate, nominalsChanged, valuesChanged, nextEventTimeDefined, nextEventTime).
+        """
+        if self.mode == "step" and self._event_mode_used is None:
+            self.enterEventMode()
+        self.instance.require("event")
+        return False, False, False, self.instance.tick(), False, 0.0
+
+    # -- time -------------------------------------------------------------------------------------------------------
+
+    @refused
+    def doStep(
+        self, currentCommunicationPoint: float, communicationStepSize: float,
+        noSetFMUStatePriorToCurrentPoint: bool = True,
+    ) -> tuple[bool, bool, bool, float]:  # fmt: skip
+        """Advance by one communication step [s].
+
+        Returns:
+            (eventHandlingNeeded, terminateSimulation, earlyReturn, lastSuccessfulTime).
+        """
+        self.instance.step(currentCommunicationPoint, communicationStepSize)
+        return False, False, False, self.instance.runtime.t
+
+    # -- values -----------------------------------------------------------------------------------------------------
+
+    @refused
+    def getFloat64(self, vr: Sequence[int], nValues: int | None = None) -> list[float]:
+        """Values of Float64 variables."""
+        return self.instance.get(vr)
+
+    @refused
+    def setFloat64(self, vr: Sequence[int], values: Sequence[float]) -> None:
+        """Set Float64 variables."""
+        self.instance.set(vr, values)
+
+    def fmi3SetFloat64(self, _component: object, vr: Iterable[int], _n: int, values: Iterable[float], _n_values: int) -> None:
+        """The low-level setter used by fmpy's `Input`."""
+        self.setFloat64(list(vr), list(values))
+
+    # -- internals --------------------------------------------------------------------------------------------------
+
+    def _mode_after_initialization(self) -> Mode:
+        return "event" if self._event_mode_used else "step"

@@ -1,0 +1,87 @@
+"""Late events: what a block does with an event whose stamp lies before its current time.
+
+``replay`` goes back to the instant of the stamp, jumps, and integrates forward again with the recorded inputs, tunable
+parameters and events; ``reject`` counts it and does nothing; ``late`` jumps now as if the event had just happened (for
+comparison only). Knows the runtime and its journal, not FMI.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from fmu_observer.block.journal import Journal, Record, Stamped
+from plant_models.hybrid import Runtime, Snapshot
+
+LatePolicy = Literal["replay", "reject", "late"]
+LATE_POLICIES: tuple[LatePolicy, ...] = ("replay", "reject", "late")
+
+
+@dataclass
+class Counters:
+    """What became of the events of one block.
+
+    Args:
+        accepted: events that took effect, on time or not. replayed: of these, the late ones applied at their stamp.
+        late: of these, the late ones applied at the time they were told. rejected: late events without effect.
+        lost: events announced (count raised by more than one) of which nothing else is known.
+    """
+
+    accepted: int = 0
+    replayed: int = 0
+    late: int = 0
+    rejected: int = 0
+    lost: int = 0
+
+
+def advance(runtime: Runtime, journal: Journal | None, until: float) -> None:
+    """Advance a runtime to `until` [s], and remember it; nothing where it is there already."""
+    if until > runtime.t:
+        if journal is not None:
+            journal.append(runtime, until)
+        runtime.advance(until)
+
+
+def jump(runtime: Runtime, journal: Journal | None, event: Stamped) -> None:
+    """Let a runtime jump now, and remember it."""
+    if journal is not None:
+        journal.append(runtime, runtime.t, event)
+    runtime.u[list(event.positions)] = event.payload
+    runtime.trigger(event.name)
+
+
+def replay(runtime: Runtime, journal: Journal, event: Stamped, given: np.ndarray, tolerance: float) -> bool:
+    """Live the past again with `event` at its stamp: what comes out is what would be, had it been told in time.
+
+    Args:
+        runtime: at the present; what it was given is kept.
+        journal: rewritten so that the event is part of it.
+        event: with a stamp in the past.
+        given: positions in the runtime's `memory` of what is set from outside: inputs proper and parameters.
+        tolerance: how far the stamp may lie before the first record [s].
+
+    Returns:
+        False, with nothing changed, where memory does not reach back to the stamp.
+    """
+    past = journal.cut(event.stamp, tolerance, runtime.t)
+    if not past:
+        return False
+    present = runtime.memory[given]
+    runtime.restore(Snapshot(past[0].memory, past[0].t, runtime.t0, past[0].ticks))
+    if past[0].event is None:
+        advance(runtime, journal, event.stamp)
+    jump(runtime, journal, event)
+    for record in past:
+        runtime.memory[given] = record.memory[given]
+        _repeat(runtime, journal, record)
+    runtime.memory[given] = present
+    return True
+
+
+def _repeat(runtime: Runtime, journal: Journal, record: Record) -> None:
+    if record.event is not None:
+        jump(runtime, journal, record.event)
+    else:
+        advance(runtime, journal, record.until)

@@ -1,0 +1,146 @@
+"""Certificates of continuous-discrete observers: every mixture of gaps up to a limit, by one Lyapunov function.
+
+It uses the exact transitions of `sampled_error` and the candidates of `quadratic`, and believes only what it recomputes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache, reduce
+from math import inf
+
+import numpy as np
+
+from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.quadratic import (
+    Condition,
+    common_quadratic_form,
+    flow_condition,
+    inequalities,
+    transition_condition,
+)
+from fmu_observer.certificates.sampled_error import SampledError, first_unstable_gap
+
+MARGIN = 1e-6  # smallest recomputed decrease, in scaled coordinates, that counts: a thousand times the rounding of the check
+SHORTEST_HORIZON = 20.0  # [s]
+COARSE, FINE = 12, 2400  # gaps a vertex for finding the Lyapunov matrix, and for checking it
+CUTS = 4
+SMALLEST_LIMIT = 1e-4  # of the constant limit: below it the aperiodic limit counts as zero
+LIMIT_TOLERANCE = 2e-4  # relative width of the last bisection interval
+
+
+@dataclass(frozen=True)
+class _Decrease:
+    """The best common quadratic decrease found: recomputed margin, and P in the observer's own coordinates."""
+
+    margin: float
+    P: np.ndarray | None
+
+
+def certify_sampled_error(vertices: tuple[SampledError, ...], max_gap: float, error_model: str) -> Certificate:
+    """Certificate of an observer whose error is, at any time, that of one of the vertices.
+
+    Args:
+        vertices: error equations, one for each corner of what is uncertain, all of one size.
+        max_gap: longest gap asked for [s].
+        error_model: the error equations in words, and what they leave out.
+
+    Returns:
+        The certificate, without observer and preset.
+    """
+    horizon = max(SHORTEST_HORIZON, 4.0 * max_gap)
+    constant_limit = first_unstable_gap(vertices, horizon)
+    found = _common_decrease(vertices, max_gap)
+    holds = found.margin > MARGIN
+    limit = aperiodic_limit(vertices, horizon)
+    return Certificate(
+        max_gap=max_gap,
+        horizon=horizon,
+        constant_limit=constant_limit,
+        aperiodic_limit=max(limit, max_gap) if holds else limit,  # the bisection stops a little below the limit
+        spectral_radius=max(vertex.spectral_radius(max_gap) for vertex in vertices),
+        quadratic_margin=found.margin,
+        holds=holds,
+        error_model=error_model,
+        lyapunov_matrix=() if found.P is None else tuple(tuple(map(float, row)) for row in found.P),
+    )
+
+
+@lru_cache(maxsize=256)
+def aperiodic_limit(vertices: tuple[SampledError, ...], horizon: float) -> float:
+    """Longest gap [s] up to which one quadratic Lyapunov function covers all gaps; inf if it covers the horizon.
+
+    By bisection: a function that covers a set of gaps covers every smaller one.
+    """
+    bound = min(first_unstable_gap(vertices, horizon), horizon)
+    if bound == horizon and _common_decrease(vertices, horizon).margin > MARGIN:
+        return inf
+    low, high = 0.0, bound
+    while high - low > LIMIT_TOLERANCE * high and high > SMALLEST_LIMIT * bound:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _common_decrease(vertices, middle).margin > MARGIN else (low, middle)
+    return low
+
+
+@lru_cache(maxsize=256)
+def _common_decrease(vertices: tuple[SampledError, ...], longest: float) -> _Decrease:
+    """Seek one P for all vertices and all gaps in (0, longest] on a coarse grid, and recompute on a fine one.
+
+    Where the fine grid finds a gap that the candidate does not cover, that gap joins the coarse grid.
+    """
+    scale = _scaling(vertices)
+    fine = [_conditions(vertex, longest, FINE, scale) for vertex in vertices]
+    sought = _pick(fine, range(0, FINE + 1, FINE // COARSE))
+    best = _Decrease(-inf, None)
+    for _ in range(CUTS):
+        candidate = common_quadratic_form(sought)
+        if candidate is None:
+            break
+        values = [inequalities(condition, candidate.P) for condition in fine]
+        margin = -max(_largest_between(v) for v in values)
+        if margin > best.margin:
+            best = _Decrease(margin, candidate.P / np.outer(scale, scale))
+        if margin > MARGIN or candidate.margin <= MARGIN:
+            break
+        worst = {int(np.linalg.eigvalsh(v)[:, -1].argmax()) for v in values}
+        sought = sought.joined(_pick(fine, sorted(worst)))
+    return best
+
+
+def _conditions(vertex: SampledError, longest: float, count: int, scale: np.ndarray) -> Condition:
+    """``(Phi' P Phi - P) / (rate gap) < 0`` at gaps from 0 to `longest`, in scaled coordinates.
+
+    At gap 0 the quotient is the derivative: the condition of the flow for infinitely frequent balises.
+    """
+    rate = _rate(vertex)
+    gaps, matrices = vertex.transitions(longest, count)
+    scaling = scale[None, :] / scale[:, None]
+    start = flow_condition(vertex.continuous_limit * scaling / rate)
+    return start.joined(transition_condition(matrices * scaling, rate * gaps))
+
+
+def _largest_between(values: np.ndarray) -> float:
+    """Largest eigenvalue on the grid and between its points.
+
+    Between two points a smooth matrix lies below its chord plus ``d^2/8`` of the norm of its second derivative, and that is
+    what the second differences on the grid estimate.
+    """
+    bend = np.linalg.norm(np.diff(values, 2, axis=0), axis=(1, 2)).max()
+    return float(np.linalg.eigvalsh(values)[:, -1].max() + 0.125 * bend)
+
+
+def _pick(conditions: list[Condition], indices: Sequence[int]) -> Condition:
+    parts = [condition.picked(indices) for condition in conditions]
+    return reduce(Condition.joined, parts)
+
+
+def _rate(vertex: SampledError) -> float:
+    """Natural rate of the closed error equations [1/s]."""
+    return max(float(np.abs(np.linalg.eigvals(vertex.continuous_limit)).max()), 1e-9)
+
+
+def _scaling(vertices: tuple[SampledError, ...]) -> np.ndarray:
+    """Size of the error components relative to the first: the j-th derivative is of the size rate^j."""
+    rate = max(_rate(vertex) for vertex in vertices)
+    return np.asarray(rate ** np.arange(vertices[0].size))

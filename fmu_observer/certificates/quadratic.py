@@ -1,0 +1,146 @@
+"""Common quadratic Lyapunov functions: found by a cone solver, then recomputed in NumPy.
+
+The linear matrix inequalities are handed to Clarabel directly as a problem over positive semidefinite cones. Its answer
+is only a candidate: what counts is the largest eigenvalue recomputed by the caller on a finer grid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+
+from plant_models.hybrid.system import Array
+
+
+@dataclass(frozen=True)
+class QuadraticForm:
+    """A candidate ``e' P e`` with trace(P) = n in the coordinates it was sought in.
+
+    Attributes:
+        P: symmetric matrix, shape (n, n). margin: margin the solver claims, to be recomputed.
+    """
+
+    P: np.ndarray
+    margin: float
+
+
+@dataclass(frozen=True)
+class Condition:
+    """Inequalities ``M_j' P N_j + N_j' P M_j - w_j P < 0``: arrays M, N of shape (count, n, n) and w of shape (count,).
+
+    A discrete transition F asks ``F' P F - P < 0`` (M = F / 2, N = F, w = 1), a flow A asks ``A' P + P A < 0`` (M = A, N = I,
+    w = 0).
+    """
+
+    M: np.ndarray
+    N: np.ndarray
+    w: np.ndarray
+
+    def picked(self, indices: Sequence[int]) -> Condition:
+        """The inequalities at `indices`."""
+        chosen = list(indices)
+        return Condition(self.M[chosen], self.N[chosen], self.w[chosen])
+
+    def joined(self, other: Condition) -> Condition:
+        """Both together."""
+        pairs = ((self.M, other.M), (self.N, other.N), (self.w, other.w))
+        return Condition(*(np.concatenate(pair) for pair in pairs))
+
+
+def transition_condition(matrices: np.ndarray, weights: Array = 1.0) -> Condition:
+    """``(F' P F - P) / weight < 0`` for transitions of shape (count, n, n) and weights of shape (count,) or a number."""
+    scale = 1.0 / np.broadcast_to(np.asarray(weights, dtype=float), (len(matrices),))
+    return Condition(0.5 * scale[:, None, None] * matrices, matrices, scale)
+
+
+def flow_condition(matrix: np.ndarray) -> Condition:
+    """``A' P + P A < 0`` for one matrix of shape (n, n)."""
+    return Condition(matrix[None], np.eye(len(matrix))[None], np.zeros(1))
+
+
+def inequalities(condition: Condition, P: np.ndarray) -> np.ndarray:
+    """Left-hand side of every inequality at P, shape (count, n, n)."""
+    half = np.swapaxes(condition.M, 1, 2) @ P @ condition.N
+    values = half + np.swapaxes(half, 1, 2) - condition.w[:, None, None] * P
+    return np.asarray(values)
+
+
+def decrease(condition: Condition, P: np.ndarray) -> np.ndarray:
+    """Largest eigenvalue of every inequality at P, shape (count,); all negative when P is a Lyapunov matrix."""
+    return np.asarray(np.linalg.eigvalsh(inequalities(condition, P))[:, -1])
+
+
+def common_quadratic_form(condition: Condition) -> QuadraticForm | None:
+    """The P with the largest common margin: maximise g subject to every inequality <= -g I, P >= 0, trace(P) = n.
+
+    Args:
+        condition: the inequalities, in coordinates where their numbers are of order one.
+
+    Returns:
+        The candidate, made symmetric and positive definite; None when the solver returns nothing usable.
+    """
+    n = condition.M.shape[1]
+    rows, size = _inequality_rows(condition), n * (n + 1) // 2
+    margin_column = np.tile(_pack(np.eye(n)), len(condition.w))[:, None]
+    positive = np.hstack([-_svec_scaling(n), np.zeros((size, 1))])
+    trace = np.append(_pack(np.eye(n)), 0.0)[None]
+    matrix = np.vstack([trace, positive, np.hstack([rows, margin_column])])
+    solution = _solve(matrix, n, len(condition.w))
+    if not np.all(np.isfinite(solution)):
+        return None
+    P = _unpack(solution[:size], n)
+    return QuadraticForm(P, float(solution[size])) if np.linalg.eigvalsh(P)[0] > 0.0 else None
+
+
+def _solve(matrix: np.ndarray, n: int, inequalities: int) -> np.ndarray:
+    import clarabel  # noqa: PLC0415 - only who certifies pays for the solver's import
+    from scipy.sparse import csc_matrix  # noqa: PLC0415
+
+    variables = matrix.shape[1]
+    right = np.zeros(len(matrix))
+    right[0] = n
+    cost = np.zeros(variables)
+    cost[-1] = -1.0
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    cones = [clarabel.ZeroConeT(1), *(clarabel.PSDTriangleConeT(n) for _ in range(inequalities + 1))]
+    empty = csc_matrix((variables, variables))
+    return np.asarray(clarabel.DefaultSolver(empty, cost, csc_matrix(matrix), right, cones, settings).solve().x)
+
+
+def _inequality_rows(condition: Condition) -> np.ndarray:
+    """The packed left-hand side of every inequality as a linear map of packed P, shape (count * size, size)."""
+    n = condition.M.shape[1]
+    columns = []
+    for i, j in _upper(n):
+        unit = np.zeros((n, n))
+        unit[i, j] = unit[j, i] = 1.0
+        columns.append(_pack_all(inequalities(condition, unit), n).ravel())
+    return np.stack(columns, axis=1)
+
+
+def _upper(n: int) -> Sequence[tuple[int, int]]:
+    return [(i, j) for j in range(n) for i in range(j + 1)]
+
+
+def _pack(matrix: np.ndarray) -> np.ndarray:
+    """Upper triangle by columns, off-diagonal entries times sqrt(2): the solver's order."""
+    return np.asarray(_pack_all(matrix[None], len(matrix))[0])
+
+
+def _pack_all(matrices: np.ndarray, n: int) -> np.ndarray:
+    return np.stack([matrices[:, i, j] * (1.0 if i == j else sqrt(2.0)) for i, j in _upper(n)], axis=1)
+
+
+def _svec_scaling(n: int) -> np.ndarray:
+    return np.diag([1.0 if i == j else sqrt(2.0) for i, j in _upper(n)])
+
+
+def _unpack(entries: np.ndarray, n: int) -> np.ndarray:
+    matrix = np.zeros((n, n))
+    for value, (i, j) in zip(entries, _upper(n), strict=True):
+        matrix[i, j] = matrix[j, i] = value
+    return matrix

@@ -1,0 +1,167 @@
+"""Certificates of observers with state jumps at two rates: a periodic odometer, and balises at any time in between.
+
+What happens between two balises is a product of per-sample updates, with the balise at every possible phase of the
+odometer period. One Lyapunov function over all such products covers every mixture of gaps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import ceil, inf
+
+import numpy as np
+from scipy.linalg import solve_discrete_lyapunov
+
+from fmu_observer.certificates.aperiodic import MARGIN
+from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.exponential import small_exponential
+from fmu_observer.certificates.quadratic import Condition, common_quadratic_form, inequalities, transition_condition
+
+HORIZON = 10.0  # [s]
+COARSE_PHASES, FINE_PHASES = 5, 41  # phases of the balise in an odometer period, for finding and for checking
+CUTS = 6
+
+
+@dataclass(frozen=True)
+class TwoRateError:
+    """Error equations ``de = A e`` with jumps ``e -= K_1 e_i`` at odometer samples and ``e -= K_2 e_j`` at balises; hashable.
+
+    Attributes:
+        A: rows of shape (n, n) [1/s].
+        odometer_gain, balise_gain: shape (n,).
+        odometer_index, balise_index: the components measured.
+        period: odometer period [s].
+    """
+
+    A: tuple[tuple[float, ...], ...]
+    odometer_gain: tuple[float, ...]
+    balise_gain: tuple[float, ...]
+    odometer_index: int
+    balise_index: int
+    period: float
+
+    def flow(self, time: float) -> np.ndarray:
+        """Transition over `time` [s] without a measurement, shape (n, n)."""
+        return small_exponential(np.asarray(self.A) * time)
+
+    def sample(self) -> np.ndarray:
+        """From one odometer sample to just after the next, without a balise, shape (n, n)."""
+        return np.asarray(self._odometer_jump() @ self.flow(self.period))
+
+    def sample_with_balise(self, phase: float) -> np.ndarray:
+        """As `sample`, with a balise at ``phase * period`` after the first sample, shape (n, n)."""
+        after, before = self.flow((1.0 - phase) * self.period), self.flow(phase * self.period)
+        return np.asarray(self._odometer_jump() @ after @ self._jump(self.balise_gain, self.balise_index) @ before)
+
+    def products(self, samples: int, phases: int) -> np.ndarray:
+        """``B(phase) N^j`` for j = 0 .. samples - 1 and equidistant phases in [0, 1], shape (samples, phases, n, n)."""
+        with_balise = np.stack([self.sample_with_balise(s) for s in np.linspace(0.0, 1.0, phases)])
+        powers = [np.eye(len(self.A))]
+        for _ in range(samples - 1):
+            powers.append(self.sample() @ powers[-1])
+        return np.stack([with_balise @ power for power in powers])
+
+    def _odometer_jump(self) -> np.ndarray:
+        return self._jump(self.odometer_gain, self.odometer_index)
+
+    def _jump(self, gain: tuple[float, ...], index: int) -> np.ndarray:
+        matrix = np.eye(len(gain))
+        matrix[:, index] -= gain
+        return matrix
+
+
+def certify_two_rate_error(error: TwoRateError, max_gap: float, error_model: str) -> Certificate:
+    """Certificate for balise gaps up to `max_gap` [s], at most one balise in an odometer period.
+
+    Constant gaps are whole numbers of odometer periods, at the worst phase.
+
+    Args:
+        error: the error equations. max_gap: longest gap asked for [s]. error_model: the same in words.
+
+    Returns:
+        The certificate, without observer and preset.
+    """
+    samples = _samples(error, max_gap)
+    horizon = max(HORIZON, 2.0 * max_gap)
+    radii = _constant_radii(error, _samples(error, horizon))
+    unstable = np.flatnonzero(~(radii < 1.0))
+    searched = int(unstable[0]) if unstable.size else len(radii)
+    covered = _aperiodic_samples(error, searched)
+    margin, P = _common_decrease(error, samples)
+    return Certificate(
+        max_gap=max_gap,
+        horizon=horizon,
+        constant_limit=float((unstable[0] + 1) * error.period) if unstable.size else inf,
+        aperiodic_limit=inf if covered == len(radii) else covered * error.period,
+        spectral_radius=float(radii[samples - 1]),
+        quadratic_margin=margin,
+        holds=margin > MARGIN,
+        error_model=error_model,
+        notes=("at most one balise in an odometer period",),
+        lyapunov_matrix=() if P is None else tuple(tuple(map(float, row)) for row in P),
+    )
+
+
+@lru_cache(maxsize=256)
+def _aperiodic_samples(error: TwoRateError, most: int) -> int:
+    """Largest number of samples in a gap, up to `most`, such that one Lyapunov function covers all shorter gaps too.
+
+    Any gap up to m periods holds at most m - 1 samples before the one in which the balise falls.
+    """
+    if most == 0 or _common_decrease(error, most)[0] > MARGIN:
+        return most
+    low, high = 0, most
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if _common_decrease(error, middle)[0] > MARGIN else (low, middle)
+    return low
+
+
+def _samples(error: TwoRateError, gap: float) -> int:
+    return max(1, ceil(gap / error.period - 1e-9))
+
+
+def _constant_radii(error: TwoRateError, samples: int) -> np.ndarray:
+    """Worst spectral radius over the phases at gaps of 1 .. `samples` periods, shape (samples,)."""
+    return np.asarray(np.abs(np.linalg.eigvals(error.products(samples, COARSE_PHASES))).max(axis=(1, 2)))
+
+
+@lru_cache(maxsize=256)
+def _common_decrease(error: TwoRateError, samples: int) -> tuple[float, np.ndarray | None]:
+    """Best recomputed relative decrease over all products of up to `samples` samples, and its P."""
+    scale = _scaling(error, samples)
+    fine = error.products(samples, FINE_PHASES) * (scale[None, :] / scale[:, None])
+    shape = fine.shape
+    condition = transition_condition(fine.reshape(-1, *shape[2:]))
+    coarse = np.arange(len(condition.w)).reshape(shape[:2])[:: max(1, samples // 8), :: FINE_PHASES // COARSE_PHASES].ravel()
+    chosen = set(map(int, coarse))
+    best: tuple[float, np.ndarray | None] = (-inf, None)
+    for _ in range(CUTS):
+        candidate = common_quadratic_form(condition.picked(sorted(chosen)))
+        if candidate is None:
+            break
+        margin, worst = _recomputed(condition, candidate.P, shape[0])
+        if margin > best[0]:
+            best = (margin, candidate.P / np.outer(scale, scale))
+        if margin > MARGIN or candidate.margin <= MARGIN:
+            break
+        chosen |= worst
+    return best
+
+
+def _recomputed(condition: Condition, P: np.ndarray, samples: int) -> tuple[float, set[int]]:
+    """Margin over the fine grid and between its phases, and the worst phase of every sample count."""
+    values = inequalities(condition, P).reshape(samples, FINE_PHASES, *P.shape)
+    largest = np.linalg.eigvalsh(values)[..., -1]
+    bend = np.linalg.norm(np.diff(values, 2, axis=1), axis=(2, 3)).max()  # see aperiodic: bound between grid points
+    worst = {i * FINE_PHASES + int(k) for i, k in enumerate(largest.argmax(axis=1))}
+    return -float(largest.max() + 0.125 * bend), worst
+
+
+def _scaling(error: TwoRateError, samples: int) -> np.ndarray:
+    """Size of each component's unit, from the Lyapunov matrix of a constant gap in the middle."""
+    middle = error.products((samples + 1) // 2, 1)[-1, 0]
+    if np.abs(np.linalg.eigvals(middle)).max() >= 1.0:
+        return np.ones(len(error.A))
+    return np.asarray(1.0 / np.sqrt(np.diag(solve_discrete_lyapunov(middle.T, np.eye(len(error.A))))))

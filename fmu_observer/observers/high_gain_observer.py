@@ -1,0 +1,79 @@
+"""The high-gain train observer at balises, shared by the cascades that differ in where the adhesion force comes from."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fmu_observer.certificates import Certificate, SampledError, certify_sampled_error
+from fmu_observer.observers.high_gain import HIGH_GAIN_K, correction, innovation_decay
+from fmu_observer.observers.train_observer import BALISE_INNOVATION, POSITION, SPEED, Estimate, TrainObserver
+from fmu_observer.observers.train_resistance import drag_slope_range, rolling_drag
+from plant_models.hybrid import Signal, parameter, vector
+from plant_models.hybrid.system import Array
+
+TOP_SPEED = 50.0  # [m/s], the range of speeds over which stability is certified
+
+
+class HighGainTrainObserver(TrainObserver):
+    """Second stage of a cascade: position and speed from an adhesion force and balises (Bouchama 2024, (3.24)-(3.43)).
+
+    ``dp = v - theta K1 eta``, ``dv = (F_ad - a sgn(v) - b v - c v|v|)/M - theta^2 K2 eta``, ``d eta = -theta K1 eta``, and at a
+    balise ``eta = p - balise_position``. The first stage, which a subclass writes, gives ``F_ad`` as `adhesion`.
+
+    With K = (2, 1) and no drag it is stable for constant gaps below ``5.0 / theta``, and for any mixture of gaps up to
+    ``4.0 / theta`` (independently measured): theta must fit the longest gap.
+    """
+
+    first_stage_states: tuple[Signal, ...] = ()
+    first_stage_parameters: tuple[Signal, ...] = ()
+    theta_name: ClassVar[str] = "theta"
+    frictions = (SPEED.name,)
+
+    def __init__(self, **options: Any) -> None:
+        self.estimator_states = (POSITION, SPEED, BALISE_INNOVATION, *self.first_stage_states)
+        gain = parameter(self.theta_name, "1/s", 8.0, "High gain at balises, at most 4 / longest gap", min=0.0)
+        shape = parameter("high_gain", "1", HIGH_GAIN_K, "Shape K of the high gain", size=2)
+        self.estimator_parameters = (gain, shape, *self.first_stage_parameters)
+        super().__init__(**options)
+
+    @abstractmethod
+    def adhesion(self, x: Array, u: Any, p: Any) -> Array:
+        """Adhesion force [N] from the first stage."""
+
+    @abstractmethod
+    def first_stage_flow(self, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
+        """Derivatives of the first-stage states."""
+
+    def estimator_flow(self, t: Array, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
+        """Derivatives of position, speed, innovation and first stage."""
+        theta = getattr(p, self.theta_name)
+        speed, innovation = x[1], x[2]
+        on_position, on_speed = correction(theta, p.high_gain, innovation)
+        traction = np.maximum(self.adhesion(x, u, p), 0.0)  # a negative one is a brake: see friction
+        acceleration = (traction - rolling_drag(speed, p)) / p.mass
+        decay = innovation_decay(theta, p.high_gain, innovation)
+        return (speed - on_position, acceleration - on_speed, decay, *self.first_stage_flow(x, u, p))
+
+    def estimate(self, x: Array, u: Any, p: Any) -> Estimate:
+        """Position, speed, adhesion force and innovation."""
+        return Estimate(x[0], x[1], self.adhesion(x, u, p), x[2])
+
+    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """At a balise the innovation is set anew; position and speed stay continuous."""
+        rest = [x[i] for i in range(3, self.state_count)]
+        return vector(x[0], x[1], x[0] - u.balise_position, *rest)
+
+    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+        """Certificate of ``de = [[0, 1], [0, -s]] e - theta inv(Delta) K eta`` for all drag slopes s of the speed range."""
+        theta = float(getattr(p, self.theta_name))
+        gain = correction(theta, p.high_gain, 1.0)
+        slopes = drag_slope_range(p, 0.0, TOP_SPEED)
+        vertices = tuple(SampledError.of([[0.0, 1.0], [0.0, -s]], gain, theta * float(p.high_gain[0])) for s in slopes)
+        model = (
+            f"position and speed error with the drag slope (b + 2 c v)/M of 0 to {TOP_SPEED:g} m/s (exact in that range, nothing "
+            "linearised); standstill and the error of the adhesion force, an input to it, are left out"
+        )
+        return certify_sampled_error(vertices, max_gap, model)

@@ -1,0 +1,16 @@
+"""Wheel slip: the two slip ratios of the literature, and the indicator of degraded adhesion."""
+
+from fmu_observer.slip.indicator import DEGRADED, NOMINAL, SlipIndicator, indicator_level, slip_filter_derivative
+from fmu_observer.slip.ratio import odometer_slip, odometer_slip_from_speed_slip, speed_slip, speed_slip_from_odometer_slip
+
+__all__ = [
+    "DEGRADED",
+    "NOMINAL",
+    "SlipIndicator",
+    "indicator_level",
+    "odometer_slip",
+    "odometer_slip_from_speed_slip",
+    "slip_filter_derivative",
+    "speed_slip",
+    "speed_slip_from_odometer_slip",
+]

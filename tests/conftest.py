@@ -1,0 +1,11 @@
+"""What holds for all tests: no deadline on shared machines, and the same examples at every run of the continuous integration."""
+
+from __future__ import annotations
+
+import os
+
+from hypothesis import settings
+
+settings.register_profile("here", deadline=None)
+settings.register_profile("ci", deadline=None, derandomize=True)
+settings.load_profile("ci" if os.environ.get("CI") else "here")

@@ -1,0 +1,269 @@
+"""Descriptions: value references, attributes, units, starts and dependencies against tables written by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from block_systems import SWING, Doorman, Swing
+from fmpy.model_description import ModelDescription, ModelVariable
+
+from fmu_observer import OBSERVERS
+from fmu_observer.description import STAMP_NOW, VariableTable, describe, exposed_inputs
+from plant_models import PLANTS
+from plant_models.hybrid import HybridSystem, parameter, scalar_names, state
+from plant_models.hybrid.units import parse_unit
+
+BOTH = pytest.mark.parametrize("version", [2, 3])
+SHIPPED: list[HybridSystem] = [cls() for cls in (*PLANTS.values(), *OBSERVERS.values())]
+
+# name, causality, variability, initial, unit, start
+TABLE = [
+    ("time", "independent", "continuous", None, "s", None),
+    ("torque", "input", "continuous", None, "N.m", 0.5),
+    ("wind[1]", "input", "continuous", None, "N", 0.1),
+    ("wind[2]", "input", "continuous", None, "N", -0.2),
+    ("kick_impulse", "input", "discrete", None, "N.m.s", 0.0),
+    ("kick_share[1]", "input", "discrete", None, None, 0.5),
+    ("kick_share[2]", "input", "discrete", None, None, 0.25),
+    ("energy", "output", "continuous", "calculated", "J", None),
+    ("last_sample", "output", "discrete", "calculated", "rad", None),
+    ("net_torque", "output", "continuous", "calculated", "N.m", None),
+    ("angle", "local", "continuous", "exact", "rad", 0.3),
+    ("rate", "local", "continuous", "exact", "rad/s", 0.0),
+    ("sample", "local", "discrete", "exact", "rad", 0.0),
+    ("sampled_at", "local", "discrete", "exact", "s", -1.0),
+    ("marks[1]", "local", "discrete", "exact", None, 0.0),
+    ("marks[2]", "local", "discrete", "exact", None, 0.0),
+    ("stiffness[1]", "parameter", "fixed", "exact", "N.m/rad", 3.0),
+    ("stiffness[2]", "parameter", "fixed", "exact", "N.m/rad", 0.5),
+    ("damping", "parameter", "tunable", "exact", "N.m.s/rad", 0.2),
+    ("period", "parameter", "fixed", "exact", "s", 0.07),
+    ("offset", "parameter", "fixed", "exact", "s", 0.013),
+    ("internal_step", "parameter", "fixed", "exact", "s", 0.01),
+    ("seed", "parameter", "fixed", "exact", None, 0.0),
+]
+EVENTS = {
+    2: [("kick_count", "Integer"), ("kick_time", "Real"), ("mark_count", "Integer"), ("mark_time", "Real")],
+    3: [("kick", "Clock"), ("kick_time", "Float64"), ("mark", "Clock"), ("mark_time", "Float64")],
+}
+
+
+def _by_name(description: ModelDescription) -> dict[str, ModelVariable]:
+    return {v.name: v for v in description.modelVariables}
+
+
+@BOTH
+def test_every_variable_is_as_the_table_says(version: Any) -> None:
+    found = [
+        (v.name, v.causality, v.variability, v.initial, v.unit, None if v.start is None else float(v.start))
+        for v in describe(SWING, version).modelVariables[: len(TABLE)]
+    ]
+    assert found == TABLE
+
+
+@BOTH
+def test_event_variables_come_last(version: Any) -> None:
+    variables = describe(SWING, version).modelVariables[len(TABLE) :]
+    assert [(v.name, v.type) for v in variables] == EVENTS[version]
+    for trigger, stamp in zip(variables[::2], variables[1::2], strict=True):
+        assert (trigger.causality, trigger.variability) == (stamp.causality, stamp.variability) == ("input", "discrete")
+        assert (stamp.unit, float(stamp.start)) == ("s", STAMP_NOW)
+        assert (trigger.start, trigger.intervalVariability) == (("0", None) if version == 2 else (None, "triggered"))
+
+
+def test_what_comes_with_an_event_carries_its_clock() -> None:
+    variables = _by_name(describe(SWING, 3))
+    clocked = {name: v.clocks for name, v in variables.items() if v.clocks}
+    kick, mark = variables["kick"].valueReference, variables["mark"].valueReference
+    payload = ("kick_impulse", "kick_share[1]", "kick_share[2]", "kick_time")
+    assert clocked == {name: [kick] for name in payload} | {"mark_time": [mark]}
+    assert not any(v.clocks for v in describe(SWING, 2).modelVariables)
+
+
+@BOTH
+@pytest.mark.parametrize("system", [SWING, Doorman(), *SHIPPED], ids=lambda s: s.name)
+def test_value_references_are_contiguous_and_in_the_order_of_the_runtime(system: HybridSystem, version: Any) -> None:
+    description, table = describe(system, version), VariableTable.of(system)
+    names = [v.name for v in description.modelVariables]
+    assert [v.valueReference for v in description.modelVariables] == list(range(table.end))
+    assert len(set(names)) == len(names)
+    for first, signals in (
+        (table.inputs, exposed_inputs(system)),
+        (table.outputs, system.outputs),
+        (table.states, system.states),
+        (table.parameters, system.parameter_signals),
+    ):
+        expected = list(scalar_names(signals))
+        assert names[first : first + len(expected)] == expected
+    assert table.inputs == 1
+    assert table.end - table.events == 2 * len(system.triggered_events)
+    assert not set(names) & {s.name for s in system.noises}
+
+
+@BOTH
+@pytest.mark.parametrize("system", [SWING, *SHIPPED], ids=lambda s: s.name)
+def test_every_unit_in_use_is_defined_and_means_what_its_name_says(system: HybridSystem, version: Any) -> None:
+    description = describe(system, version)
+    defined = {u.name: u for u in description.unitDefinitions}
+    used = {v.unit for v in description.modelVariables if v.unit is not None}
+    assert set(defined) == used
+    for name, unit in defined.items():
+        meaning, base = parse_unit(name), unit.baseUnit
+        powers = tuple(getattr(base, symbol) for symbol in ("kg", "m", "s", "A", "K", "mol", "cd", "rad"))
+        assert (powers, base.factor, base.offset) == (meaning.exponents, meaning.factor, meaning.offset)
+    for variable in description.modelVariables:
+        if variable.displayUnit is not None:
+            assert variable.displayUnit in {d.name for d in defined[variable.unit].displayUnits}
+
+
+def test_display_units_convert_as_the_standard_defines() -> None:
+    torque = next(u for u in describe(SWING, 3).unitDefinitions if u.name == "N.m")
+    (display,) = torque.displayUnits
+    assert (display.name, display.offset) == ("kN.m", 0.0)
+    assert display.factor == pytest.approx(1e-3, rel=1e-15)  # shown = factor * value + offset
+
+
+@BOTH
+def test_dependencies_of_outputs_are_exact(version: Any) -> None:
+    description = describe(SWING, version)
+    found = {u.variable.name: [v.name for v in u.dependencies] for u in description.outputs}
+    assert found == {"energy": [], "last_sample": [], "net_torque": ["torque", "wind[2]"]}
+    for unknown in description.outputs:
+        assert unknown.dependenciesKind == ["dependent"] * len(unknown.dependencies)
+        assert unknown.index == unknown.variable.valueReference + 1  # FMI 2 counts from one
+    assert [u.variable.name for u in description.initialUnknowns] == list(found)
+
+
+ESTIMATE = {"position": [], "speed": [], "slip": ["odometer"], "slip_indicator": ["odometer"], "innovation": []}
+HAND = {  # read off the equations of the observers
+    "differentiator_cdo": ESTIMATE | {"adhesion_force": ["effort"]},
+    "takagi_sugeno_cdo": ESTIMATE | {"adhesion_force": ["effort"]},
+    "multirate_cdo": ESTIMATE | {"adhesion_force": []},
+    "discrete_uio": ESTIMATE | {"adhesion_force": ["effort"]},
+    "slip_indicator": {"slip": ["odometer", "speed"], "slip_indicator": ["odometer", "speed"]},
+}
+
+
+@BOTH
+@pytest.mark.parametrize("name", sorted(HAND))
+def test_dependencies_of_shipped_observers(name: str, version: Any) -> None:
+    found = {u.variable.name: [v.name for v in u.dependencies] for u in describe(OBSERVERS[name](), version).outputs}
+    assert found == HAND[name]
+
+
+@BOTH
+def test_a_preset_gives_the_start_values(version: Any) -> None:
+    soft, declared = _by_name(describe(SWING, version, preset="soft")), _by_name(describe(SWING, version))
+    changed = {name: float(v.start) for name, v in soft.items() if v.start != declared[name].start}
+    assert changed == {"angle": 1.5, "stiffness[1]": 0.5, "stiffness[2]": 0.1, "internal_step": 0.005, "seed": 7.0}
+    with pytest.raises(ValueError, match="unknown preset 'hard'; it has: soft"):
+        describe(SWING, version, preset="hard")
+
+
+@pytest.mark.parametrize("name", sorted(OBSERVERS))
+def test_presets_of_shipped_observers_land_in_the_starts(name: str) -> None:
+    system = OBSERVERS[name]()
+    for preset in system.presets:
+        variables = _by_name(describe(system, 3, preset=preset))
+        for signal_name, value in system.presets[preset].items():
+            signal = next(s for s in (*system.parameter_signals, *system.states) if s.name == signal_name)
+            found = [float(variables[n].start) for n in signal.scalar_names]
+            np.testing.assert_array_equal(found, np.broadcast_to(np.asarray(value, dtype=float), len(found)))
+    default = {n: v.start for n, v in _by_name(describe(system, 3)).items()}
+    assert default == {n: v.start for n, v in _by_name(describe(system, 3, preset=system.default_preset)).items()}
+
+
+@BOTH
+@pytest.mark.parametrize("system", [SWING, *SHIPPED], ids=lambda s: s.name)
+def test_starts_are_plain_numbers_that_read_back_exactly(system: HybridSystem, version: Any) -> None:
+    starts = dict(zip(scalar_names(system.parameter_signals), system.start_parameters(), strict=True))
+    starts |= dict(zip(scalar_names(system.states), system.start_state(), strict=True))
+    variables = _by_name(describe(system, version))
+    assert {name: float(variables[name].start) for name in starts} == starts
+
+
+def test_numpy_scalars_as_starts_are_written_as_numbers() -> None:
+    class Scalars(Swing):
+        name = "scalars"
+        parameters = (*Swing.parameters, parameter("gain", "1", (np.float64(0.1), np.int64(2)), min=np.float64(0.0), size=2))  # type: ignore[arg-type]
+
+    variables = _by_name(describe(Scalars(), 3))
+    assert (variables["gain[1]"].start, variables["gain[2]"].start, variables["gain[1]"].min) == ("0.1", "2.0", "0.0")
+
+
+@BOTH
+def test_capabilities_are_those_of_a_block(version: Any) -> None:
+    swing, cosimulation = describe(SWING, version), describe(SWING, version).coSimulation
+    assert cosimulation.modelIdentifier == "swing"
+    assert cosimulation.canHandleVariableCommunicationStepSize
+    assert cosimulation.canGetAndSetFMUstate
+    assert cosimulation.canSerializeFMUstate
+    assert bool(cosimulation.hasEventMode) == (version == 3)
+    assert swing.fmiVersion == f"{version}.0"
+    assert swing.modelName == "swing"
+    assert describe(SWING, version, model_name="Pendulum").modelName == "Pendulum"
+    without = next(s for s in SHIPPED if not s.triggered_events)
+    assert not describe(without, version).coSimulation.hasEventMode
+
+
+def test_an_unknown_version_is_refused() -> None:
+    with pytest.raises(ValueError, match="FMI version 1 is unknown; use 2 or 3"):
+        describe(SWING, 1)  # type: ignore[arg-type]
+
+
+# -- token --------------------------------------------------------------------------------------------------------------
+
+
+def _variant(**attributes: Any) -> HybridSystem:
+    made: HybridSystem = type("Variant", (Swing,), attributes)()
+    return made
+
+
+def test_the_token_names_the_content() -> None:
+    token = describe(SWING, 3).instantiationToken
+    assert describe(Swing(), 3).instantiationToken == token
+    changed = {
+        "version": describe(SWING, 2),
+        "preset": describe(SWING, 3, preset="soft"),
+        "name": describe(_variant(name="swung"), 3),
+        "internal step": describe(_variant(internal_step=0.02), 3),
+        "method": describe(_variant(method="rosenbrock"), 3),
+        "start": describe(_variant(states=(state("angle", "rad", 0.31), *Swing.states[1:])), 3),
+        "unit": describe(_variant(states=(state("angle", "deg", 0.3), *Swing.states[1:])), 3),
+        "order": describe(_variant(states=(Swing.states[1], Swing.states[0], *Swing.states[2:])), 3),
+        "variability": describe(_variant(parameters=(_tunable(Swing.parameters[0]), *Swing.parameters[1:])), 3),
+        "largest value": describe(_variant(parameters=(_limited(Swing.parameters[0]), *Swing.parameters[1:])), 3),
+        "offset of an event": describe(_variant(events=(Swing.events[0], _without_offset(), Swing.events[2])), 3),
+        "dependency": describe(_Direct(), 3),
+    }
+    tokens = {what: description.instantiationToken for what, description in changed.items()} | {"none": token}
+    assert len(set(tokens.values())) == len(tokens), tokens
+
+
+def _tunable(signal: Any) -> Any:
+    return parameter(signal.name, signal.unit, signal.start, min=signal.min, size=signal.size, variability="tunable")
+
+
+def _limited(signal: Any) -> Any:
+    return parameter(signal.name, signal.unit, signal.start, min=signal.min, max=9.0, size=signal.size)
+
+
+def _without_offset() -> Any:
+    return replace(Swing.events[1], offset=None)  # type: ignore[type-var]
+
+
+class _Direct(Swing):
+    """One output depends on one more input."""
+
+    def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        values = super().output(t, x, u, p)
+        return values | {"energy": values["energy"] + 0.0 * u.torque + u.wind[0]}
+
+
+def test_options_of_one_class_give_different_tokens() -> None:
+    cls = OBSERVERS["takagi_sugeno_cdo"]
+    tokens = {describe(cls(premise=p), 3).instantiationToken for p in ("live", "estimated", "frozen")}
+    assert len(tokens) == 3

@@ -1,0 +1,50 @@
+"""The cascade of two continuous-discrete observers: its sampled odometer."""
+
+import numpy as np
+import pytest
+from observer_bench import SteadyMotion, in_step
+
+from fmu_observer.observers import MultirateCdo
+
+MOTION = SteadyMotion(speed=20.0)
+
+
+def test_the_odometer_is_read_at_its_period_only() -> None:
+    bench = in_step(MultirateCdo(), MOTION)
+    bench.runtime.start(0.0)
+    bench.runtime.advance(0.11)
+    bench.set("u", {"odometer": 25.0})
+    bench.runtime.advance(0.19)
+    assert abs(bench.state("odometer_innovation")) < 1e-9
+    bench.runtime.advance(0.2)
+    assert bench.state("odometer_innovation") == pytest.approx(-5.0, abs=1e-6)
+
+
+def test_the_odometer_period_is_a_parameter() -> None:
+    bench = in_step(MultirateCdo(), MOTION)
+    bench.set("p", {"odometer_period": 0.25})
+    bench.runtime.start(0.0)
+    bench.set("u", {"odometer": 25.0})
+    bench.runtime.advance(0.249)
+    assert abs(bench.state("odometer_innovation")) < 1e-9
+    bench.runtime.advance(0.25)
+    assert bench.state("odometer_innovation") == pytest.approx(-5.0, abs=1e-6)
+
+
+def test_a_balise_leaves_the_wheel_stage_alone() -> None:
+    bench = in_step(MultirateCdo(), MOTION)
+    bench.runtime.start(0.0)
+    before = bench.runtime.x.copy()
+    bench.balise(-3.0)
+    changed = np.flatnonzero(bench.runtime.x != before)
+    assert changed.tolist() == [2]
+    assert bench.outputs()["innovation"] == 3.0
+
+
+def test_the_wheel_stage_alone_decides_nothing_about_balises_but_can_spoil_the_certificate() -> None:
+    observer = MultirateCdo()
+    assert observer.certify(0.4).holds
+    fast = observer.certify(0.4, {"theta_1": 60.0})  # theta_1 times the period: 6, beyond 5
+    assert not fast.holds
+    assert fast.quadratic_margin == observer.certify(0.4).quadratic_margin
+    assert "spectral radius" in fast.explain()
