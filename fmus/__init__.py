@@ -1,0 +1,48 @@
+"""How a model or an observer becomes an FMU: tracing, C generation, the C runtime, the model description, packing.
+
+Importing this package costs nothing and needs no compiler: what does the work is loaded when it is first used. It may use
+`plant_models` and `fmu_observer`, never `cosim`.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from fmus.build import build_fmu
+    from fmus.cache import cache_folder, cached_fmu
+    from fmus.compile import CompilationError, CompilerMissing
+    from fmus.generate import GenerationError
+    from fmus.recipes import RECIPES, UnknownRecipeError, recipe
+
+__all__ = [
+    "RECIPES",
+    "CompilationError",
+    "CompilerMissing",
+    "GenerationError",
+    "UnknownRecipeError",
+    "build_fmu",
+    "cache_folder",
+    "cached_fmu",
+    "recipe",
+]
+
+_HOMES = {
+    "RECIPES": "fmus.recipes",
+    "CompilationError": "fmus.compile",
+    "CompilerMissing": "fmus.compile",
+    "GenerationError": "fmus.generate",
+    "UnknownRecipeError": "fmus.recipes",
+    "build_fmu": "fmus.build",
+    "cache_folder": "fmus.cache",
+    "cached_fmu": "fmus.cache",
+    "recipe": "fmus.recipes",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(_HOMES[name]), name)
+    return value

@@ -1,0 +1,46 @@
+"""Packing: the files of an FMU become one zip file, byte for byte the same each time, written all or not at all."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+
+TIMESTAMP = (1980, 1, 1, 0, 0, 0)
+"""Of every file in an FMU: the earliest a zip file can hold."""
+
+
+def pack_fmu(files: Mapping[str, bytes], target: Path) -> Path:
+    """Write an FMU.
+
+    Args:
+        files: content by name inside the FMU, with forward slashes.
+        target: path of the FMU; its folder is created where it is missing. An older file is replaced in one move.
+
+    Returns:
+        `target`.
+    """
+    target.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=".part", dir=target.parent)
+    draft = Path(name)
+    try:
+        with os.fdopen(handle, "wb") as stream, zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+            for inner in sorted(files):
+                archive.writestr(_entry(inner), files[inner], compresslevel=9)
+        draft.chmod(0o644)
+        draft.replace(target)
+    finally:
+        with suppress(FileNotFoundError):
+            draft.unlink()
+    return target
+
+
+def _entry(name: str) -> zipfile.ZipInfo:
+    entry = zipfile.ZipInfo(name, TIMESTAMP)
+    entry.create_system = 3  # the same on every system
+    entry.external_attr = (0o100755 if name.startswith("binaries/") else 0o100644) << 16
+    entry.compress_type = zipfile.ZIP_DEFLATED
+    return entry

@@ -1,0 +1,75 @@
+"""Recipes: the systems that can be exported by name, plants and observers alike."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from difflib import get_close_matches
+from inspect import Parameter, signature
+from typing import Any
+
+from fmu_observer import OBSERVERS
+from plant_models import PLANTS
+from plant_models.hybrid import HybridSystem
+
+
+class UnknownRecipeError(LookupError):
+    """A name or an option that does not exist; the message names the nearest that does."""
+
+
+class _Recipes(Mapping[str, type[HybridSystem]]):
+    """Both registries as one; read at each look-up, so that what a user registers is found."""
+
+    def __getitem__(self, name: str) -> type[HybridSystem]:
+        return PLANTS[name] if name in PLANTS else OBSERVERS[name]
+
+    def __iter__(self) -> Iterator[str]:
+        yield from PLANTS
+        yield from (name for name in OBSERVERS if name not in PLANTS)
+
+    def __len__(self) -> int:
+        return len(set(PLANTS) | set(OBSERVERS))
+
+
+RECIPES: Mapping[str, type[HybridSystem]] = _Recipes()
+"""Class by model name: all of `plant_models.PLANTS` and `fmu_observer.OBSERVERS`."""
+
+
+def recipe(name: str, **options: Any) -> HybridSystem:
+    """A system by name.
+
+    Args:
+        name: model name, see `RECIPES`.
+        options: numbers and choices that shape its equations, see `recipe_options`.
+
+    Raises:
+        UnknownRecipeError: the name or an option does not exist.
+        ValueError: an option has a value that the system refuses.
+    """
+    if name not in RECIPES:
+        raise UnknownRecipeError(f"There is no model named {name!r}{_nearest(name, RECIPES)}; 'fmus list' shows all.")
+    known = recipe_options(name)
+    for option in options:
+        if option not in known:
+            has = ", ".join(known) or "none"
+            raise UnknownRecipeError(f"{name} has no option {option!r}{_nearest(option, known)}; it has: {has}.")
+    return RECIPES[name](**options)
+
+
+def recipe_options(name: str) -> dict[str, Any]:
+    """Options of a model and their defaults (None where it has none).
+
+    Args:
+        name: model name, one of `RECIPES`.
+    """
+    cls = RECIPES[name]
+    named = {
+        p.name: None if p.default is Parameter.empty else p.default
+        for p in signature(cls).parameters.values()
+        if p.kind in {Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY}
+    }
+    return dict.fromkeys(cls.option_choices) | named
+
+
+def _nearest(name: str, known: Mapping[str, Any]) -> str:
+    matches = get_close_matches(name, list(known), n=1, cutoff=0.5)
+    return f"; did you mean {matches[0]!r}?" if matches else ""

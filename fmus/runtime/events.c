@@ -1,0 +1,120 @@
+/* Triggered events with a stamp. The one place that decides what becomes of an event that is told too late. */
+#include "events.h"
+
+#include <math.h>
+#include <string.h>
+
+#define TIME_TOLERANCE 1e-9 /* [s] closer than this is the same instant, as in the Python block */
+
+/* -- the queue: entries (event, stamp, payload) in the order of their stamps ----------------------------------------- */
+
+static double *entry(const Runtime *runtime, int position) {
+    return runtime->queue + (size_t)position * runtime_queue_stride();
+}
+
+static size_t payload_bytes(int event) {
+    return (size_t)model.triggered[event].payload_count * sizeof(double);
+}
+
+/* Sorted by stamp; of equal stamps the one announced first stays first. */
+static void insert(Runtime *runtime, int event, double stamp) {
+    size_t stride = runtime_queue_stride();
+    int length = (int)*runtime->queue_length, position = length;
+    while (position > 0 && entry(runtime, position - 1)[1] > stamp)
+        position--;
+    double *place = entry(runtime, position);
+    memmove(place + stride, place, (size_t)(length - position) * stride * sizeof(double));
+    memset(place, 0, stride * sizeof(double));
+    place[0] = event;
+    place[1] = stamp;
+    memcpy(place + 2, runtime->u + model.triggered[event].payload, payload_bytes(event));
+    *runtime->queue_length += 1.0;
+}
+
+static void remove_first(Runtime *runtime) {
+    size_t stride = runtime_queue_stride();
+    int rest = (int)*runtime->queue_length - 1;
+    memmove(runtime->queue, runtime->queue + stride, (size_t)rest * stride * sizeof(double));
+    memset(entry(runtime, rest), 0, stride * sizeof(double));
+    *runtime->queue_length = rest;
+}
+
+/* -- announcing -------------------------------------------------------------------------------------------------- */
+
+Status events_announce(Instance *instance, int event) {
+    Runtime *runtime = &instance->runtime;
+    double stamp = runtime->stamps[event] > STAMP_NOW ? runtime->stamps[event] : runtime->clock.t;
+    runtime->stamps[event] = STAMP_NOW;
+    if (*runtime->queue_length >= QUEUE_CAPACITY) {
+        instance->lost += 1;
+        return instance_warn(instance, "event %s at %.17g s: %d events are waiting already; this one is lost",
+                             model.triggered[event].name, stamp, QUEUE_CAPACITY);
+    }
+    insert(runtime, event, stamp);
+    return STATUS_OK;
+}
+
+static Status poll_count(Instance *instance, int event) {
+    Runtime *runtime = &instance->runtime;
+    const char *name = model.triggered[event].name;
+    double before = runtime->seen[event], now = runtime->raised[event];
+    Status status = STATUS_OK;
+    runtime->seen[event] = now;
+    if (now > before)
+        status = events_announce(instance, event);
+    if (now > before + 1.0) {
+        instance->lost += (int64_t)(now - before) - 1;
+        status = instance_warn(instance, "event %s: the count rose from %.0f to %.0f at once; only the last payload is known", name, before, now);
+    }
+    if (now < before)
+        status = instance_warn(instance, "event %s: the count went down from %.0f to %.0f; no event is taken from that", name, before, now);
+    return status;
+}
+
+Status events_poll_counts(Instance *instance) {
+    Status status = STATUS_OK;
+    for (int i = 0; i < model.triggered_count; i++) {
+        Status polled = poll_count(instance, i);
+        status = polled > status ? polled : status;
+    }
+    return status;
+}
+
+/* -- applying ---------------------------------------------------------------------------------------------------- */
+
+/* An event whose stamp lies in the past. The policy is to reject it: it is counted and reported. A policy that goes
+   back to the stamp and integrates forward again takes its place here. */
+static Status late_event(Instance *instance, int event, double stamp) {
+    instance->rejected += 1;
+    return instance_warn(instance, "event %s: its stamp %.17g s lies before the current time %.17g s; it is rejected (%lld so far)",
+                         model.triggered[event].name, stamp, instance->runtime.clock.t, (long long)instance->rejected);
+}
+
+static Status apply_first(Instance *instance) {
+    Runtime *runtime = &instance->runtime;
+    const double *first = entry(runtime, 0);
+    int event = (int)first[0];
+    double stamp = first[1];
+    if (stamp < runtime->clock.t - TIME_TOLERANCE) {
+        remove_first(runtime);
+        return late_event(instance, event, stamp);
+    }
+    if (stamp > runtime->clock.t)
+        runtime_advance(runtime, stamp);
+    memcpy(runtime->u + model.triggered[event].payload, first + 2, payload_bytes(event));
+    runtime_trigger(runtime, event);
+    remove_first(runtime);
+    instance->outputs_outdated = true;
+    instance_note(instance, "event %s applied at %.17g s", model.triggered[event].name, runtime->clock.t);
+    return STATUS_OK;
+}
+
+Status events_apply_until(Instance *instance, double t_end) {
+    Runtime *runtime = &instance->runtime;
+    Status status = STATUS_OK;
+    while (*runtime->queue_length > 0.0 && entry(runtime, 0)[1] <= t_end + TIME_TOLERANCE) {
+        Status applied = apply_first(instance);
+        status = applied > status ? applied : status;
+    }
+    return status;
+}

@@ -1,0 +1,13 @@
+/* Counter-based noise: a number depends on (seed, signal, index) and on nothing else. Mirrors `noise.py`. */
+#ifndef NOISE_H
+#define NOISE_H
+
+#include <stdint.h>
+
+/* Ten rounds of Philox 4x32 on a 128-bit counter with a 64-bit key, in place on `counter`. */
+void noise_philox4x32(uint32_t counter[4], uint32_t k0, uint32_t k1);
+
+/* A standard normal number by Box and Muller. */
+double noise_standard_normal(uint64_t seed, uint64_t signal, uint64_t index);
+
+#endif

@@ -1,0 +1,239 @@
+/* The runtime: a hybrid system moving through time. Mirrors `runtime.py`; change the two together. */
+#include "runtime.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "noise.h"
+
+#define GRID_TOLERANCE 1e-9 /* of an internal step: closer to a grid point than this is on it */
+
+/* -- places ------------------------------------------------------------------------------------------------------ */
+
+size_t runtime_queue_stride(void) {
+    int longest = 0;
+    for (int i = 0; i < model.triggered_count; i++)
+        if (model.triggered[i].payload_count > longest)
+            longest = model.triggered[i].payload_count;
+    return 2 + (size_t)longest;
+}
+
+static size_t queue_size(void) {
+    return model.triggered_count > 0 ? QUEUE_CAPACITY * runtime_queue_stride() : 0;
+}
+
+size_t runtime_memory_length(void) {
+    size_t length = (size_t)model.states + (size_t)model.inputs + (size_t)model.parameters;
+    return length + 3 * (size_t)model.periodic_count + 4 * (size_t)model.triggered_count + 1 + queue_size();
+}
+
+size_t runtime_total_length(void) {
+    return runtime_memory_length() + (size_t)model.outputs + (size_t)model.states + (size_t)model.real_work;
+}
+
+static double *take(double **place, size_t count) {
+    double *taken = *place;
+    *place += count;
+    return taken;
+}
+
+void runtime_place(Runtime *runtime, double *numbers, int *integers) {
+    double *place = numbers;
+    runtime->memory = numbers;
+    runtime->x = take(&place, (size_t)model.states);
+    runtime->u = take(&place, (size_t)model.inputs);
+    runtime->p = take(&place, (size_t)model.parameters);
+    runtime->periods = take(&place, (size_t)model.periodic_count);
+    runtime->offsets = take(&place, (size_t)model.periodic_count);
+    runtime->ticks = take(&place, (size_t)model.periodic_count);
+    runtime->active = take(&place, (size_t)model.triggered_count);
+    runtime->raised = take(&place, (size_t)model.triggered_count);
+    runtime->seen = take(&place, (size_t)model.triggered_count);
+    runtime->stamps = take(&place, (size_t)model.triggered_count);
+    runtime->queue_length = take(&place, 1);
+    runtime->queue = take(&place, queue_size());
+    runtime->y = take(&place, (size_t)model.outputs);
+    runtime->x_next = take(&place, (size_t)model.states);
+    runtime->real_work = take(&place, (size_t)model.real_work);
+    runtime->integer_work = integers;
+    runtime_reset(runtime);
+}
+
+static void copy(double *target, const double *source, int count) {
+    if (count > 0)
+        memcpy(target, source, (size_t)count * sizeof(double));
+}
+
+void runtime_reset(Runtime *runtime) {
+    memset(runtime->memory, 0, runtime_memory_length() * sizeof(double));
+    copy(runtime->x, model.start_x, model.states);
+    copy(runtime->u, model.start_u, model.inputs);
+    copy(runtime->p, model.start_p, model.parameters);
+    for (int i = 0; i < model.triggered_count; i++)
+        runtime->stamps[i] = STAMP_NOW;
+    runtime->clock.t = runtime->clock.t0 = 0.0;
+    runtime->clock.h = runtime->p[model.internal_step];
+}
+
+/* -- evaluation (the kernel of `kernel.py`) ------------------------------------------------------------------------ */
+
+static void step(Runtime *runtime, double t, double h) {
+    if (model.step == NULL)
+        return;
+    const double *arguments[] = {&t, &h, runtime->x, runtime->u, runtime->p};
+    double *results[] = {runtime->x_next};
+    model.step(arguments, results, runtime->integer_work, runtime->real_work, 0);
+    copy(runtime->x, runtime->x_next, model.states);
+}
+
+static void grid_steps(Runtime *runtime, double t0, double k, double count, double h) {
+    for (double i = 0.0; i < count; i += 1.0)
+        step(runtime, t0 + (k + i) * h, h);
+}
+
+static void jump(Runtime *runtime, ModelFunction function) {
+    const double *arguments[] = {&runtime->clock.t, runtime->x, runtime->u, runtime->p};
+    double *results[] = {runtime->x_next};
+    function(arguments, results, runtime->integer_work, runtime->real_work, 0);
+    copy(runtime->x, runtime->x_next, model.states);
+}
+
+void runtime_update_outputs(Runtime *runtime) {
+    if (model.output == NULL)
+        return;
+    const double *arguments[] = {&runtime->clock.t, runtime->x, runtime->u, runtime->p};
+    double *results[] = {runtime->y};
+    model.output(arguments, results, runtime->integer_work, runtime->real_work, 0);
+}
+
+/* -- periodic events --------------------------------------------------------------------------------------------- */
+
+double runtime_tolerance(const Runtime *runtime, double t) {
+    double magnitude = fabs(t);
+    return GRID_TOLERANCE * runtime->clock.h + 4.0 * (nextafter(magnitude, INFINITY) - magnitude);
+}
+
+static double instant(const Runtime *runtime, int i) {
+    return runtime->clock.t0 + runtime->offsets[i] + runtime->ticks[i] * runtime->periods[i];
+}
+
+static double next_due(const Runtime *runtime) {
+    double due = INFINITY;
+    for (int i = 0; i < model.periodic_count; i++)
+        due = fmin(due, instant(runtime, i));
+    return due;
+}
+
+static void draw_noises(Runtime *runtime, int event, int position) {
+    uint64_t seed = model.seed < 0 ? 0 : (uint64_t)runtime->p[model.seed];
+    for (int j = 0; j < model.periodic[event].noises; j++) {
+        uint64_t signal = (uint64_t)(position - model.noise_offset + j);
+        runtime->u[position + j] = noise_standard_normal(seed, signal, (uint64_t)runtime->ticks[event]);
+    }
+}
+
+static void fire_due(Runtime *runtime) {
+    int position = model.noise_offset;
+    for (int i = 0; i < model.periodic_count; i++) {
+        if (instant(runtime, i) <= runtime->clock.t + runtime_tolerance(runtime, runtime->clock.t)) {
+            draw_noises(runtime, i, position);
+            jump(runtime, model.periodic[i].jump);
+            runtime->ticks[i] += 1.0;
+        }
+        position += model.periodic[i].noises;
+    }
+}
+
+/* -- time -------------------------------------------------------------------------------------------------------- */
+
+static bool is_positive(double value) {
+    return isfinite(value) && value > 0.0;
+}
+
+int runtime_start(Runtime *runtime, double t0) {
+    if (!is_positive(runtime->p[model.internal_step]))
+        return model.internal_step;
+    for (int i = 0; i < model.periodic_count; i++) {
+        int offset = model.periodic[i].offset;
+        runtime->periods[i] = runtime->p[model.periodic[i].period];
+        runtime->offsets[i] = offset < 0 ? 0.0 : runtime->p[offset];
+        runtime->ticks[i] = 0.0;
+        if (!is_positive(runtime->periods[i]))
+            return model.periodic[i].period;
+        if (!isfinite(runtime->offsets[i]))
+            return offset;
+    }
+    if (model.seed >= 0 && !(runtime->p[model.seed] >= 0.0 && runtime->p[model.seed] < 0x1p53))
+        return model.seed;
+    runtime->clock.t = runtime->clock.t0 = t0;
+    runtime->clock.h = runtime->p[model.internal_step];
+    fire_due(runtime);
+    return -1;
+}
+
+/* Move to `target` through whole cells of the grid, with a part of a cell at either end. */
+static void integrate(Runtime *runtime, double target) {
+    double t = runtime->clock.t, t0 = runtime->clock.t0, h = runtime->clock.h;
+    double tolerance = runtime_tolerance(runtime, target);
+    if (target - t <= tolerance) {
+        runtime->clock.t = fmax(t, target);
+        return;
+    }
+    double cell = (t - t0) / h;
+    double k = floor(cell + tolerance / h);
+    if ((cell - k) * h > tolerance) { /* inside a cell: finish it, or stop within it */
+        double boundary = t0 + (k + 1.0) * h;
+        if (boundary >= target - tolerance) {
+            step(runtime, t, target - t);
+            runtime->clock.t = target;
+            return;
+        }
+        step(runtime, t, boundary - t);
+        k += 1.0;
+    }
+    double whole = floor((target - t0) / h + tolerance / h) - k;
+    if (whole > 0.0) {
+        grid_steps(runtime, t0, k, whole, h);
+        k += whole;
+    }
+    double rest = target - (t0 + k * h);
+    if (rest > tolerance)
+        step(runtime, t0 + k * h, rest);
+    runtime->clock.t = target;
+}
+
+void runtime_advance(Runtime *runtime, double t_end) {
+    for (;;) {
+        double due = next_due(runtime);
+        if (due > t_end + runtime_tolerance(runtime, t_end))
+            break;
+        integrate(runtime, due);
+        fire_due(runtime);
+    }
+    integrate(runtime, t_end);
+}
+
+void runtime_trigger(Runtime *runtime, int event) {
+    jump(runtime, model.triggered[event].jump);
+}
+
+bool runtime_memory_is_sane(const double *memory) {
+    const double *end = memory + runtime_memory_length();
+    const double *queue = end - queue_size(), *length = queue - 1;
+    if (!(*length >= 0.0 && *length <= (model.triggered_count > 0 ? QUEUE_CAPACITY : 0)))
+        return false;
+    for (int i = 0; i < (int)*length; i++) {
+        double event = queue[(size_t)i * runtime_queue_stride()];
+        if (!(event >= 0.0 && event < model.triggered_count))
+            return false;
+    }
+    return true;
+}
+
+int runtime_first_broken_state(const Runtime *runtime) {
+    for (int i = 0; i < model.states; i++)
+        if (!isfinite(runtime->x[i]))
+            return i;
+    return -1;
+}

@@ -1,0 +1,109 @@
+"""The command line: exit codes 0, 1, 2, the nearest name on a mistake, and no traceback."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from fmus import RECIPES, UnknownRecipeError, cached_fmu, recipe
+from fmus.cli import main
+
+Output = pytest.CaptureFixture[str]
+
+
+def test_list_shows_every_model(capsys: Output) -> None:
+    assert main(["list"]) == 0
+    shown = capsys.readouterr().out
+    assert all(name in shown for name in RECIPES)
+    assert "locomotive" in shown
+
+
+@pytest.mark.compiler
+def test_build_and_info(tmp_path: Path, capsys: Output) -> None:
+    assert main(["build", "odometer", "--fmi", "2", "-o", str(tmp_path)]) == 0
+    built = Path(capsys.readouterr().out.strip())
+    assert built == tmp_path / "odometer.fmu"
+    assert main(["info", str(built)]) == 0
+    shown = capsys.readouterr().out
+    assert "odometer: FMI 2.0, co-simulation" in shown
+    assert "wheel_speed = " in shown
+
+
+@pytest.mark.compiler
+def test_build_with_option(tmp_path: Path, capsys: Output) -> None:
+    arguments = [
+        "build",
+        "locomotive",
+        "--option",
+        "adhesion=polach",
+        "--option",
+        "zone_count=1",
+        "-o",
+        str(tmp_path / "wet.fmu"),
+    ]
+    assert main(arguments) == 0
+    assert main(["info", capsys.readouterr().out.strip()]) == 0
+    shown = capsys.readouterr().out
+    assert "zone_from[1]" in shown
+    assert "zone_from[2]" not in shown
+
+
+@pytest.mark.compiler
+def test_build_with_preset(tmp_path: Path, capsys: Output) -> None:
+    assert main(["build", "locomotive", "--preset", "chapter_3_four_axles", "-o", str(tmp_path)]) == 0
+    assert main(["info", capsys.readouterr().out.strip()]) == 0
+    assert "n_axles = 4.0" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["build", "locomotiv"], "did you mean 'locomotive'?"),
+        (["build", "locomotive", "--preset", "nonsense"], "unknown preset 'nonsense'"),
+        (["build", "locomotive", "--option", "adhesoin=polach"], "did you mean 'adhesion'?"),
+        (["build", "locomotive", "--option", "adhesion=glue"], "one of burckhardt, polach"),
+        (["build", "locomotive", "--option", "zone_count=900"], "1 to 64"),
+        (["build", "locomotive", "--option", "adhesion"], "write it as name=value"),
+        (["info", "no_such.fmu"], "does not exist"),
+    ],
+)
+def test_mistakes_end_with_two_and_advice(arguments: list[str], words: str, capsys: Output) -> None:
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert "Traceback" not in said
+
+
+@pytest.mark.parametrize("arguments", [[], ["build"], ["bake", "locomotive"], ["build", "locomotive", "--fmi", "1"]])
+def test_wrong_usage_ends_with_two(arguments: list[str], capsys: Output) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main(arguments)
+    assert stopped.value.code == 2
+    assert "usage: fmus" in capsys.readouterr().err
+
+
+def test_info_on_something_else(tmp_path: Path, capsys: Output) -> None:
+    file = tmp_path / "text.fmu"
+    file.write_text("no FMU")
+    assert main(["info", str(file)]) == 2
+    assert "cannot be read as an FMU" in capsys.readouterr().err
+
+
+@pytest.mark.compiler
+def test_info_reports_problems_with_one(tmp_path: Path, capsys: Output) -> None:
+    with zipfile.ZipFile(cached_fmu(recipe("odometer"))) as archive:
+        text = archive.read("modelDescription.xml").decode()
+    broken = tmp_path / "broken.fmu"
+    with zipfile.ZipFile(broken, "w") as archive:
+        archive.writestr("modelDescription.xml", text.replace('name="reading"', 'name="sample_period"', 1))
+    assert main(["info", str(broken)]) == 1
+    assert "problem: " in capsys.readouterr().out
+
+
+def test_recipe_by_name() -> None:
+    assert recipe("locomotive", adhesion="polach").name == "locomotive"
+    with pytest.raises(UnknownRecipeError, match="no option 'mass'"):
+        recipe("locomotive", mass=3.0)
+    assert len(RECIPES) == len(list(RECIPES)) == len(set(RECIPES))
