@@ -1,0 +1,1 @@
+"""Balises: layouts, localisation, telegrams."""

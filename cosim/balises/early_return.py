@@ -1,0 +1,57 @@
+"""Localisation by early return: an FMI 3 plant with event mode reports the passing itself."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cosim.balises.layout import InstantLayout, TrackLayout
+from cosim.balises.localiser import Localiser, Method
+from cosim.balises.telegram import Passing
+from cosim.balises.watch import Watch
+from cosim.components.component import TIME_TOLERANCE
+from cosim.components.fmi3 import MAX_RETURNS_PER_STEP, FMI3Component
+from cosim.errors import CouplingError
+
+
+class EarlyReturnLocaliser(Localiser):
+    """The plant returns early from its step at a balise, and its output clock ticks.
+
+    Args:
+        clock: name of the plant's triggered output clock.
+
+    Raises:
+        CouplingError: the plant has no event mode, or no such clock.
+    """
+
+    method: Method = "early-return"
+
+    def __init__(self, watch: Watch, layout: TrackLayout | InstantLayout, clock: str) -> None:
+        super().__init__(watch, layout)
+        component = watch.component
+        if not isinstance(component, FMI3Component) or not component.has_event_mode:
+            raise CouplingError(f"{component.name}: 'early-return' needs an FMI 3 plant with event mode.")
+        self._plant = component
+        self._clock = component.output_clock(clock)
+        self._count = 0
+
+    def step(self, t: float, until: float) -> list[tuple[Passing, np.ndarray]]:  # noqa: D102 - see Localiser
+        plant, watch = self._plant, self.watch
+        passings: list[tuple[Passing, np.ndarray]] = []
+        watch.write()
+        for _ in range(MAX_RETURNS_PER_STEP):
+            t, event = plant.step(t, plant.next_stop(t, until))
+            if not plant.terminated and plant.is_event(t, event) and plant.report_clock(self._clock):
+                watch.read()
+                passings.append((self._passing(t), watch.outputs.copy()))
+            if plant.terminated or until - t <= TIME_TOLERANCE:
+                watch.read()
+                return passings
+        raise plant.failure(f"returned early {MAX_RETURNS_PER_STEP} times without reaching {until:g} s", t)
+
+    def _passing(self, stamp: float) -> Passing:
+        """The plant says that it passed a balise; which one and how accurately it is placed, the layout knows."""
+        self._count += 1
+        if not isinstance(self.layout, TrackLayout):
+            return Passing(stamp, self.watch.position, f"E{self._count}", 0.0, self.method, 0.0)
+        balise = self.layout.nearest(self.watch.position)
+        return Passing(stamp, self.watch.position, balise.identity, balise.location_accuracy, self.method, 0.0)

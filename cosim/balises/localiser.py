@@ -1,0 +1,65 @@
+"""The localiser: steps the watched plant in place of the master, and finds when it passes a balise on the way.
+
+It may cut or redo the step; how, is up to the methods in the modules beside this one.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Literal
+
+import numpy as np
+
+from cosim.balises.hermite import HermiteStep
+from cosim.balises.layout import InstantLayout, TrackLayout
+from cosim.balises.telegram import Passing
+from cosim.balises.watch import Watch
+
+Method = Literal["early-return", "rollback", "predict", "interpolate"]
+METHODS: tuple[Method, ...] = ("early-return", "rollback", "predict", "interpolate")
+
+ACCELERATION_LIMIT = 5.0
+"""No train accelerates or brakes harder [m/s2]; where one does, its passings are found all the same, with a larger bound."""
+
+
+class Localiser(ABC):
+    """Steps the watched plant and finds the passings on the way.
+
+    Args:
+        watch: the plant with its position and speed.
+        layout: what to look for.
+    """
+
+    method: Method
+
+    def __init__(self, watch: Watch, layout: TrackLayout | InstantLayout) -> None:
+        self.watch, self.layout = watch, layout
+
+    @abstractmethod
+    def step(self, t: float, until: float) -> list[tuple[Passing, np.ndarray]]:
+        """Step the plant from `t` to `until` [s].
+
+        Returns:
+            The passings in ``(t, until]`` in order of time, each with the plant's outputs at that instant, shape (q,).
+        """
+
+    def passings_between(self, step: HermiteStep, t: float, start: np.ndarray, bound: float) -> list[tuple[Passing, np.ndarray]]:
+        """Passings of a step that was taken, by cubic Hermite interpolation.
+
+        Args:
+            step: both ends of it. t: when it began [s]. start: the plant's outputs there, shape (q,).
+            bound: bound of the stamps' error [s].
+        """
+        assert isinstance(self.layout, TrackLayout)
+        found = []
+        for stretch in step.stretches():
+            for balise in self.layout.crossed(stretch.before, stretch.after):
+                s = step.crossing(balise.position, stretch)
+                passing = Passing(t + s, balise.position, balise.identity, balise.location_accuracy, self.method, bound)
+                found.append((passing, self.watch.between(start, s / step.h, balise.position)))
+        return found
+
+    def instant_passing(self, instant: float, position: float) -> Passing:
+        """The passing that a test placed at an instant [s], where the plant was at a position [m]."""
+        assert isinstance(self.layout, InstantLayout)
+        return Passing(instant, position, self.layout.identity(instant), 0.0, self.method, 0.0)

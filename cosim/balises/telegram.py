@@ -1,0 +1,124 @@
+"""Telegrams: what the on-board is told of a passing, when, and what goes wrong on the way.
+
+A telegram carries its stamp and the odometer reading at the passing, and arrives a latency later. Some balises are missed,
+some telegrams are false. All chance comes from (seed, number of the passing) and from nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from math import inf, nan
+
+from cosim.errors import ScenarioError
+from cosim.results.result import BaliseRecord
+from plant_models.hybrid.noise import standard_normal, uniform_pair
+
+
+@dataclass(frozen=True, slots=True)
+class Passing:
+    """The train over a balise.
+
+    Args:
+        stamp: when [s]. position: where the plant was [m]. identity: of the balise. location_accuracy: Q_LOCACC [m].
+        method: localisation method. time_bound: bound or estimate of the stamp's error [s].
+    """
+
+    stamp: float
+    position: float
+    identity: str
+    location_accuracy: float = 0.0
+    method: str = ""
+    time_bound: float = 0.0
+
+
+@dataclass(frozen=True)
+class FalseTelegram:
+    """A telegram without a balise: told at `time` [s], claiming a position `offset` metres from the true one."""
+
+    time: float
+    offset: float
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What happens between a balise and the on-board.
+
+    Args:
+        latency: delay from passing to delivery [s].
+        latency_jitter: further delay, uniform in [0, jitter] [s]; telegrams may overtake each other.
+        missed_fraction: probability that a balise is not read.
+        missed: identities of balises that are not read.
+        position_noise: standard deviation of the told position as a share of the location accuracy.
+        false_telegrams: telegrams without a balise.
+        seed: seed of all chance here.
+    """
+
+    latency: float = 0.0
+    latency_jitter: float = 0.0
+    missed_fraction: float = 0.0
+    missed: frozenset[str] = frozenset()
+    position_noise: float = 0.0
+    false_telegrams: tuple[FalseTelegram, ...] = ()
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("latency", "latency_jitter", "missed_fraction", "position_noise"):
+            if not 0.0 <= getattr(self, name) < inf:
+                raise ScenarioError(f"balises.{name} must not be negative, got {getattr(self, name)!r}.")
+        if self.missed_fraction > 1.0:
+            raise ScenarioError(f"balises.missed_fraction is a probability, got {self.missed_fraction!r}.")
+
+    def transmit(self, passing: Passing, number: int, odometer_reading: float) -> BaliseRecord:
+        """The telegram of passing `number`; `delivered_at` is NaN where the balise is missed."""
+        luck, jitter = uniform_pair(self.seed, 0, number)
+        missed = luck < self.missed_fraction or passing.identity in self.missed
+        noise = self.position_noise * passing.location_accuracy * standard_normal(self.seed, 1, number)
+        return BaliseRecord(
+            stamp=passing.stamp,
+            delivered_at=nan if missed else passing.stamp + self.latency + jitter * self.latency_jitter,
+            identity=passing.identity,
+            position=passing.position + noise,
+            true_position=passing.position,
+            location_accuracy=passing.location_accuracy,
+            odometer_reading=odometer_reading,
+            kind="missed" if missed else "true",
+            method=passing.method,
+            time_bound=passing.time_bound,
+        )
+
+
+@dataclass
+class Mailbox:
+    """Telegrams on their way, in order of delivery, and a record of all of them."""
+
+    waiting: list[BaliseRecord] = field(default_factory=list)
+    log: list[BaliseRecord] = field(default_factory=list)
+
+    def post(self, telegram: BaliseRecord) -> None:
+        """Put a telegram on its way; a missed one is only logged."""
+        if telegram.kind == "missed":
+            self.log.append(telegram)
+            return
+        self.waiting.append(telegram)
+        self.waiting.sort(key=lambda e: (e.delivered_at, e.stamp))
+
+    def due(self, until: float) -> list[BaliseRecord]:
+        """Take out what is delivered at or before `until` [s]."""
+        count = sum(1 for e in self.waiting if e.delivered_at <= until)
+        taken, self.waiting = self.waiting[:count], self.waiting[count:]
+        return taken
+
+    def delivered(self, telegram: BaliseRecord, outcomes: Mapping[str, str]) -> None:
+        """Log a delivered telegram with what became of it."""
+        self.log.append(replace(telegram, outcomes=dict(outcomes)))
+
+
+def payload(telegram: BaliseRecord) -> dict[str, float]:
+    """The numeric fields of a telegram, by the names a receiver may declare as ``balise_<field>``."""
+    return {
+        "position": telegram.position,
+        "location_accuracy": telegram.location_accuracy,
+        "odometer_reading": telegram.odometer_reading,
+        "delivered_at": telegram.delivered_at,
+    }

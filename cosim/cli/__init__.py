@@ -1,0 +1,33 @@
+"""The command line ``cosim``: run, list, info. Exit codes: 0 done, 1 done but not as asked for, 2 usage or run error."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from cosim.cli import info, listing, run
+from cosim.errors import CosimError
+
+__all__ = ["main"]
+
+ERROR = 2
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point of ``cosim``; returns the exit code."""
+    parser = argparse.ArgumentParser(
+        prog="cosim", description="Co-simulate train observers with train plant FMUs, balise events exact."
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for command in (run, listing, info):
+        command.register(commands)
+    options = parser.parse_args(arguments)
+    try:
+        return int(options.execute(options))
+    except CosimError as error:
+        print(f"cosim: {error}", file=sys.stderr)
+        return ERROR
+    except KeyboardInterrupt:
+        print("cosim: interrupted.", file=sys.stderr)
+        return ERROR

@@ -1,0 +1,149 @@
+"""``cosim run``: one scenario, result files, report, table."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from cosim.errors import ScenarioError
+from cosim.scenario import Outcome, Scenario
+
+DONE, NOT_AS_ASKED, ERROR = 0, 1, 2
+
+
+def register(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser("run", help="run a scenario", description="Run a shipped scenario by name, or a TOML file.")
+    parser.add_argument("scenario", nargs="?", default="freight_profile_d", help="name or file (default: freight_profile_d)")
+    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="settings",
+                        help="override component.parameter, balises.key or a top-level key; may be repeated")  # fmt: skip
+    parser.add_argument("--out", metavar="DIR", default=None, help="folder for results and report (default: results/NAME)")
+    parser.add_argument("--seeds", type=_positive, metavar="N", help="also run N balise seeds and report medians and quartiles")
+    parser.add_argument("--json", action="store_true", help="print the summary as JSON instead of the table")
+    parser.add_argument("--no-report", action="store_true", help="write result files only")
+    parser.add_argument(
+        "--strict", action="store_true", help="exit with 1 when the run gave warnings, e.g. an exceeded certificate"
+    )
+    parser.add_argument("--quiet", action="store_true", help="no progress bar")
+    parser.set_defaults(execute=execute)
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Run and write; everything computed is written also when the run fails."""
+    from cosim.results.folder import check_writable  # noqa: PLC0415 - scipy is loaded only by those who run
+
+    scenario = Scenario.load(options.scenario)
+    for setting in options.settings:
+        name, value = parse_setting(setting)
+        scenario.set(name, value)
+    scenario.table()
+    directory = Path(options.out) if options.out is not None else Path("results") / scenario.name
+    check_writable(directory)
+    bar = None if options.quiet or options.json else ProgressBar()
+    try:
+        outcome = scenario.run(progress=bar)
+    finally:
+        if bar is not None:
+            bar.close()
+    study = None if not options.seeds else _study(scenario, options)
+    if study is not None:
+        outcome = outcome.with_summary(seed_study=study.to_data())
+    paths = outcome.write(directory, report=not options.no_report)
+    _tell(outcome, study, paths, options)
+    if outcome.failure is not None:
+        return ERROR
+    return NOT_AS_ASKED if options.strict and outcome.warnings else DONE
+
+
+def parse_setting(text: str) -> tuple[str, Any]:
+    """``name=value`` with the value read as a TOML value where it is one, else as text.
+
+    Raises:
+        ScenarioError: there is no ``=``.
+    """
+    import tomllib  # noqa: PLC0415 - a small thing, only here
+
+    name, sign, value = text.partition("=")
+    if not sign or not name.strip():
+        raise ScenarioError(f"--set {text!r}: expected NAME=VALUE, for instance --set locomotive.mass=80e3.")
+    try:
+        return name.strip(), tomllib.loads(f"value = {value.strip()}")["value"]
+    except tomllib.TOMLDecodeError:
+        return name.strip(), value.strip()
+
+
+class ProgressBar:
+    """A progress bar in simulated seconds; appears only where somebody can see it."""
+
+    def __init__(self) -> None:
+        self._bar: Any = None
+
+    def __call__(self, t: float, stop: float) -> None:
+        """Move to `t` of `stop` [s]."""
+        if self._bar is None:
+            from tqdm import tqdm  # noqa: PLC0415 - only for those who watch
+
+            shape = "{percentage:3.0f}%|{bar}| {n:.1f}/{total:.1f} s simulated, {elapsed} elapsed"
+            self._bar = tqdm(total=stop, bar_format=shape, disable=not sys.stderr.isatty(), leave=False, file=sys.stderr)
+        self._bar.update(t - self._bar.n)
+
+    def close(self) -> None:
+        """Remove the bar."""
+        if self._bar is not None:
+            self._bar.close()
+
+
+def _study(scenario: Scenario, options: argparse.Namespace) -> Any:
+    from cosim.study import seed_study  # noqa: PLC0415 - only for those who ask
+
+    def tell(done: int, count: int) -> None:
+        if not (options.quiet or options.json) and sys.stderr.isatty():
+            print(f"\rseed {done} of {count}", end="" if done < count else "\n", file=sys.stderr)
+
+    return seed_study(scenario, range(options.seeds), tell)
+
+
+def _tell(outcome: Outcome, study: Any, paths: dict[str, Path], options: argparse.Namespace) -> None:
+    summary = outcome.result.summary
+    if options.json:
+        from cosim.results.summary_file import jsonable  # noqa: PLC0415 - only here
+
+        data = dict(summary) | {"failure": outcome.failure, "files": {k: str(p) for k, p in paths.items()}}
+        print(json.dumps(jsonable(data), indent=2))
+        return
+    for warning in outcome.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    print(_headline(summary))
+    if outcome.result.table.size:
+        from cosim.report.metrics import phase_metrics  # noqa: PLC0415 - only here
+        from cosim.report.table import text_table  # noqa: PLC0415
+
+        metrics = phase_metrics(outcome.result, outcome.spec)
+        if metrics:
+            print(text_table(metrics, outcome.spec))
+    if study is not None:
+        print(study.text())
+    for kind, path in paths.items():
+        print(f"{kind:>10}: {path}")
+    if outcome.failure is not None:
+        print(f"cosim: the run ended early: {outcome.failure}", file=sys.stderr)
+
+
+def _headline(summary: Any) -> str:
+    factor = summary.get("real_time_factor") or float("nan")
+    localisation = summary.get("localisation")
+    how = "" if not localisation else f" Balises localised by '{localisation['method']}'."
+    return (
+        f"{summary['title']}: {summary['reached'] - summary['start']:g} s simulated in {summary['wall_seconds']:.2f} s "
+        f"({factor:.0f} times real time) at {summary['step']:g} s steps.{how}"
+    )
+
+
+def _positive(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError("must be at least 1")
+    return value

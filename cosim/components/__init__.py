@@ -1,0 +1,1 @@
+"""Components: FMUs and blocks behind one face."""

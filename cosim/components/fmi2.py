@@ -1,0 +1,99 @@
+"""The FMI 2.0 dialect of a component: events by count, stamp and payload before a step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from time import perf_counter
+from typing import Any
+
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import fmi2Discard, fmi2LastSuccessfulTime, fmi2Terminated
+
+from cosim.components.component import Component, EventPort
+
+
+class FMI2Component(Component):
+    """An FMI 2.0 co-simulation slave. Arguments as for `Component`."""
+
+    fmi_version = 2
+    real_type = "Real"
+    event_needs_step = True
+
+    def _instantiate(self) -> None:
+        self.slave.instantiate()
+        self._forget()
+
+    def _forget(self) -> None:
+        self._counts = dict.fromkeys(self.events, 0)
+
+    def _find_events(self) -> dict[str, EventPort]:
+        inputs = {v.name: v for v in self.description.modelVariables if v.causality == "input"}
+        references = {name: v.valueReference for name, v in inputs.items()}
+        events = {}
+        for name, variable in inputs.items():
+            stem = name.removesuffix("_count")
+            if stem != name and variable.type == "Integer" and f"{stem}_time" in inputs:
+                events[stem] = EventPort(
+                    stem, variable.valueReference, references[f"{stem}_time"], self._payload_of(stem, references)
+                )
+        return events
+
+    def enter_initialization(self, start_time: float, stop_time: float) -> None:  # noqa: D102 - see Component
+        slave, self.time = self.slave, start_time
+        self._guard("setupExperiment", lambda: slave.setupExperiment(startTime=start_time, stopTime=stop_time))
+        self._guard("enterInitializationMode", slave.enterInitializationMode)
+
+    def exit_initialization(self) -> None:  # noqa: D102 - see Component
+        self._guard("exitInitializationMode", self.slave.exitInitializationMode)
+
+    def advance(self, t: float, until: float) -> None:  # noqa: D102 - see Component
+        begin = perf_counter()
+        try:
+            self.slave.doStep(t, until - t)
+            self.time = until
+        except FMICallException as error:
+            self._after_refusal(error, t, until)
+        except Exception as error:
+            raise self._explained("doStep", error, t) from error
+        finally:
+            self.seconds += perf_counter() - begin
+            self.calls += 1
+
+    def tell(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Component
+        self._counts[event.name] += 1
+        fields = {event.payload[n]: float(payload[n]) for n in event.payload if n in payload}
+        if event.stamp is not None:
+            fields[event.stamp] = stamp
+        count = self._counts[event.name]
+        self._guard(f"payload of event '{event.name}'", lambda: self.slave.setReal(list(fields), list(fields.values())))
+        self._guard(f"count of event '{event.name}'", lambda: self.slave.setInteger([event.trigger], [count]))
+
+    def save(self) -> Any:  # noqa: D102 - see Component
+        return self._guard("getFMUstate", self.slave.getFMUstate), dict(self._counts), self.time, self.terminated
+
+    def restore(self, state: Any) -> None:  # noqa: D102 - see Component
+        self._guard("setFMUstate", lambda: self.slave.setFMUstate(state[0]))
+        self._counts, self.time, self.terminated = dict(state[1]), state[2], state[3]
+
+    def release(self, state: Any) -> None:  # noqa: D102 - see Component
+        self._guard("freeFMUstate", lambda: self.slave.freeFMUstate(state[0]))
+
+    def _after_refusal(self, error: FMICallException, t: float, until: float) -> None:
+        """A discarded step is the end: the slave has terminated, or it cannot do this step and its state is lost."""
+        if error.status != fmi2Discard:
+            raise self._explained("doStep", error, t) from error
+        reached = self._asked(self.slave.getRealStatus, fmi2LastSuccessfulTime)
+        if self._asked(self.slave.getBooleanStatus, fmi2Terminated):
+            self.terminated = True
+            self.time = t if reached is None else min(max(float(reached), t), until)
+            return
+        known = "it does not say how far it came" if reached is None else f"it came to {reached:g} s"
+        reason = f"doStep was discarded: asked for {until:g} s, {known}; try a smaller communication step"
+        raise self.failure(reason, t) from error
+
+    @staticmethod
+    def _asked(call: Any, kind: int) -> Any:
+        try:
+            return call(kind)
+        except Exception:  # a slave that cannot say why it discarded a step has simply not terminated
+            return None

@@ -1,0 +1,1 @@
+"""Coupling: connections, order, plan."""

@@ -1,0 +1,53 @@
+"""Errors a user can meet, each with the place where it happened and what to do. Standard library only."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class CosimError(Exception):
+    """Base of all errors that are explained to the user without a traceback."""
+
+
+class ScenarioError(CosimError, ValueError):
+    """A scenario file or a scenario script says something that cannot be."""
+
+
+class FmuLoadError(CosimError, OSError):
+    """An FMU cannot be opened: missing, broken, or built for another platform."""
+
+
+class CouplingError(CosimError, ValueError):
+    """Components cannot be connected as asked: unknown variables, units, two sources, loops."""
+
+
+class OutputError(CosimError, OSError):
+    """Results cannot be written where asked."""
+
+
+class CertificateError(CosimError, ValueError):
+    """A scenario requires certificates and an observer's gaps exceed its own."""
+
+
+class RunError(CosimError, RuntimeError):
+    """A component failed during the run.
+
+    Args:
+        reason: what happened and what to do.
+        component: name of the component. time: communication point at which it happened [s].
+    """
+
+    def __init__(self, reason: str, component: str = "", time: float = float("nan")) -> None:
+        super().__init__(reason)
+        self.component, self.time = component, time
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """A hint with the names nearest to a misspelt one, or all of them where none is near."""
+    names = list(known)
+    close = get_close_matches(name, names, 3, 0.5)
+    if close:
+        return f"did you mean {', '.join(repr(n) for n in close)}?"
+    shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
+    return f"known: {shown or 'none'}."

@@ -1,0 +1,1 @@
+"""The master: initialisation, stepping, delivery of events."""

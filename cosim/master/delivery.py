@@ -1,0 +1,214 @@
+"""Delivery: a receiver is stepped through the telegrams that reach it within a communication step.
+
+What a receiver allows decides how: it is stopped at the instant where it can be, told beforehand with a stamp where it cannot,
+and told too late where the run asks for that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from cosim.balises.telegram import payload
+from cosim.components.component import TIME_TOLERANCE, EventPort
+from cosim.coupling.plan import PlannedComponent
+from cosim.results.result import BaliseRecord
+
+Timing = Literal["exact", "stale"]
+OUTCOMES = ("replayed", "late", "rejected", "accepted")  # of several that changed at once the first one says most
+
+
+@dataclass
+class Delivery:
+    """What one telegram did to one receiver.
+
+    Args:
+        time: when the receiver was told [s].
+        before, after: its outputs before and after, shape (q,); None where it could not be stopped there.
+        outcome: what became of it: ``accepted``, ``replayed``, ``late``, ``rejected``, or ``told`` where that is not known.
+    """
+
+    time: float
+    before: np.ndarray | None = None
+    after: np.ndarray | None = None
+    outcome: str = "told"
+
+
+@dataclass
+class Receiver:
+    """A planned component that declares the balise event.
+
+    An FMI 2 receiver acts on a telegram in the step that follows, and knows one telegram for each step. A telegram of this very
+    instant is therefore announced before the step that ends there; of telegrams that must not be announced together the later
+    ones wait in `backlog` for the next step.
+
+    Args:
+        planned: the component in the plan.
+        event: name of its event.
+        timing: ``exact`` uses a telegram at its own instant; ``stale`` hands it over unshifted at the next communication
+            point, as a master without events would (for comparison only).
+    """
+
+    planned: PlannedComponent
+    event: str = "balise"
+    timing: Timing = "exact"
+    seen: dict[str, int] = field(default_factory=dict)
+    backlog: list[BaliseRecord] = field(default_factory=list)
+    arrived: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    _open: list[Delivery] = field(default_factory=list)
+    _announced: bool = False
+
+    @property
+    def busy(self) -> bool:
+        """Whether something told or held back earlier still has to be seen to."""
+        return bool(self.backlog or self._announced)
+
+    def step(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
+        """Step from `t` to `until` [s] through `telegrams`, in order of delivery.
+
+        Afterwards `arrived` holds the outputs on reaching `until`, before anything was told there, shape (q,).
+
+        Returns:
+            What became of each telegram, in the same order.
+        """
+        self.planned.write()
+        self._open.clear()
+        waiting, self.backlog = self.backlog, []
+        if self.timing == "stale":
+            return self._step_then_tell(t, until, telegrams)
+        if not self.planned.component.can_vary_step:
+            return self._tell_then_step(t, until, [*waiting, *telegrams])[len(waiting) :]
+        return self._step_through(t, until, [*waiting, *telegrams])[len(waiting) :]
+
+    # -- a receiver that can be stopped anywhere --------------------------------------------------------------------
+
+    def _step_through(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
+        now = t
+        deliveries: list[Delivery] = []
+        arrived = None
+        for telegram in telegrams:
+            told_at = _snapped(telegram.delivered_at, now, until)
+            deliveries.append(self._deliver(now, told_at, telegram))
+            if told_at == until and arrived is None:
+                arrived = deliveries[-1].before
+            now = told_at
+        if until > now:
+            self._advance(now, until)
+            self.planned.read()
+        self.arrived = self.planned.outputs.copy() if arrived is None else arrived
+        return deliveries
+
+    def _deliver(self, now: float, told_at: float, telegram: BaliseRecord) -> Delivery:
+        component = self.planned.component
+        if not component.event_needs_step:
+            if told_at > now:
+                self._advance(now, told_at)
+            return self._tell_here(told_at, telegram, telegram.stamp)
+        on_time = abs(telegram.stamp - told_at) <= TIME_TOLERANCE
+        if on_time and told_at > now and not self._announced:
+            return self._announce(now, told_at, telegram)
+        if told_at > now:
+            self._advance(now, told_at)
+        if self._announced:
+            self.backlog.append(telegram)
+            return Delivery(told_at)
+        self._announced = True
+        return self._tell_here(told_at, telegram, telegram.stamp)
+
+    def _tell_here(self, t: float, telegram: BaliseRecord, stamp: float) -> Delivery:
+        before = self._outputs()
+        delivery = Delivery(t, before, before)
+        self._tell(t, telegram, stamp, delivery)
+        delivery.after = self._outputs()
+        return delivery
+
+    def _announce(self, now: float, told_at: float, telegram: BaliseRecord) -> Delivery:
+        """FMI 2: the event happens at the end of the step from `now` to `told_at` [s]."""
+        delivery = Delivery(told_at, self._look_ahead(now, told_at))
+        self._tell(now, telegram, told_at, delivery)
+        self._advance(now, told_at)
+        delivery.after = self._outputs()
+        return delivery
+
+    def _look_ahead(self, now: float, told_at: float) -> np.ndarray | None:
+        """Outputs at `told_at` [s] without the event, where going there and back is known to leave no trace."""
+        component = self.planned.component
+        if not component.restores_exactly:
+            return None
+        state = component.save()
+        try:
+            component.advance(now, told_at)
+            outputs = self._outputs()
+            component.restore(state)
+            return outputs
+        finally:
+            component.release(state)
+
+    # -- a receiver that takes whole steps only ---------------------------------------------------------------------
+
+    def _tell_then_step(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
+        """Stamps inside the coming step tell the receiver what it may not be stopped for; without stamps it is told late."""
+        if self._port.stamp is None:
+            return self._step_then_tell(t, until, telegrams)
+        at_once = 1 if self.planned.component.event_needs_step else len(telegrams)
+        self.backlog.extend(telegrams[at_once:])
+        deliveries = [Delivery(_snapped(telegram.delivered_at, t, until)) for telegram in telegrams]
+        for telegram, delivery in zip(telegrams[:at_once], deliveries, strict=False):
+            self._tell(t, telegram, telegram.stamp, delivery)
+        self._advance(t, until)
+        self.arrived = self._outputs()
+        return deliveries
+
+    def _step_then_tell(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
+        """Whatever was passed in the step is told at its end, as if it had happened there."""
+        self._advance(t, until)
+        self.arrived = self._outputs()
+        known = telegrams[-1:] if self.planned.component.event_needs_step else telegrams  # the last payload replaces the others
+        overwritten = len(telegrams) - len(known)
+        return [Delivery(until, self.arrived, self.arrived, "rejected") for _ in range(overwritten)] + [
+            self._tell_here(until, telegram, until) for telegram in known
+        ]
+
+    # -- internals --------------------------------------------------------------------------------------------------
+
+    @property
+    def _port(self) -> EventPort:
+        return self.planned.component.events[self.event]
+
+    def _advance(self, now: float, until: float) -> None:
+        self.planned.component.advance(now, until)
+        self._announced = False
+        self._note_outcome()
+
+    def _outputs(self) -> np.ndarray:
+        self.planned.read()
+        return self.planned.outputs.copy()
+
+    def _tell(self, t: float, telegram: BaliseRecord, stamp: float, delivery: Delivery) -> None:
+        self.planned.component.tell(self._port, t, stamp, payload(telegram))
+        self._open.append(delivery)
+        self._note_outcome()
+
+    def _note_outcome(self) -> None:
+        """What the receiver's own counters say of the telegrams it was told and has not answered for yet."""
+        counts = self.planned.component.outcomes()
+        if counts is None:
+            return
+        changed = {name for name, value in counts.items() if value > self.seen.get(name, 0)}
+        self.seen = dict(counts)
+        outcome = next((name for name in OUTCOMES if name in changed), None)
+        if outcome is not None:
+            for delivery in self._open:
+                delivery.outcome = outcome
+            self._open.clear()
+
+
+def _snapped(delivered_at: float, now: float, until: float) -> float:
+    """Time of delivery within ``[now, until]`` [s], on an end where it is too near for a step in between."""
+    told_at = min(max(delivered_at, now), until)
+    if until - told_at <= TIME_TOLERANCE:
+        return until
+    return now if told_at - now <= TIME_TOLERANCE else told_at

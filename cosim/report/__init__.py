@@ -1,0 +1,1 @@
+"""Reports of runs: metrics, tables, figures and a page. Imported one by one, since the figures load matplotlib."""

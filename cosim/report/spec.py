@@ -1,0 +1,50 @@
+"""What a report needs to know about a run: which signals play which role. Standard library only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A part of the run to be judged on its own, ``start <= t <= end`` [s]."""
+
+    name: str
+    start: float
+    end: float
+
+
+@dataclass(frozen=True)
+class ReportSpec:
+    """Roles of the recorded signals; a role without a signal is left out of the report.
+
+    Args:
+        title: heading of the report.
+        true_position, true_speed, true_slip, true_adhesion_force, odometer, speed_reference: names of recorded signals.
+        observers: component names of the observers; signals are ``<name>.position``, ``.speed``, ``.slip``,
+            ``.adhesion_force``, ``.slip_indicator``, each used where it was recorded.
+        labels: text to show for an observer.
+        phases: parts of the run for the table.
+        zones: low-adhesion zones in time [s].
+        evaluate_after: start of the evaluation, after the start-up transient [s].
+        published: published numbers by observer and phase, ``{observer: {phase: max |speed error| [m/s]}}``.
+        independent: independently measured numbers, likewise.
+        notes: sentences to stand below the table (why numbers differ).
+    """
+
+    title: str = "Co-simulation"
+    true_position: str | None = None
+    true_speed: str | None = None
+    true_slip: str | None = None
+    true_adhesion_force: str | None = None
+    odometer: str | None = None
+    speed_reference: str | None = None
+    observers: Sequence[str] = ()
+    labels: Mapping[str, str] = field(default_factory=dict)
+    phases: Sequence[Phase] = ()
+    zones: Sequence[tuple[float, float]] = ()
+    evaluate_after: float = 0.0
+    published: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    independent: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    notes: Sequence[str] = ()

@@ -1,0 +1,1 @@
+"""Results of runs: tables, balise telegrams and summaries, and the files that keep them."""

@@ -1,0 +1,134 @@
+"""A result as a folder of files: table, events, summary. Touches only the folder it is given.
+
+All files are written to a hidden folder beside their places first and moved there when they are complete: a full disk or a
+stopped program leaves the former files whole.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from cosim.errors import OutputError, nearest
+from cosim.results.csv_file import read_csv, write_csv
+from cosim.results.events_file import read_events, write_events
+from cosim.results.mat_file import read_mat, write_mat
+from cosim.results.result import Result, SignalInfo
+from cosim.results.summary_file import read_summary, write_summary
+
+TABLES = {"csv": "table.csv", "mat": "table.mat"}
+EVENTS, SUMMARY = "events.csv", "summary.json"
+LAYOUT = 1  # version of the layout of summary.json
+
+
+def check_writable(directory: str | Path) -> Path:
+    """Make sure, before a run, that results can be written to a folder; it is created where it does not exist.
+
+    Args:
+        directory: the folder.
+
+    Returns:
+        The folder.
+
+    Raises:
+        OutputError: it cannot be created or written; the message says why and what to do.
+    """
+    folder = Path(directory)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(b"results")
+    except OSError as error:
+        raise OutputError(f"Results cannot be written to {folder}: {_reason(error)}. Choose another output folder.") from error
+    for name in (*TABLES.values(), EVENTS, SUMMARY):
+        if (folder / name).is_dir():
+            raise OutputError(f"Results cannot be written to {folder}: {name} is a folder there. Choose another output folder.")
+    return folder
+
+
+def _reason(error: OSError) -> str:
+    return f"{error.strerror or error}" + (f" ({error.filename})" if error.filename else "")
+
+
+def _check_formats(formats: Sequence[str]) -> None:
+    for name in formats:
+        if name not in TABLES:
+            raise OutputError(f"Unknown result format {name!r}; {nearest(name, TABLES)}")
+
+
+def _write_all(result: Result, folder: Path, formats: Sequence[str]) -> list[str]:
+    if "csv" in formats:
+        write_csv(folder / TABLES["csv"], result.table)
+    if "mat" in formats:
+        write_mat(folder / TABLES["mat"], result)
+    write_events(folder / EVENTS, result.events)
+    content = {"layout": LAYOUT, "failure": result.failure, "signals": list(result.signals), "summary": result.summary}
+    write_summary(folder / SUMMARY, content)
+    return [*(TABLES[name] for name in TABLES if name in formats), EVENTS, SUMMARY]
+
+
+def write_results(result: Result, directory: str | Path, formats: Sequence[str] = ("csv", "mat")) -> dict[str, Path]:
+    """Write a result to a folder, replacing what an earlier run left there.
+
+    Args:
+        result: what to write.
+        directory: the folder; created where it does not exist.
+        formats: formats of the table, any of ``csv`` and ``mat``. A table that an earlier run left in another format is
+            removed, since it would not belong to the other files.
+
+    Returns:
+        Paths by what they hold: ``csv``, ``mat``, ``events``, ``summary``.
+
+    Raises:
+        OutputError: a format is unknown, or a file cannot be written; former files are then still whole.
+    """
+    _check_formats(formats)
+    folder = check_writable(directory)
+    try:
+        with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as scratch:
+            for name in _write_all(result, Path(scratch), formats):
+                (Path(scratch) / name).replace(folder / name)
+        for stale in set(TABLES) - set(formats):
+            (folder / TABLES[stale]).unlink(missing_ok=True)
+    except OSError as error:
+        hint = "Free the disk, or close the program that has the file open."
+        raise OutputError(f"Results could not be written to {folder}: {_reason(error)}. {hint}") from error
+    return {name: folder / TABLES[name] for name in TABLES if name in formats} | {
+        "events": folder / EVENTS,
+        "summary": folder / SUMMARY,
+    }
+
+
+def _read(folder: Path) -> tuple[Result, Mapping[str, Any]]:
+    content = read_summary(folder / SUMMARY)
+    if content.get("layout") != LAYOUT:
+        raise ValueError(f"{SUMMARY} has layout {content.get('layout')!r}, this version reads layout {LAYOUT}.")
+    signals = [SignalInfo(**signal) for signal in content["signals"]]
+    csv, mat = folder / TABLES["csv"], folder / TABLES["mat"]
+    table = read_csv(csv) if csv.exists() else read_mat(mat).table
+    return Result(table, signals, read_events(folder / EVENTS)), content
+
+
+def read_results(directory: str | Path) -> Result:
+    """Read the result that `write_results` left in a folder.
+
+    Args:
+        directory: the folder.
+
+    Returns:
+        The result: table and events bit by bit; in the summary NaN has become None and tuples have become lists.
+
+    Raises:
+        OutputError: a file is missing or is not what `write_results` writes; the message names it.
+    """
+    folder = Path(directory)
+    try:
+        result, content = _read(folder)
+        return replace(result, summary=content["summary"], failure=content["failure"])
+    except OSError as error:
+        raise OutputError(f"No complete result in {folder}: {_reason(error)}. Run the scenario again.") from error
+    except (KeyError, TypeError, ValueError) as error:
+        raise OutputError(f"The result in {folder} cannot be read: {error}. Run the scenario again.") from error

@@ -1,0 +1,45 @@
+"""Layouts: from the balise table of a scenario to where, or when, the balises are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from cosim.balises.layout import InstantLayout, Layout, TrackLayout, aperiodic, by_positions, by_spacing, from_csv
+from cosim.errors import ScenarioError
+from cosim.scenario.schema import BalisesTable
+
+
+def make_layout(table: BalisesTable, stop: float, folder: Path, where: str) -> Layout:
+    """The balise layout of a scenario.
+
+    Args:
+        table: its balise table. stop: end of the run [s]. folder: start of relative paths. where: place for messages.
+
+    Raises:
+        ScenarioError: with file and key.
+    """
+    try:
+        if table.layout == "aperiodic":
+            gaps = {k: getattr(table, k) for k in ("min_gap", "max_gap", "dropout_after", "dropout_fraction", "dropout_stretch")}
+            return aperiodic(stop, table.seed, **gaps)
+        if table.layout == "instants":
+            return InstantLayout(np.array(table.instants, dtype=float))
+        layout = _track_layout(table, folder)
+        if table.track_end is not None:
+            layout.check_within(table.track_start, table.track_end)
+        return layout
+    except ScenarioError as error:
+        raise ScenarioError(f"{where}: balises: {error}") from error
+
+
+def _track_layout(table: BalisesTable, folder: Path) -> TrackLayout:
+    if table.layout == "csv":
+        return from_csv(folder / str(table.file))
+    if table.layout == "positions":
+        return by_positions(table.positions or [], table.location_accuracy)
+    assert table.spacing is not None
+    assert table.track_end is not None
+    first = table.first if table.first is not None else table.track_start + table.spacing
+    return by_spacing(table.spacing, first, table.track_end, table.location_accuracy)

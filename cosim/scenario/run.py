@@ -1,0 +1,191 @@
+"""Running a validated scenario: make the components, couple them, check, step, and gather the result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from cosim.balises.layout import Layout
+from cosim.components.component import Component
+from cosim.coupling.connection import Connection, connect, unconnected_inputs
+from cosim.coupling.graph import execution_order, undeclared
+from cosim.coupling.plan import Plan, make_plan
+from cosim.errors import CosimError
+from cosim.master.master import BaliseService, Master, TimeAxis, close
+from cosim.report.spec import Phase, ReportSpec
+from cosim.results.result import Result
+from cosim.scenario.balise_service import Choice, choose_method, find_receivers, make_service, watched_plant
+from cosim.scenario.certificates import check_certificates, expected_gap
+from cosim.scenario.connections import parse_connections
+from cosim.scenario.layouts import make_layout
+from cosim.scenario.models import component_factory
+from cosim.scenario.outcome import Outcome
+from cosim.scenario.schema import ScenarioTable, step_count
+from cosim.scenario.starts import start_values
+from cosim.scenario.summary import run_summary
+
+Progress = Callable[[float, float], None]
+ROLES = ("true_position", "true_speed", "true_slip", "true_adhesion_force", "odometer", "speed_reference")
+
+
+def run_scenario(table: ScenarioTable, name: str, folder: Path, where: str, progress: Progress | None = None) -> Outcome:
+    """Run a scenario to its end or to its first failure.
+
+    Args:
+        table: validated scenario. name: its name. folder: start of relative paths. where: place for messages.
+        progress: called with the time reached and the end [s].
+
+    Raises:
+        CosimError: the scenario cannot be set up; failures on the way are in the outcome.
+    """
+    setup = _Setup(table, folder, where)
+    try:
+        setup.prepare()
+        return setup.execute(name, progress)
+    finally:
+        setup.close()
+
+
+class _Setup:
+    """The parts of one run while it is put together; thrown away at its end."""
+
+    def __init__(self, table: ScenarioTable, folder: Path, where: str) -> None:
+        self.table, self.folder, self.where = table, folder, where
+        self.axis = TimeAxis(table.start, table.step, step_count(table.start, table.stop, table.step))
+        self.warnings: list[str] = []
+        self.notes: list[str] = []
+        self.certificates: dict[str, dict[str, Any]] = {}
+        self.factories: dict[str, Callable[[], Component]] = {}
+        self.components: dict[str, Component] = {}
+        self.plan: Plan | None = None
+        self.choice: Choice | None = None
+        self.service: BaliseService | None = None
+        self.setup_seconds = 0.0
+
+    def prepare(self) -> None:
+        """Everything up to the first step, cheap checks first."""
+        begin = perf_counter()
+        table = self.table
+        layout = None if table.balises is None else make_layout(table.balises, table.stop, self.folder, self.where)
+        pairs = parse_connections(table.connections, self.where)
+        for name, component in table.components.items():
+            self.factories[name] = component_factory(name, component, self.folder, f"{self.where}: components.{name}")
+        for name, factory in self.factories.items():
+            self.components[name] = factory()
+        connections = connect(pairs, self.components)
+        receivers, plant = self._balise_roles()
+        order = execution_order(self.components, connections, [(plant, name) for name in receivers if name != plant])
+        starts = {n: start_values(c, table.components[n].parameters) for n, c in self.components.items()}
+        if layout is not None:
+            self._check_certificates(layout, receivers)
+        self._instantiate(starts)
+        self.plan = make_plan(self.components, connections, order, {n: t.record for n, t in table.components.items()})
+        self._note_unconnected(connections)
+        if layout is not None:
+            self._add_balises(layout, plant, receivers, starts[plant])
+        self.setup_seconds = perf_counter() - begin
+
+    def execute(self, name: str, progress: Progress | None) -> Outcome:
+        """Run the master and gather what came out."""
+        assert self.plan is not None
+        stop = self.axis.stop
+        master = Master(self.plan, self.axis, self.service, None if progress is None else lambda t: progress(t, stop))
+        failure = None
+        try:
+            master.run()
+        except CosimError as error:
+            failure = str(error)
+        if master.ended_early is not None:
+            self.warnings.append(master.ended_early)
+        summary = run_summary(name, self.table, self.plan, master, self.setup_seconds)
+        events = [] if self.service is None else list(self.service.mailbox.log)
+        summary |= self._balise_summary([e.stamp for e in events if e.kind == "true"])
+        summary |= {"certificates": self.certificates, "warnings": self.warnings, "notes": self.notes}
+        return Outcome(Result(master.recorder.table(), self.plan.signals, events, summary, failure), self._report_spec())
+
+    def close(self) -> None:
+        """Free everything, also after a set-up that failed half-way."""
+        if self.plan is not None:
+            close(self.plan)
+        for component in self.components.values():
+            component.terminate()
+            component.free()
+
+    # -- set-up -----------------------------------------------------------------------------------------------------
+
+    def _instantiate(self, starts: dict[str, dict[str, float]]) -> None:
+        for name, component in self.components.items():
+            component.instantiate()
+            for parameter, value in starts[name].items():
+                component.set_start(parameter, value)
+
+    def _balise_roles(self) -> tuple[list[str], str]:
+        balises = self.table.balises
+        if balises is None:
+            return [], ""
+        plant = watched_plant(balises, self.components, self.where)
+        return find_receivers(balises, self.components, self.where), plant
+
+    def _check_certificates(self, layout: Layout, receivers: list[str]) -> None:
+        assert self.table.balises is not None
+        gap = expected_gap(layout, self.table.balises, self.table.start)
+        tables = {n: self.table.components[n] for n in receivers if self.table.components[n].fmu is None}
+        self.certificates, warnings = check_certificates(tables, gap, self.table.certificates, self.where)
+        self.warnings += warnings
+
+    def _add_balises(self, layout: Layout, plant: str, receivers: list[str], starts: dict[str, float]) -> None:
+        table = self.table.balises
+        assert table is not None
+        assert self.plan is not None
+        self.choice = choose_method(table, self.components[plant], self.factories[plant], starts, self.axis.start, self.axis.step)
+        self.warnings += self.choice.warnings
+        self.notes.append(f"Balises localised by '{self.choice.method}': {self.choice.reason}.")
+        self.service = make_service(table, layout, self.plan, plant, receivers, self.choice.method)
+
+    def _note_unconnected(self, connections: list[Connection]) -> None:
+        free = unconnected_inputs(connections, self.components.values())
+        if free:
+            self.warnings.append(f"Unconnected inputs keep their start values: {', '.join(free)}.")
+        silent = undeclared(self.components.values())
+        if silent:
+            self.notes.append(f"Declare no dependencies, direct feedthrough assumed absent: {', '.join(silent)}.")
+
+    # -- after the run ----------------------------------------------------------------------------------------------
+
+    def _balise_summary(self, stamps: list[float]) -> dict[str, Any]:
+        """Method, probe, and the gaps that really occurred against what is certified."""
+        if self.choice is None or self.service is None:
+            return {"localisation": None, "probe": None, "redo_differences": None, "largest_gap": None}
+        gap = max((b - a for a, b in pairwise([self.axis.start, *sorted(stamps)])), default=0.0)
+        for name, certificate in self.certificates.items():
+            limit = certificate["aperiodic_limit"]
+            certificate["largest_gap_seen"] = gap
+            if limit is not None and gap > limit and certificate["holds"] is not False:
+                self.warnings.append(f"{name}: the longest gap between balises was {gap:.3g} s, certified are {limit:.3g} s.")
+        return {
+            "localisation": {"method": self.choice.method, "reason": self.choice.reason},
+            "probe": None if self.choice.probe is None else self.choice.probe.to_dict(),
+            "redo_differences": self.service.localiser.watch.redo_differences,
+            "largest_gap": gap,
+        }
+
+    def _report_spec(self) -> ReportSpec:
+        table = self.table.report
+        observers = table.observers
+        if observers is None:
+            observers = [n for n, t in self.table.components.items() if t.observer is not None]
+        return ReportSpec(
+            title=self.table.title,
+            **{role: getattr(table, role) for role in ROLES},
+            observers=observers,
+            labels={n: t.label for n, t in self.table.components.items() if t.label is not None},
+            phases=[Phase(p.name, p.start, p.end) for p in table.phases],
+            zones=table.zones,
+            evaluate_after=table.evaluate_after,
+            published=table.published,
+            independent=table.independent,
+            notes=table.notes,
+        )

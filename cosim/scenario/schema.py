@@ -1,0 +1,204 @@
+"""The schema of a scenario: what may stand in a scenario file, with types, ranges and defaults.
+
+Unknown keys, wrong types and values out of range are refused with the place and the nearest legal name.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from cosim.errors import ScenarioError, nearest
+from fmu_observer.block import LatePolicy
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
+Number = float | list[float]
+Realisation = Literal["fmu3", "fmu2", "block3", "block2"]
+
+
+class Table(BaseModel):
+    """A table of a scenario file."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True, allow_inf_nan=False)
+
+
+class ComponentTable(Table):
+    """One component: an FMU by path, or a shipped plant, sensor, driver or observer by name."""
+
+    fmu: str | None = None
+    model: str | None = None
+    observer: str | None = None
+    realisation: Realisation | None = Field(default=None, alias="as")
+    preset: str | None = None
+    options: dict[str, str | int | float | bool] = {}
+    parameters: dict[str, Number] = {}
+    late_policy: LatePolicy = "replay"
+    replay_horizon: Annotated[float, Field(gt=0.0)] = 10.0
+    record: list[str] = []
+    label: str | None = None
+
+    @model_validator(mode="after")
+    def _one_origin(self) -> ComponentTable:
+        given = [k for k in ("fmu", "model", "observer") if getattr(self, k) is not None]
+        if len(given) != 1:
+            raise ValueError("give exactly one of 'fmu' (a path), 'model' (a shipped plant) or 'observer' (a shipped observer)")
+        if given == ["fmu"] and (self.preset or self.options or self.realisation):
+            raise ValueError("'preset', 'options' and 'as' belong to shipped models; an FMU takes 'parameters' only")
+        return self
+
+
+class FalseTelegramTable(Table):
+    """A telegram without a balise."""
+
+    time: float
+    offset: float
+
+
+class BalisesTable(Table):
+    """Balises: where they are, how the passings are found, what happens to the telegrams."""
+
+    position: str
+    speed: str
+    odometer: str | None = None
+    layout: Literal["spacing", "positions", "csv", "instants", "aperiodic"]
+    spacing: Annotated[float, Field(gt=0.0)] | None = None
+    first: float | None = None
+    positions: list[float] | None = None
+    file: str | None = None
+    instants: list[float] | None = None
+    seed: Annotated[int, Field(ge=0)] = 0
+    min_gap: Annotated[float, Field(gt=0.0)] = 0.1
+    max_gap: Annotated[float, Field(gt=0.0)] = 0.5
+    dropout_after: float = 7.9
+    dropout_fraction: Annotated[float, Field(ge=0.0, le=1.0)] = 0.15
+    dropout_stretch: Annotated[float, Field(ge=1.2)] = 2.5
+    track_start: float = 0.0
+    track_end: float | None = None
+    expected_speed: Annotated[float, Field(gt=0.0)] | None = None
+    location_accuracy: Annotated[float, Field(ge=0.0, le=63.0)] = 0.0
+    method: Literal["auto", "early-return", "rollback", "predict", "interpolate"] = "auto"
+    clock: str | None = None
+    jerk_bound: Annotated[float, Field(gt=0.0)] = 10.0
+    timing: Literal["exact", "stale"] = "exact"
+    receivers: list[Name] | None = None
+    latency: Annotated[float, Field(ge=0.0)] = 0.0
+    latency_jitter: Annotated[float, Field(ge=0.0)] = 0.0
+    missed_fraction: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    missed: list[str] = []
+    position_noise: Annotated[float, Field(ge=0.0)] = 0.0
+    false_telegrams: list[FalseTelegramTable] = []
+
+    @model_validator(mode="after")
+    def _layout_complete(self) -> BalisesTable:
+        needed = {"spacing": "spacing", "positions": "positions", "csv": "file", "instants": "instants"}.get(self.layout)
+        if needed is not None and getattr(self, needed) is None:
+            raise ValueError(f"layout '{self.layout}' needs '{needed}'")
+        if self.layout == "spacing" and self.track_end is None:
+            raise ValueError("layout 'spacing' needs 'track_end', the end of the track [m]")
+        return self
+
+
+class PhaseTable(Table):
+    """A part of the run to be judged on its own."""
+
+    name: str
+    start: float
+    end: float
+
+
+class ReportTable(Table):
+    """Roles of signals in the report, and the numbers to print beside the measured ones."""
+
+    true_position: str | None = None
+    true_speed: str | None = None
+    true_slip: str | None = None
+    true_adhesion_force: str | None = None
+    odometer: str | None = None
+    speed_reference: str | None = None
+    observers: list[Name] | None = None
+    phases: list[PhaseTable] = []
+    zones: list[tuple[float, float]] = []
+    evaluate_after: float = 0.0
+    published: dict[str, dict[str, float]] = {}
+    independent: dict[str, dict[str, float]] = {}
+    notes: list[str] = []
+
+
+class ScenarioTable(Table):
+    """A whole scenario."""
+
+    title: str = "Co-simulation"
+    description: str = ""
+    source: str = ""
+    start: float = 0.0
+    stop: float
+    step: float
+    certificates: Literal["warn", "require", "ignore"] = "warn"
+    components: dict[Name, ComponentTable]
+    connections: list[str] = []
+    balises: BalisesTable | None = None
+    report: ReportTable = ReportTable()
+
+    @model_validator(mode="after")
+    def _times(self) -> ScenarioTable:
+        step_count(self.start, self.stop, self.step)
+        if not self.components:
+            raise ValueError("a scenario needs at least one component")
+        return self
+
+
+def step_count(start: float, stop: float, step: float) -> int:
+    """Number of communication steps.
+
+    Raises:
+        ValueError: the step is not positive, the horizon is empty, or the step does not divide it.
+    """
+    if not step > 0.0:
+        raise ValueError(f"step must be positive, got {step!r} s")
+    if not stop > start:
+        raise ValueError(f"stop ({stop!r} s) must lie behind start ({start!r} s)")
+    count = round((stop - start) / step)
+    if count < 1 or abs(start + count * step - stop) > 1e-9 * max(1.0, abs(stop)):
+        below = int((stop - start) / step)
+        proposals = f"stop = {start + below * step:g} or {start + (below + 1) * step:g}"
+        raise ValueError(f"step {step!r} s does not divide the horizon from {start!r} s to {stop!r} s; use {proposals}")
+    return count
+
+
+def parse_scenario(data: dict[str, Any], where: str) -> ScenarioTable:
+    """A validated scenario.
+
+    Args:
+        data: as read from TOML or built by a script.
+        where: file name or 'script', for messages.
+
+    Raises:
+        ScenarioError: with one line for each thing that is wrong.
+    """
+    try:
+        return ScenarioTable.model_validate(data)
+    except ValidationError as error:
+        lines = [_explain(dict(item)) for item in error.errors()]
+        raise ScenarioError(f"{where}: " + f"\n{where}: ".join(lines)) from error
+
+
+def _explain(item: dict[str, Any]) -> str:
+    place = ".".join(str(p) for p in item["loc"] if p not in ("float", "list[float]", "constrained-str")) or "scenario"
+    message = str(item["msg"]).removeprefix("Value error, ")
+    if item["type"] == "extra_forbidden":
+        key = str(item["loc"][-1])
+        return f"{place}: unknown key; {nearest(key, _known_keys(item['loc']))}"
+    given = item.get("input")
+    if item["type"] == "value_error" or isinstance(given, dict):
+        return f"{place}: {message}"
+    return f"{place}: {message} (got {json.dumps(given, default=str)})"
+
+
+def _known_keys(location: tuple[Any, ...]) -> list[str]:
+    table: type[Table] = ScenarioTable
+    tables: dict[str, type[Table]] = {"components": ComponentTable, "balises": BalisesTable, "report": ReportTable}
+    if len(location) > 1:
+        table = tables.get(str(location[0]), ScenarioTable)
+    return [field.alias or name for name, field in table.model_fields.items()]

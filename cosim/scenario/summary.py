@@ -1,0 +1,78 @@
+"""The summary of a run: how it was made, what it cost, what to know; plain data for a JSON file."""
+
+from __future__ import annotations
+
+import platform
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from cosim.components.component import Component
+from cosim.coupling.plan import Plan
+from cosim.master.master import Master
+from cosim.scenario.schema import ComponentTable, ScenarioTable
+
+
+def run_summary(name: str, table: ScenarioTable, plan: Plan, master: Master, setup_seconds: float) -> dict[str, Any]:
+    """Scenario, times, components, versions.
+
+    Args:
+        name: of the scenario. table: the scenario. plan, master: after the run. setup_seconds: wall time of the set-up [s].
+    """
+    axis, timing = master.axis, master.timing
+    reached = float(master.recorder.table()["time"][-1]) if master.recorder.count else axis.start
+    wall = timing.initialisation + timing.stepping + timing.recording
+    in_components = {s.component.name: s.component.seconds for s in plan.steps}
+    rest = wall - sum(in_components.values()) - timing.recording
+    return {
+        "scenario": name,
+        "title": table.title,
+        "description": " ".join(table.description.split()),
+        "source": table.source,
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "start": axis.start,
+        "stop": axis.stop,
+        "reached": reached,
+        "step": axis.step,
+        "rows": master.recorder.count,
+        "setup_seconds": setup_seconds,
+        "wall_seconds": wall,
+        "real_time_factor": (reached - axis.start) / wall if wall > 0.0 else None,
+        "seconds": {**in_components, "master": rest, "recording": timing.recording},
+        "exchange_rounds": master.exchange_rounds,
+        "order": [s.component.name for s in plan.steps],
+        "components": [_component(s.component, table.components[s.component.name]) for s in plan.steps],
+        "connections": list(table.connections),
+        "versions": versions(),
+    }
+
+
+def versions() -> dict[str, str]:
+    """Versions of everything that can change a number."""
+    packages = ("fmu-observer", "fmpy", "numpy", "scipy", "casadi")
+    return {"python": platform.python_version(), "platform": platform.platform(), **{p: _version(p) for p in packages}}
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def _component(component: Component, table: ComponentTable) -> dict[str, Any]:
+    outcomes = component.outcomes()
+    return {
+        "name": component.name,
+        "kind": component.kind,
+        "fmi_version": component.description.fmiVersion,
+        "model": component.description.modelName,
+        "guid": component.description.guid,
+        "preset": table.preset,
+        "options": table.options,
+        "parameters": component.starts,
+        "source": component.source,
+        "calls": component.calls,
+        "seconds": component.seconds,
+        "events": None if outcomes is None else dict(outcomes),
+    }

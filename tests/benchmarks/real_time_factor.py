@@ -1,0 +1,57 @@
+"""Benchmark: how many times faster than real time the default scenario runs, and where the time goes.
+
+Run it with ``python tests/benchmarks/real_time_factor.py [REPETITIONS]``. Variants are run in turn within one process, so
+that their ratios hold on a noisy machine; nothing is asserted. Set-up (building or loading FMUs, certificates) is not counted.
+"""
+
+from __future__ import annotations
+
+import statistics
+import sys
+from collections.abc import Mapping
+
+from cosim import Scenario
+
+OBSERVERS = ("differentiator_cdo", "takagi_sugeno_cdo", "multirate_cdo", "discrete_uio")
+PLANTS = ("locomotive", "odometer", "driver")
+VARIANTS = {
+    "plants as FMI 3 FMUs, observers as blocks": {},
+    "plants as FMI 2 FMUs, observers as blocks": {f"{name}.as": "fmu2" for name in PLANTS},
+    "everything as FMI 3 FMUs": {f"{name}.as": "fmu3" for name in OBSERVERS},
+    "everything as blocks": {f"{name}.as": "block3" for name in PLANTS},
+}
+
+
+def measure(overrides: Mapping[str, str]) -> dict[str, float]:
+    """Real-time factor and microseconds per communication step of one run."""
+    outcome = Scenario.load("freight_profile_d").run(overrides={"certificates": "ignore", **overrides})
+    if outcome.failure is not None:
+        raise SystemExit(f"the run failed: {outcome.failure}")
+    summary = outcome.result.summary
+    steps = (summary["reached"] - summary["start"]) / summary["step"]
+    seconds = summary["seconds"]
+    return {
+        "real-time factor": summary["real_time_factor"],
+        "plants [us/step]": sum(seconds[n] for n in PLANTS) / steps * 1e6,
+        "observers [us/step]": sum(seconds[n] for n in OBSERVERS) / steps * 1e6,
+        "master [us/step]": seconds["master"] / steps * 1e6,
+        "recording [us/step]": seconds["recording"] / steps * 1e6,
+    }
+
+
+def main() -> None:
+    """Run all variants in turn and print medians."""
+    repetitions = int(sys.argv[1]) if len(sys.argv) > 1 else 5
+    runs: dict[str, list[dict[str, float]]] = {name: [] for name in VARIANTS}
+    for _ in range(repetitions):
+        for name, overrides in VARIANTS.items():
+            runs[name].append(measure(overrides))
+    for name, rows in runs.items():
+        print(name)
+        for key in rows[0]:
+            values = [row[key] for row in rows]
+            print(f"  {key:<22} median {statistics.median(values):8.1f}   min {min(values):8.1f}   max {max(values):8.1f}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,189 @@
+"""Bad input: every mistake is answered with file, place, what was expected, and exit code 2; results so far are kept."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from small_scenarios import small
+
+from cosim.cli import main
+from cosim.errors import CosimError
+from cosim.results.folder import read_results
+
+SETTINGS: dict[str, tuple[dict[str, Any], str]] = {
+    "step negative": ({"step": -0.01}, "step must be positive"),
+    "step zero": ({"step": 0.0}, "step must be positive"),
+    "step does not divide": ({"step": 0.03}, "does not divide the horizon.*stop = 0.48 or 0.51"),
+    "horizon empty": ({"stop": 0.0}, "must lie behind start"),
+    "wrong type": ({"stop": "soon"}, "stop: .*number.*soon"),
+    "unknown preset": ({"observer.preset": "repared"}, "components.observer.*no preset 'repared'.*'repaired'"),
+    "unknown option": ({"observer.options.premis": "live"}, "no option 'premis'.*premise"),
+    "bad option": ({"observer.options.premise": "dead"}, "'dead'.*'frozen'"),
+    "unknown parameter": ({"locomotive.mas": 1.0}, "locomotive: no variable 'mas'.*'mass'"),
+    "unknown model": ({"report.observers": ["x y"]}, "report.observers"),
+    "unknown key": ({"balises.spaceing": 3.0}, "balises.spaceing: unknown key.*'spacing'"),
+    "unknown top-level key": ({"stepp": 3.0}, "stepp: unknown key.*'step'"),
+    "balises unsorted": ({"balises.positions": [3.0, 1.0]}, "increasing position.*number 2 at 1 m follows number 1 at 3 m"),
+    "two balises at one place": ({"balises.positions": [1.0, 1.0]}, "one at a place"),
+    "balise outside the track": ({"balises.track_end": 3.0}, "'B3' at 4 m lies outside the track from 0 m to 3 m"),
+    "no balises": ({"balises.positions": []}, "at least one balise"),
+    "layout incomplete": ({"balises.layout": "csv"}, "layout 'csv' needs 'file'"),
+    "balise list missing": ({"balises.layout": "csv", "balises.file": "none.csv"}, "none.csv does not exist"),
+    "position unknown": ({"balises.position": "locomotive.positon"}, "locomotive: no variable 'positon'.*'position'"),
+    "position of nobody": ({"balises.position": "lokomotive.position"}, "balises.position.*'locomotive'"),
+    "not a receiver": ({"balises.receivers": ["driver"]}, "'driver' declares no event 'balise'"),
+    "early return impossible": ({"balises.method": "early-return"}, "needs balises.clock"),
+    "location accuracy": ({"balises.location_accuracy": 80.0}, "location_accuracy.*63"),
+    "probability": ({"balises.missed_fraction": 1.5}, "missed_fraction.*1"),
+    "certificate required": (
+        {"certificates": "require", "balises.expected_speed": 1.0},
+        "certificates = 'require'.*(?s:.)*UNSTABLE",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", SETTINGS)
+def test_a_wrong_setting_is_named_with_what_was_expected(case: str) -> None:
+    settings, message = SETTINGS[case]
+    with pytest.raises(CosimError, match=message):
+        small().run(overrides=settings)
+
+
+CONNECTIONS = {
+    "two sources": (
+        "locomotive.speed -> driver.odometer",
+        "driver.odometer has two sources, .*odometer.reading.* and locomotive.speed",
+    ),
+    "unknown component": ("train.speed -> driver.odometer", "'train.speed'.*component"),
+    "unknown output": ("locomotive.sped -> driver.odometer", "no variable 'sped'.*'speed'"),
+    "an input as source": ("driver.odometer -> observer.odometer", "causality 'input', expected output"),
+    "no arrow": ("driver.odometer observer.odometer", "line 4.*is not 'source.signal -> target.signal'"),
+}
+
+
+@pytest.mark.parametrize("case", CONNECTIONS)
+def test_a_wrong_connection_is_named(case: str) -> None:
+    line, message = CONNECTIONS[case]
+    with pytest.raises(CosimError, match=message):
+        small().connect(line).run()
+
+
+def test_units_that_do_not_fit_are_refused_with_both_names() -> None:
+    scenario = small()
+    scenario._data["connections"] = ["locomotive.position -> odometer.wheel_speed"]
+    with pytest.raises(CosimError, match=r"locomotive.position -> odometer.wheel_speed: units 'm' and 'm/s' do not fit"):
+        scenario.run()
+
+
+def test_an_unconnected_input_keeps_its_start_value_and_is_reported() -> None:
+    scenario = small()
+    scenario._data["connections"] = scenario._data["connections"][:2]
+    outcome = scenario.run()
+    assert any("Unconnected inputs" in w and "driver.odometer" in w and "observer.odometer" in w for w in outcome.warnings)
+
+
+# -- the command line ---------------------------------------------------------------------------------------------------
+
+
+def run_cli(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str]:
+    code = main(list(arguments))
+    return code, capsys.readouterr().err
+
+
+@pytest.fixture
+def plant_file(tmp_path: Path) -> Path:
+    path = tmp_path / "plant.toml"
+    path.write_text(
+        'stop = 1.0\nstep = 0.1\n[components.plant]\nfmu = "plant.fmu"\n[components.driver]\nmodel = "driver"\nas = "block3"\n'
+    )
+    return path
+
+
+def test_a_missing_fmu(plant_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, error = run_cli(capsys, "run", str(plant_file), "--out", str(plant_file.parent / "out"))
+    assert code == 2
+    assert f"plant: FMU {plant_file.parent / 'plant.fmu'} does not exist" in error
+
+
+def test_a_broken_fmu(plant_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (plant_file.parent / "plant.fmu").write_bytes(b"PK not a zip")
+    code, error = run_cli(capsys, "run", str(plant_file), "--out", str(plant_file.parent / "out"))
+    assert code == 2
+    assert "plant.fmu is not a readable FMU" in error
+    assert "Traceback" not in error
+
+
+def test_an_fmu_of_another_platform(plant_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with zipfile.ZipFile(plant_file.parent / "plant.fmu", "w") as archive:
+        archive.writestr(
+            "modelDescription.xml",
+            '<fmiModelDescription fmiVersion="2.0" modelName="plant" guid="{0}"><CoSimulation modelIdentifier="plant"/>'
+            "<ModelVariables/><ModelStructure/></fmiModelDescription>",
+        )
+        archive.writestr("binaries/win32/plant.dll", "")
+    code, error = run_cli(capsys, "run", str(plant_file), "--out", str(plant_file.parent / "out"))
+    assert code == 2
+    assert "no library for this platform" in error
+    assert "win32" in error
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "freight_profil_d"], "No scenario 'freight_profil_d'; did you mean 'freight_profile_"),
+        (["run", "missing.toml"], "missing.toml does not exist"),
+        (["run", "--set", "locomotive.mass"], "expected NAME=VALUE"),
+        (["run", "--set", "locomotiv.mass=3"], "no component 'locomotiv'.*did you mean 'locomotive'"),
+        (["info", "missing.fmu"], "missing.fmu does not exist"),
+    ],
+)
+def test_a_wrong_command_ends_with_2_and_a_hint(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    code, error = run_cli(capsys, *arguments)
+    assert code == 2
+    assert re.search(message, error), error
+
+
+def test_a_file_that_is_not_toml(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "bad.toml").write_text("stop = = 3")
+    code, error = run_cli(capsys, "run", str(tmp_path / "bad.toml"))
+    assert code == 2
+    assert "bad.toml: not readable as TOML" in error
+    assert "line 1" in error
+
+
+def test_every_fault_of_a_file_is_named_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "faults.toml"
+    path.write_text('stop = 1.0\nstep = 0.1\ncolour = 1\n[components.a]\nmodel = "driver"\nfmu = "x.fmu"\n')
+    code, error = run_cli(capsys, "run", str(path))
+    assert code == 2
+    assert "colour: unknown key" in error
+    assert "components.a: give exactly one of 'fmu'" in error
+
+
+def test_an_output_folder_that_cannot_be_written_is_found_early(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "taken").write_text("a file")
+    code, error = run_cli(capsys, "run", "--out", str(tmp_path / "taken" / "out"))
+    assert code == 2
+    assert "taken" in error
+
+
+def test_a_run_that_turns_to_nan_keeps_its_rows_and_ends_with_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "diverging.toml"
+    path.write_text(
+        "stop = 60.0\nstep = 0.1\n"
+        '[components.train]\nmodel = "locomotive"\nas = "block3"\n'
+        "parameters = { train_speed = 1e200, wheel_rate = 1e200 }\n"
+    )
+    code, error = run_cli(capsys, "run", str(path), "--out", str(tmp_path / "out"), "--no-report")
+    assert code == 2
+    assert "the run ended early" in error
+    assert " at t = " in error
+    result = read_results(tmp_path / "out")
+    assert result.failure is not None
+    assert len(result.table) >= 1
+    assert np.isfinite(result.table["time"]).all()

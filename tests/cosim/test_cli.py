@@ -1,0 +1,121 @@
+"""The command line: what it prints, what it writes, how it exits."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from small_scenarios import small
+
+from cosim import Scenario
+from cosim.cli import main
+from cosim.cli.run import parse_setting
+from cosim.results.folder import read_results
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every scenario name stands for the small one."""
+    monkeypatch.setattr(Scenario, "load", classmethod(lambda _cls, _name: small(title="Small run")))
+
+
+@pytest.mark.usefixtures("quick")
+def test_run_writes_everything_and_prints_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "any", "--out", str(tmp_path / "out"), "--set", "stop=0.3"]) == 0
+    printed = capsys.readouterr().out
+    assert "Small run: 0.3 s simulated" in printed
+    assert "localised by 'rollback'" in printed
+    written = {p.name for p in (tmp_path / "out").iterdir()}
+    assert written >= {"table.csv", "table.mat", "events.csv", "summary.json", "report.html"}
+    result = read_results(tmp_path / "out")
+    assert result.time[-1] == 0.3
+    assert result.summary["scenario"] == "script"
+
+
+@pytest.mark.usefixtures("quick")
+def test_strict_turns_a_warning_into_exit_code_1(tmp_path: Path) -> None:
+    common = ["run", "any", "--out", str(tmp_path), "--no-report", "--quiet", "--strict"]
+    assert main([*common, "--set", "balises.expected_speed=10.0"]) == 0  # gaps of 0.15 s: certified
+    assert main([*common, "--set", "balises.expected_speed=1.0"]) == 1  # 1.5 s: not
+
+
+@pytest.mark.usefixtures("quick")
+def test_run_as_json_is_one_document(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "any", "--out", str(tmp_path), "--json", "--no-report"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["failure"] is None
+    assert data["reached"] == 0.5
+    assert not (tmp_path / "report.html").exists()
+
+
+@pytest.mark.usefixtures("quick")
+def test_seeds_add_quartiles_to_print_and_report(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def load(_cls: type, _name: str) -> Scenario:
+        scenario = small().report(phases=[{"name": "all", "start": 0.0, "end": 0.5}], published={"observer": {"all": 0.5}})
+        return scenario.set("balises.layout", "aperiodic").set("balises.max_gap", 0.2)
+
+    monkeypatch.setattr(Scenario, "load", classmethod(load))
+    assert main(["run", "any", "--out", str(tmp_path), "--seeds", "3"]) == 0
+    assert "over 3 balise seeds" in capsys.readouterr().out
+    assert "Over several balise seeds" in (tmp_path / "report.html").read_text()
+    study = read_results(tmp_path).summary["seed_study"]
+    row = study["rows"][0]
+    assert study["seeds"] == [0, 1, 2]
+    assert row["lower quartile"] <= row["median"] <= row["upper quartile"]
+    assert row["published"] == 0.5
+
+
+def test_list_names_everything_with_its_source(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["list", "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert {"freight_profile_d", "freight_profile_b", "own_fmu"} <= set(data["scenarios"])
+    assert {"locomotive", "odometer", "driver"} <= set(data["models"])
+    observers = {"differentiator_cdo", "takagi_sugeno_cdo", "multirate_cdo", "discrete_uio", "slip_indicator"}
+    assert observers <= set(data["observers"])
+    for observer in data["observers"].values():
+        assert "Bouchama 2024" in observer["source"]
+    assert main(["list", "observers"]) == 0
+    printed = capsys.readouterr().out
+    assert "as_published" in printed
+    assert "scenarios:" not in printed
+
+
+@pytest.mark.compiler
+def test_info_describes_an_fmu(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from fmus import build_fmu
+    from plant_models import PLANTS
+
+    path = build_fmu(PLANTS["driver"](), tmp_path, fmi_version=2)
+    assert main(["info", str(path)]) == 0
+    printed = capsys.readouterr().out
+    assert "FMI version" in printed
+    assert "runs here" in printed
+    assert "odometer" in printed
+    assert main(["info", str(path), "--json"]) == 0
+    names = {v["name"] for v in json.loads(capsys.readouterr().out)["variables"]}
+    assert {"odometer", "effort", "effort_limit"} <= names
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("a.b=3", ("a.b", 3)),
+        ("a.b = 80e3", ("a.b", 80e3)),
+        ("a=[1.0, 2.0]", ("a", [1.0, 2.0])),
+        ("a=true", ("a", True)),
+        ("a=repaired", ("a", "repaired")),
+        ('a="x=y"', ("a", "x=y")),
+    ],
+)
+def test_a_setting_is_a_toml_value_where_it_is_one(text: str, expected: tuple[str, object]) -> None:
+    assert parse_setting(text) == expected
+
+
+def test_a_usage_error_exits_with_2(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as error:
+        main(["run", "--seeds", "0"])
+    assert error.value.code == 2
+    assert "at least 1" in capsys.readouterr().err

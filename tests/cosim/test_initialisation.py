@@ -1,0 +1,133 @@
+"""The exchange in Initialization Mode, against the solution of the coupled equations."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+from coupled_runs import block, prepare, run
+from mock_slaves import Counter, Mock, component
+
+from cosim.errors import RunError
+from cosim.master.initialisation import MAX_ROUNDS
+from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, state, vector
+
+STIFFNESS, DAMPING, MASS = 3.0, 0.5, 2.0
+
+
+class Mass(HybridSystem):
+    """``m x'' = force``; feeds its acceleration through."""
+
+    name = "mass"
+    states = (state("x", "m", 1.0), state("v", "m/s", 0.3))
+    inputs = (input_signal("force", "N"),)
+    outputs = (output_signal("position", "m"), output_signal("speed", "m/s"), output_signal("acceleration", "m/s2"))
+    internal_step = 1e-3
+
+    def flow(self, t, x, u, p):
+        return vector(x[1], u.force / MASS)
+
+    def output(self, t, x, u, p):
+        return {"position": x[0], "speed": x[1], "acceleration": u.force / MASS}
+
+
+class Spring(HybridSystem):
+    """``force = -k x - d v``: nothing but feedthrough."""
+
+    name = "spring"
+    inputs = (input_signal("position", "m"), input_signal("speed", "m/s"))
+    outputs = (output_signal("force", "N"),)
+
+    def output(self, t, x, u, p):
+        return {"force": -STIFFNESS * u.position - DAMPING * u.speed}
+
+
+class Sampler(HybridSystem):
+    """Samples at the start time and every 0.5 s."""
+
+    name = "sampler"
+    states = (memory("kept", "m", -7.0),)
+    inputs = (input_signal("signal", "m"),)
+    outputs = (output_signal("sample", "m", variability="discrete"),)
+    parameters = (parameter("period", "s", 0.5),)
+    events = (PeriodicEvent("tick", "period"),)
+
+    def output(self, t, x, u, p):
+        return {"sample": x[0]}
+
+    def jump(self, event, t, x, u, p):
+        return vector(u.signal)
+
+
+PAIRS = [("spring.force", "mass.force"), ("mass.position", "spring.position"), ("mass.speed", "spring.speed")]
+
+
+@pytest.mark.parametrize("listing", [("mass", "spring"), ("spring", "mass")])
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_mass_on_a_spring_starts_with_the_right_force(listing: tuple[str, str], version: int) -> None:
+    parts = {"mass": Mass(), "spring": Spring()}
+    ran = run([block(parts[n], n, version) for n in listing], PAIRS, 0.01, 3)
+    force = -STIFFNESS * 1.0 - DAMPING * 0.3
+    assert ran["spring.force"][0] == pytest.approx(force, rel=1e-15)
+    assert ran["mass.acceleration"][0] == pytest.approx(force / MASS, rel=1e-15)
+    assert ran.master.exchange_rounds >= 2
+
+
+def test_without_the_exchange_the_first_step_would_be_wrong() -> None:
+    """The first step uses the force at the start: to first order v(h) = v(0) + h F / m, and not v(0)."""
+    h = 0.01
+    ran = run([block(Mass(), "mass"), block(Spring(), "spring")], PAIRS, h, 1)
+    force = -STIFFNESS * 1.0 - DAMPING * 0.3
+    assert ran["mass.speed"][1] == pytest.approx(0.3 + h * force / MASS, rel=1e-12)
+
+
+def test_what_is_sampled_at_the_start_time_is_in_the_first_row() -> None:
+    """The sample is taken when initialisation ends; a component listed before the sampler reads it all the same."""
+    parts = [block(Spring(), "reader"), block(Mass(), "mass"), block(Sampler(), "sampler")]
+    ran = run(parts, [("mass.position", "sampler.signal"), ("sampler.sample", "reader.position")], 0.1, 2)
+    assert ran["sampler.sample"][0] == 1.0
+    assert ran["reader.force"][0] == -STIFFNESS
+
+
+def test_a_contraction_settles_on_its_fixed_point() -> None:
+    """y = u / 2 + 1 and u = y: y = 2. Undeclared feedthrough is the only way to get here without being refused."""
+
+    class Half(Mock):
+        inputs: ClassVar[dict[str, Any]] = {"u": 0.0}
+        outputs: ClassVar[dict[str, Any]] = {"y": 0.0}
+
+        def compute(self) -> None:
+            self.v["y"] = 0.5 * self.v["u"] + 1.0
+
+    ran = run([component(Half(), "a")], [("a.y", "a.u")], 0.1, 1)
+    assert ran["a.y"][0] == pytest.approx(2.0, rel=1e-11)
+    assert ran.master.exchange_rounds > 30
+
+
+def test_an_exchange_that_does_not_settle_names_the_signals() -> None:
+    class Flip(Mock):
+        inputs: ClassVar[dict[str, Any]] = {"u": 0.0}
+        outputs: ClassVar[dict[str, Any]] = {"y": 0.0, "steady": 5.0}
+
+        def compute(self) -> None:
+            self.v["y"] = 1.0 - self.v["u"]
+
+    calm = component(Counter(), "calm")
+    master = prepare([component(Flip(), "a"), calm], [("a.y", "a.u")], 0.1, 3, start=2.0)
+    with pytest.raises(RunError, match=rf"t = 2 s does not settle after {MAX_ROUNDS} exchanges; still changing: a\.y\.") as error:
+        master.run()
+    assert error.value.time == 2.0
+    assert master.recorder.count == 0
+
+
+def test_infinite_and_missing_values_do_not_hide_as_unsettled() -> None:
+    class Odd(Mock):
+        outputs: ClassVar[dict[str, Any]] = {"y": 0.0}
+
+        def compute(self) -> None:
+            self.v["y"] = np.inf
+
+    master = prepare([component(Odd(), "odd")], [], 0.1, 3)
+    with pytest.raises(RunError, match=r"Component 'odd' at t = 0 s: output odd.y is inf"):
+        master.run()

@@ -1,0 +1,318 @@
+"""Report figures, tables and page: labels with units, wild data, missing data, and a page that needs nothing from outside."""
+
+import math
+import re
+from base64 import b64decode
+from collections.abc import Callable
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+from synthetic_run import OBSERVERS, ZONES, synthetic_result, synthetic_spec
+
+from cosim.errors import OutputError
+from cosim.report.drawing import thin
+from cosim.report.gallery import PANELS, Panel, draw_all, png
+from cosim.report.gap_figure import certified_gaps, sampling_gaps
+from cosim.report.html import write_report
+from cosim.report.main_picture import main_picture
+from cosim.report.metrics import phase_metrics
+from cosim.report.spec import ReportSpec
+from cosim.report.style import new_figure, observer_line
+from cosim.report.table import text_table
+from cosim.results.folder import read_results, write_results
+from cosim.results.result import Result
+
+VOID = {"meta", "img", "br", "hr", "link", "input"}
+
+
+class Page(HTMLParser):
+    """A strict reader: every element must be closed in order."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.text = ""
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text += data if self.open and self.open[-1] != "style" else ""
+
+    def all(self, tag: str) -> list[dict[str, str | None]]:
+        return [attrs for name, attrs in self.tags if name == tag]
+
+
+def rows_of(result: Result, count: int) -> Result:
+    return replace(result, table=result.table[:count])
+
+
+@pytest.fixture(scope="module")
+def result() -> Result:
+    return synthetic_result()
+
+
+# --- figures ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("panel", PANELS, ids=lambda p: p.key)
+def test_axes_have_names_with_units(panel: Panel, result: Result) -> None:
+    ax = panel.draw(result, synthetic_spec(), None)
+    assert ax.get_xlabel() == "Time [s]"
+    assert re.search(r"\[(km/h|m/s|m|%|kN|s)\]", ax.get_ylabel())
+    assert ax.get_legend() is not None
+
+
+@pytest.mark.parametrize("panel", PANELS, ids=lambda p: p.key)
+def test_figures_draw_on_the_axes_given(panel: Panel, result: Result) -> None:
+    ax = new_figure().add_subplot()
+    assert panel.draw(result, synthetic_spec(), ax) is ax
+
+
+@pytest.mark.parametrize("panel", PANELS, ids=lambda p: p.key)
+def test_figures_leave_matplotlib_as_it_was(panel: Panel, result: Result) -> None:
+    with matplotlib.rc_context({"font.size": 17.0, "axes.grid": False}):
+        before = dict(matplotlib.rcParams)
+        png(panel.draw(result, synthetic_spec(), None).figure)
+        assert dict(matplotlib.rcParams) == before
+
+
+def test_legends_lie_above_the_curves_and_inside_the_picture(result: Result) -> None:
+    for panel in PANELS:
+        ax = panel.draw(result, synthetic_spec(), None)
+        ax.figure.draw_without_rendering()  # type: ignore[union-attr]
+        box, legend = ax.get_window_extent(), ax.get_legend().get_window_extent()  # type: ignore[union-attr]
+        assert legend.y0 >= box.y1
+        assert legend.x1 <= ax.figure.bbox.x1, panel.key
+        assert box.width > 0.8 * ax.figure.bbox.width, panel.key  # nothing squashes the axes
+
+
+def limits(ax: Axes) -> tuple[float, float]:
+    return ax.get_ylim()
+
+
+@pytest.mark.parametrize("key", ["speed_error", "position_error"])
+def test_diverged_observer_does_not_squash_the_others(key: str, result: Result) -> None:
+    panel = next(p for p in PANELS if p.key == key)
+    wild = synthetic_result(diverged="takagi_sugeno_cdo")
+    normal, diverged = (panel.draw(r, synthetic_spec(), None) for r in (result, wild))
+    assert limits(diverged)[1] <= 1.5 * limits(normal)[1]
+    assert any("diverged" in text for text in diverged.get_legend_handles_labels()[1])
+
+
+def test_diverged_observer_does_not_stretch_the_speed_axis(result: Result) -> None:
+    speed = PANELS[0]
+    normal, diverged = (speed.draw(r, synthetic_spec(), None) for r in (result, synthetic_result(diverged="multirate_cdo")))
+    assert limits(diverged) == pytest.approx(limits(normal), rel=0.05)  # the odd one out set nothing but its own noise
+    assert not any("off scale" in text for text in normal.get_legend_handles_labels()[1])
+    assert "two CDOs (off scale)" in diverged.get_legend_handles_labels()[1]
+
+
+def test_similar_errors_are_drawn_with_their_sign(result: Result) -> None:
+    spec = replace(synthetic_spec(), observers=OBSERVERS[2:])
+    ax = PANELS[1].draw(result, spec, None)
+    assert ax.get_yscale() == "linear"
+    assert limits(ax)[0] == -limits(ax)[1]
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, 1e300, 0.0, 5e-324])
+def test_figures_stand_any_value(value: float) -> None:
+    wild = synthetic_result()
+    for name in wild.table.dtype.names or ():
+        if name.startswith("discrete_uio"):
+            wild.table[name] = value
+    pictures = draw_all(wild, synthetic_spec())
+    assert len(pictures) == len(PANELS)
+
+
+def test_every_column_may_be_beyond_all_bounds() -> None:
+    wild = synthetic_result()
+    for name in (wild.table.dtype.names or ())[1:]:
+        wild.table[name][5:] = np.where(np.arange(len(wild.table) - 5) % 2, 1e308, math.nan)
+    assert len(draw_all(wild, synthetic_spec())) == len(PANELS)
+
+
+def test_observers_differ_in_colour_and_in_dashes() -> None:
+    lines = [observer_line(OBSERVERS, o) for o in OBSERVERS]
+    assert len({to_hex(line["color"]) for line in lines}) == len({str(line["linestyle"]) for line in lines}) == len(OBSERVERS)
+
+
+def test_equal_runs_give_equal_bytes(result: Result) -> None:
+    assert png(main_picture(result, synthetic_spec())) == png(main_picture(result, synthetic_spec()))
+
+
+def test_main_picture_shares_one_time_axis(result: Result) -> None:
+    axes = main_picture(result, synthetic_spec()).axes
+    assert len(axes) == 4
+    assert {ax.get_xlim() for ax in axes} == {(0.0, 90.0)}
+
+
+def test_thinning_keeps_the_extremes() -> None:
+    time = np.arange(100_000.0)
+    values = np.sin(time / 300)
+    values[[3456, 78901]] = [50.0, -60.0]
+    t, v = thin(time, values)
+    assert len(t) < 7000
+    assert (v.max(), v.min()) == (50.0, -60.0)
+    assert (t[0], t[-1]) == (0.0, 99_999.0)
+    assert np.all(np.diff(t) > 0)
+
+
+def test_gaps_come_from_used_telegrams_only(result: Result) -> None:
+    stamps, gaps = sampling_gaps(result)
+    used = [e.stamp for e in result.events if e.kind == "true"]
+    assert stamps.tolist() == used
+    assert gaps.tolist() == np.diff(used).tolist()
+
+
+def test_observer_without_a_limit_has_no_level(result: Result) -> None:
+    assert certified_gaps(result, synthetic_spec()) == dict(zip(OBSERVERS[:3], (0.5, 0.286, 0.5), strict=True))
+
+
+def test_certified_gaps_name_their_observers(result: Result) -> None:
+    texts = PANELS[-1].draw(result, synthetic_spec(), None).get_legend_handles_labels()[1]
+    assert "certified to 0.286 s: Takagi-Sugeno CDO (exceeded)" in texts
+    assert "certified to 0.500 s: differentiator + CDO, two CDOs (exceeded)" in texts
+
+
+# --- table ------------------------------------------------------------------------------------------------------------
+
+
+def test_text_table_is_aligned_and_shows_published_numbers(result: Result) -> None:
+    lines = text_table(phase_metrics(result, synthetic_spec()), synthetic_spec()).splitlines()
+    assert len({len(line) for line in lines}) == 1
+    assert len(lines) == 2 + 4 * 3
+    assert "max |v| [m/s]" in lines[0]
+    braking = next(line for line in lines if line.startswith("Takagi-Sugeno CDO") and "braking" in line)
+    assert braking.split()[-2:] == ["0.0250", "0.0225"]
+
+
+# --- page -------------------------------------------------------------------------------------------------------------
+
+
+def test_page_needs_nothing_from_outside(result: Result, tmp_path: Path) -> None:
+    path = write_report(result, synthetic_spec(), tmp_path / "out")
+    text = path.read_text(encoding="utf-8")
+    assert not re.search(r"https?:|//[a-z]|url\(|<script|<link|@import", re.sub(r"base64,[^\"]*", "", text))
+    images = Page(text).all("img")
+    assert len(images) == len(PANELS)
+    for image, panel in zip(images, PANELS, strict=True):
+        head, _, data = (image["src"] or "").partition(",")
+        assert head == "data:image/png;base64"
+        assert b64decode(data) == (path.parent / "figures" / f"{panel.key}.png").read_bytes()
+        assert image["alt"]
+
+
+def test_page_is_well_formed_and_says_what_was_run(result: Result, tmp_path: Path) -> None:
+    page = Page(write_report(result, synthetic_spec(), tmp_path).read_text(encoding="utf-8"))
+    assert len(page.all("h1")) == 1
+    assert all(attrs.get("scope") for attrs in page.all("th"))
+    for words in (
+        "Scenario adhesion_zones covers 90.0 s of train time in communication steps of 10.0 ms",
+        "72.9 times as fast as real time",  # 90 s in 1.234 s
+        "located by 'rollback': redone steps are bit-identical.",
+        "gaps up to 1.1 s exceed the certified 0.286 s",
+        "published max |speed error| [m/s]",
+        "does not hold",
+        "balises were missed",
+        "locomotive.fmu",
+        "agree in order of magnitude only",
+    ):
+        assert words in page.text
+    assert "The run ended early" not in page.text
+
+
+def test_every_text_is_escaped(result: Result, tmp_path: Path) -> None:
+    evil = '<img src=x onerror="1">&\'"'
+    spec = replace(synthetic_spec(), title=evil, labels=dict.fromkeys(OBSERVERS, evil), notes=[evil])
+    phases = [replace(p, name=evil) for p in spec.phases]
+    summary = {
+        "scenario": evil, "localisation": {"method": "m", "reason": evil}, "description": evil,
+        "warnings": [evil], "notes": evil, "versions": {evil: evil},
+        "components": [{"name": evil, "kind": evil}], "certificates": {evil: {"explanation": evil}},
+    }  # fmt: skip
+    text = write_report(replace(result, summary=summary, failure=evil), replace(spec, phases=phases), tmp_path).read_text("utf-8")
+    page = Page(text)
+    assert "onerror" not in {name for _, attrs in page.tags for name in attrs}
+    assert page.text.count(evil) >= 10
+
+
+def test_failure_stands_at_the_top_in_a_red_box(result: Result, tmp_path: Path) -> None:
+    failed = replace(rows_of(result, 300), failure="Component 'locomotive' at t = 10 s: stopped.")
+    page = Page(write_report(failed, synthetic_spec(), tmp_path).read_text(encoding="utf-8"))
+    first = page.all("section")[0]
+    assert (first["class"], first["role"]) == ("box failure", "alert")
+    assert "Component 'locomotive' at t = 10 s: stopped." in page.text
+
+
+@pytest.mark.parametrize("rows", [0, 1, 2])
+def test_report_of_hardly_any_rows(rows: int, result: Result, tmp_path: Path) -> None:
+    few = replace(rows_of(result, rows), events=(), summary={}, failure="initialisation failed")
+    Page(write_report(few, synthetic_spec(), tmp_path).read_text(encoding="utf-8"))
+    png(main_picture(few, synthetic_spec()))
+
+
+@pytest.mark.parametrize(
+    "spec", [ReportSpec(), ReportSpec(observers=OBSERVERS), ReportSpec(true_speed="no.such", observers=["none"])]
+)
+def test_report_without_roles(spec: ReportSpec, result: Result, tmp_path: Path) -> None:
+    page = Page(write_report(result, spec, tmp_path).read_text(encoding="utf-8"))
+    assert len(page.all("img")) == sum(panel.available(result, spec) for panel in PANELS)
+    png(main_picture(result, spec))
+
+
+def test_report_of_an_unusual_summary(result: Result, tmp_path: Path) -> None:
+    summary = {
+        "scenario": 3,
+        "wall_seconds": 0,
+        "step": "x",
+        "warnings": None,
+        "certificates": {"a": 1},
+        "components": [1],
+        "versions": 2,
+    }
+    Page(write_report(replace(result, summary=summary), synthetic_spec(), tmp_path).read_text(encoding="utf-8"))
+
+
+def test_report_of_a_result_read_back_is_the_same(result: Result, tmp_path: Path) -> None:
+    write_results(result, tmp_path / "a", ("csv",))
+    first = write_report(result, synthetic_spec(), tmp_path / "a").read_text(encoding="utf-8")
+    second = write_report(read_results(tmp_path / "a"), synthetic_spec(), tmp_path / "b").read_text(encoding="utf-8")
+    assert _without_order(first) == _without_order(second)
+
+
+def _without_order(text: str) -> list[str]:
+    return sorted(text.splitlines())  # the summary's keys are sorted in its file
+
+
+def test_figures_of_an_earlier_run_do_not_stay(result: Result, tmp_path: Path) -> None:
+    write_report(result, synthetic_spec(), tmp_path)
+    write_report(result, ReportSpec(), tmp_path)
+    assert [p.name for p in (tmp_path / "figures").iterdir()] == ["gaps.png"]
+
+
+def test_folder_that_cannot_be_written_is_refused(result: Result, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="Choose another output folder"):
+        write_report(rows_of(result, 2), synthetic_spec(), tmp_path / "file")
+
+
+def test_zones_are_shaded(result: Result) -> None:
+    draw: Callable[..., Axes] = PANELS[1].draw
+    shaded = [p for p in draw(result, synthetic_spec(), None).patches if p.get_label() == "low adhesion" or p.get_zorder() == 0]
+    assert len(shaded) == len(ZONES)
