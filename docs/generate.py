@@ -1,0 +1,217 @@
+"""Writes the generated parts of README.md and of these pages, and the README's picture: ``python docs/generate.py``.
+
+A generated part stands between ``<!-- generated: NAME -->`` and ``<!-- end -->``. The tests compare the parts with what this
+script would write, so that no table can drift from the code. It touches README.md, ``docs/*.md`` and the
+picture only.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Callable, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any, get_args, get_origin
+
+from annotated_types import Ge, Gt, Le
+from pydantic.fields import FieldInfo
+
+import fmu_observer
+from cosim import Outcome, Scenario
+from cosim.report.main_picture import main_picture
+from cosim.report.metrics import phase_metrics
+from cosim.report.table import text_table
+from cosim.scenario import schema
+
+DOCS = Path(__file__).parent
+ROOT = DOCS.parent
+WORDS = DOCS / "scenario_keys.toml"
+PICTURE = DOCS / "images" / "main_picture.png"
+PART = r"(<!-- generated: {name} -->\n)(.*?)(<!-- end -->)"
+SHORTENED = ("traction zone", "braking zone")
+
+
+def main() -> None:
+    """Rewrite every generated part."""
+    for (file, name), make in PARTS.items():
+        path = ROOT / file
+        text = path.read_text(encoding="utf-8")
+        path.write_text(replace_part(text, name, make()), encoding="utf-8")
+        print(f"{file}: {name}")
+    write_picture()
+    print(PICTURE.relative_to(ROOT))
+
+
+def part(text: str, name: str) -> str:
+    """The present content of a generated part.
+
+    Raises:
+        ValueError: the text has no such part.
+    """
+    found = re.search(PART.format(name=re.escape(name)), text, re.DOTALL)
+    if found is None:
+        raise ValueError(f"no part '<!-- generated: {name} -->' ... '<!-- end -->'")
+    return found.group(2)
+
+
+def replace_part(text: str, name: str, content: str) -> str:
+    """The text with new content in a generated part."""
+    part(text, name)
+    return re.sub(PART.format(name=re.escape(name)), lambda m: m[1] + content + m[3], text, flags=re.DOTALL)
+
+
+# -- the run of the README ------------------------------------------------------------------------------------------
+
+
+@cache
+def default_run() -> Outcome:
+    """The run of the README's first command; certificates change no number of it.
+
+    Raises:
+        RuntimeError: the run failed.
+    """
+    outcome = Scenario.load("freight_profile_d").run(overrides={"certificates": "ignore"})
+    if outcome.failure is not None:
+        raise RuntimeError(outcome.failure)
+    return outcome
+
+
+def write_picture() -> None:
+    """The main picture of the default run, for the README."""
+    outcome = default_run()
+    PICTURE.parent.mkdir(exist_ok=True)
+    main_picture(outcome.result, outcome.spec).savefig(PICTURE, dpi=110)
+
+
+def printed_table() -> str:
+    """The table of the default run, two phases of it, as ``cosim run`` prints it."""
+    outcome = default_run()
+    head, rule, *rows = text_table(phase_metrics(outcome.result, outcome.spec), outcome.spec).splitlines()
+    chosen = [row for row in rows if any(f"  {phase}  " in row for phase in SHORTENED)]
+    return "\n".join(["```text", head, rule, *chosen, "```", ""])
+
+
+# -- certificates ---------------------------------------------------------------------------------------------------
+
+NUMBERS = {"S1": "differentiator_cdo", "S2": "takagi_sugeno_cdo", "S4": "multirate_cdo", "S5": "discrete_uio"}
+
+
+def certificate_table() -> str:
+    """Shipped observers and presets with their source and their certified gaps, default parameters."""
+    rows = [
+        "| | observer | what it is | Bouchama 2024 | preset | mixed gaps certified up to | constant gap unstable from |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for number, name in NUMBERS.items():
+        system: Any = fmu_observer.OBSERVERS[name]()
+        source = system.source.removeprefix("Bouchama 2024, ")
+        for preset in list(system.presets) or [None]:
+            certificate = system.certify(0.1, preset=preset)
+            limits = [f"{limit:.3g} s" for limit in (certificate.aperiodic_limit, certificate.constant_limit)]
+            preset_cell = _preset(system, preset)
+            rows.append(f"| {number} | `{name}` | {system.description} | {source} | {preset_cell} | {limits[0]} | {limits[1]} |")
+    return "\n".join([*rows, ""])
+
+
+def _preset(system: Any, preset: str | None) -> str:
+    if preset is None:
+        return "(none)"
+    return f"`{preset}`" + (" (default)" if preset == system.default_preset else "")
+
+
+# -- the keys of a scenario -----------------------------------------------------------------------------------------
+
+
+def schema_page(table: str) -> Callable[[], str]:
+    """A function that writes the key table of one table of the schema."""
+    return lambda: key_table(table)
+
+
+def key_table(table: str) -> str:
+    """Keys of one table of the schema, types and defaults from the code, units and meanings from ``scenario_keys.toml``.
+
+    Raises:
+        ValueError: the code has a key without words, or there are words without a key.
+    """
+    model, words = schema_tables()[table], tomllib.loads(WORDS.read_text(encoding="utf-8"))[table]
+    fields: Mapping[str, FieldInfo] = {info.alias or name: info for name, info in model.model_fields.items()}
+    if set(fields) != set(words):
+        bare, extra = sorted(set(fields) - set(words)), sorted(set(words) - set(fields))
+        raise ValueError(f"{WORDS.name}, [{table}]: keys without words {bare}, words without key {extra}")
+    rows = ["| key | type | default | unit | meaning |", "|---|---|---|---|---|"]
+    for key, info in fields.items():
+        unit, meaning = words[key]
+        rows.append(f"| `{key}` | {_type(info)} | {_default(info)} | {unit or '-'} | {meaning} |")
+    return "\n".join([*rows, ""])
+
+
+def schema_tables() -> dict[str, Any]:
+    """The tables of the schema by the name they have on the page."""
+    return {
+        "scenario": schema.ScenarioTable,
+        "component": schema.ComponentTable,
+        "balises": schema.BalisesTable,
+        "false_telegram": schema.FalseTelegramTable,
+        "report": schema.ReportTable,
+        "phase": schema.PhaseTable,
+    }
+
+
+def _default(info: FieldInfo) -> str:
+    if info.is_required():
+        return "**required**"
+    value = info.default
+    if value is None:
+        return "-"
+    if isinstance(value, str):
+        return f'`"{value}"`'
+    return f"`{value}`" if isinstance(value, int | float) else "empty"
+
+
+def _type(info: FieldInfo) -> str:
+    limits = [_limit(bound) for bound in info.metadata if isinstance(bound, Gt | Ge | Le)]
+    return ", ".join([_kind(info.annotation), *limits])
+
+
+def _limit(bound: Gt | Ge | Le) -> str:
+    if isinstance(bound, Gt):
+        return f"> {bound.gt:g}"  # type: ignore[str-format]
+    return f">= {bound.ge:g}" if isinstance(bound, Ge) else f"<= {bound.le:g}"  # type: ignore[str-format]
+
+
+SIMPLE = {float: "number", int: "whole number", str: "text", bool: "true or false"}
+
+
+def _kind(annotation: Any) -> str:
+    """A type in the words of TOML."""
+    origin, arguments = get_origin(annotation), [a for a in get_args(annotation) if a is not type(None)]
+    if annotation in SIMPLE:
+        text = SIMPLE[annotation]
+    elif hasattr(annotation, "__metadata__"):
+        text = _type(FieldInfo.from_annotation(annotation))
+    elif origin is list:
+        text = f"list of {_kind(arguments[0])}s"
+    elif origin is tuple:
+        text = f"list of {len(arguments)} numbers"
+    elif origin is dict:
+        text = f"table of {_kind(arguments[1])}"
+    elif isinstance(annotation, type):
+        text = "table"
+    elif all(isinstance(a, str) for a in arguments):
+        text = ", ".join(f'`"{a}"`' for a in arguments)
+    else:
+        text = " or ".join(dict.fromkeys(_kind(a) for a in arguments))
+    return text
+
+
+PARTS: dict[tuple[str, str], Callable[[], str]] = {
+    ("README.md", "printed table"): printed_table,
+    ("README.md", "observers"): certificate_table,
+    ("docs/certificates.md", "observers"): certificate_table,
+    **{("docs/scenario_files.md", name): schema_page(name)
+       for name in ("scenario", "component", "balises", "false_telegram", "report", "phase")},
+}  # fmt: skip
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,66 @@
+"""What the pages tell the reader to type works: Python blocks, scenario files and commands, page by page in order."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+from pkgutil import resolve_name
+from typing import Any
+
+import pytest
+from pages import PAGES, Block, blocks
+
+import cosim.cli
+import fmus.cli
+import plant_models
+
+PROGRAMS = {"cosim": cosim.cli.main, "fmus": fmus.cli.main}
+WITH_CODE = [page for page in PAGES if any(b.language in ("python", "toml", "sh") and b.command is None for b in blocks(page))]
+
+
+def run_commands(page: Path, block: Block) -> None:
+    for number, line in enumerate(block.code.splitlines()):
+        program, *arguments = shlex.split(line)
+        assert PROGRAMS[program](arguments) == 0, f"{page.name}, line {block.line + number}: {line}"
+
+
+def run_python(page: Path, block: Block, names: dict[str, Any]) -> None:
+    code = "\n" * (block.line - 1) + block.code  # line numbers of a failure are those of the page
+    exec(compile(code, str(page), "exec"), names)
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("page", WITH_CODE, ids=lambda p: p.name)
+def test_blocks_of_a_page(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    fmus.build_fmu(plant_models.Locomotive(), "vendor.fmu", preset="chapter_3_four_axles")  # the reader's own
+    names: dict[str, Any] = {"__name__": "page"}
+    for block in blocks(page):
+        if block.command is not None:
+            continue  # installs; the CI script runs these
+        if block.language == "python":
+            run_python(page, block, names)
+        elif block.language == "toml":
+            first, _, rest = block.code.partition("\n")
+            Path(first.removeprefix("# ")).write_text(rest, encoding="utf-8")
+        elif block.language == "sh":
+            run_commands(page, block)
+
+
+NAMES = re.compile(r"`((?:plant_models|fmu_observer|fmus|cosim)(?:\.[A-Za-z_]\w*)+)[`(]")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_names_that_a_page_mentions_exist(page: Path) -> None:
+    missing = []
+    for name in NAMES.findall(page.read_text(encoding="utf-8")):
+        try:
+            resolve_name(name)
+        except (ImportError, AttributeError):
+            missing.append(name)
+    assert missing == []
+
+
+def test_every_language_is_checked_or_plain() -> None:
+    assert {b.language for page in PAGES for b in blocks(page)} <= {"python", "toml", "sh", "text"}

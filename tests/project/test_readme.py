@@ -1,0 +1,124 @@
+"""The README keeps its word: its two commands, its printed table, its list of dependencies, its links."""
+
+from __future__ import annotations
+
+import ast
+import re
+import shlex
+import subprocess
+import tomllib
+from pathlib import Path
+
+import pytest
+from pages import PACKAGES, PAGES, README, ROOT, blocks, generator
+
+from cosim import shipped_scenarios
+
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+PACKAGE_NAME = re.compile(r"^[A-Za-z0-9-]+")
+
+
+def command(name: str) -> str:
+    (line,) = [b.code for b in blocks(README) if b.command == name]
+    return line.removesuffix("\n")
+
+
+def requirements(entries: list[str]) -> list[str]:
+    return [PACKAGE_NAME.match(entry)[0] for entry in entries]  # type: ignore[index]
+
+
+@pytest.mark.parametrize(("name", "program"), [("run", ".venv/bin/cosim"), ("test", ".venv/bin/python -m pytest")])
+def test_a_command_is_one_line_that_installs_and_does_its_work(name: str, program: str) -> None:
+    line = command(name)
+    assert "\n" not in line
+    environment, install, work = line.split(" && ")
+    assert environment == "python3 -m venv .venv"
+    assert install.startswith(".venv/bin/pip install")
+    assert work.startswith(program)
+
+
+def test_the_run_command_names_a_shipped_scenario_and_what_is_installed() -> None:
+    words = shlex.split(command("run").split(" && ")[-1])
+    assert words[2] in shipped_scenarios()
+    assert Path(words[0]).name in PROJECT["project"]["scripts"]
+
+
+def test_the_test_command_installs_an_extra_that_exists() -> None:
+    extras = re.search(r"\.\[(.*?)\]", command("test"))
+    assert extras is not None
+    assert set(extras[1].split(",")) <= set(PROJECT["project"]["optional-dependencies"])
+
+
+@pytest.mark.parametrize("name", ["run", "test"])
+def test_the_ci_script_takes_the_commands_from_the_readme(name: str) -> None:
+    script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    function = script[script.index("readme_command()") :].partition("\n}\n")[0] + "\n}\n"
+    code = f"set -euo pipefail; VENV=.ci/venv; {function} readme_command {name}"
+    done = subprocess.run(["bash", "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == command(name).replace(".venv", ".ci/venv")
+    assert f"run_readme {name}" in script
+
+
+def test_the_printed_table_is_what_the_run_prints() -> None:
+    generate = generator()
+    stated = generate.part(README.read_text(encoding="utf-8"), "printed table").splitlines()
+    actual = generate.printed_table().splitlines()
+    assert len(stated) == len(actual)
+    for ours, theirs in zip(stated, actual, strict=True):
+        ours_cells, theirs_cells = re.split(r"  +", ours.strip()), re.split(r"  +", theirs.strip())
+        assert len(ours_cells) == len(theirs_cells)
+        for a, b in zip(ours_cells, theirs_cells, strict=True):
+            # 10 %: sliding modes chatter, and another processor or library may round differently
+            assert float(a) == pytest.approx(float(b), rel=0.1) if _is_number(b) else a.strip("-") == b.strip("-")
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+# -- dependencies ---------------------------------------------------------------------------------------------------
+
+
+def imported_packages() -> set[str]:
+    """Top-level names that the four packages import anywhere."""
+    names: set[str] = set()
+    for path in (p for package in PACKAGES for p in (ROOT / package).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                names |= {alias.name.partition(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                names.add(node.module.partition(".")[0])
+    return names
+
+
+@pytest.mark.parametrize("dependency", requirements(PROJECT["project"]["dependencies"]))
+def test_a_dependency_has_a_line_that_is_true(dependency: str) -> None:
+    (line,) = [row for row in README.read_text(encoding="utf-8").splitlines() if row.startswith(f"| `{dependency}` |")]
+    assert ("not imported yet" in line) == (dependency not in imported_packages())
+
+
+def test_nothing_is_imported_that_is_not_a_dependency() -> None:
+    import sys
+
+    known = {*requirements(PROJECT["project"]["dependencies"]), *PACKAGES, *sys.stdlib_module_names}
+    assert imported_packages() - known == set()
+
+
+@pytest.mark.parametrize("extra", ["test", "docs"])
+def test_the_extras_are_named(extra: str) -> None:
+    text = README.read_text(encoding="utf-8")
+    assert [n for n in requirements(PROJECT["project"]["optional-dependencies"][extra]) if f"`{n}`" not in text] == []
+
+
+# -- links ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_links_and_pictures_exist(page: Path) -> None:
+    targets = re.findall(r"\]\(([^)#]+?)(?:#[^)]*)?\)", page.read_text(encoding="utf-8"))
+    missing = [t for t in targets if not (page.parent / t).exists() and not (page.parent / f"{t}.md").exists()]
+    assert missing == []
