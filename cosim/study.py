@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from math import isnan
 from typing import Any
 
 import numpy as np
@@ -84,7 +85,7 @@ def seed_study(scenario: Scenario, seeds: Iterable[int], tell: Callable[[int, in
             raise RunError(f"Seed {seed}: {outcome.failure}")
         study = study or SeedStudy(outcome.spec, chosen)
         for row in phase_metrics(outcome.result, outcome.spec):
-            if row.speed is not None:
+            if row.speed is not None and not isnan(row.speed.max_abs):  # NaN: the run ended before this phase
                 study.errors.setdefault((row.observer, row.phase), []).append(row.speed.max_abs)
         if tell is not None:
             tell(done, len(chosen))

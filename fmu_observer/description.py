@@ -245,10 +245,11 @@ def _feedthrough(system: HybridSystem) -> np.ndarray:
 
 
 def _token(system: HybridSystem, description: ModelDescription) -> str:
-    """A name for the content: other variables, starts, options or events, another token."""
+    """A name for the content: other equations, variables, starts, options or events, another token."""
     content: list[object] = [description.fmiVersion, system.name, system.method, sorted(map(str, system.options.items()))]
     content += [[getattr(v, name) for name in TOKEN_ATTRIBUTES] + list(v.clocks or ()) for v in description.modelVariables]
     content += [[e.name, e.period, e.offset, len(e.noises)] for e in system.periodic_events]
     content += [[u.variable.name, *(known.name for known in u.dependencies)] for u in description.outputs]
+    content += [TracedSystem(system).digest() if system.traceable else type(system).__qualname__]
     digest = hashlib.sha256(json.dumps(content).encode()).hexdigest()
     return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"

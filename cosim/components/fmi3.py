@@ -81,6 +81,13 @@ class FMI3Component(Component):
         return self.time, event
 
     def advance(self, t: float, until: float) -> None:  # noqa: D102 - see Component
+        if self.next_event == NEVER:  # the ordinary step: nothing is due, and mostly nothing happens
+            reached, event = self.step(t, until)
+            if event and self.has_event_mode and not self.terminated:
+                self.handle_event()
+            if self.terminated or until - reached <= TIME_TOLERANCE:
+                return
+            t = reached
         for _ in range(MAX_RETURNS_PER_STEP):
             if self.has_event_mode and self.next_event <= t + TIME_TOLERANCE:
                 self.handle_event()

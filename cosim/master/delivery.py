@@ -128,7 +128,7 @@ class Receiver:
     def _announce(self, now: float, told_at: float, telegram: BaliseRecord) -> Delivery:
         """FMI 2: the event happens at the end of the step from `now` to `told_at` [s]."""
         delivery = Delivery(told_at, self._look_ahead(now, told_at))
-        self._tell(now, telegram, told_at, delivery)
+        self._tell(now, telegram, min(telegram.stamp, told_at), delivery)
         self._advance(now, told_at)
         delivery.after = self._outputs()
         return delivery

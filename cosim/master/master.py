@@ -25,6 +25,8 @@ from cosim.results.result import BaliseRecord
 
 PROGRESS_INTERVAL = 64
 Row = tuple[float, np.ndarray]
+Snapshot = tuple[Passing, np.ndarray]
+NO_ROWS: tuple[Row, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -111,6 +113,9 @@ class Master:
         self._progress = progress
         self._plant = None if balises is None else plan.find(balises.plant)
         self._receivers = {} if balises is None else {r.planned.component.name: r for r in balises.receivers}
+        watched = len(plan.steps) if self._plant is None else plan.steps.index(self._plant)
+        self._upstream, self._downstream = plan.steps[:watched], plan.steps[watched + 1 :]
+        self._busy = False
         self._previous = np.zeros_like(plan.values)
         self._false = [] if balises is None else sorted(balises.channel.false_telegrams, key=lambda f: f.time)
         self._check_order()
@@ -154,7 +159,7 @@ class Master:
         if self._progress is not None:
             self._progress(axis.stop)
 
-    def _step_or_name_the_cause(self, t: float, until: float) -> list[Row]:
+    def _step_or_name_the_cause(self, t: float, until: float) -> Sequence[Row]:
         """`_step`; where a component fails because another one handed it NaN, the error names that one."""
         try:
             return self._step(t, until)
@@ -162,47 +167,55 @@ class Master:
             self._check_finite(until)
             raise
 
-    def _step(self, t: float, until: float) -> list[Row]:
+    def _step(self, t: float, until: float) -> Sequence[Row]:
         """Step all components; returns the event rows within the step."""
-        balises = self.balises
-        if balises is None:
-            for step in self.plan.steps:
-                step.step(t, until)
-            return []
+        for step in self._upstream:
+            step.step(t, until)
+        if self.balises is None:
+            return NO_ROWS
+        snapshots = self.balises.localiser.step(t, until)
+        if snapshots or self.balises.mailbox.waiting or self._false or self._busy:
+            return self._step_with_telegrams(t, until, snapshots)
+        for step in self._downstream:
+            step.step(t, until)
+        return NO_ROWS
+
+    def _step_with_telegrams(self, t: float, until: float, snapshots: Sequence[Snapshot]) -> Sequence[Row]:
+        """Step what comes after the plant, receivers through what is delivered to them in this step."""
         telegrams: list[BaliseRecord] | None = None
-        snapshots: list[tuple[Passing, np.ndarray]] = []
         told: dict[str, list[Delivery]] = {}
-        for step in self.plan.steps:
+        for step in self._downstream:
             receiver = self._receivers.get(step.component.name)
-            if step is self._plant:
-                snapshots = balises.localiser.step(t, until)
-                if not (snapshots or balises.mailbox.waiting or self._false):
-                    telegrams = []
-            elif receiver is None:
+            if receiver is None:
                 step.step(t, until)
+                continue
+            if telegrams is None:
+                telegrams = self._collect(snapshots, t, until)
+            if telegrams or receiver.busy:
+                told[step.component.name] = receiver.step(t, until, telegrams)
             else:
-                if telegrams is None:
-                    telegrams = self._collect(snapshots, t, until)
-                if telegrams or receiver.busy:
-                    told[step.component.name] = receiver.step(t, until, telegrams)
-                else:
-                    step.step(t, until)
+                step.step(t, until)
         if telegrams is None:
             telegrams = self._collect(snapshots, t, until)
-        return self._event_rows(t, until, telegrams, snapshots, told) if telegrams else []
+        self._busy = any(receiver.busy for receiver in self._receivers.values())
+        return self._event_rows(t, until, telegrams, snapshots, told) if telegrams else NO_ROWS
 
     def _stopped_at(self, until: float) -> float | None:
         """When the first component that asked for the end stopped [s]; None where nobody asked."""
+        for step in self.plan.steps:
+            if step.component.terminated:
+                return self._first_stop(until)
+        return None
+
+    def _first_stop(self, until: float) -> float:
         asking = [s.component for s in self.plan.steps if s.component.terminated]
-        if not asking:
-            return None
         first = min(asking, key=lambda c: c.time)
         self.ended_early = f"Component '{first.name}' asked to terminate at t = {min(first.time, until):g} s."
         return min(first.time, until)
 
     # -- balises ----------------------------------------------------------------------------------------------------
 
-    def _collect(self, snapshots: Sequence[tuple[Passing, np.ndarray]], t: float, until: float) -> list[BaliseRecord]:
+    def _collect(self, snapshots: Sequence[Snapshot], t: float, until: float) -> list[BaliseRecord]:
         """Post the passings of this step, and take what is delivered within it."""
         balises = self.balises
         assert balises is not None
@@ -229,7 +242,7 @@ class Master:
     # -- rows -------------------------------------------------------------------------------------------------------
 
     def _event_rows(
-        self, t: float, until: float, telegrams: Sequence[BaliseRecord], snapshots: Sequence[tuple[Passing, np.ndarray]],
+        self, t: float, until: float, telegrams: Sequence[BaliseRecord], snapshots: Sequence[Snapshot],
         told: dict[str, list[Delivery]],
     ) -> list[Row]:  # fmt: skip
         """Log the telegrams; rows before and after each, at the times at which receivers were told."""
@@ -275,7 +288,7 @@ class Master:
         share = (time - t) / (until - t)
         return np.where(self.plan.continuous[columns], start + share * (end - start), start)
 
-    def _record(self, rows: list[Row], until: float) -> None:
+    def _record(self, rows: Sequence[Row], until: float) -> None:
         begin = perf_counter()
         for time, row in rows:
             self.recorder.add(time, row)

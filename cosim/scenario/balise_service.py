@@ -13,11 +13,11 @@ from cosim.components.component import Component
 from cosim.components.probe import ProbeReport, probe
 from cosim.coupling.connection import split_name
 from cosim.coupling.plan import Plan
-from cosim.errors import ScenarioError
+from cosim.errors import CouplingError, ScenarioError
 from cosim.master.delivery import Receiver
 from cosim.master.master import BaliseService
 from cosim.scenario.schema import BalisesTable
-from plant_models.hybrid.units import conversion, parse_unit
+from plant_models.hybrid.units import UnitError, conversion, parse_unit
 
 BALISE_EVENT = "balise"
 ASKED_FOR = "asked for in the scenario"
@@ -38,13 +38,13 @@ class Choice:
     warnings: list[str] = field(default_factory=list)
 
 
-def find_receivers(table: BalisesTable, components: Mapping[str, Component], where: str) -> list[str]:
-    """Names of the components that are told of balises: those listed, or all that declare the event.
+def find_receivers(table: BalisesTable, components: Mapping[str, Component], plant: str, where: str) -> list[str]:
+    """Names of the components that are told of balises: those listed, or all but the plant that declare the event.
 
     Raises:
         ScenarioError: one that is listed does not declare the event.
     """
-    able = [name for name, component in components.items() if BALISE_EVENT in component.events]
+    able = [name for name, component in components.items() if BALISE_EVENT in component.events and name != plant]
     if table.receivers is None:
         return able
     for name in table.receivers:
@@ -122,5 +122,8 @@ def make_service(
 
 def _scale(component: Component, name: str, unit: str) -> float:
     """Factor from the plant's own unit to [m] or [m/s]; 1 where it declares none."""
-    declared = component.unit(name.partition(".")[2])
-    return 1.0 if declared is None else conversion(declared, parse_unit(unit))[0]
+    try:
+        declared = component.unit(name.partition(".")[2])
+        return 1.0 if declared is None else conversion(declared, parse_unit(unit))[0]
+    except UnitError as error:
+        raise CouplingError(f"{name} cannot be read in {unit} to find balises: {error}.") from error

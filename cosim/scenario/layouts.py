@@ -11,11 +11,11 @@ from cosim.errors import ScenarioError
 from cosim.scenario.schema import BalisesTable
 
 
-def make_layout(table: BalisesTable, stop: float, folder: Path, where: str) -> Layout:
+def make_layout(table: BalisesTable, start: float, stop: float, folder: Path, where: str) -> Layout:
     """The balise layout of a scenario.
 
     Args:
-        table: its balise table. stop: end of the run [s]. folder: start of relative paths. where: place for messages.
+        table: its balise table. start, stop: of the run [s]. folder: start of relative paths. where: place for messages.
 
     Raises:
         ScenarioError: with file and key.
@@ -23,7 +23,7 @@ def make_layout(table: BalisesTable, stop: float, folder: Path, where: str) -> L
     try:
         if table.layout == "aperiodic":
             gaps = {k: getattr(table, k) for k in ("min_gap", "max_gap", "dropout_after", "dropout_fraction", "dropout_stretch")}
-            return aperiodic(stop, table.seed, **gaps)
+            return aperiodic(stop, table.seed, start=start, **gaps)
         if table.layout == "instants":
             return InstantLayout(np.array(table.instants, dtype=float))
         layout = _track_layout(table, folder)

@@ -17,6 +17,7 @@ from cosim.errors import CosimError
 from cosim.master.master import BaliseService, Master, TimeAxis, close
 from cosim.report.spec import Phase, ReportSpec
 from cosim.results.result import Result
+from cosim.results.si import in_si
 from cosim.scenario.balise_service import Choice, choose_method, find_receivers, make_service, watched_plant
 from cosim.scenario.certificates import check_certificates, expected_gap
 from cosim.scenario.connections import parse_connections
@@ -26,6 +27,7 @@ from cosim.scenario.outcome import Outcome
 from cosim.scenario.schema import ScenarioTable, step_count
 from cosim.scenario.starts import start_values
 from cosim.scenario.summary import run_summary
+from plant_models.hybrid.units import Unit
 
 Progress = Callable[[float, float], None]
 ROLES = ("true_position", "true_speed", "true_slip", "true_adhesion_force", "odometer", "speed_reference")
@@ -69,7 +71,7 @@ class _Setup:
         """Everything up to the first step, cheap checks first."""
         begin = perf_counter()
         table = self.table
-        layout = None if table.balises is None else make_layout(table.balises, table.stop, self.folder, self.where)
+        layout = None if table.balises is None else make_layout(table.balises, table.start, table.stop, self.folder, self.where)
         pairs = parse_connections(table.connections, self.where)
         for name, component in table.components.items():
             self.factories[name] = component_factory(name, component, self.folder, f"{self.where}: components.{name}")
@@ -77,7 +79,7 @@ class _Setup:
             self.components[name] = factory()
         connections = connect(pairs, self.components)
         receivers, plant = self._balise_roles()
-        order = execution_order(self.components, connections, [(plant, name) for name in receivers if name != plant])
+        order = execution_order(self.components, connections, self._before(plant, receivers))
         starts = {n: start_values(c, table.components[n].parameters) for n, c in self.components.items()}
         if layout is not None:
             self._check_certificates(layout, receivers)
@@ -104,7 +106,8 @@ class _Setup:
         events = [] if self.service is None else list(self.service.mailbox.log)
         summary |= self._balise_summary([e.stamp for e in events if e.kind == "true"])
         summary |= {"certificates": self.certificates, "warnings": self.warnings, "notes": self.notes}
-        return Outcome(Result(master.recorder.table(), self.plan.signals, events, summary, failure), self._report_spec())
+        table, signals = in_si(master.recorder.table(), self.plan.signals, self._unit)
+        return Outcome(Result(table, signals, events, summary, failure), self._report_spec())
 
     def close(self) -> None:
         """Free everything, also after a set-up that failed half-way."""
@@ -113,6 +116,10 @@ class _Setup:
         for component in self.components.values():
             component.terminate()
             component.free()
+
+    def _unit(self, name: str) -> Unit | None:
+        component, _, signal = name.partition(".")
+        return self.components[component].unit(signal)
 
     # -- set-up -----------------------------------------------------------------------------------------------------
 
@@ -127,7 +134,13 @@ class _Setup:
         if balises is None:
             return [], ""
         plant = watched_plant(balises, self.components, self.where)
-        return find_receivers(balises, self.components, self.where), plant
+        return find_receivers(balises, self.components, plant, self.where), plant
+
+    def _before(self, plant: str, receivers: list[str]) -> list[tuple[str, str]]:
+        """What must be stepped before the receivers: the plant, and the odometer whose reading the telegrams carry."""
+        balises = self.table.balises
+        sources = {plant} if balises is None or balises.odometer is None else {plant, balises.odometer.partition(".")[0]}
+        return [(source, name) for source in sorted(sources) for name in receivers if source != name]
 
     def _check_certificates(self, layout: Layout, receivers: list[str]) -> None:
         assert self.table.balises is not None
@@ -143,7 +156,20 @@ class _Setup:
         self.choice = choose_method(table, self.components[plant], self.factories[plant], starts, self.axis.start, self.axis.step)
         self.warnings += self.choice.warnings
         self.notes.append(f"Balises localised by '{self.choice.method}': {self.choice.reason}.")
+        self._note_late_telegrams(receivers)
         self.service = make_service(table, layout, self.plan, plant, receivers, self.choice.method)
+
+    def _note_late_telegrams(self, receivers: list[str]) -> None:
+        """A block replays what arrives late; a sealed receiver may not, and cannot say what it did."""
+        table = self.table.balises
+        assert table is not None
+        sealed = [name for name in receivers if self.components[name].kind == "FMU"]
+        if sealed and table.latency + table.latency_jitter > 0.0:
+            delay = table.latency + table.latency_jitter
+            self.warnings.append(
+                f"Telegrams arrive up to {delay:g} s late; {', '.join(sealed)}: an exported observer rejects late stamps, "
+                "and an FMU does not say what it did with them. Use a block to replay them."
+            )
 
     def _note_unconnected(self, connections: list[Connection]) -> None:
         free = unconnected_inputs(connections, self.components.values())
@@ -158,7 +184,7 @@ class _Setup:
     def _balise_summary(self, stamps: list[float]) -> dict[str, Any]:
         """Method, probe, and the gaps that really occurred against what is certified."""
         if self.choice is None or self.service is None:
-            return {"localisation": None, "probe": None, "redo_differences": None, "largest_gap": None}
+            return {"localisation": None, "probe": None, "redo_differences": None, "largest_gap": None, "undelivered": 0}
         gap = max((b - a for a, b in pairwise([self.axis.start, *sorted(stamps)])), default=0.0)
         for name, certificate in self.certificates.items():
             limit = certificate["aperiodic_limit"]
@@ -170,6 +196,7 @@ class _Setup:
             "probe": None if self.choice.probe is None else self.choice.probe.to_dict(),
             "redo_differences": self.service.localiser.watch.redo_differences,
             "largest_gap": gap,
+            "undelivered": len(self.service.mailbox.waiting),
         }
 
     def _report_spec(self) -> ReportSpec:

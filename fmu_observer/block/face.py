@@ -105,7 +105,7 @@ class Face:
     @property
     def counters(self) -> Counters:
         """What became of the events so far."""
-        return self.instance.counters
+        return self.instance.events.counters
 
     @property
     def component(self) -> Face:

@@ -83,7 +83,7 @@ class FMI2Block(Face, FMU2Slave):
     def getInteger(self, vr: Sequence[int]) -> list[int]:
         """Values of event counts."""
         self.instance.require_alive()
-        return [self.instance.counts[self.instance.variables.event_number(reference)] for reference in vr]
+        return [self.instance.events.counts[self.instance.variables.event_number(reference)] for reference in vr]
 
     @refused
     def setInteger(self, vr: Sequence[int], value: Sequence[int]) -> None:
@@ -91,7 +91,7 @@ class FMI2Block(Face, FMU2Slave):
         self.instance.require("instantiated", "initialization", "step")
         numbers = [self.instance.variables.event_number(reference) for reference in vr]
         for number, count in zip(numbers, value, strict=True):
-            self.instance.counts[number] = int(count)
+            self.instance.events.counts[number] = int(count)
 
     def fmi2SetReal(self, _component: object, vr: Iterable[int], _n: int, values: Iterable[float]) -> None:
         """The low-level setter used by fmpy's `Input`."""

@@ -56,8 +56,8 @@ class FMI3Block(Face, FMU3Slave):
     def enterStepMode(self) -> None:
         """From event mode to step mode."""
         self.instance.require("event")
-        if self.instance.active:
-            names = ", ".join(self.system.triggered_events[number].name for number in sorted(self.instance.active))
+        if self.instance.events.active:
+            names = ", ".join(self.system.triggered_events[number].name for number in sorted(self.instance.events.active))
             raise BlockError(f"clock {names} is active; call updateDiscreteStates first, or the event is lost.")
         self.instance.mode = "step"
 
@@ -67,13 +67,13 @@ class FMI3Block(Face, FMU3Slave):
         self.instance.require("event")
         numbers = [self.instance.variables.event_number(reference) for reference in vr]
         for number, value in zip(numbers, values, strict=True):
-            (self.instance.active.add if value else self.instance.active.discard)(number)
+            (self.instance.events.active.add if value else self.instance.events.active.discard)(number)
 
     @refused
     def getClock(self, vr: Sequence[int]) -> list[bool]:
         """Whether clocks are active."""
         self.instance.require_alive()
-        return [self.instance.variables.event_number(reference) in self.instance.active for reference in vr]
+        return [self.instance.variables.event_number(reference) in self.instance.events.active for reference in vr]
 
     @refused
     def updateDiscreteStates(self) -> tuple[bool, bool, bool, bool, bool, float]:

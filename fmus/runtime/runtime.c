@@ -185,7 +185,8 @@ static void integrate(Runtime *runtime, double target) {
     if ((cell - k) * h > tolerance) { /* inside a cell: finish it, or stop within it */
         double boundary = t0 + (k + 1.0) * h;
         if (boundary >= target - tolerance) {
-            step(runtime, t, target - t);
+            /* a target on the boundary but for rounding is the boundary */
+            step(runtime, t, (boundary <= target + tolerance ? boundary : target) - t);
             runtime->clock.t = target;
             return;
         }

@@ -160,8 +160,8 @@ class Runtime:
         k = floor(cell + tolerance / h)
         if (cell - k) * h > tolerance:  # inside a cell: finish it, or stop within it
             boundary = self.t0 + (k + 1) * h
-            if boundary >= target - tolerance:
-                self._kernel.step(self.t, target - self.t)
+            if boundary >= target - tolerance:  # a target on the boundary but for rounding is the boundary
+                self._kernel.step(self.t, (boundary if boundary <= target + tolerance else target) - self.t)
                 self.t = target
                 return
             self._kernel.step(self.t, boundary - self.t)

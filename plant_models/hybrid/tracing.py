@@ -6,6 +6,7 @@ differentiated exactly (EKF, observability, directional derivatives) and from wh
 
 from __future__ import annotations
 
+import hashlib
 import traceback
 from dataclasses import dataclass
 from functools import cached_property
@@ -101,6 +102,15 @@ class TracedSystem:
         return ca.Function(
             f"{function}_by_{by}", [s.t, s.x, s.u, s.p], [ca.densify(derivative)], ["t", "x", "u", "p"], ["jacobian"]
         )
+
+    def digest(self) -> str:
+        """A digest that changes with any of the equations."""
+        s = self._symbols
+        names = ["state_derivative", "output_vector", *(["friction_vector"] if self.system.frictions else [])]
+        parts = [self._trace(name) for name in names]
+        parts += [self._trace("jump_vector", event.name) for event in self.system.events]
+        function = ca.Function("equations", [s.t, s.x, s.u, s.p], [ca.SX(part) for part in parts])
+        return hashlib.sha256(function.serialize().encode()).hexdigest()
 
     def dependencies(self, function: str, by: str) -> np.ndarray:
         """Structural dependence of `flow` or `output` on a variable group: boolean array, shape (rows, columns)."""

@@ -119,7 +119,10 @@ def test_events_told_after_a_restore_are_told_again(version: Any) -> None:
         made.tell(made.events["balise"], 0.0, 0.05, {"position": 3.0, "unknown": 1.0})
         made.advance(0.0, 0.1)
         assert read(made, ["last", "at", "heard"]) == pytest.approx([3.0, 0.05, 1.0])
+        assert made.outcomes()["lost"] == 0  # type: ignore[index]
+        assert made.time == 0.1
         made.restore(state)
+        assert made.time == 0.0
 
 
 @pytest.mark.parametrize("slave", [Train, Train2])

@@ -61,8 +61,13 @@ def assert_same(seen: np.ndarray, reference: np.ndarray) -> None:
     np.testing.assert_allclose(seen, reference, rtol=1e-9, atol=1e-9)
 
 
+def milliseconds(most: int) -> st.SearchStrategy[float]:
+    """Whole ones: a latency below 1e-9 s is none, by the tolerance of all communication times."""
+    return st.integers(0, most).map(lambda n: 1e-3 * n)
+
+
 @given(
-    latency=st.floats(0.0, 0.9), jitter=st.floats(0.0, 0.6), seed=st.integers(0, 50),
+    latency=milliseconds(900), jitter=milliseconds(600), seed=st.integers(0, 50),
     h=st.sampled_from([0.01, 0.05, 0.1]), version=st.sampled_from([2, 3]), stoppable=st.booleans(),
 )  # fmt: skip
 @settings(max_examples=40, deadline=None)
@@ -199,6 +204,22 @@ def test_an_fmi3_receiver_gets_all_the_fields_it_declares() -> None:
     assert first["delivered_at"] == pytest.approx(first["at"], abs=1e-9)
     assert first["location_accuracy"] == 0.0
     assert seen["observer.heard"][-1] == 2.0
+
+
+@pytest.mark.parametrize("off", [-5e-10, 5e-10])
+def test_no_receiver_is_asked_for_a_step_of_less_than_a_nanosecond(off: float) -> None:
+    """A balise as good as at a communication point is told there."""
+
+    class Coarse(StampedLogging):
+        def move(self, t: float, h: float) -> None:
+            assert h > 1e-6
+
+    slave = Coarse()
+    made = component(slave, "observer")
+    layout = InstantLayout(np.array([0.5 + off]))
+    seen = run([block(Motion(), "plant"), made], [], H, 10, Balises(layout, receivers=["observer"]))
+    assert [entry["at"] for entry in slave.log] == [0.5]
+    assert np.count_nonzero(np.abs(seen.time - 0.5) < 1e-6) == 2 + (off > 0.0)
 
 
 def test_a_receiver_that_can_neither_be_stopped_nor_stamped_is_told_late_never_early() -> None:

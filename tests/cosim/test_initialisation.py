@@ -83,11 +83,14 @@ def test_without_the_exchange_the_first_step_would_be_wrong() -> None:
 
 
 def test_what_is_sampled_at_the_start_time_is_in_the_first_row() -> None:
-    """The sample is taken when initialisation ends; a component listed before the sampler reads it all the same."""
-    parts = [block(Spring(), "reader"), block(Mass(), "mass"), block(Sampler(), "sampler")]
-    ran = run(parts, [("mass.position", "sampler.signal"), ("sampler.sample", "reader.position")], 0.1, 2)
+    """The sample is taken when initialisation ends, after the mass, which comes first in the loop, has ended its own."""
+    parts = [block(Mass(), "mass"), block(Sampler(), "sampler"), block(Spring(), "spring")]
+    pairs = [("mass.position", "sampler.signal"), ("sampler.sample", "spring.position"), ("spring.force", "mass.force")]
+    ran = run(parts, pairs, 0.1, 2)
+    assert [s.component.name for s in ran.plan.steps] == ["mass", "sampler", "spring"]
     assert ran["sampler.sample"][0] == 1.0
-    assert ran["reader.force"][0] == -STIFFNESS
+    assert ran["spring.force"][0] == -STIFFNESS
+    assert ran["mass.acceleration"][0] == -STIFFNESS / MASS
 
 
 def test_a_contraction_settles_on_its_fixed_point() -> None:

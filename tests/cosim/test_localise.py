@@ -99,7 +99,8 @@ def test_crossing_times_of_closed_form_motions(name: str, method: str) -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_crossing_times_over_changes_of_adhesion(method: str) -> None:
     """The truth is a dense run of the same plant at 1 ms, inverted between its own points by their parabola."""
-    layout = line(20, 3.3, 3.17)
+    near_the_changes = [19.6, 19.9, 20.05, 20.2, 20.5, 39.5, 39.9, 40.06, 40.4]  # in the very steps in which they happen
+    layout = positions(*sorted([*near_the_changes, *(3.3 + 3.17 * i for i in range(20))]))
     truth = run([block(Slippery(), "plant")], [], 1e-3, 9000)
     p, v, t = truth["plant.position"], truth["plant.speed"], truth.time
     true_times = {}
@@ -159,6 +160,24 @@ def test_reversing_over_balises(method: str, turn: float) -> None:
     bounds = np.array([e.time_bound for e in ran.events])
     promised = {"rollback": 1e-9, "predict": 1e-6}.get(method, np.inf)
     assert np.all(off <= np.minimum(promised, np.maximum(bounds, 1e-9)))
+
+
+def test_rollback_finds_where_the_plant_itself_turns() -> None:
+    """v = 2 cos(4 t): within steps of 0.25 s the cubic turns elsewhere than the train, at 0.5 m."""
+    offsets = (-3e-5, -1e-7, 1e-7, 3e-5)
+    layout = positions(*(0.5 + d for d in offsets))
+    motion = {"v0": 0.0, "A": 2.0, "w": 4.0, "p0": -0.5}  # p = -0.5 cos(4 t)
+    seen = run([block(Motion(), "plant")], [], 0.25, 4, Balises(layout), starts={"plant": motion})
+    assert [e.identity for e in seen.events] == ["B1", "B2", "B2", "B1"]
+    half = [(np.pi - np.arccos((0.5 + d) / 0.5)) / 4.0 for d in offsets[:2]]
+    expected = [*half, *(np.pi / 2.0 - t for t in reversed(half))]
+    np.testing.assert_allclose([e.stamp for e in seen.events], expected, rtol=0.0, atol=1e-9)
+
+
+def test_the_row_of_an_interpolated_balise_shows_the_plant_on_it() -> None:
+    seen = watched(block(Motion(), "plant"), positions(3.3), "interpolate", 1.0, {"v0": 3.0, "a": 4.0})
+    at = np.flatnonzero(seen.time == seen.events[0].stamp)
+    np.testing.assert_allclose(seen["plant.position"][at], [3.3, 3.3], rtol=1e-15)
 
 
 def test_standstill_takes_no_time_of_the_prediction() -> None:

@@ -45,6 +45,13 @@ class Unshortened(Train):
         super().move(t, H)
 
 
+class Rounding(Train):
+    """Does very short steps as asked, and every other one as if it were the whole."""
+
+    def move(self, t: float, h: float) -> None:
+        super().move(t, H if h > 0.05 * H else h)
+
+
 class HalfRestored(Train):
     """Restores position and speed, but not a filter that acts on the train a while later."""
 
@@ -57,6 +64,18 @@ class HalfRestored(Train):
         effort, self.v["effort"] = self.v["effort"], pull
         super().move(t, h)
         self.v["effort"] = effort
+
+
+class LateRestored(HalfRestored):
+    """Restores the filter but for its newest entry, which takes a second step to act."""
+
+    def setFMUstate(self, state: Any) -> None:
+        newest = self.hidden[-1]
+        super().setFMUstate(state)
+        self.hidden[0], self.hidden[-1] = state["hidden"][0], newest
+
+    setFMUState = setFMUstate
+    memory = ("v", "x", "time", "hidden")
 
 
 class Restoring(HalfRestored):
@@ -161,12 +180,14 @@ def test_steps_of_its_own_are_seen_at_any_communication_step(h: float) -> None:
     assert any("steps of other lengths" in remark for remark in report.remarks)
 
 
-def test_unshortened_result_is_seen() -> None:
-    assert not probed(Unshortened).honest_step
+@pytest.mark.parametrize("slave", [Unshortened, Rounding])
+def test_unshortened_result_is_seen(slave: type[Mock]) -> None:
+    assert not probed(slave).honest_step
 
 
-def test_state_that_is_restored_in_part_is_seen() -> None:
-    report = probed(HalfRestored)
+@pytest.mark.parametrize("slave", [HalfRestored, LateRestored])
+def test_state_that_is_restored_in_part_is_seen(slave: type[Mock]) -> None:
+    report = probed(slave)
     assert (report.declares_state, report.exact_state) == (True, False)
     assert report.honest_step
 

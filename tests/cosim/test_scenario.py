@@ -149,3 +149,12 @@ def test_what_ships_is_valid(name: str) -> None:
     table = Scenario.load(name).table()
     assert table.title
     assert table.description
+
+
+@pytest.mark.compiler
+def test_late_telegrams_to_a_sealed_receiver_are_warned_about() -> None:
+    scenario = small().set("balises.latency", 0.1)
+    assert not any("late" in w for w in scenario.run().warnings)
+    assert any(
+        "observer: an exported observer rejects late stamps" in w for w in scenario.set("observer.as", "fmu3").run().warnings
+    )

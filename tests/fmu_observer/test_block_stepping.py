@@ -100,11 +100,8 @@ def test_splitting_a_step_on_the_internal_grid_changes_nothing(
         end = start_time + cell * internal_step
         pieces.step(t, end - t)
         t = end
-    found, expected = pieces.get(*VALUES[3:]), whole.get(*VALUES[3:])
-    if internal_step == 2.0**-7:  # all times are exact, so all bits are
-        np.testing.assert_array_equal(found, expected)
-    else:  # t + (end - t) may miss the grid point by the last place, and with it the length of a part of a cell after an event
-        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+    # 0.0077 s is no exact float: t + (end - t) misses grid points by the last place, and the grid absorbs it.
+    np.testing.assert_array_equal(pieces.get(*VALUES[3:]), whole.get(*VALUES[3:]))
 
 
 SPLIT2, SPLIT3 = Driven(SWING, 2), Driven(SWING, 3)

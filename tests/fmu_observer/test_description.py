@@ -267,3 +267,11 @@ def test_options_of_one_class_give_different_tokens() -> None:
     cls = OBSERVERS["takagi_sugeno_cdo"]
     tokens = {describe(cls(premise=p), 3).instantiationToken for p in ("live", "estimated", "frozen")}
     assert len(tokens) == 3
+
+
+def test_other_equations_give_another_token() -> None:
+    class Stiffer(Swing):
+        def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
+            return 2.0 * super().flow(t, x, u, p)
+
+    assert describe(Stiffer(), 3).instantiationToken != describe(SWING, 3).instantiationToken
