@@ -80,7 +80,7 @@ def seed_study(scenario: Scenario, seeds: Iterable[int], tell: Callable[[int, in
     chosen = list(seeds)
     study: SeedStudy | None = None
     for done, seed in enumerate(chosen, start=1):
-        outcome = scenario.run(overrides={"balises.seed": seed, "certificates": "ignore"})
+        outcome = scenario.run(overrides={"balises.seed": seed, "certificates": "ignore"}, warn=_silent)
         if outcome.failure is not None:
             raise RunError(f"Seed {seed}: {outcome.failure}")
         study = study or SeedStudy(outcome.spec, chosen)
@@ -91,6 +91,10 @@ def seed_study(scenario: Scenario, seeds: Iterable[int], tell: Callable[[int, in
             tell(done, len(chosen))
     assert study is not None
     return study
+
+
+def _silent(_text: str) -> None:
+    """What is doubtful about a scenario is said once, by its own run, and not for every seed."""
 
 
 def _cell(value: float | None, width: int) -> str:

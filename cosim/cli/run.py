@@ -44,7 +44,7 @@ def execute(options: argparse.Namespace) -> int:
     check_writable(directory)
     bar = None if options.quiet or options.json else ProgressBar()
     try:
-        outcome = scenario.run(progress=bar)
+        outcome = scenario.run(progress=bar, warn=_warn)
     finally:
         if bar is not None:
             bar.close()
@@ -96,6 +96,10 @@ class ProgressBar:
             self._bar.close()
 
 
+def _warn(text: str) -> None:
+    print(f"warning: {text}", file=sys.stderr, flush=True)
+
+
 def _study(scenario: Scenario, options: argparse.Namespace) -> Any:
     from cosim.study import seed_study  # noqa: PLC0415 - only for those who ask
 
@@ -114,8 +118,6 @@ def _tell(outcome: Outcome, study: Any, paths: dict[str, Path], options: argpars
         data = dict(summary) | {"failure": outcome.failure, "files": {k: str(p) for k, p in paths.items()}}
         print(json.dumps(jsonable(data), indent=2))
         return
-    for warning in outcome.warnings:
-        print(f"warning: {warning}", file=sys.stderr)
     print(_headline(summary))
     if outcome.result.table.size:
         from cosim.report.metrics import phase_metrics  # noqa: PLC0415 - only here

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
@@ -29,21 +30,26 @@ from cosim.scenario.starts import start_values
 from cosim.scenario.summary import run_summary
 from plant_models.hybrid.units import Unit
 
+LOG = logging.getLogger("cosim")
 Progress = Callable[[float, float], None]
+Warn = Callable[[str], None]
 ROLES = ("true_position", "true_speed", "true_slip", "true_adhesion_force", "odometer", "speed_reference")
 
 
-def run_scenario(table: ScenarioTable, name: str, folder: Path, where: str, progress: Progress | None = None) -> Outcome:
+def run_scenario(
+    table: ScenarioTable, name: str, folder: Path, where: str, progress: Progress | None = None, warn: Warn | None = None
+) -> Outcome:
     """Run a scenario to its end or to its first failure.
 
     Args:
         table: validated scenario. name: its name. folder: start of relative paths. where: place for messages.
         progress: called with the time reached and the end [s].
+        warn: told of everything doubtful as soon as it is known, before the run where it can be; by default the log ``cosim``.
 
     Raises:
         CosimError: the scenario cannot be set up; failures on the way are in the outcome.
     """
-    setup = _Setup(table, folder, where)
+    setup = _Setup(table, folder, where, warn or LOG.warning)
     try:
         setup.prepare()
         return setup.execute(name, progress)
@@ -54,10 +60,11 @@ def run_scenario(table: ScenarioTable, name: str, folder: Path, where: str, prog
 class _Setup:
     """The parts of one run while it is put together; thrown away at its end."""
 
-    def __init__(self, table: ScenarioTable, folder: Path, where: str) -> None:
+    def __init__(self, table: ScenarioTable, folder: Path, where: str, tell: Warn) -> None:
         self.table, self.folder, self.where = table, folder, where
         self.axis = TimeAxis(table.start, table.step, step_count(table.start, table.stop, table.step))
         self.warnings: list[str] = []
+        self._tell = tell
         self.notes: list[str] = []
         self.certificates: dict[str, dict[str, Any]] = {}
         self.factories: dict[str, Callable[[], Component]] = {}
@@ -101,7 +108,7 @@ class _Setup:
         except CosimError as error:
             failure = str(error)
         if master.ended_early is not None:
-            self.warnings.append(master.ended_early)
+            self._warn(master.ended_early)
         summary = run_summary(name, self.table, self.plan, master, self.setup_seconds)
         events = [] if self.service is None else list(self.service.mailbox.log)
         summary |= self._balise_summary([e.stamp for e in events if e.kind == "true"])
@@ -116,6 +123,10 @@ class _Setup:
         for component in self.components.values():
             component.terminate()
             component.free()
+
+    def _warn(self, text: str) -> None:
+        self.warnings.append(text)
+        self._tell(text)
 
     def _unit(self, name: str) -> Unit | None:
         component, _, signal = name.partition(".")
@@ -147,14 +158,16 @@ class _Setup:
         gap = expected_gap(layout, self.table.balises, self.table.start)
         tables = {n: self.table.components[n] for n in receivers if self.table.components[n].fmu is None}
         self.certificates, warnings = check_certificates(tables, gap, self.table.certificates, self.where)
-        self.warnings += warnings
+        for warning in warnings:
+            self._warn(warning)
 
     def _add_balises(self, layout: Layout, plant: str, receivers: list[str], starts: dict[str, float]) -> None:
         table = self.table.balises
         assert table is not None
         assert self.plan is not None
         self.choice = choose_method(table, self.components[plant], self.factories[plant], starts, self.axis.start, self.axis.step)
-        self.warnings += self.choice.warnings
+        for warning in self.choice.warnings:
+            self._warn(warning)
         self.notes.append(f"Balises localised by '{self.choice.method}': {self.choice.reason}.")
         self._note_late_telegrams(receivers)
         self.service = make_service(table, layout, self.plan, plant, receivers, self.choice.method)
@@ -166,7 +179,7 @@ class _Setup:
         sealed = [name for name in receivers if self.components[name].kind == "FMU"]
         if sealed and table.latency + table.latency_jitter > 0.0:
             delay = table.latency + table.latency_jitter
-            self.warnings.append(
+            self._warn(
                 f"Telegrams arrive up to {delay:g} s late; {', '.join(sealed)}: an exported observer rejects late stamps, "
                 "and an FMU does not say what it did with them. Use a block to replay them."
             )
@@ -174,7 +187,7 @@ class _Setup:
     def _note_unconnected(self, connections: list[Connection]) -> None:
         free = unconnected_inputs(connections, self.components.values())
         if free:
-            self.warnings.append(f"Unconnected inputs keep their start values: {', '.join(free)}.")
+            self._warn(f"Unconnected inputs keep their start values: {', '.join(free)}.")
         silent = undeclared(self.components.values())
         if silent:
             self.notes.append(f"Declare no dependencies, direct feedthrough assumed absent: {', '.join(silent)}.")
@@ -190,7 +203,7 @@ class _Setup:
             limit = certificate["aperiodic_limit"]
             certificate["largest_gap_seen"] = gap
             if limit is not None and gap > limit and certificate["holds"] is not False:
-                self.warnings.append(f"{name}: the longest gap between balises was {gap:.3g} s, certified are {limit:.3g} s.")
+                self._warn(f"{name}: the longest gap between balises was {gap:.3g} s, certified are {limit:.3g} s.")
         return {
             "localisation": {"method": self.choice.method, "reason": self.choice.reason},
             "probe": None if self.choice.probe is None else self.choice.probe.to_dict(),

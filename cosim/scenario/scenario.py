@@ -128,12 +128,17 @@ class Scenario:
         """
         return parse_scenario(self._data, self.where)
 
-    def run(self, progress: Callable[[float, float], None] | None = None, overrides: Mapping[str, Any] | None = None) -> Outcome:
+    def run(
+        self, progress: Callable[[float, float], None] | None = None, overrides: Mapping[str, Any] | None = None,
+        warn: Callable[[str], None] | None = None,
+    ) -> Outcome:  # fmt: skip
         """Run it.
 
         Args:
             progress: called with the time reached and the end [s].
             overrides: as for `set`, for this run only.
+            warn: told of everything doubtful as soon as it is known, before the run where it can be; by default the log
+                ``cosim``, which Python shows on the error stream. All warnings are in the outcome as well.
 
         Returns:
             The outcome: result, report roles, warnings; also for a run that failed on the way (see `Outcome.failure`).
@@ -144,7 +149,7 @@ class Scenario:
         scenario = self.copy()
         for name, value in (overrides or {}).items():
             scenario.set(name, value)
-        return run_scenario(scenario.table(), scenario.name, self.folder, self.where, progress)
+        return run_scenario(scenario.table(), scenario.name, self.folder, self.where, progress, warn)
 
 
 def shipped_scenarios() -> list[str]:

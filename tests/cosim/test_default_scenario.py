@@ -19,7 +19,7 @@ from cosim.study import SeedStudy, seed_study
 pytestmark = [pytest.mark.compiler, pytest.mark.slow]
 
 SEEDS = range(10)
-TRACTION, BRAKING = "traction zone", "braking zone"
+TRACTION, HOLD, BRAKING = "traction zone", "hold phase", "braking zone"
 
 
 @cache
@@ -41,10 +41,13 @@ def median(observer: str, phase: str) -> float:
     ("observer", "phase", "independent"),
     [
         ("takagi_sugeno_cdo", TRACTION, 0.0262),
+        ("takagi_sugeno_cdo", HOLD, 0.0080),
         ("takagi_sugeno_cdo", BRAKING, 0.0225),
         ("multirate_cdo", TRACTION, 0.064),
+        ("multirate_cdo", HOLD, 0.217),
         ("multirate_cdo", BRAKING, 0.061),
         ("discrete_uio", TRACTION, 0.136),
+        ("discrete_uio", HOLD, 0.26),
         ("discrete_uio", BRAKING, 0.150),
     ],
 )

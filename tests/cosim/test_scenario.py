@@ -158,3 +158,20 @@ def test_late_telegrams_to_a_sealed_receiver_are_warned_about() -> None:
     assert any(
         "observer: an exported observer rejects late stamps" in w for w in scenario.set("observer.as", "fmu3").run().warnings
     )
+
+
+def test_doubts_are_told_before_the_first_step() -> None:
+    told: list[str] = []
+
+    def progress(t: float, _stop: float) -> None:
+        told.append(f"reached {t}")
+
+    outcome = small().set("balises.expected_speed", 1.0).run(progress=progress, warn=told.append)
+    assert "UNSTABLE" in told[0]
+    assert told[1].startswith("reached")
+    assert outcome.warnings == [t for t in told if not t.startswith("reached")]
+
+
+def test_a_script_that_asks_for_nothing_finds_the_doubts_in_the_log(caplog: pytest.LogCaptureFixture) -> None:
+    small().set("balises.expected_speed", 1.0).run()
+    assert any("UNSTABLE" in record.message for record in caplog.records if record.name == "cosim")
