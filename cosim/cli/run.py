@@ -48,10 +48,12 @@ def execute(options: argparse.Namespace) -> int:
     finally:
         if bar is not None:
             bar.close()
-    study = None if not options.seeds else _study(scenario, options)
-    if study is not None:
-        outcome = outcome.with_summary(seed_study=study.to_data())
     paths = outcome.write(directory, report=not options.no_report)
+    study = None
+    if options.seeds and outcome.failure is None:
+        study = _study(scenario, options)
+        outcome = outcome.with_summary(seed_study=study.to_data())
+        paths = outcome.write(directory, report=not options.no_report)
     _tell(outcome, study, paths, options)
     if outcome.failure is not None:
         return ERROR

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -28,6 +29,7 @@ NUMERIC_TYPES = frozenset(
     {"Real", "Integer", "Boolean", "Enumeration", "Float64", "Float32"}
     | {f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)}
 )
+MESSAGES_KEPT = 20
 NEVER = math.inf
 FATAL = 4  # FMI status: the slave must not be called again
 OWN_TOOL = "fmu-observer"
@@ -88,6 +90,7 @@ class Component(ABC):
         self.next_event = NEVER
         self._release_files = release_files
         self._alive = self._running = False
+        self.messages: deque[str] = deque(maxlen=MESSAGES_KEPT)
         self._units = {u.name: u for u in description.unitDefinitions}
 
     # -- what it is -------------------------------------------------------------------------------------------------
@@ -162,14 +165,14 @@ class Component(ABC):
     def instantiate(self) -> None:
         """Create the instance."""
         self._guard("instantiate", self._instantiate)
-        self._alive = self._running = True
+        self._alive = True
 
     def reset(self) -> None:
         """Back to the state after `instantiate`."""
         self._guard("reset", self.slave.reset)
         self._forget()
         self.time, self.terminated, self.next_event = math.nan, False, NEVER
-        self._running = True
+        self._running = False
 
     def set_start(self, name: str, value: float) -> None:
         """Set a parameter, a start state or an unconnected input before initialisation.
@@ -262,8 +265,15 @@ class Component(ABC):
         counters = getattr(self.slave, "counters", None)
         return None if counters is None else dict(vars(counters))
 
+    def note(self, message: str | bytes | None) -> None:
+        """Keep a message of the slave's own log; the last ones are part of a failure and of the summary."""
+        text = message.decode("utf-8", "replace") if isinstance(message, bytes) else str(message or "")
+        if text.strip():
+            self.messages.append(text.strip())
+
     def failure(self, reason: str, t: float | None = None) -> RunError:
-        """A RunError of this component at `t` [s], by default where it stands."""
+        """A RunError of this component at `t` [s], by default where it stands, with what the slave logged last."""
+        reason += f" The FMU says: {self.messages[-1]}" if self.messages else ""
         when = self.time if t is None else t
         place = "" if math.isnan(when) else f" at t = {when:g} s"
         return RunError(f"Component '{self.name}'{place}: {reason}", self.name, when)

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from time import perf_counter
 from typing import Any
 
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import fmi2Discard, fmi2LastSuccessfulTime, fmi2Terminated
+from fmpy.fmi2 import (
+    defaultCallbacks,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+    fmi2Discard,
+    fmi2LastSuccessfulTime,
+    fmi2Terminated,
+)
 
 from cosim.components.component import Component, EventPort
 
@@ -20,7 +27,10 @@ class FMI2Component(Component):
     event_needs_step = True
 
     def _instantiate(self) -> None:
-        self.slave.instantiate()
+        if hasattr(self.slave, "dll"):
+            self.slave.instantiate(callbacks=_callbacks(self.note))
+        else:
+            self.slave.instantiate()
         self._forget()
 
     def _forget(self) -> None:
@@ -45,6 +55,7 @@ class FMI2Component(Component):
 
     def exit_initialization(self) -> None:  # noqa: D102 - see Component
         self._guard("exitInitializationMode", self.slave.exitInitializationMode)
+        self._running = True
 
     def advance(self, t: float, until: float) -> None:  # noqa: D102 - see Component
         begin = perf_counter()
@@ -97,3 +108,12 @@ class FMI2Component(Component):
             return call(kind)
         except Exception:  # a slave that cannot say why it discarded a step has simply not terminated
             return None
+
+
+def _callbacks(note: Callable[[bytes], None]) -> Any:
+    """fmpy's callbacks with our logger in place of the one that prints; it sees the message without its arguments."""
+    callbacks = fmi2CallbackFunctions()
+    callbacks.logger = fmi2CallbackLoggerTYPE(lambda _environment, _name, _status, _category, message: note(message))
+    callbacks.allocateMemory = defaultCallbacks.allocateMemory
+    callbacks.freeMemory = defaultCallbacks.freeMemory
+    return callbacks

@@ -29,8 +29,10 @@ class FMI3Component(Component):
 
     def _instantiate(self) -> None:
         early = bool(self.description.coSimulation.mightReturnEarlyFromDoStep)
-        self.slave.instantiate(eventModeUsed=self.has_event_mode, earlyReturnAllowed=early)
-        self._do_step = _native_step(self.slave) if hasattr(self.slave, "dll") else self.slave.doStep
+        native = hasattr(self.slave, "dll")
+        log = {"logMessage": lambda _environment, _status, _category, message: self.note(message)} if native else {}
+        self.slave.instantiate(eventModeUsed=self.has_event_mode, earlyReturnAllowed=early, **log)
+        self._do_step = _native_step(self.slave) if native else self.slave.doStep
 
     def _find_events(self) -> dict[str, EventPort]:
         variables = self.description.modelVariables
@@ -52,6 +54,7 @@ class FMI3Component(Component):
 
     def exit_initialization(self) -> None:  # noqa: D102 - see Component
         self._guard("exitInitializationMode", self.slave.exitInitializationMode)
+        self._running = True
         if self.has_event_mode:
             self._settle()
 

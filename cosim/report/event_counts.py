@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from cosim.results.result import BaliseRecord
 
-OUTCOMES = ("accepted", "replayed", "late", "rejected", "told")
+OUTCOMES = ("accepted", "replayed", "late", "rejected", "told", "undelivered")
 USED = ("accepted", "replayed", "late", "told")
 """Outcomes after which the telegram is part of the estimate; ``told`` is a receiver that does not say."""
 

@@ -43,7 +43,8 @@ class BaliseRecord:
         kind: ``true``, ``missed`` (read by nobody) or ``false`` (told, but no balise is there).
         method: localisation method that gave the stamp.
         time_bound: bound or estimate of the stamp's error [s].
-        outcomes: what became of it at each receiver: ``accepted``, ``replayed``, ``late``, ``rejected`` or ``told``.
+        outcomes: what became of it at each receiver: ``accepted``, ``replayed``, ``late``, ``rejected``, ``told``
+            (it does not say), or ``undelivered`` (still on its way when the run ended).
     """
 
     stamp: float

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,17 +27,27 @@ class ExpectedGap:
     reason: str
 
 
+NO_BALISES = ExpectedGap(None, "no balise instant lies within the run")
+
+ASKED_FOR_LIMITS_ONLY = 0.5
+"""A gap to ask for [s] where only the limits of a certificate are of interest; they do not depend on it."""
+
+
 def expected_gap(layout: Layout, table: BalisesTable, start: float) -> ExpectedGap:
-    """The longest gap as far as layout and scenario tell before the run."""
-    late = table.latency + table.latency_jitter
+    """The longest gap between the stamps of two balises, as far as layout and scenario tell before the run.
+
+    A constant latency does not count: what arrives late is used at its stamp.
+    """
+    if table.missed_fraction > 0.0 or table.missed:
+        return ExpectedGap(None, "balises are missed by chance or by name, so a gap may be of any length")
     if isinstance(layout, InstantLayout):
-        gaps = np.diff([start, *layout.instants])
-        return ExpectedGap(float(gaps.max()) + late, "longest gap between the balise instants") if len(gaps) else _unknown()
-    if table.expected_speed is None or len(layout.positions) < 2:
-        return _unknown()
-    spacing = float(np.diff(layout.positions).max())
-    reason = f"spacing up to {spacing:g} m at the expected {table.expected_speed:g} m/s"
-    return ExpectedGap(spacing / table.expected_speed + late, reason)
+        gaps = np.diff([start, *layout.instants[layout.instants > start]])
+        return ExpectedGap(float(gaps.max()), "longest gap between the balise instants") if len(gaps) else NO_BALISES
+    if table.expected_speed is None:
+        return ExpectedGap(None, "balises are laid by position; give balises.expected_speed to check")
+    spacing = float(np.diff([min(table.track_start, layout.positions[0]), *layout.positions]).max())
+    reason = f"up to {spacing:g} m between balises or to the first one, at the expected {table.expected_speed:g} m/s"
+    return ExpectedGap(spacing / table.expected_speed, reason)
 
 
 def check_certificates(
@@ -52,28 +62,39 @@ def check_certificates(
         Certificates by component as plain data, and warnings.
 
     Raises:
-        CertificateError: `mode` is ``require`` and a certificate does not hold.
+        CertificateError: `mode` is ``require`` and a certificate does not hold, or cannot be had.
     """
     certificates: dict[str, dict[str, Any]] = {}
     warnings: list[str] = []
     if mode == "ignore":
         return certificates, warnings
     for name, table in components.items():
-        system = make_system(table, where)
-        certify = getattr(system, "certify", None)
+        certify = getattr(make_system(table, where), "certify", None)
         if certify is None:
+            warnings.append(
+                f"{name}: not checked against the balise gaps; an FMU or a model without certificate cannot tell its limit."
+            )
             continue
-        certificate = certify(gap.seconds or 0.5, parameters=_numbers(table), preset=table.preset)
-        certificates[name] = certificate.to_dict() | {"explanation": certificate.explain()}
-        if gap.seconds is None:
-            known = f"its gains are certified up to {certificate.aperiodic_limit:.3g} s"
-            warnings.append(f"{name}: balise gaps cannot be known before this run ({gap.reason}); {known}.")
-            certificates[name]["holds"] = None
-        elif not certificate.holds:
-            warnings.append(f"{certificate.explain()} Expected: {gap.seconds:.3g} s ({gap.reason}).")
-    if mode == "require" and any(c["holds"] is False for c in certificates.values()):
+        certificates[name], doubt = _judge(name, table, certify, gap)
+        warnings += doubt
+    if mode == "require" and warnings:
         raise CertificateError(f"{where}: certificates = 'require' and not all hold.\n" + "\n".join(warnings))
     return certificates, warnings
+
+
+def _judge(name: str, table: ComponentTable, certify: Callable[..., Any], gap: ExpectedGap) -> tuple[dict[str, Any], list[str]]:
+    """Certificate of one observer as plain data, and what speaks against it."""
+    asked = ASKED_FOR_LIMITS_ONLY if gap.seconds is None else gap.seconds
+    certificate = certify(asked, parameters=_numbers(table), preset=table.preset)
+    data: dict[str, Any] = certificate.to_dict() | {"explanation": certificate.explain()}
+    if gap.seconds is None:
+        known = f"its gains are certified up to {certificate.aperiodic_limit:.3g} s"
+        doubt = f"{name}: balise gaps cannot be known before this run ({gap.reason}); {known}."
+        unknown = dict.fromkeys(("max_gap", "spectral_radius", "quadratic_margin", "holds"))
+        return data | unknown | {"explanation": doubt}, [doubt]
+    if certificate.holds:
+        return data, []
+    return data, [f"{certificate.explain()} Expected: {gap.seconds:.3g} s ({gap.reason})."]
 
 
 def _numbers(table: ComponentTable) -> dict[str, Any]:
@@ -81,7 +102,3 @@ def _numbers(table: ComponentTable) -> dict[str, Any]:
     assert system is not None
     known = {n for s in system.parameter_signals for n in (s.name, *s.scalar_names)}
     return {name: value for name, value in table.parameters.items() if name in known}
-
-
-def _unknown() -> ExpectedGap:
-    return ExpectedGap(None, "balises are laid by position; give balises.expected_speed to check")

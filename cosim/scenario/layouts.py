@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from cosim.balises.layout import InstantLayout, Layout, TrackLayout, aperiodic, by_positions, by_spacing, from_csv
-from cosim.errors import ScenarioError
+from cosim.errors import ScenarioError, nearest
 from cosim.scenario.schema import BalisesTable
 
 
@@ -20,6 +20,11 @@ def make_layout(table: BalisesTable, start: float, stop: float, folder: Path, wh
     Raises:
         ScenarioError: with file and key.
     """
+    for false in table.false_telegrams:
+        if not start < false.time <= stop:
+            raise ScenarioError(
+                f"{where}: balises.false_telegrams: {false.time:g} s lies outside the run from {start:g} s to {stop:g} s."
+            )
     try:
         if table.layout == "aperiodic":
             gaps = {k: getattr(table, k) for k in ("min_gap", "max_gap", "dropout_after", "dropout_fraction", "dropout_stretch")}
@@ -27,6 +32,10 @@ def make_layout(table: BalisesTable, start: float, stop: float, folder: Path, wh
         if table.layout == "instants":
             return InstantLayout(np.array(table.instants, dtype=float))
         layout = _track_layout(table, folder)
+        known = [b.identity for b in layout.balises]
+        for identity in table.missed:
+            if identity not in known:
+                raise ScenarioError(f"missed: no balise {identity!r}; {nearest(identity, known)}")
         if table.track_end is not None:
             layout.check_within(table.track_start, table.track_end)
         return layout

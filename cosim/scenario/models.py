@@ -60,6 +60,9 @@ def component_factory(name: str, table: ComponentTable, folder: Path, where: str
     if realisation.startswith("block"):
         arguments = {"preset": table.preset, "late_policy": table.late_policy, "replay_horizon": table.replay_horizon}
         return lambda: load_block(system, name, version, **arguments)
+    meant_for_blocks = sorted(table.model_fields_set & {"late_policy", "replay_horizon"})
+    if meant_for_blocks:
+        raise ScenarioError(f"{where}: {', '.join(meant_for_blocks)} belongs to blocks; as = '{realisation}' has no such choice.")
     path = _native(system, version, table.preset, where)
     return lambda: load_fmu(path, name)
 

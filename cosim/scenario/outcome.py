@@ -57,4 +57,6 @@ class Outcome:
         paths = dict(write_results(self.result, directory))
         if report:
             paths["report"] = write_report(self.result, self.spec, directory)
+        else:
+            (Path(directory) / "report.html").unlink(missing_ok=True)  # of an earlier run: it would not speak of these results
         return paths

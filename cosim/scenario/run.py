@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
@@ -17,7 +18,7 @@ from cosim.coupling.plan import Plan, make_plan
 from cosim.errors import CosimError
 from cosim.master.master import BaliseService, Master, TimeAxis, close
 from cosim.report.spec import Phase, ReportSpec
-from cosim.results.result import Result
+from cosim.results.result import BaliseRecord, Result
 from cosim.results.si import in_si
 from cosim.scenario.balise_service import Choice, choose_method, find_receivers, make_service, watched_plant
 from cosim.scenario.certificates import check_certificates, expected_gap
@@ -25,6 +26,7 @@ from cosim.scenario.connections import parse_connections
 from cosim.scenario.layouts import make_layout
 from cosim.scenario.models import component_factory
 from cosim.scenario.outcome import Outcome
+from cosim.scenario.roles import ROLES, check_roles
 from cosim.scenario.schema import ScenarioTable, step_count
 from cosim.scenario.starts import start_values
 from cosim.scenario.summary import run_summary
@@ -33,7 +35,6 @@ from plant_models.hybrid.units import Unit
 LOG = logging.getLogger("cosim")
 Progress = Callable[[float, float], None]
 Warn = Callable[[str], None]
-ROLES = ("true_position", "true_speed", "true_slip", "true_adhesion_force", "odometer", "speed_reference")
 
 
 def run_scenario(
@@ -51,7 +52,10 @@ def run_scenario(
     """
     setup = _Setup(table, folder, where, warn or LOG.warning)
     try:
-        setup.prepare()
+        try:
+            setup.prepare()
+        except CosimError as error:
+            raise error if str(error).startswith(where) else type(error)(f"{where}: {error}") from error
         return setup.execute(name, progress)
     finally:
         setup.close()
@@ -86,6 +90,7 @@ class _Setup:
             self.components[name] = factory()
         connections = connect(pairs, self.components)
         receivers, plant = self._balise_roles()
+        check_roles(table, self.components, self.where)
         order = execution_order(self.components, connections, self._before(plant, receivers))
         starts = {n: start_values(c, table.components[n].parameters) for n, c in self.components.items()}
         if layout is not None:
@@ -107,10 +112,13 @@ class _Setup:
             master.run()
         except CosimError as error:
             failure = str(error)
+        except KeyboardInterrupt:
+            failure = "The run was interrupted; what was computed so far is kept."
         if master.ended_early is not None:
             self._warn(master.ended_early)
         summary = run_summary(name, self.table, self.plan, master, self.setup_seconds)
-        events = [] if self.service is None else list(self.service.mailbox.log)
+        events = [] if self.service is None else self._all_telegrams(self.service)
+        self._warn_of_rejections()
         summary |= self._balise_summary([e.stamp for e in events if e.kind == "true"])
         summary |= {"certificates": self.certificates, "warnings": self.warnings, "notes": self.notes}
         table, signals = in_si(master.recorder.table(), self.plan.signals, self._unit)
@@ -156,7 +164,7 @@ class _Setup:
     def _check_certificates(self, layout: Layout, receivers: list[str]) -> None:
         assert self.table.balises is not None
         gap = expected_gap(layout, self.table.balises, self.table.start)
-        tables = {n: self.table.components[n] for n in receivers if self.table.components[n].fmu is None}
+        tables = {n: self.table.components[n] for n in receivers}
         self.certificates, warnings = check_certificates(tables, gap, self.table.certificates, self.where)
         for warning in warnings:
             self._warn(warning)
@@ -193,6 +201,18 @@ class _Setup:
             self.notes.append(f"Declare no dependencies, direct feedthrough assumed absent: {', '.join(silent)}.")
 
     # -- after the run ----------------------------------------------------------------------------------------------
+
+    def _all_telegrams(self, service: BaliseService) -> list[BaliseRecord]:
+        """Everything that was passed: told, missed, and still on its way at the end."""
+        names = [r.planned.component.name for r in service.receivers]
+        waiting = [replace(e, outcomes=dict.fromkeys(names, "undelivered")) for e in service.mailbox.waiting]
+        return [*service.mailbox.log, *waiting]
+
+    def _warn_of_rejections(self) -> None:
+        for name, component in self.components.items():
+            rejected = (component.outcomes() or {}).get("rejected", 0)
+            if rejected:
+                self._warn(f"{name}: {rejected} telegrams were rejected: stamped in the past, and beyond what it replays.")
 
     def _balise_summary(self, stamps: list[float]) -> dict[str, Any]:
         """Method, probe, and the gaps that really occurred against what is certified."""

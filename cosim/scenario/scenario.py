@@ -12,9 +12,10 @@ from typing import Any, Self
 from cosim.errors import ScenarioError, nearest
 from cosim.scenario.outcome import Outcome
 from cosim.scenario.run import run_scenario
-from cosim.scenario.schema import ScenarioTable, parse_scenario
+from cosim.scenario.schema import ComponentTable, ScenarioTable, parse_scenario
 
 SHIPPED = files("cosim") / "scenarios"
+COMPONENT_KEYS = {field.alias or name for name, field in ComponentTable.model_fields.items()}
 
 
 class Scenario:
@@ -103,7 +104,7 @@ class Scenario:
             table = components[head]
             if rest == "fmu":
                 table[rest] = str(Path(str(value)).resolve())  # given here, so relative to where the user stands
-            elif rest in ("preset", "as", "late_policy"):
+            elif rest in COMPONENT_KEYS:
                 table[rest] = value
             elif rest.startswith("options."):
                 table.setdefault("options", {})[rest.removeprefix("options.")] = value

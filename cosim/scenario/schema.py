@@ -180,7 +180,7 @@ def parse_scenario(data: dict[str, Any], where: str) -> ScenarioTable:
     try:
         return ScenarioTable.model_validate(data)
     except ValidationError as error:
-        lines = [_explain(dict(item)) for item in error.errors()]
+        lines = [_explain(dict(item)) for item in error.errors() if item["loc"][-1:] != ("list[float]",)]
         raise ScenarioError(f"{where}: " + f"\n{where}: ".join(lines)) from error
 
 
@@ -193,6 +193,8 @@ def _explain(item: dict[str, Any]) -> str:
     given = item.get("input")
     if item["type"] == "value_error" or isinstance(given, dict):
         return f"{place}: {message}"
+    if item["loc"][-1:] == ("float",):
+        message = "expected a number, or a list of numbers for a vector"
     return f"{place}: {message} (got {json.dumps(given, default=str)})"
 
 

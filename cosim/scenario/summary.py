@@ -74,5 +74,6 @@ def _component(component: Component, table: ComponentTable) -> dict[str, Any]:
         "source": component.source,
         "calls": component.calls,
         "seconds": component.seconds,
+        "messages": list(component.messages),
         "events": None if outcomes is None else dict(outcomes),
     }

@@ -187,3 +187,82 @@ def test_a_run_that_turns_to_nan_keeps_its_rows_and_ends_with_2(tmp_path: Path, 
     assert result.failure is not None
     assert len(result.table) >= 1
     assert np.isfinite(result.table["time"]).all()
+
+
+# -- what a sceptical user tried ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("setting", "value", "message"),
+    [
+        ("locomotive.mass", -5.0, r"locomotive.mass = -5 lies outside what the component declares: 1.0 to inf kg"),
+        ("observer.mass", 0.0, r"observer.mass = 0 lies outside"),
+        ("report.true_speed", "locomotive.sped", r"no variable 'sped'.*'speed'"),
+        ("report.true_speed", "locomotive.position", r"report.true_speed: locomotive.position is not in m/s"),
+        ("report.observers", ["nobody"], r"report.observers: no component 'nobody'"),
+        ("report.zones", [[5.0, 2.0]], r"report.zones, number 1: ends at 2 s"),
+        ("report.phases", [{"name": "p", "start": 1.0, "end": 1.0}], r"report.phases, 'p'"),
+        ("balises.false_telegrams", [{"time": 500.0, "offset": 1.0}], r"false_telegrams: 500 s lies outside the run"),
+        ("balises.missed", ["B33"], r"missed: no balise 'B33'.*'B3'"),
+        ("observer.parameters.mass", "heavy", r"parameters"),
+        ("observer.mass", "heavy", r"mass: expected a number, or a list of numbers for a vector \(got .heavy.\)"),
+    ],
+)
+def test_nonsense_is_refused_with_its_place(setting: str, value: Any, message: str) -> None:
+    with pytest.raises(CosimError, match=message) as caught:
+        small().run(overrides={setting: value})
+    assert str(caught.value).startswith("script: ")
+
+
+@pytest.mark.compiler
+def test_a_late_policy_for_a_sealed_receiver_is_refused() -> None:
+    with pytest.raises(CosimError, match="late_policy belongs to blocks"):
+        small().run(overrides={"observer.as": "fmu3", "observer.late_policy": "reject"})
+
+
+@pytest.mark.parametrize(
+    "doubt", [{}, {"balises.expected_speed": 10.0, "balises.missed_fraction": 0.1}, {"balises.expected_speed": 1.0}]
+)
+def test_required_certificates_must_be_had(doubt: dict[str, Any]) -> None:
+    with pytest.raises(CosimError, match="require"):
+        small().run(overrides={"certificates": "require", **doubt})
+    assert small().run(overrides={"certificates": "require", "balises.expected_speed": 10.0}).failure is None
+
+
+def test_rejected_and_undelivered_telegrams_are_not_passed_over() -> None:
+    outcome = small().run(overrides={"observer.late_policy": "reject", "balises.latency": 0.15})
+    fates = [e.outcomes["observer"] for e in outcome.result.events]
+    assert fates == ["rejected", "rejected", "undelivered"]  # passed at 0.1, 0.25 and 0.4 s; the run ends at 0.5 s
+    assert any("observer: 2 telegrams were rejected" in w for w in outcome.warnings)
+
+
+def test_an_interrupted_run_keeps_its_rows() -> None:
+    def interrupt(_t: float, _stop: float) -> None:
+        raise KeyboardInterrupt
+
+    outcome = small(title="long").set("stop", 5.0).run(progress=interrupt)
+    assert outcome.failure is not None
+    assert "interrupted" in outcome.failure
+    assert len(outcome.result.table) > 1
+
+
+def test_a_failed_run_with_seeds_writes_what_it_has(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "bad.toml"
+    path.write_text(
+        'stop = 1.0\nstep = 0.1\n[components.train]\nmodel = "locomotive"\nas = "block3"\n'
+        "parameters = { train_speed = 1e200, wheel_rate = 1e200 }\n"
+    )
+    code, _ = run_cli(capsys, "run", str(path), "--out", str(tmp_path / "out"), "--seeds", "2")
+    assert code == 2
+    assert (tmp_path / "out" / "report.html").exists()
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("realisation", ["fmu2", "fmu3"])
+def test_what_a_failing_fmu_logged_is_part_of_the_message(realisation: str) -> None:
+    overflow = {"driver.profile_speed": 1e305, "driver.effort_limit": 1e308, "driver.power_limit": 1e308}
+    outcome = small().run(overrides={"driver.as": realisation, **overflow})
+    assert outcome.failure is not None
+    assert "Component 'driver' at t = " in outcome.failure
+    assert "The FMU says: " in outcome.failure
+    assert "not a finite number" in outcome.failure

@@ -143,6 +143,8 @@ def test_the_end_comes_once_and_frees_everything() -> None:
     slave = Train()
     made = type(component(slave))("mock", slave, slave.model_description, release_files=lambda: released.append("files"))
     made.instantiate()
+    made.enter_initialization(0.0, 1.0)
+    made.exit_initialization()
     for _ in range(2):
         made.terminate()
         made.free()
