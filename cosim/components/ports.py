@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from fmpy.model_description import ModelVariable
@@ -18,34 +18,30 @@ REAL_TYPE = {2: "Real", 3: "Float64"}
 
 def make_reader(slave: Any, fmi_version: int, variables: Sequence[ModelVariable], values: np.ndarray) -> Callable[[], None]:
     """A call that reads `variables` into `values`, shape (len(variables),)."""
-    groups = _groups(variables, fmi_version)
-    if not groups:
-        return _nothing
-    if list(groups) == [REAL_TYPE[fmi_version]]:
-        references = [v.valueReference for v in variables]
-        if _is_native(slave):
-            return _native(slave, fmi_version, "Get", references, values)
-        if hasattr(slave, "prepared_get"):
-            prepared: Callable[[], None] = slave.prepared_get(references, values)
-            return prepared
-    readers = [_list_reader(slave, kind, variables, positions, values) for kind, positions in groups.items()]
-    return _sequence(readers)
+    return _make_port(slave, fmi_version, variables, values, "Get")
 
 
 def make_writer(slave: Any, fmi_version: int, variables: Sequence[ModelVariable], buffer: np.ndarray) -> Callable[[], None]:
     """A call that writes `variables` from `buffer`, shape (len(variables),)."""
+    return _make_port(slave, fmi_version, variables, buffer, "Set")
+
+
+def _make_port(
+    slave: Any, fmi_version: int, variables: Sequence[ModelVariable], values: np.ndarray, verb: Literal["Get", "Set"]
+) -> Callable[[], None]:
     groups = _groups(variables, fmi_version)
     if not groups:
         return _nothing
     if list(groups) == [REAL_TYPE[fmi_version]]:
         references = [v.valueReference for v in variables]
         if _is_native(slave):
-            return _native(slave, fmi_version, "Set", references, buffer)
-        if hasattr(slave, "prepared_set"):
-            prepared: Callable[[], None] = slave.prepared_set(references, buffer)
+            return _native(slave, fmi_version, verb, references, values)
+        prepare = getattr(slave, f"prepared_{verb.lower()}", None)
+        if prepare is not None:
+            prepared: Callable[[], None] = prepare(references, values)
             return prepared
-    writers = [_list_writer(slave, kind, variables, positions, buffer) for kind, positions in groups.items()]
-    return _sequence(writers)
+    list_port = _list_reader if verb == "Get" else _list_writer
+    return _sequence([list_port(slave, kind, variables, positions, values) for kind, positions in groups.items()])
 
 
 def _groups(variables: Sequence[ModelVariable], fmi_version: int) -> dict[str, list[int]]:

@@ -141,3 +141,18 @@ def test_advancing_to_now_does_nothing(system: HybridSystem) -> None:
     before = runtime.x.copy()
     runtime.advance(0.25)
     np.testing.assert_array_equal(runtime.x, before)
+
+
+@pytest.mark.parametrize("towards", [-np.inf, np.inf])
+def test_a_target_that_misses_a_grid_point_by_rounding_is_the_grid_point(towards: float) -> None:
+    """After a stop inside a cell: a master that adds up times arrives one unit in the last place beside the boundary."""
+
+    def run(end: float) -> np.ndarray:
+        runtime = started(Locomotive(), x0=rolling(8.0), internal_step=0.0077)
+        runtime.start(100.0)
+        runtime.advance(100.0 + 2.4 * 0.0077)
+        runtime.advance(end)
+        return runtime.x.copy()
+
+    boundary = 100.0 + 3 * 0.0077
+    np.testing.assert_array_equal(run(float(np.nextafter(boundary, towards))), run(boundary))
