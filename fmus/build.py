@@ -17,7 +17,9 @@ from fmus.pack import pack_fmu
 from fmus.xml import build_description_xml, model_description_xml
 from plant_models.hybrid import HybridSystem
 
-COMMON_SOURCES = ("model.c", "runtime.c", "noise.c", "events.c", "instance.c")
+MAIN_SOURCE = "all.c"
+"""The one file to compile; it includes the others."""
+
 FACES = {2: "fmi2.c", 3: "fmi3.c"}
 
 
@@ -38,8 +40,15 @@ class Plan:
 
     @property
     def sources(self) -> list[str]:
-        """Names of the C files."""
-        return [*COMMON_SOURCES, FACES[self.fmi_version]]
+        """Names of the C files to compile."""
+        return [MAIN_SOURCE]
+
+    def source_files(self) -> dict[str, bytes]:
+        """All that the FMU carries in ``sources/``, by name: the runtime with the face of this FMI version, and the model."""
+        others = {name for version, name in FACES.items() if version != self.fmi_version}
+        files = {name: text for name, text in runtime_sources().items() if name not in others}
+        files["model.c"] = generate_model(self.system, self.equations, self.description, self.preset).encode()
+        return files
 
     def description_xml(self) -> str:
         """The text of modelDescription.xml."""
@@ -87,8 +96,7 @@ def write_fmu(plan: Plan, compiler: Compiler, target: Path) -> Path:
     Raises:
         CompilationError: the compiler refused the sources.
     """
-    sources = {name: text for name, text in runtime_sources().items() if name in plan.sources or name.endswith(".h")}
-    sources["model.c"] = generate_model(plan.system, plan.equations, plan.description, plan.preset).encode()
+    sources = plan.source_files()
     library = library_name(plan.system.name)
     with tempfile.TemporaryDirectory(prefix="fmus-") as name:
         folder = Path(name)

@@ -79,6 +79,7 @@ def generate_model(system: HybridSystem, equations: Equations, description: Mode
     parts = [
         f"/* Generated from the hybrid system '{system.name}': its equations, and the table that describes them. */",
         '#include "model.h"\n',
+        f"#define FMI_VERSION {str(description.fmiVersion)[0]}\n",
         "#define casadi_int int\n",
         _equations_source(system.name, equations),
         _start_arrays(system, preset),
@@ -189,7 +190,7 @@ def _model_table(system: HybridSystem, equations: Equations, token: str) -> str:
         "variables": "variables",
     }
     rows = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
-    return f"#include <stddef.h>\n\nconst Model model = {{\n{rows}}};\n"
+    return f"#include <stddef.h>\n\nPRIVATE const Model model = {{\n{rows}}};\n"
 
 
 def _table(kind: str, name: str, rows: Iterable[str]) -> str:

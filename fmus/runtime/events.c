@@ -41,7 +41,7 @@ static void remove_first(Runtime *runtime) {
 
 /* -- announcing -------------------------------------------------------------------------------------------------- */
 
-Status events_announce(Instance *instance, int event) {
+PRIVATE Status events_announce(Instance *instance, int event) {
     Runtime *runtime = &instance->runtime;
     double stamp = runtime->stamps[event] > STAMP_NOW ? runtime->stamps[event] : runtime->clock.t;
     runtime->stamps[event] = STAMP_NOW;
@@ -71,7 +71,7 @@ static Status poll_count(Instance *instance, int event) {
     return status;
 }
 
-Status events_poll_counts(Instance *instance) {
+PRIVATE Status events_poll_counts(Instance *instance) {
     Status status = STATUS_OK;
     for (int i = 0; i < model.triggered_count; i++) {
         Status polled = poll_count(instance, i);
@@ -109,7 +109,7 @@ static Status apply_first(Instance *instance) {
     return STATUS_OK;
 }
 
-Status events_apply_until(Instance *instance, double t_end) {
+PRIVATE Status events_apply_until(Instance *instance, double t_end) {
     Runtime *runtime = &instance->runtime;
     Status status = STATUS_OK;
     while (*runtime->queue_length > 0.0 && entry(runtime, 0)[1] <= t_end + TIME_TOLERANCE) {

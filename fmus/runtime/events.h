@@ -8,13 +8,13 @@
 #include "instance.h"
 
 /* Queue an event with the payload in u and the stamp in `stamps`, and reset the stamp. STATUS_WARNING: it is lost. */
-Status events_announce(Instance *instance, int event);
+PRIVATE Status events_announce(Instance *instance, int event);
 
 /* FMI 2: announce every event whose count was raised since the last call. */
-Status events_poll_counts(Instance *instance);
+PRIVATE Status events_poll_counts(Instance *instance);
 
 /* Apply all queued events whose stamps are not after t_end [s], in the order of their stamps, integrating from one to
    the next. Does not integrate to t_end itself. STATUS_WARNING: one came too late. */
-Status events_apply_until(Instance *instance, double t_end);
+PRIVATE Status events_apply_until(Instance *instance, double t_end);
 
 #endif

@@ -13,7 +13,7 @@
 
 /* -- life -------------------------------------------------------------------------------------------------------- */
 
-Instance *instance_create(const char *name, const Face *face) {
+PRIVATE Instance *instance_create(const char *name, const Face *face) {
     size_t numbers = runtime_total_length() * sizeof(double);
     size_t integers = (size_t)model.integer_work * sizeof(int);
     size_t length = strlen(name) + 1;
@@ -30,15 +30,15 @@ Instance *instance_create(const char *name, const Face *face) {
     return instance;
 }
 
-void instance_free(Instance *instance) {
+PRIVATE void instance_free(Instance *instance) {
     free(instance);
 }
 
-bool instance_token_fits(const char *token) {
+PRIVATE bool instance_token_fits(const char *token) {
     return token != NULL && strcmp(token, model.token) == 0;
 }
 
-Status instance_reset(Instance *instance) {
+PRIVATE Status instance_reset(Instance *instance) {
     runtime_reset(&instance->runtime);
     instance->mode = MODE_INSTANTIATED;
     instance->rejected = instance->lost = 0;
@@ -55,7 +55,7 @@ static void log_message(const Instance *instance, Status status, const char *cat
     instance->face->log(instance, status, category, message);
 }
 
-Status instance_fail(const Instance *instance, const char *format, ...) {
+PRIVATE Status instance_fail(const Instance *instance, const char *format, ...) {
     va_list arguments;
     va_start(arguments, format);
     log_message(instance, STATUS_ERROR, "logStatusError", format, arguments);
@@ -63,7 +63,7 @@ Status instance_fail(const Instance *instance, const char *format, ...) {
     return STATUS_ERROR;
 }
 
-Status instance_warn(const Instance *instance, const char *format, ...) {
+PRIVATE Status instance_warn(const Instance *instance, const char *format, ...) {
     va_list arguments;
     va_start(arguments, format);
     log_message(instance, STATUS_WARNING, "logStatusWarning", format, arguments);
@@ -71,7 +71,7 @@ Status instance_warn(const Instance *instance, const char *format, ...) {
     return STATUS_WARNING;
 }
 
-void instance_note(const Instance *instance, const char *format, ...) {
+PRIVATE void instance_note(const Instance *instance, const char *format, ...) {
     if (!instance->debug_logging)
         return;
     va_list arguments;
@@ -80,7 +80,7 @@ void instance_note(const Instance *instance, const char *format, ...) {
     va_end(arguments);
 }
 
-Status instance_set_logging(Instance *instance, bool on, size_t count, const char *const categories[]) {
+PRIVATE Status instance_set_logging(Instance *instance, bool on, size_t count, const char *const categories[]) {
     bool wanted = count == 0;
     for (size_t i = 0; i < count && categories != NULL; i++)
         wanted = wanted || (categories[i] != NULL && strcmp(categories[i], "logEvents") == 0);
@@ -108,7 +108,7 @@ static void list_modes(char *text, size_t size, int modes) {
     }
 }
 
-Status instance_require(const Instance *instance, const char *function, int modes) {
+PRIVATE Status instance_require(const Instance *instance, const char *function, int modes) {
     if (instance == NULL)
         return STATUS_ERROR;
     if (instance->mode & modes)
@@ -128,7 +128,7 @@ static const Variable *find(const Instance *instance, const char *function, unsi
     return NULL;
 }
 
-const Variable *instance_variable(const Instance *instance, const char *function, unsigned reference, Role role) {
+PRIVATE const Variable *instance_variable(const Instance *instance, const char *function, unsigned reference, Role role) {
     const Variable *variable = find(instance, function, reference);
     if (variable != NULL && variable->role != role) {
         instance_fail(instance, "%s: %s (value reference %u) is of another type", function, variable->name, reference);
@@ -183,17 +183,17 @@ static Status check_settable(const Instance *instance, const char *function, uns
                          reference, mode_name(instance->mode), allowed);
 }
 
-Status instance_check_arrays(const Instance *instance, const char *function, const void *references, size_t count, const void *values) {
+PRIVATE Status instance_check_arrays(const Instance *instance, const char *function, const void *references, size_t count, const void *values) {
     if (count > 0 && (references == NULL || values == NULL))
         return instance_fail(instance, "%s: the array of value references or of values is missing", function);
     return STATUS_OK;
 }
 
-Status instance_no_variables(const Instance *instance, const char *function, size_t count) {
+PRIVATE Status instance_no_variables(const Instance *instance, const char *function, size_t count) {
     return count == 0 ? STATUS_OK : instance_fail(instance, "%s: this model has no variables of this type", function);
 }
 
-Status instance_get_reals(Instance *instance, const char *function, const unsigned *references, size_t count, double *values) {
+PRIVATE Status instance_get_reals(Instance *instance, const char *function, const unsigned *references, size_t count, double *values) {
     if (instance_check_arrays(instance, function, references, count, values) != STATUS_OK)
         return STATUS_ERROR;
     for (size_t i = 0; i < count; i++) {
@@ -212,7 +212,7 @@ Status instance_get_reals(Instance *instance, const char *function, const unsign
     return STATUS_OK;
 }
 
-Status instance_set_reals(Instance *instance, const char *function, const unsigned *references, size_t count, const double *values) {
+PRIVATE Status instance_set_reals(Instance *instance, const char *function, const unsigned *references, size_t count, const double *values) {
     if (instance_check_arrays(instance, function, references, count, values) != STATUS_OK)
         return STATUS_ERROR;
     for (size_t i = 0; i < count; i++)
@@ -242,7 +242,7 @@ static const char *state_name(int index) {
     return "?";
 }
 
-Status instance_start(Instance *instance, Mode next) {
+PRIVATE Status instance_start(Instance *instance, Mode next) {
     int refused = runtime_start(&instance->runtime, instance->start_time);
     if (refused >= 0)
         return instance_fail(instance, "time cannot run with parameter %s = %.17g; set it to a legal value", parameter_name(refused),
@@ -252,7 +252,7 @@ Status instance_start(Instance *instance, Mode next) {
     return STATUS_OK;
 }
 
-Status instance_setup(Instance *instance, double start_time) {
+PRIVATE Status instance_setup(Instance *instance, double start_time) {
     if (!isfinite(start_time))
         return instance_fail(instance, "the start time %g s is not a finite number", start_time);
     instance->start_time = instance->runtime.clock.t = instance->runtime.clock.t0 = start_time;
@@ -270,7 +270,7 @@ static Status check_step(const Instance *instance, const char *function, double 
     return STATUS_OK;
 }
 
-Status instance_do_step(Instance *instance, const char *function, double current, double size) {
+PRIVATE Status instance_do_step(Instance *instance, const char *function, double current, double size) {
     if (check_step(instance, function, current, size) != STATUS_OK)
         return STATUS_ERROR;
     instance->outputs_outdated = true;
@@ -319,7 +319,7 @@ static Status not_own(const Instance *instance, const char *function) {
     return instance_fail(instance, "%s: this is not a state of this model", function);
 }
 
-Status instance_save(const Instance *instance, const char *function, void **state) {
+PRIVATE Status instance_save(const Instance *instance, const char *function, void **state) {
     if (state == NULL)
         return instance_fail(instance, "%s: no place for the state was given", function);
     if (*state != NULL && !is_own(*state))
@@ -339,7 +339,7 @@ Status instance_save(const Instance *instance, const char *function, void **stat
     return STATUS_OK;
 }
 
-Status instance_restore(Instance *instance, const char *function, const void *state) {
+PRIVATE Status instance_restore(Instance *instance, const char *function, const void *state) {
     const Snapshot *snapshot = state;
     if (!is_own(snapshot))
         return not_own(instance, function);
@@ -353,7 +353,7 @@ Status instance_restore(Instance *instance, const char *function, const void *st
     return STATUS_OK;
 }
 
-Status instance_forget(void **state) {
+PRIVATE Status instance_forget(void **state) {
     if (state != NULL) {
         free(*state);
         *state = NULL;
@@ -361,14 +361,14 @@ Status instance_forget(void **state) {
     return STATUS_OK;
 }
 
-Status instance_serialized_size(const Instance *instance, const char *function, const void *state, size_t *size) {
+PRIVATE Status instance_serialized_size(const Instance *instance, const char *function, const void *state, size_t *size) {
     if (size == NULL || !is_own(state))
         return not_own(instance, function);
     *size = snapshot_size();
     return STATUS_OK;
 }
 
-Status instance_serialize(const Instance *instance, const char *function, const void *state, void *bytes, size_t size) {
+PRIVATE Status instance_serialize(const Instance *instance, const char *function, const void *state, void *bytes, size_t size) {
     if (bytes == NULL || !is_own(state))
         return not_own(instance, function);
     if (size < snapshot_size())
@@ -384,7 +384,7 @@ static bool is_sane(const Snapshot *head) {
     return is_own(head) && known;
 }
 
-Status instance_deserialize(const Instance *instance, const char *function, const void *bytes, size_t size, void **state) {
+PRIVATE Status instance_deserialize(const Instance *instance, const char *function, const void *bytes, size_t size, void **state) {
     if (bytes == NULL || state == NULL || size != snapshot_size())
         return instance_fail(instance, "%s: %zu bytes are not a state of this model; it has %zu", function, size, snapshot_size());
     Snapshot *snapshot = malloc(snapshot_size());

@@ -46,22 +46,22 @@ struct Instance {
 };
 
 /* All memory of an instance in one piece, or NULL. The name is copied. */
-Instance *instance_create(const char *name, const Face *face);
-void instance_free(Instance *instance);
+PRIVATE Instance *instance_create(const char *name, const Face *face);
+PRIVATE void instance_free(Instance *instance);
 
 /* Whether the token of the importer's model description is the one this library was built with. */
-bool instance_token_fits(const char *token);
+PRIVATE bool instance_token_fits(const char *token);
 
-Status instance_reset(Instance *instance);
+PRIVATE Status instance_reset(Instance *instance);
 
 /* From initialisation mode: time begins to run; `next` is the mode that follows. */
-Status instance_start(Instance *instance, Mode next);
+PRIVATE Status instance_start(Instance *instance, Mode next);
 
 /* Before initialisation: where time will start [s]. */
-Status instance_setup(Instance *instance, double start_time);
+PRIVATE Status instance_setup(Instance *instance, double start_time);
 
 /* One communication step, events included. */
-Status instance_do_step(Instance *instance, const char *function, double current, double size);
+PRIVATE Status instance_do_step(Instance *instance, const char *function, double current, double size);
 
 /* -- messages: each logs and returns its status ------------------------------------------------------------------ */
 
@@ -71,40 +71,40 @@ Status instance_do_step(Instance *instance, const char *function, double current
 #define PRINTF_LIKE
 #endif
 
-Status instance_fail(const Instance *instance, const char *format, ...) PRINTF_LIKE;
-Status instance_warn(const Instance *instance, const char *format, ...) PRINTF_LIKE;
-void instance_note(const Instance *instance, const char *format, ...) PRINTF_LIKE;
+PRIVATE Status instance_fail(const Instance *instance, const char *format, ...) PRINTF_LIKE;
+PRIVATE Status instance_warn(const Instance *instance, const char *format, ...) PRINTF_LIKE;
+PRIVATE void instance_note(const Instance *instance, const char *format, ...) PRINTF_LIKE;
 
 /* Errors and warnings are always logged; notes only where the category logEvents is switched on (no category: all). */
-Status instance_set_logging(Instance *instance, bool on, size_t count, const char *const categories[]);
+PRIVATE Status instance_set_logging(Instance *instance, bool on, size_t count, const char *const categories[]);
 
 /* STATUS_OK, or STATUS_ERROR with a message when the instance is in none of the allowed modes. */
-Status instance_require(const Instance *instance, const char *function, int modes);
+PRIVATE Status instance_require(const Instance *instance, const char *function, int modes);
 
 /* -- variables --------------------------------------------------------------------------------------------------- */
 
 /* STATUS_ERROR with a message when there is something to read or write and an array is missing. */
-Status instance_check_arrays(const Instance *instance, const char *function, const void *references, size_t count, const void *values);
+PRIVATE Status instance_check_arrays(const Instance *instance, const char *function, const void *references, size_t count, const void *values);
 
 /* For the types that no variable has: STATUS_OK for none, else STATUS_ERROR with a message. */
-Status instance_no_variables(const Instance *instance, const char *function, size_t count);
+PRIVATE Status instance_no_variables(const Instance *instance, const char *function, size_t count);
 
 /* Read or write the real variables `references`. Nothing is written unless everything may be. */
-Status instance_get_reals(Instance *instance, const char *function, const unsigned *references, size_t count, double *values);
-Status instance_set_reals(Instance *instance, const char *function, const unsigned *references, size_t count, const double *values);
+PRIVATE Status instance_get_reals(Instance *instance, const char *function, const unsigned *references, size_t count, double *values);
+PRIVATE Status instance_set_reals(Instance *instance, const char *function, const unsigned *references, size_t count, const double *values);
 
 /* The variable behind a reference if it has the wanted role, else NULL with a message. */
-const Variable *instance_variable(const Instance *instance, const char *function, unsigned reference, Role role);
+PRIVATE const Variable *instance_variable(const Instance *instance, const char *function, unsigned reference, Role role);
 
 /* -- snapshots: everything that decides the future ----------------------------------------------------------------- */
 
 /* Save into `*state`: allocated when it is NULL, else overwritten. */
-Status instance_save(const Instance *instance, const char *function, void **state);
-Status instance_restore(Instance *instance, const char *function, const void *state);
-Status instance_forget(void **state);
+PRIVATE Status instance_save(const Instance *instance, const char *function, void **state);
+PRIVATE Status instance_restore(Instance *instance, const char *function, const void *state);
+PRIVATE Status instance_forget(void **state);
 
-Status instance_serialized_size(const Instance *instance, const char *function, const void *state, size_t *size);
-Status instance_serialize(const Instance *instance, const char *function, const void *state, void *bytes, size_t size);
-Status instance_deserialize(const Instance *instance, const char *function, const void *bytes, size_t size, void **state);
+PRIVATE Status instance_serialized_size(const Instance *instance, const char *function, const void *state, size_t *size);
+PRIVATE Status instance_serialize(const Instance *instance, const char *function, const void *state, void *bytes, size_t size);
+PRIVATE Status instance_deserialize(const Instance *instance, const char *function, const void *bytes, size_t size, void **state);
 
 #endif

@@ -5,6 +5,8 @@
 #ifndef MODEL_H
 #define MODEL_H
 
+#include "private.h"
+
 /* A generated function: pointers to its arguments and results, work vectors, and a memory index that is always 0. */
 typedef int (*ModelFunction)(const double **arg, double **res, int *iw, double *w, int mem);
 
@@ -70,6 +72,6 @@ typedef struct {
     const Variable *variables; /* by value reference */
 } Model;
 
-extern const Model model;
+PRIVATE const Model model; /* defined in model.c */
 
 #endif

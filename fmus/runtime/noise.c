@@ -6,7 +6,7 @@
 
 #define PI 3.141592653589793
 
-void noise_philox4x32(uint32_t counter[4], uint32_t k0, uint32_t k1) {
+PRIVATE void noise_philox4x32(uint32_t counter[4], uint32_t k0, uint32_t k1) {
     for (int round = 0; round < 10; round++) {
         uint64_t product_0 = UINT64_C(0xD2511F53) * counter[0];
         uint64_t product_1 = UINT64_C(0xCD9E8D57) * counter[2];
@@ -25,7 +25,7 @@ static double uniform(uint32_t high, uint32_t low) {
     return ((high >> 5) * 67108864.0 + (low >> 6) + 0.5) * 0x1p-53;
 }
 
-double noise_standard_normal(uint64_t seed, uint64_t signal, uint64_t index) {
+PRIVATE double noise_standard_normal(uint64_t seed, uint64_t signal, uint64_t index) {
     uint32_t word[4] = {(uint32_t)index, (uint32_t)(index >> 32), (uint32_t)signal, 0};
     noise_philox4x32(word, (uint32_t)seed, (uint32_t)(seed >> 32));
     double first = uniform(word[0], word[1]);

@@ -4,10 +4,12 @@
 
 #include <stdint.h>
 
+#include "private.h"
+
 /* Ten rounds of Philox 4x32 on a 128-bit counter with a 64-bit key, in place on `counter`. */
-void noise_philox4x32(uint32_t counter[4], uint32_t k0, uint32_t k1);
+PRIVATE void noise_philox4x32(uint32_t counter[4], uint32_t k0, uint32_t k1);
 
 /* A standard normal number by Box and Muller. */
-double noise_standard_normal(uint64_t seed, uint64_t signal, uint64_t index);
+PRIVATE double noise_standard_normal(uint64_t seed, uint64_t signal, uint64_t index);
 
 #endif

@@ -11,7 +11,7 @@
 
 /* -- places ------------------------------------------------------------------------------------------------------ */
 
-size_t runtime_queue_stride(void) {
+PRIVATE size_t runtime_queue_stride(void) {
     int longest = 0;
     for (int i = 0; i < model.triggered_count; i++)
         if (model.triggered[i].payload_count > longest)
@@ -23,12 +23,12 @@ static size_t queue_size(void) {
     return model.triggered_count > 0 ? QUEUE_CAPACITY * runtime_queue_stride() : 0;
 }
 
-size_t runtime_memory_length(void) {
+PRIVATE size_t runtime_memory_length(void) {
     size_t length = (size_t)model.states + (size_t)model.inputs + (size_t)model.parameters;
     return length + 3 * (size_t)model.periodic_count + 4 * (size_t)model.triggered_count + 1 + queue_size();
 }
 
-size_t runtime_total_length(void) {
+PRIVATE size_t runtime_total_length(void) {
     return runtime_memory_length() + (size_t)model.outputs + (size_t)model.states + (size_t)model.real_work;
 }
 
@@ -38,7 +38,7 @@ static double *take(double **place, size_t count) {
     return taken;
 }
 
-void runtime_place(Runtime *runtime, double *numbers, int *integers) {
+PRIVATE void runtime_place(Runtime *runtime, double *numbers, int *integers) {
     double *place = numbers;
     runtime->memory = numbers;
     runtime->x = take(&place, (size_t)model.states);
@@ -65,7 +65,7 @@ static void copy(double *target, const double *source, int count) {
         memcpy(target, source, (size_t)count * sizeof(double));
 }
 
-void runtime_reset(Runtime *runtime) {
+PRIVATE void runtime_reset(Runtime *runtime) {
     memset(runtime->memory, 0, runtime_memory_length() * sizeof(double));
     copy(runtime->x, model.start_x, model.states);
     copy(runtime->u, model.start_u, model.inputs);
@@ -99,7 +99,7 @@ static void jump(Runtime *runtime, ModelFunction function) {
     copy(runtime->x, runtime->x_next, model.states);
 }
 
-void runtime_update_outputs(Runtime *runtime) {
+PRIVATE void runtime_update_outputs(Runtime *runtime) {
     if (model.output == NULL)
         return;
     const double *arguments[] = {&runtime->clock.t, runtime->x, runtime->u, runtime->p};
@@ -109,7 +109,7 @@ void runtime_update_outputs(Runtime *runtime) {
 
 /* -- periodic events --------------------------------------------------------------------------------------------- */
 
-double runtime_tolerance(const Runtime *runtime, double t) {
+PRIVATE double runtime_tolerance(const Runtime *runtime, double t) {
     double magnitude = fabs(t);
     return GRID_TOLERANCE * runtime->clock.h + 4.0 * (nextafter(magnitude, INFINITY) - magnitude);
 }
@@ -151,7 +151,7 @@ static bool is_positive(double value) {
     return isfinite(value) && value > 0.0;
 }
 
-int runtime_start(Runtime *runtime, double t0) {
+PRIVATE int runtime_start(Runtime *runtime, double t0) {
     if (!is_positive(runtime->p[model.internal_step]))
         return model.internal_step;
     for (int i = 0; i < model.periodic_count; i++) {
@@ -204,7 +204,7 @@ static void integrate(Runtime *runtime, double target) {
     runtime->clock.t = target;
 }
 
-void runtime_advance(Runtime *runtime, double t_end) {
+PRIVATE void runtime_advance(Runtime *runtime, double t_end) {
     for (;;) {
         double due = next_due(runtime);
         if (due > t_end + runtime_tolerance(runtime, t_end))
@@ -215,11 +215,11 @@ void runtime_advance(Runtime *runtime, double t_end) {
     integrate(runtime, t_end);
 }
 
-void runtime_trigger(Runtime *runtime, int event) {
+PRIVATE void runtime_trigger(Runtime *runtime, int event) {
     jump(runtime, model.triggered[event].jump);
 }
 
-bool runtime_memory_is_sane(const double *memory) {
+PRIVATE bool runtime_memory_is_sane(const double *memory) {
     const double *end = memory + runtime_memory_length();
     const double *queue = end - queue_size(), *length = queue - 1;
     if (!(*length >= 0.0 && *length <= (model.triggered_count > 0 ? QUEUE_CAPACITY : 0)))
@@ -232,7 +232,7 @@ bool runtime_memory_is_sane(const double *memory) {
     return true;
 }
 
-int runtime_first_broken_state(const Runtime *runtime) {
+PRIVATE int runtime_first_broken_state(const Runtime *runtime) {
     for (int i = 0; i < model.states; i++)
         if (!isfinite(runtime->x[i]))
             return i;

@@ -33,38 +33,38 @@ typedef struct {
 } Runtime;
 
 /* Number of doubles in `memory`, and of all doubles a runtime needs. */
-size_t runtime_memory_length(void);
-size_t runtime_total_length(void);
+PRIVATE size_t runtime_memory_length(void);
+PRIVATE size_t runtime_total_length(void);
 
 /* Doubles of one entry of the queue: event, stamp, payload. */
-size_t runtime_queue_stride(void);
+PRIVATE size_t runtime_queue_stride(void);
 
 /* Lay the arrays into `numbers` (`runtime_total_length()` doubles) and `integers`; then reset. */
-void runtime_place(Runtime *runtime, double *numbers, int *integers);
+PRIVATE void runtime_place(Runtime *runtime, double *numbers, int *integers);
 
 /* Back to the start values, at time zero. */
-void runtime_reset(Runtime *runtime);
+PRIVATE void runtime_reset(Runtime *runtime);
 
 /* Begin at t0 [s] and fire the periodic events due there. Returns -1, or the position in p of a parameter with which
    time cannot run: a step or period that is not positive, an offset that is not finite, a seed outside [0, 2^53). */
-int runtime_start(Runtime *runtime, double t0);
+PRIVATE int runtime_start(Runtime *runtime, double t0);
 
 /* Integrate to t_end [s] and fire the periodic events on the way and at the end. */
-void runtime_advance(Runtime *runtime, double t_end);
+PRIVATE void runtime_advance(Runtime *runtime, double t_end);
 
 /* Jump at a triggered event now, with the payload in u. */
-void runtime_trigger(Runtime *runtime, int event);
+PRIVATE void runtime_trigger(Runtime *runtime, int event);
 
 /* Compute y from t, x, u, p. */
-void runtime_update_outputs(Runtime *runtime);
+PRIVATE void runtime_update_outputs(Runtime *runtime);
 
 /* Closer in time than this [s] is the same instant. */
-double runtime_tolerance(const Runtime *runtime, double t);
+PRIVATE double runtime_tolerance(const Runtime *runtime, double t);
 
 /* Whether what serves as an index in a `memory` that came from outside is within its bounds. */
-bool runtime_memory_is_sane(const double *memory);
+PRIVATE bool runtime_memory_is_sane(const double *memory);
 
 /* Position in x of the first state that is not a finite number, or -1. */
-int runtime_first_broken_state(const Runtime *runtime);
+PRIVATE int runtime_first_broken_state(const Runtime *runtime);
 
 #endif

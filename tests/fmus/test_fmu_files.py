@@ -55,11 +55,11 @@ def test_sources_in_the_fmu_give_its_library(tracker: HybridSystem, version: int
     fmu = build_fmu(tracker, tmp_path / "one.fmu", version)  # type: ignore[arg-type]
     with zipfile.ZipFile(fmu) as archive:
         archive.extractall(tmp_path)
-    from fmus.build import COMMON_SOURCES, FACES
+    from fmus.build import MAIN_SOURCE
     from fmus.compile import compile_library
 
     library = next((tmp_path / "binaries").rglob("tracker.*"))
-    again = compile_library(find_compiler(), tmp_path / "sources", [*COMMON_SOURCES, FACES[version]], library.name)
+    again = compile_library(find_compiler(), tmp_path / "sources", [MAIN_SOURCE], library.name)
     assert again.read_bytes() == library.read_bytes()
 
 
