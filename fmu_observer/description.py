@@ -19,12 +19,16 @@ from fmpy.model_description import (
     CoSimulation,
     DefaultExperiment,
     DisplayUnit,
+    Item,
     ModelDescription,
+    ModelExchange,
     ModelVariable,
+    SimpleType,
     Unit,
     Unknown,
 )
 
+from fmu_observer.event_protocol import LATE_POLICIES, EventProtocol
 from plant_models.hybrid import HybridSystem, Signal, TracedSystem, TriggeredEvent, width
 from plant_models.hybrid.units import BASE_SYMBOLS, conversion, parse_unit
 
@@ -33,7 +37,15 @@ FmiVersion = Literal[2, 3]
 STAMP_NOW = -1.0e30
 """Start value of ``<event>_time``: the event happened at the time at which it is told."""
 
+LOG_CATEGORIES = {
+    "logStatusError": "Calls that were refused, and why",
+    "logStatusDiscard": "Steps that could not be done and were undone",
+    "logStatusWarning": "Events that came too late or were lost",
+    "logEvents": "Events that were applied",
+}
+
 VERSION_STRINGS = {2: "2.0", 3: "3.0"}
+LATE_POLICY_TYPE = "LatePolicy"
 TOKEN_ATTRIBUTES = (
     "name", "valueReference", "type", "causality", "variability", "initial", "start", "min", "max", "unit", "displayUnit",
 )  # fmt: skip
@@ -47,6 +59,9 @@ class VariableTable:
         inputs: first value reference of inputs and payloads (noise is not exposed).
         outputs: first of the outputs. states: first of the states. parameters: first of the parameters.
         events: first of the event variables, two for each triggered event (clock or count, then stamp).
+        protocol: first of `late_policy` and `replay_horizon`; both are missing where there is no triggered event.
+        derivatives: first of the derivatives of the continuous states.
+        indicators: first of the event indicators, one for each state with dry friction.
         end: first value reference that is not used.
     """
 
@@ -55,14 +70,18 @@ class VariableTable:
     states: int
     parameters: int
     events: int
+    protocol: int
+    derivatives: int
+    indicators: int
     end: int
 
     @classmethod
     def of(cls, system: HybridSystem) -> VariableTable:
         """The table of a system, the same for FMI 2 and FMI 3."""
+        triggered = len(system.triggered_events)
         counts = [width(exposed_inputs(system)), width(system.outputs), system.state_count, width(system.parameter_signals)]
-        inputs, outputs, states, parameters, events = (1 + sum(counts[:i]) for i in range(5))
-        return cls(inputs, outputs, states, parameters, events, end=events + 2 * len(system.triggered_events))
+        counts += [2 * triggered, 2 if triggered else 0, system.continuous_count, len(system.frictions)]
+        return cls(*(1 + sum(counts[:i]) for i in range(len(counts) + 1)))
 
 
 def exposed_inputs(system: HybridSystem) -> tuple[Signal, ...]:
@@ -71,8 +90,9 @@ def exposed_inputs(system: HybridSystem) -> tuple[Signal, ...]:
 
 
 def describe(
-    system: HybridSystem, fmi_version: FmiVersion, *, preset: str | None = None, model_name: str | None = None
-) -> ModelDescription:
+    system: HybridSystem, fmi_version: FmiVersion, *, preset: str | None = None, model_name: str | None = None,
+    protocol: EventProtocol | None = None, model_exchange: bool = False,
+) -> ModelDescription:  # fmt: skip
     """The model description of a system as a co-simulation FMU.
 
     Args:
@@ -80,13 +100,16 @@ def describe(
         fmi_version: 2 or 3.
         preset: preset whose values become the start values; None for the system's default.
         model_name: name to show; None for the system's own.
+        protocol: how it is told of triggered events; by default as is usual in the FMI version.
+        model_exchange: whether it is a model exchange FMU as well; only a traceable system without communication events can be.
 
     Raises:
-        ValueError: the preset or the version of FMI is unknown.
+        ValueError: the preset or the version of FMI is unknown, or the protocol is none of this version.
     """
     if fmi_version not in VERSION_STRINGS:
         raise ValueError(f"{system.name}: FMI version {fmi_version!r} is unknown; use 2 or 3.")
-    variables = _variables(system, fmi_version, preset)
+    protocol = protocol or EventProtocol()
+    variables = _variables(system, fmi_version, preset, protocol)
     experiment = DefaultExperiment(startTime="0.0", stopTime="10.0", stepSize="0.01")  # text, as fmpy reads it from a file
     description = ModelDescription(
         fmiVersion=VERSION_STRINGS[fmi_version],
@@ -94,29 +117,68 @@ def describe(
         description=" ".join(system.description.split()),
         generationTool="fmu-observer",
         variableNamingConvention="structured",
-        coSimulation=_co_simulation(system, fmi_version),
+        coSimulation=_co_simulation(system, protocol.counts(fmi_version)),
+        modelExchange=_model_exchange(system) if model_exchange else None,
+        typeDefinitions=[_late_policy_type()] if system.triggered_events else [],
         defaultExperiment=experiment,
-        logCategories=[Category(name="logStatusError", description="Calls that failed, and why")],
+        logCategories=[Category(name=name, description=text) for name, text in LOG_CATEGORIES.items()],
         unitDefinitions=_unit_definitions(variables),
         modelVariables=variables,
     )
-    description.outputs = _output_structure(system, variables)
-    description.initialUnknowns = [Unknown(index=u.index, variable=u.variable) for u in description.outputs]
+    table = VariableTable.of(system)
+    description.outputs = _structure(system, variables, "output", table.outputs, width(system.outputs))
+    description.derivatives = _structure(system, variables, "derivative", table.derivatives, system.continuous_count)
+    indicators = variables[table.indicators : table.end]
+    description.eventIndicators = [Unknown(index=v.valueReference + 1, variable=v) for v in indicators]
+    description.numberOfContinuousStates, description.numberOfEventIndicators = system.continuous_count, len(indicators)
+    unknowns = [*description.outputs, *description.derivatives]
+    description.initialUnknowns = [Unknown(index=u.index, variable=u.variable) for u in unknowns]
     description.instantiationToken = _token(system, description)
     return description
 
 
-def _co_simulation(system: HybridSystem, fmi_version: FmiVersion) -> CoSimulation:
+def can_exchange(system: HybridSystem) -> bool:
+    """Whether a system can be a model exchange FMU: its equations can be traced, and no master's steps are part of them."""
+    return system.traceable and not system.communication_events
+
+
+def _model_exchange(system: HybridSystem) -> ModelExchange:
+    if not can_exchange(system):
+        raise ValueError(
+            f"{system.name}: a system with communication events, or one that cannot be traced, has no model exchange."
+        )
+    return ModelExchange(
+        modelIdentifier=system.name,
+        canGetAndSetFMUstate=True,
+        canSerializeFMUstate=True,
+        providesDirectionalDerivative=True,
+        completedIntegratorStepNotNeeded=True,
+    )
+
+
+def _late_policy_type() -> SimpleType:
+    texts = {
+        "replay": "Back to the stamp, jump, forward again",
+        "reject": "No effect but a warning",
+        "late": "Jump when told; for comparison only",
+    }
+    items = [Item(name=name, value=str(i + 1), description=texts[name]) for i, name in enumerate(LATE_POLICIES)]
+    return SimpleType(name=LATE_POLICY_TYPE, type="Enumeration", description="What to do with a late event", items=items)
+
+
+def _co_simulation(system: HybridSystem, counts_events: bool) -> CoSimulation:
     return CoSimulation(
         modelIdentifier=system.name,
         canHandleVariableCommunicationStepSize=True,
         canGetAndSetFMUstate=True,
         canSerializeFMUstate=True,
-        hasEventMode=fmi_version == 3 and bool(system.triggered_events),
+        providesDirectionalDerivative=system.traceable,
+        hasEventMode=bool(system.triggered_events) and not counts_events,
+        mightReturnEarlyFromDoStep=bool(system.periodic_events),
     )
 
 
-def _variables(system: HybridSystem, fmi_version: FmiVersion, preset: str | None) -> list[ModelVariable]:
+def _variables(system: HybridSystem, fmi_version: FmiVersion, preset: str | None, protocol: EventProtocol) -> list[ModelVariable]:
     table = VariableTable.of(system)
     real = "Real" if fmi_version == 2 else "Float64"
     starts = _start_values(system, preset)
@@ -131,38 +193,71 @@ def _variables(system: HybridSystem, fmi_version: FmiVersion, preset: str | None
         names = ((signal, name) for signal in signals for name in signal.scalar_names)
         variables += [_signal_variable(s, name, first + i, real, starts) for i, (s, name) in enumerate(names)]
     for i, event in enumerate(system.triggered_events):
-        variables += _event_variables(event, table.events + 2 * i, fmi_version)
-    if fmi_version == 3:
+        variables += _event_variables(event, table.events + 2 * i, fmi_version, protocol.counts(fmi_version))
+    if system.triggered_events:
+        variables += _protocol_variables(protocol, table.protocol, real)
+    if not protocol.counts(fmi_version):
         _assign_clocks(system, variables)
-    return variables
+    return variables + _rate_variables(system, variables, real)
 
 
 def _signal_variable(signal: Signal, name: str, reference: int, real: str, starts: dict[str, float]) -> ModelVariable:
     initial = {"output": "calculated", "local": "exact", "parameter": "exact"}.get(signal.causality)
     start = None if signal.causality == "output" else starts[name]
-    variable = _variable(
-        name, reference, real, signal.causality, signal.variability, initial, signal.unit, start, signal.description
-    )
+    kind = real if not signal.integer else ("Integer" if real == "Real" else "Int32")
+    unit = None if signal.integer else signal.unit
+    variable = _variable(name, reference, kind, signal.causality, signal.variability, initial, unit, start, signal.description)
     variable.displayUnit = signal.display_unit
     variable.min = None if signal.min is None else repr(float(signal.min))
     variable.max = None if signal.max is None else repr(float(signal.max))
     return variable
 
 
-def _event_variables(event: TriggeredEvent, reference: int, fmi_version: FmiVersion) -> list[ModelVariable]:
+def _event_variables(event: TriggeredEvent, reference: int, fmi_version: FmiVersion, counts_events: bool) -> list[ModelVariable]:
     what = event.description or f"event {event.name}"
     stamp_text = f"Instant of the {event.name}; start value: at the current time"
-    if fmi_version == 2:
+    real, integer = ("Real", "Integer") if fmi_version == 2 else ("Float64", "Int32")
+    if counts_events:
         counter = _variable(
-            f"{event.name}_count", reference, "Integer", "input", "discrete", start=0, description=f"Raise by one: {what}"
+            f"{event.name}_count", reference, integer, "input", "discrete", start=0, description=f"Raise by one: {what}"
         )
-        real = "Real"
     else:
         counter = _variable(event.name, reference, "Clock", "input", "discrete", description=what)
         counter.intervalVariability = "triggered"
-        real = "Float64"
     stamp = _variable(f"{event.name}_time", reference + 1, real, "input", "discrete", None, "s", STAMP_NOW, stamp_text)
     return [counter, stamp]
+
+
+def _protocol_variables(protocol: EventProtocol, reference: int, real: str) -> list[ModelVariable]:
+    number = LATE_POLICIES.index(protocol.late_policy) + 1
+    text = "What to do with an event stamped before the current time"
+    policy = _variable("late_policy", reference, "Enumeration", "parameter", "fixed", "exact", None, number, text)
+    policy.declaredType = _late_policy_type()
+    text = "How far back late events can be replayed"
+    horizon = _variable("replay_horizon", reference + 1, real, "parameter", "fixed", "exact", "s", protocol.replay_horizon, text)
+    horizon.min = "0.0"
+    return [policy, horizon]
+
+
+def _rate_variables(system: HybridSystem, variables: list[ModelVariable], real: str) -> list[ModelVariable]:
+    """Derivatives of the continuous states, then the event indicators of the states with dry friction."""
+    table = VariableTable.of(system)
+    states = variables[table.states : table.states + system.continuous_count]
+    rates = []
+    for i, state in enumerate(states):
+        unit, text = _per_second(state.unit or "1"), f"Derivative of {state.name}"
+        rate = _variable(f"der({state.name})", table.derivatives + i, real, "local", "continuous", "calculated", unit, None, text)
+        rate.derivative, state.reinit = state, bool(system.events or system.frictions)
+        rates.append(rate)
+    for i, name in enumerate(system.frictions):
+        text = f"Changes its sign when {name} comes to rest or breaks away"
+        kind = ("local", "continuous", "calculated", None, None, text)
+        rates.append(_variable(f"event_indicator.{name}", table.indicators + i, real, *kind))
+    return rates
+
+
+def _per_second(unit: str) -> str:
+    return f"{unit}2" if unit.endswith("/s") else f"{unit}/s"
 
 
 def _assign_clocks(system: HybridSystem, variables: list[ModelVariable]) -> None:
@@ -178,7 +273,7 @@ def _variable(
     name: str, reference: int, kind: str, causality: str, variability: str, initial: str | None = None,
     unit: str | None = None, start: float | None = None, description: str = "",
 ) -> ModelVariable:  # fmt: skip
-    python_type: type = {"Integer": int, "Clock": bool}.get(kind, float)
+    python_type: type = {"Integer": int, "Int32": int, "Enumeration": int, "Clock": bool}.get(kind, float)
     return ModelVariable(
         name=name,
         valueReference=reference,
@@ -220,28 +315,31 @@ def _unit_definition(name: str, shown: list[str]) -> Unit:
     return Unit(name=name, baseUnit=base, displayUnits=display)
 
 
-def _output_structure(system: HybridSystem, variables: list[ModelVariable]) -> list[Unknown]:
+def _structure(system: HybridSystem, variables: list[ModelVariable], function: str, first: int, count: int) -> list[Unknown]:
+    """Outputs or derivatives, each with the inputs, continuous states and time that it depends on."""
     table = VariableTable.of(system)
-    count = width(system.outputs)
-    feedthrough = _feedthrough(system)
     unknowns = []
-    for row in range(count):
-        known = [variables[table.inputs + int(column)] for column in np.flatnonzero(feedthrough[row])]
-        reference = table.outputs + row
-        unknown = Unknown(index=reference + 1, variable=variables[reference], dependencies=known)
+    for row, references in enumerate(_dependencies(system, function, count, table)):
+        known = [variables[reference] for reference in references]
+        unknown = Unknown(index=first + row + 1, variable=variables[first + row], dependencies=known)
         unknown.dependenciesKind = ["dependent"] * len(known)
         unknowns.append(unknown)
     return unknowns
 
 
-def _feedthrough(system: HybridSystem) -> np.ndarray:
-    """Which outputs depend directly on which exposed inputs: shape (outputs, inputs); all where it cannot be traced."""
-    shape = (width(system.outputs), width(exposed_inputs(system)))
-    if not system.traceable:
-        return np.ones(shape, dtype=bool)
-    if 0 in shape:
-        return np.zeros(shape, dtype=bool)
-    return TracedSystem(system).dependencies("output", "u")[:, : shape[1]]
+def _dependencies(system: HybridSystem, function: str, count: int, table: VariableTable) -> list[list[int]]:
+    """Value references that each row of `output` or `derivative` depends on; all of them where it cannot be traced."""
+    inputs, states = width(exposed_inputs(system)), system.continuous_count
+    groups = (("t", 0, 1), ("u", table.inputs, inputs), ("x", table.states, states))
+    rows: list[list[int]] = [[] for _ in range(count)]
+    traced = TracedSystem(system) if system.traceable and count else None
+    for group, first, width_ in groups:
+        pattern = np.ones((count, width_), dtype=bool)
+        if traced is not None and width_:
+            pattern = traced.dependencies(function, group)[:, :width_]
+        for row in range(count):
+            rows[row] += [first + int(column) for column in np.flatnonzero(pattern[row])]
+    return rows
 
 
 def _token(system: HybridSystem, description: ModelDescription) -> str:
@@ -249,7 +347,8 @@ def _token(system: HybridSystem, description: ModelDescription) -> str:
     content: list[object] = [description.fmiVersion, system.name, system.method, sorted(map(str, system.options.items()))]
     content += [[getattr(v, name) for name in TOKEN_ATTRIBUTES] + list(v.clocks or ()) for v in description.modelVariables]
     content += [[e.name, e.period, e.offset, len(e.noises)] for e in system.periodic_events]
-    content += [[u.variable.name, *(known.name for known in u.dependencies)] for u in description.outputs]
+    structure = (*description.outputs, *description.derivatives)
+    content += [[u.variable.name, *(known.name for known in u.dependencies)] for u in structure]
     content += [TracedSystem(system).digest() if system.traceable else type(system).__qualname__]
     digest = hashlib.sha256(json.dumps(content).encode()).hexdigest()
     return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"

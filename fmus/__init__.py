@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fmus.build import build_fmu
-    from fmus.cache import cache_folder, cached_fmu
-    from fmus.compile import CompilationError, CompilerMissing
-    from fmus.generate import GenerationError
+    from fmus.cache import cached_fmu
+    from fmus.content.generate import GenerationError
+    from fmus.folders import cache_folder
     from fmus.recipes import RECIPES, UnknownRecipeError, recipe
+    from fmus.toolchain.compile import CompilationError, CompilerMissing
 
 __all__ = [
     "RECIPES",
@@ -30,12 +31,12 @@ __all__ = [
 
 _HOMES = {
     "RECIPES": "fmus.recipes",
-    "CompilationError": "fmus.compile",
-    "CompilerMissing": "fmus.compile",
-    "GenerationError": "fmus.generate",
+    "CompilationError": "fmus.toolchain.compile",
+    "CompilerMissing": "fmus.toolchain.compile",
+    "GenerationError": "fmus.content.generate",
     "UnknownRecipeError": "fmus.recipes",
     "build_fmu": "fmus.build",
-    "cache_folder": "fmus.cache",
+    "cache_folder": "fmus.folders",
     "cached_fmu": "fmus.cache",
     "recipe": "fmus.recipes",
 }

@@ -1,8 +1,8 @@
-"""Building: a hybrid system becomes an FMU file. Puts generation, XML, compilation and packing in a row."""
+"""Building: a hybrid system becomes an FMU file. Puts generation, XML, compilation, documentation and packing in a row."""
 
 from __future__ import annotations
 
-import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -10,22 +10,28 @@ from pathlib import Path
 
 from fmpy.model_description import ModelDescription
 
-from fmu_observer.description import FmiVersion, describe
-from fmus.compile import Compiler, binaries_folder, compile_library, find_compiler, library_name
-from fmus.generate import Equations, generate_model, trace_equations
-from fmus.pack import pack_fmu
-from fmus.xml import build_description_xml, model_description_xml
+from fmu_observer.description import FmiVersion, can_exchange, describe
+from fmu_observer.event_protocol import EventProtocol
+from fmus.content.generate import Equations, generate_model, trace_equations
+from fmus.content.names import check_names
+from fmus.content.resources import resource_files
+from fmus.content.xml import build_description_xml, model_description_xml
+from fmus.documentation import documentation_files
+from fmus.pack import check_target, pack_fmu
+from fmus.toolchain.compile import header_folder
+from fmus.toolchain.platforms import HOST, binary_files
+from fmus.toolchain.targets import Progress, Target, choose_targets, compile_targets
 from plant_models.hybrid import HybridSystem
 
 MAIN_SOURCE = "all.c"
 """The one file to compile; it includes the others."""
 
-FACES = {2: "fmi2.c", 3: "fmi3.c"}
+FACES = {2: {"fmi2.c", "fmi2_prefix.h"}, 3: {"fmi3.c"}}
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What an FMU will be made of; all that decides its content except the compiler.
+    """What an FMU will be made of; all that decides its content except the compilers.
 
     Args:
         system: the hybrid system. equations: its traced functions. description: its model description.
@@ -44,71 +50,94 @@ class Plan:
         return [MAIN_SOURCE]
 
     def source_files(self) -> dict[str, bytes]:
-        """All that the FMU carries in ``sources/``, by name: the runtime with the face of this FMI version, and the model."""
-        others = {name for version, name in FACES.items() if version != self.fmi_version}
+        """Our files in ``sources/``, by name: the runtime with the face of this FMI version, and the model."""
+        others = set().union(*(names for version, names in FACES.items() if version != self.fmi_version))
         files = {name: text for name, text in runtime_sources().items() if name not in others}
         files["model.c"] = generate_model(self.system, self.equations, self.description, self.preset).encode()
         return files
+
+    def header_files(self) -> dict[str, bytes]:
+        """The headers of the FMI standard in ``sources/``, by name."""
+        return standard_headers(self.fmi_version)
 
     def description_xml(self) -> str:
         """The text of modelDescription.xml."""
         return model_description_xml(self.description, self.sources)
 
 
-def plan_fmu(system: HybridSystem, fmi_version: FmiVersion = 3, preset: str | None = None) -> Plan:
+def plan_fmu(
+    system: HybridSystem, fmi_version: FmiVersion = 3, preset: str | None = None, protocol: EventProtocol | None = None
+) -> Plan:
     """Trace and describe a system.
 
     Raises:
-        ValueError: the FMI version is not 2 or 3, the preset is unknown, or the system cannot become C.
+        ValueError: the FMI version is not 2 or 3, the preset is unknown, a name is not legal, the protocol is none of this
+            version, or the system cannot become C.
     """
     if fmi_version not in FACES:
         raise ValueError(f"FMI version {fmi_version!r} cannot be exported; choose 2 or 3.")
+    check_names(system)
     equations = trace_equations(system)
-    return Plan(system, equations, describe(system, fmi_version, preset=preset), fmi_version, preset)
+    description = describe(system, fmi_version, preset=preset, protocol=protocol, model_exchange=can_exchange(system))
+    return Plan(system, equations, description, fmi_version, preset)
 
 
-def build_fmu(system: HybridSystem, target: Path | str, fmi_version: FmiVersion = 3, preset: str | None = None) -> Path:
-    """Export a hybrid system as a native co-simulation FMU, with its sources.
+def build_fmu(
+    system: HybridSystem, target: Path | str, fmi_version: FmiVersion = 3, preset: str | None = None, *,
+    platforms: str | Sequence[str] = HOST, protocol: EventProtocol | None = None, progress: Progress | None = None,
+) -> Path:  # fmt: skip
+    """Export a hybrid system as a native FMU, with its sources and documentation.
 
     Args:
         system: the hybrid system.
         target: path of the FMU file (ending in ``.fmu``), or a folder that gets ``<name>.fmu``.
         fmi_version: 2 or 3.
         preset: preset whose values become the start values; None for the system's default.
+        platforms: ``host`` (built by the system's compiler), ``all``, or platform tuples such as ``x86_64-windows`` (built by the
+            cross compiler of the extra ``cross``), as a sequence or separated by commas.
+        protocol: how it is told of triggered events, and what it does with late ones; by default clocks in FMI 3 and counts in
+            FMI 2, and late events are replayed.
+        progress: called with the name of each platform whose library is done, from any thread.
 
     Returns:
         Path of the FMU. The same system gives the same bytes; a failed build leaves nothing behind.
 
     Raises:
-        ValueError: the FMI version, the preset or the system does not allow it.
-        CompilerMissing: no C compiler was found.
+        ValueError: the FMI version, the preset, a platform, the protocol, a name or the system does not allow it.
+        TracingError: a function of the system cannot be traced.
+        CompilerMissing: no C compiler was found, or ``ziglang`` is not installed.
         CompilationError: the compiler refused the sources.
+        OSError: the target cannot be written.
     """
-    plan = plan_fmu(system, fmi_version, preset)
-    compiler = find_compiler()
+    path = fmu_path(system, target)
+    check_names(system)
+    check_target(path)
+    targets = choose_targets(platforms)
+    return write_fmu(plan_fmu(system, fmi_version, preset, protocol), targets, path, progress)
+
+
+def fmu_path(system: HybridSystem, target: Path | str) -> Path:
+    """Where the FMU of a system goes: `target` itself where it ends in ``.fmu``, else into that folder."""
     path = Path(target)
-    return write_fmu(plan, compiler, path if path.suffix.lower() == ".fmu" else path / f"{system.name}.fmu")
+    return path if path.suffix.lower() == ".fmu" else path / f"{system.name}.fmu"
 
 
-def write_fmu(plan: Plan, compiler: Compiler, target: Path) -> Path:
+def write_fmu(plan: Plan, targets: Sequence[Target], path: Path, progress: Progress | None = None) -> Path:
     """Carry out a plan: generate, compile, pack.
 
     Raises:
-        CompilationError: the compiler refused the sources.
+        CompilationError: a compiler refused the sources.
     """
-    sources = plan.source_files()
-    library = library_name(plan.system.name)
-    with tempfile.TemporaryDirectory(prefix="fmus-") as name:
-        folder = Path(name)
-        for source, text in sources.items():
-            (folder / source).write_bytes(text)
-        binary = compile_library(compiler, folder, plan.sources, library).read_bytes()
-    content = {f"sources/{source}": text for source, text in sources.items()}
-    content[f"{binaries_folder(plan.fmi_version)}/{library}"] = binary
+    sources = plan.source_files() | plan.header_files()
+    libraries = compile_targets(targets, sources, plan.sources, plan.system.name, progress)
+    content = {f"sources/{name}": text for name, text in sources.items()}
     content["modelDescription.xml"] = plan.description_xml().encode()
     if plan.fmi_version == 3:
         content["sources/buildDescription.xml"] = build_description_xml(plan.system.name, plan.sources).encode()
-    return pack_fmu(content, target)
+    content |= resource_files(plan.system, plan.preset)
+    content |= binary_files(plan.fmi_version, plan.system.name, libraries)
+    content |= documentation_files(plan.system, plan.description, plan.preset, targets)
+    return pack_fmu(content, path)
 
 
 @cache
@@ -116,3 +145,9 @@ def runtime_sources() -> dict[str, bytes]:
     """The C files of the runtime that ships with this package, by name."""
     folder = files("fmus") / "runtime"
     return {entry.name: entry.read_bytes() for entry in folder.iterdir() if entry.name.endswith((".c", ".h"))}
+
+
+@cache
+def standard_headers(fmi_version: int) -> dict[str, bytes]:
+    """The headers of the FMI standard, by name, as fmpy carries them."""
+    return {path.name: path.read_bytes() for path in sorted(header_folder().glob(f"fmi{fmi_version}*.h"))}

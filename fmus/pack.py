@@ -13,6 +13,28 @@ TIMESTAMP = (1980, 1, 1, 0, 0, 0)
 """Of every file in an FMU: the earliest a zip file can hold."""
 
 
+def check_target(target: Path) -> None:
+    """Find out before the work whether an FMU can be written; changes nothing.
+
+    Args:
+        target: path of the FMU; its folder need not exist.
+
+    Raises:
+        OSError: a folder is in its place, or its folder cannot be created or written to.
+    """
+    if target.is_dir():
+        raise IsADirectoryError(f"{target} is a folder; give another file name, or remove the folder.")
+    folder = target.parent
+    while not folder.exists() and folder != folder.parent:
+        folder = folder.parent
+    try:
+        handle, name = tempfile.mkstemp(prefix=".fmus-", dir=folder)
+    except OSError as error:
+        raise type(error)(f"{target} cannot be written: {folder}: {error.strerror or error}; choose another folder.") from error
+    os.close(handle)
+    Path(name).unlink()
+
+
 def pack_fmu(files: Mapping[str, bytes], target: Path) -> Path:
     """Write an FMU.
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from fmpy import read_model_description
 from fmpy.model_description import ModelDescription, ModelVariable
 from fmpy.validation import validate_fmu
+
+from fmus.toolchain.machine_code import platforms_of_library
+from fmus.toolchain.platforms import host_platform
 
 _INTERFACES = (
     ("coSimulation", "co-simulation"),
@@ -23,6 +26,17 @@ _CAPABILITIES = (
     "providesDirectionalDerivative",
 )
 _SHOWN = ("input", "output", "parameter")
+_EXTENSIONS = (".so", ".dll", ".dylib")
+_FOLDERS = {
+    "linux32": {"x86-linux"},
+    "linux64": {"x86_64-linux", "aarch64-linux"},  # many importers look there on any 64-bit processor
+    "win32": {"x86-windows"},
+    "win64": {"x86_64-windows"},
+    "darwin64": {"x86_64-darwin", "aarch64-darwin"},
+}
+"""What may lie in a folder named as in FMI 2.0; all others are platform tuples."""
+LARGEST = 2_000_000_000
+HEADER_SIZE = 4096
 
 
 def describe_file(path: Path) -> list[str]:
@@ -36,16 +50,18 @@ def describe_file(path: Path) -> list[str]:
     """
     try:
         with zipfile.ZipFile(path) as archive:
-            platforms = sorted(
-                {name.split("/")[1] for name in archive.namelist() if name.startswith("binaries/") and name.count("/") > 1}
+            platforms, has_sources = (
+                _platforms(archive),
+                any(n.startswith("sources/") and n.endswith(".c") for n in archive.namelist()),
             )
         description = read_model_description(str(path), validate=False)
     except Exception as error:
-        raise ValueError(f"{path} cannot be read as an FMU: {error}") from error
+        raise ValueError(f"{path} cannot be read as an FMU: {_reason(error)}") from error
     lines = [
         f"{description.modelName}: FMI {description.fmiVersion}, {', '.join(_interfaces(description)) or 'no interface'}",
         *([description.description] if description.description else []),
         f"platforms: {', '.join(platforms) or 'none'}",
+        _on_this_machine(description, platforms, has_sources),
         f"capabilities: {', '.join(_capabilities(description)) or 'none'}",
     ]
     for causality in _SHOWN:
@@ -55,10 +71,65 @@ def describe_file(path: Path) -> list[str]:
     return lines
 
 
+def platforms_of(path: Path) -> list[str]:
+    """Names of the folders of an FMU that hold libraries."""
+    with zipfile.ZipFile(path) as archive:
+        return _platforms(archive)
+
+
 def problems_of(path: Path) -> list[str]:
-    """Problems that fmpy's validation finds in an FMU; empty for a valid one."""
-    problems: list[str] = validate_fmu(str(path))
+    """Damaged files, libraries in the wrong folder, and what fmpy's validation finds; empty for a valid FMU."""
+    with zipfile.ZipFile(path) as archive:
+        problems = [*_damage(archive), *_strays(archive)]
+    return problems + list(validate_fmu(str(path)))
+
+
+def _platforms(archive: zipfile.ZipFile) -> list[str]:
+    return sorted({name.split("/")[1] for name in _libraries(archive)})
+
+
+def _libraries(archive: zipfile.ZipFile) -> list[str]:
+    names = (entry.filename for entry in archive.infolist() if not entry.is_dir())
+    return [name for name in names if name.startswith("binaries/") and name.count("/") == 2 and name.endswith(_EXTENSIONS)]
+
+
+def _on_this_machine(description: ModelDescription, platforms: Sequence[str], has_sources: bool) -> str:
+    host = host_platform()
+    wanted = [host.name] if str(description.fmiVersion).startswith("3") else [host.fmi2_folder, host.name]
+    if set(wanted) & set(platforms):
+        return f"this machine ({host.name}): yes"
+    rebuild = "; its sources can be compiled" if has_sources else ""
+    return f"this machine ({host.name}): no library in binaries/{' or binaries/'.join(wanted)}{rebuild}"
+
+
+def _damage(archive: zipfile.ZipFile) -> list[str]:
+    if sum(entry.file_size for entry in archive.infolist()) > LARGEST:
+        return [f"It unpacks to more than {LARGEST / 1e9:g} GB; its content was not checked."]
+    try:
+        broken = archive.testzip()
+    except Exception as error:  # zlib's own, a wrong header, an unknown compression
+        return [f"The archive is damaged: {_reason(error)}"]
+    return [f"The archive is damaged: {broken} has a wrong check sum."] if broken else []
+
+
+def _strays(archive: zipfile.ZipFile) -> list[str]:
+    """Libraries that were built for another platform than their folder says."""
+    problems = []
+    for name in _libraries(archive):
+        folder = name.split("/")[1]
+        expected = _FOLDERS.get(folder, {folder})
+        try:
+            with archive.open(name) as stream:
+                found = platforms_of_library(stream.read(HEADER_SIZE))
+        except Exception:
+            continue  # told as damage
+        if not expected & set(found):
+            problems.append(f"{name} is a library for {', '.join(found)}, not for {' or '.join(sorted(expected))}.")
     return problems
+
+
+def _reason(error: Exception) -> str:
+    return str(error) or type(error).__name__
 
 
 def _interfaces(description: ModelDescription) -> list[str]:

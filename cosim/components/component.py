@@ -18,8 +18,8 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription, ModelVariable
 
-from cosim.components.ports import make_reader, make_writer
 from cosim.errors import CouplingError, RunError, nearest
+from fmus.ports import make_reader, make_writer
 from plant_models.hybrid.units import BASE_SYMBOLS, Unit, UnitError, parse_unit
 
 TIME_TOLERANCE = 1e-9

@@ -16,7 +16,7 @@ from fmpy.fmi2 import (
     fmi2Terminated,
 )
 
-from cosim.components.component import Component, EventPort
+from cosim.components.component import TIME_TOLERANCE, Component, EventPort
 
 
 class FMI2Component(Component):
@@ -60,7 +60,7 @@ class FMI2Component(Component):
     def advance(self, t: float, until: float) -> None:  # noqa: D102 - see Component
         begin = perf_counter()
         try:
-            self.slave.doStep(t, until - t)
+            self.slave.doStep(t, until - t, False)  # the state may be set back: nothing of the past may be forgotten
             self.time = until
         except FMICallException as error:
             self._after_refusal(error, t, until)
@@ -95,8 +95,10 @@ class FMI2Component(Component):
             raise self._explained("doStep", error, t) from error
         reached = self._asked(self.slave.getRealStatus, fmi2LastSuccessfulTime)
         if self._asked(self.slave.getBooleanStatus, fmi2Terminated):
-            self.terminated = True
             self.time = t if reached is None else min(max(float(reached), t), until)
+            if self.time <= t + TIME_TOLERANCE and (self.messages or self.kind == "block"):
+                raise self._explained("doStep", error, t) from error  # it did nothing, and says why
+            self.terminated = True
             return
         known = "it does not say how far it came" if reached is None else f"it came to {reached:g} s"
         reason = f"doStep was discarded: asked for {until:g} s, {known}; try a smaller communication step"

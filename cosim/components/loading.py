@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import zipfile
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any, Literal
@@ -19,9 +18,8 @@ from cosim.components.fmi2 import FMI2Component
 from cosim.components.fmi3 import FMI3Component
 from cosim.errors import FmuLoadError
 from fmu_observer.block import make_block
+from fmus.check.archive import MAX_UNPACKED_BYTES, Archive, NotAnFmuError, open_archive
 from plant_models.hybrid import HybridSystem
-
-MAX_UNPACKED_BYTES = 2 * 1024**3
 
 
 def load_fmu(path: str | Path, name: str) -> Component:
@@ -35,13 +33,14 @@ def load_fmu(path: str | Path, name: str) -> Component:
         FmuLoadError: the file is missing or broken, has no co-simulation, or no library for this platform.
     """
     path = Path(path)
-    description = read_description(path, name)
+    archive = _open(path, name)
+    description = archive.description
     if description.coSimulation is None:
         raise FmuLoadError(f"{name}: {path} offers no co-simulation interface; this master steps co-simulation FMUs only.")
-    version = description.fmiVersion
-    if not version.startswith(("2.", "3.")):
-        raise FmuLoadError(f"{name}: {path} is FMI {version}; FMI 2.0 and 3.0 are supported.")
-    _check_platform(path, name)
+    try:
+        archive.demand_this_platform()
+    except NotAnFmuError as error:
+        raise FmuLoadError(f"{name}: {error}") from error
     folder = Path(mkdtemp(prefix="fmu_"))
     here = Path.cwd()
     try:
@@ -61,22 +60,16 @@ def read_description(path: str | Path, name: str = "FMU") -> ModelDescription:
     """The model description of an FMU file.
 
     Raises:
-        FmuLoadError: the file is missing, is not a zip archive, unpacks to an unreasonable size, or cannot be parsed.
+        FmuLoadError: the file is missing, broken or dangerous, or of an FMI version that is not supported.
     """
-    path = Path(path)
-    if not path.is_file():
-        what = "is a folder, expected an .fmu file" if path.is_dir() else "does not exist"
-        raise FmuLoadError(f"{name}: FMU {path} {what}.")
+    return _open(Path(path), name).description
+
+
+def _open(path: Path, name: str) -> Archive:
     try:
-        with zipfile.ZipFile(path) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
-        if size > MAX_UNPACKED_BYTES:
-            raise FmuLoadError(f"{name}: {path} would unpack to {size / 1e9:.1f} GB; refused.")
-        return fmpy.read_model_description(str(path), validate=False)
-    except FmuLoadError:
-        raise
-    except Exception as error:
-        raise FmuLoadError(f"{name}: {path} is not a readable FMU: {error}") from error
+        return open_archive(path, MAX_UNPACKED_BYTES)
+    except NotAnFmuError as error:
+        raise FmuLoadError(f"{name}: {error}") from error
 
 
 def load_block(system: HybridSystem, name: str, fmi_version: Literal[2, 3] = 3, **arguments: Any) -> Component:
@@ -100,11 +93,3 @@ def _slave(folder: Path, description: ModelDescription, name: str) -> Any:
     if description.fmiVersion.startswith("2."):
         return fmpy.fmi2.FMU2Slave(**arguments)
     return fmpy.fmi3.FMU3Slave(**arguments)
-
-
-def _check_platform(path: Path, name: str) -> None:
-    offered = fmpy.supported_platforms(str(path))
-    here = {fmpy.platform, fmpy.platform_tuple}
-    if not here & set(offered):
-        known = ", ".join(offered) or "none"
-        raise FmuLoadError(f"{name}: {path} has no library for this platform ({fmpy.platform_tuple}); it offers: {known}.")

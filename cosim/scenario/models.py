@@ -15,6 +15,8 @@ from cosim.errors import FmuLoadError, ScenarioError, nearest
 from cosim.scenario.schema import ComponentTable
 from plant_models.hybrid import HybridSystem
 
+LATE_PARAMETERS = frozenset({"late_policy", "replay_horizon"})
+
 
 def shipped() -> Mapping[str, type[HybridSystem]]:
     """All shipped systems by name, plants and observers."""
@@ -60,11 +62,23 @@ def component_factory(name: str, table: ComponentTable, folder: Path, where: str
     if realisation.startswith("block"):
         arguments = {"preset": table.preset, "late_policy": table.late_policy, "replay_horizon": table.replay_horizon}
         return lambda: load_block(system, name, version, **arguments)
-    meant_for_blocks = sorted(table.model_fields_set & {"late_policy", "replay_horizon"})
-    if meant_for_blocks:
-        raise ScenarioError(f"{where}: {', '.join(meant_for_blocks)} belongs to blocks; as = '{realisation}' has no such choice.")
     path = _native(system, version, table.preset, where)
     return lambda: load_fmu(path, name)
+
+
+def protocol_parameters(table: ComponentTable, component: Component, where: str) -> dict[str, float | str]:
+    """What the table says about late events, as parameters of an FMU; a block was made with them.
+
+    Raises:
+        ScenarioError: the FMU has no such parameter.
+    """
+    if component.kind != "FMU":
+        return {}
+    given: dict[str, float | str] = {name: getattr(table, name) for name in sorted(table.model_fields_set & LATE_PARAMETERS)}
+    for name in given:
+        if name not in component.variables:
+            raise ScenarioError(f"{where}: this FMU has no parameter {name}; what it does with late events is its own choice.")
+    return given
 
 
 def _native(system: HybridSystem, version: Any, preset: str | None, where: str) -> Path:

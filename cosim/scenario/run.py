@@ -24,7 +24,7 @@ from cosim.scenario.balise_service import Choice, choose_method, find_receivers,
 from cosim.scenario.certificates import check_certificates, expected_gap
 from cosim.scenario.connections import parse_connections
 from cosim.scenario.layouts import make_layout
-from cosim.scenario.models import component_factory
+from cosim.scenario.models import component_factory, protocol_parameters
 from cosim.scenario.outcome import Outcome
 from cosim.scenario.roles import ROLES, check_roles
 from cosim.scenario.schema import ScenarioTable, step_count
@@ -92,7 +92,7 @@ class _Setup:
         receivers, plant = self._balise_roles()
         check_roles(table, self.components, self.where)
         order = execution_order(self.components, connections, self._before(plant, receivers))
-        starts = {n: start_values(c, table.components[n].parameters) for n, c in self.components.items()}
+        starts = {n: self._start_values(n, c) for n, c in self.components.items()}
         if layout is not None:
             self._check_certificates(layout, receivers)
         self._instantiate(starts)
@@ -148,6 +148,10 @@ class _Setup:
             for parameter, value in starts[name].items():
                 component.set_start(parameter, value)
 
+    def _start_values(self, name: str, component: Component) -> dict[str, float]:
+        table = self.table.components[name]
+        return start_values(component, protocol_parameters(table, component, f"components.{name}") | table.parameters)
+
     def _balise_roles(self) -> tuple[list[str], str]:
         balises = self.table.balises
         if balises is None:
@@ -181,15 +185,15 @@ class _Setup:
         self.service = make_service(table, layout, self.plan, plant, receivers, self.choice.method)
 
     def _note_late_telegrams(self, receivers: list[str]) -> None:
-        """A block replays what arrives late; a sealed receiver may not, and cannot say what it did."""
+        """A block replays what arrives late, and so does an FMU with the parameter `late_policy`; another one may not."""
         table = self.table.balises
         assert table is not None
-        sealed = [name for name in receivers if self.components[name].kind == "FMU"]
+        sealed = [n for n in receivers if self.components[n].kind == "FMU" and "late_policy" not in self.components[n].variables]
         if sealed and table.latency + table.latency_jitter > 0.0:
             delay = table.latency + table.latency_jitter
             self._warn(
-                f"Telegrams arrive up to {delay:g} s late; {', '.join(sealed)}: an exported observer rejects late stamps, "
-                "and an FMU does not say what it did with them. Use a block to replay them."
+                f"Telegrams arrive up to {delay:g} s late; {', '.join(sealed)}: a sealed FMU without a parameter "
+                "late_policy does not say what it does with late stamps."
             )
 
     def _note_unconnected(self, connections: list[Connection]) -> None:

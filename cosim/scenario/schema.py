@@ -14,7 +14,8 @@ from cosim.errors import ScenarioError, nearest
 from fmu_observer.block import LatePolicy
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
-Number = float | list[float]
+Number = float | list[float] | str
+"""A number, a list of them for a vector, or the name of an item of an enumeration."""
 Realisation = Literal["fmu3", "fmu2", "block3", "block2"]
 
 

@@ -5,8 +5,8 @@ from typing import Any, Literal
 from fmu_observer.block.face import BlockCallError, Face
 from fmu_observer.block.fmi2 import FMI2Block
 from fmu_observer.block.fmi3 import FMI3Block
-from fmu_observer.block.policy import LATE_POLICIES, LatePolicy
 from fmu_observer.block.variables import BlockError
+from fmu_observer.event_protocol import LATE_POLICIES, LatePolicy
 from plant_models.hybrid import HybridSystem
 
 __all__ = ["LATE_POLICIES", "BlockCallError", "BlockError", "FMI2Block", "FMI3Block", "Face", "LatePolicy", "make_block"]

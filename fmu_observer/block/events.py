@@ -7,52 +7,60 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
-from fmu_observer.block.journal import Journal, Record, Stamped
-from fmu_observer.block.policy import LATE_POLICIES, Counters, LatePolicy, advance, jump, replay
-from fmu_observer.block.variables import BlockError
+from fmu_observer.block.journal import Journal, Mark, Record, Stamped
+from fmu_observer.block.policy import Counters, advance, communicate, jump, replay
 from fmu_observer.description import STAMP_NOW, exposed_inputs
+from fmu_observer.event_protocol import LATE_POLICIES, EventProtocol, LatePolicy
 from plant_models.hybrid import HybridSystem, Runtime, width
 
 TIME_TOLERANCE = 1e-9
 """Two communication times closer than this are the same [s]; below any sampling in use, above rounding at 1e5 s."""
 
+QUEUE_CAPACITY = 64
+"""Events that can wait at once, as in the exported FMU; one more is lost."""
+
 _log = logging.getLogger(__name__)
+
+
+EventsMark = tuple[Mark | None, tuple[list[Stamped], list[float], list[int], Counters] | None]
+"""Where the events stood: journal, and queue, stamps, counts seen and counters where something waits; see `Events.mark`."""
 
 
 class Events:
     """Triggered events of one runtime.
 
-    `stamps`, `counts` and `active` (FMI 3: numbers of the active clocks) are set from outside; `seen` are the counts already
-    taken notice of, `queue` the events whose stamp lies ahead, `journal` the past for replay, where the policy needs it.
+    `stamps`, `counts` and `active` (FMI 3: numbers of the active clocks) are set from outside, as are, before time runs, the two
+    parameters in `protocol`: the number of the late policy, from one, and how far back it can go [s]. `seen` are the counts
+    already taken notice of, `queue` the events whose stamp lies ahead, `journal` the past for replay, where the policy needs it.
 
     Args:
         system: the hybrid system. runtime: its runtime.
-        late_policy: what to do with events stamped in the past.
-        replay_horizon: how far back `replay` can go [s].
-
-    Raises:
-        BlockError: the policy is unknown, or the horizon is not a time.
+        protocol: start values of the parameters.
     """
 
-    def __init__(self, system: HybridSystem, runtime: Runtime, late_policy: LatePolicy, replay_horizon: float) -> None:
-        if late_policy not in LATE_POLICIES:
-            raise BlockError(f"late_policy {late_policy!r} is unknown; use one of {', '.join(LATE_POLICIES)}.")
-        if not replay_horizon >= 0.0:
-            raise BlockError(f"replay_horizon = {replay_horizon!r} s; expected zero or more seconds.")
-        self.late_policy, self.replay_horizon = late_policy, replay_horizon
+    def __init__(self, system: HybridSystem, runtime: Runtime, protocol: EventProtocol) -> None:
+        self._start = [LATE_POLICIES.index(protocol.late_policy) + 1.0, protocol.replay_horizon]
         self.payloads = _payload_positions(system)
         self._names = tuple(self.payloads)
         self._runtime, self._given = runtime, _given_positions(system, runtime)
+        self.protocol = list(self._start)
         self.stamps = [STAMP_NOW] * len(self._names)
         self.reset()
+
+    @property
+    def late_policy(self) -> LatePolicy:
+        """What to do with events stamped in the past."""
+        return LATE_POLICIES[round(self.protocol[0]) - 1]
 
     def reset(self) -> None:
         """Nothing announced, nothing past."""
         count = len(self._names)
+        self.protocol[:] = self._start
         self.stamps[:] = [STAMP_NOW] * count
         self.counts, self.seen = [0] * count, [0] * count
         self.active: set[int] = set()
@@ -63,7 +71,22 @@ class Events:
     def restore_past(self, records: Sequence[Record]) -> None:
         """Take over what happened so far, where the policy needs it."""
         remembers = bool(self._names) and self.late_policy == "replay"
-        self.journal = Journal(self.replay_horizon, records) if remembers else None
+        self.journal = Journal(self.protocol[1], records) if remembers else None
+
+    def mark(self) -> EventsMark:
+        """Where the events stand, for `undo`."""
+        waiting = None
+        if self.queue or self.counts != self.seen:
+            waiting = (list(self.queue), list(self.stamps), list(self.seen), replace(self.counters))
+        return (None if self.journal is None else self.journal.mark(), waiting)
+
+    def undo(self, mark: EventsMark) -> None:
+        """Forget everything since `mark`."""
+        past, waiting = mark
+        if self.journal is not None and past is not None:
+            self.journal.undo(past)
+        if waiting is not None:
+            self.queue, self.stamps[:], self.seen, self.counters = waiting
 
     def advance(self, end: float) -> None:
         """Move the runtime to `end` [s] through the waiting events whose stamps lie before it or at it."""
@@ -71,10 +94,19 @@ class Events:
             self._take_until(end)
         advance(self._runtime, self.journal, end)
 
-    def tell(self, number: int) -> None:
-        """An event happened: its payload stands in the inputs, its stamp in `stamps` (unset: now). A stamp ahead waits."""
-        self._announce(number)
+    def end_step(self) -> None:
+        """A communication step ends now."""
+        communicate(self._runtime, self.journal)
+
+    def tick(self) -> bool:
+        """The events of the active clocks happen, in declared order, their payload in the inputs, their stamp in `stamps` (unset:
+        now); a stamp ahead waits. Whether there were any."""
+        ticked = sorted(self.active)
+        self.active.clear()
+        for number in ticked:
+            self._announce(number)
         self._take_until(self._runtime.t)
+        return bool(ticked)
 
     def poll_counts(self) -> None:
         """FMI 2: a raised ``<event>_count`` announces one event; more than one step up means that events were lost."""
@@ -94,6 +126,10 @@ class Events:
         name = self._names[number]
         stamp = self.stamps[number] if self.stamps[number] > STAMP_NOW else self._runtime.t
         self.stamps[number] = STAMP_NOW
+        if len(self.queue) >= QUEUE_CAPACITY:
+            self.counters.lost += 1
+            _log.warning("event %s at %r s: %d events are waiting already; this one is lost", name, stamp, QUEUE_CAPACITY)
+            return
         positions = self.payloads[name]
         self.queue.append(Stamped(name, stamp, positions, tuple(float(self._runtime.u[i]) for i in positions)))
         self.queue.sort(key=lambda e: e.stamp)  # of equal stamps the one announced first stays first
@@ -107,16 +143,23 @@ class Events:
         if event.stamp >= runtime.t - TIME_TOLERANCE:
             advance(runtime, self.journal, event.stamp)
             jump(runtime, self.journal, event)
-            self.counters.accepted += 1
-        elif self.journal is not None and replay(runtime, self.journal, event, self._given, TIME_TOLERANCE):
-            self.counters.accepted += 1
-            self.counters.replayed += 1
         elif self.late_policy == "late":
             jump(runtime, None, event)
-            self.counters.accepted += 1
             self.counters.late += 1
         else:
-            self.counters.rejected += 1
+            reason = "late_policy is reject"
+            if self.journal is not None:
+                reason = replay(runtime, self.journal, event, self._given, TIME_TOLERANCE)
+            if reason:
+                self._reject(event, reason)
+                return
+            self.counters.replayed += 1
+        self.counters.accepted += 1
+
+    def _reject(self, event: Stamped, reason: str) -> None:
+        self.counters.rejected += 1
+        text = "event %s: its stamp %r s lies before the current time %r s; it is rejected (%d so far): %s"
+        _log.warning(text, event.name, event.stamp, self._runtime.t, self.counters.rejected, reason)
 
 
 def _payload_positions(system: HybridSystem) -> dict[str, tuple[int, ...]]:
@@ -128,6 +171,8 @@ def _payload_positions(system: HybridSystem) -> dict[str, tuple[int, ...]]:
 
 
 def _given_positions(system: HybridSystem, runtime: Runtime) -> np.ndarray:
-    """Where in the runtime's memory stands what is set from outside at any time: inputs proper, and parameters."""
+    """Where in the runtime's memory stands what is set from outside: inputs and payloads (not the noises), and parameters."""
     states, inputs = len(runtime.x), len(runtime.u)
-    return np.array([*range(states, states + width(system.inputs)), *range(states + inputs, len(runtime.memory))], dtype=np.intp)
+    return np.array(
+        [*range(states, states + width(exposed_inputs(system))), *range(states + inputs, len(runtime.memory))], dtype=np.intp
+    )

@@ -17,14 +17,16 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription
 
-from fmu_observer.block.instance import DEFAULT_REPLAY_HORIZON, Instance
-from fmu_observer.block.policy import Counters, LatePolicy
+from fmu_observer.block.instance import Instance
+from fmu_observer.block.policy import Counters
+from fmu_observer.block.sensitivity import Sensitivity
 from fmu_observer.block.state import BlockState, deserialize, serialize
-from fmu_observer.block.variables import BlockError, Mode, Role
+from fmu_observer.block.variables import BlockError, Mode, Role, StepDiscarded
 from fmu_observer.description import describe
+from fmu_observer.event_protocol import DEFAULT_REPLAY_HORIZON, Announcement, EventProtocol, LatePolicy
 from plant_models.hybrid import HybridSystem
 
-FMI_ERROR = 3
+FMI_DISCARD, FMI_ERROR = 2, 3
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -36,15 +38,16 @@ class BlockCallError(FMICallException, BlockError):
     Args:
         function: the call.
         reason: on which block, when, why.
+        status: of FMI: an error, or a discarded step.
     """
 
-    def __init__(self, function: str, reason: str) -> None:
-        FMICallException.__init__(self, function, FMI_ERROR)
+    def __init__(self, function: str, reason: str, status: int = FMI_ERROR) -> None:
+        FMICallException.__init__(self, function, status)
         self.reason = reason
         self.args = (f"{function}: {reason}",)
 
-    def __reduce__(self) -> tuple[type[BlockCallError], tuple[str, str]]:
-        return type(self), (self.function, self.reason)
+    def __reduce__(self) -> tuple[type[BlockCallError], tuple[str, str, int]]:
+        return type(self), (self.function, self.reason, self.status)
 
 
 def refused(function: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[Any, P], R]:
@@ -72,11 +75,13 @@ class Face:
         system: the hybrid system to present.
         preset: preset whose values are the start values.
         instance_name: name used in messages; the system's name by default.
-        late_policy: what to do with events stamped in the past: ``replay``, ``reject`` or ``late``.
-        replay_horizon: how far back ``replay`` can go [s].
+        late_policy: what to do with events stamped in the past: ``replay``, ``reject`` or ``late``; the start value of the
+            parameter of that name.
+        replay_horizon: how far back ``replay`` can go [s]; the start value of the parameter of that name.
+        announcement: how events are announced, ``clocks`` (FMI 3 only) or ``counts``; None for what is usual in the version.
 
     Raises:
-        ValueError: the preset or the policy is unknown, or the horizon is not a time.
+        ValueError: the preset, the policy or the announcement is unknown, or the horizon is not a time.
     """
 
     fmi_version: ClassVar[Literal[2, 3]]
@@ -85,14 +90,21 @@ class Face:
     def __init__(
         self, system: HybridSystem, *, preset: str | None = None, instance_name: str | None = None,
         late_policy: LatePolicy = "replay", replay_horizon: float = DEFAULT_REPLAY_HORIZON,
+        announcement: Announcement | None = None,
     ) -> None:  # fmt: skip
         self.system = system
-        self.model_description: ModelDescription = describe(system, self.fmi_version, preset=preset)
+        try:
+            protocol = EventProtocol(announcement, late_policy, replay_horizon)
+            counts_events = protocol.counts(self.fmi_version)
+        except ValueError as error:
+            raise BlockError(f"{system.name}: {error}") from error
+        self.model_description: ModelDescription = describe(system, self.fmi_version, preset=preset, protocol=protocol)
         self.modelDescription = self.model_description
         self.guid: str = self.model_description.instantiationToken
         self.instanceName = instance_name or system.name
         self.modelIdentifier = system.name
-        self.instance = Instance(system, self.guid, self.fmi_version == 2, preset, late_policy, replay_horizon)
+        self.instance = Instance(system, self.guid, counts_events, protocol, preset)
+        self._sensitivity = Sensitivity(system, self.model_description.modelVariables)
         self._folder: str | None = None
 
     # -- identity ---------------------------------------------------------------------------------------------------
@@ -184,6 +196,13 @@ class Face:
         set_values = getattr(self, f"set{self.real_type}")
         return lambda: set_values(references, values.tolist())
 
+    def directional_derivative(self, unknowns: Sequence[int], knowns: Sequence[int], seed: Sequence[float]) -> list[float]:
+        """Exact directional derivatives of real outputs and derivatives, see `Sensitivity.directional`."""
+        self.instance.require_alive()
+        if self.mode == "instantiated":
+            raise BlockError("directional derivatives are there from initialization mode on.")
+        return self._sensitivity.directional(self.instance.runtime, unknowns, knowns, seed)
+
     # -- saved states -----------------------------------------------------------------------------------------------
 
     @refused
@@ -214,7 +233,8 @@ class Face:
 
     def refusal(self, function: str, reason: object) -> BlockCallError:
         """The exception for a refused call: it names the call, the block and the time."""
-        return BlockCallError(function, f"{self.instanceName} at t = {self.instance.runtime.t!r} s: {reason}")
+        status = FMI_DISCARD if isinstance(reason, StepDiscarded) else FMI_ERROR
+        return BlockCallError(function, f"{self.instanceName} at t = {self.instance.runtime.t!r} s: {reason}", status)
 
     def _mode_after_initialization(self) -> Mode:
         return "step"

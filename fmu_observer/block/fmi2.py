@@ -8,7 +8,9 @@ from typing import Any
 from fmpy.fmi2 import FMU2Slave, fmi2LastSuccessfulTime, fmi2Terminated
 
 from fmu_observer.block.face import Face, refused
-from fmu_observer.block.variables import BlockError
+from fmu_observer.block.variables import BlockError, Role
+
+WHOLE: tuple[Role, ...] = ("count", "integer_output", "policy")
 
 
 class FMI2Block(Face, FMU2Slave):
@@ -62,10 +64,10 @@ class FMI2Block(Face, FMU2Slave):
 
     @refused
     def getBooleanStatus(self, kind: int) -> bool:
-        """Whether the block wants to end the run: never."""
+        """Whether the run should end: after a discarded step, until one succeeds."""
         if kind != fmi2Terminated:
             raise BlockError(f"status {kind} is not a Boolean one; only fmi2Terminated is known.")
-        return False
+        return self.instance.discarded
 
     # -- values -----------------------------------------------------------------------------------------------------
 
@@ -81,17 +83,13 @@ class FMI2Block(Face, FMU2Slave):
 
     @refused
     def getInteger(self, vr: Sequence[int]) -> list[int]:
-        """Values of event counts."""
-        self.instance.require_alive()
-        return [self.instance.events.counts[self.instance.variables.event_number(reference)] for reference in vr]
+        """Values of event counts, integer outputs and the late policy."""
+        return self.instance.get_whole(vr, WHOLE)
 
     @refused
     def setInteger(self, vr: Sequence[int], value: Sequence[int]) -> None:
-        """Set event counts."""
-        self.instance.require("instantiated", "initialization", "step")
-        numbers = [self.instance.variables.event_number(reference) for reference in vr]
-        for number, count in zip(numbers, value, strict=True):
-            self.instance.events.counts[number] = int(count)
+        """Set event counts, or the late policy."""
+        self.instance.set_whole(vr, value, WHOLE)
 
     def fmi2SetReal(self, _component: object, vr: Iterable[int], _n: int, values: Iterable[float]) -> None:
         """The low-level setter used by fmpy's `Input`."""
@@ -100,6 +98,13 @@ class FMI2Block(Face, FMU2Slave):
     def fmi2SetInteger(self, _component: object, vr: Iterable[int], _n: int, values: Iterable[int]) -> None:
         """The low-level setter used by fmpy's `Input`."""
         self.setInteger(list(vr), list(values))
+
+    @refused
+    def getDirectionalDerivative(
+        self, vUnknown_ref: Sequence[int], vKnown_ref: Sequence[int], dvKnown: Sequence[float]
+    ) -> list[float]:
+        """Directional derivatives of the unknowns by the knowns with the seed `dvKnown`."""
+        return self.directional_derivative(vUnknown_ref, vKnown_ref, dvKnown)
 
     def getTypesPlatform(self) -> str:
         """Platform of the types."""

@@ -8,30 +8,45 @@ from typing import Any
 from fmpy.fmi3 import FMU3Slave
 
 from fmu_observer.block.face import Face, refused
-from fmu_observer.block.variables import BlockError, Mode
+from fmu_observer.block.variables import BlockError, Mode, Role
+
+INT32: tuple[Role, ...] = ("count", "integer_output")
+INT64: tuple[Role, ...] = ("policy",)
 
 
 class FMI3Block(Face, FMU3Slave):
     """A hybrid system with the call surface of an FMI 3.0 co-simulation slave.
 
     An event: `enterEventMode`, `setClock`, payload and, where it happened earlier, ``<event>_time`` by `setFloat64`,
-    `updateDiscreteStates`, `enterStepMode`. A block on which `instantiate` was never called (fmpy's `simulate_fmu` does not)
-    uses event mode as soon as its caller does. Arguments as for `Face`.
+    `updateDiscreteStates`, `enterStepMode`; with ``announcement="counts"`` as in FMI 2, and event mode has nothing to do. A
+    block on which `instantiate` was never called (fmpy's `simulate_fmu` does not) uses event mode as soon as its caller does.
+    Arguments as for `Face`.
     """
 
     fmi_version = 3
     real_type = "Float64"
     _event_mode_used: bool | None = None  # None: `instantiate` was never called
+    _early_return_allowed = False
 
     # -- life -------------------------------------------------------------------------------------------------------
 
+    @refused
     def instantiate(
         self, visible: bool = False, loggingOn: bool = False, eventModeUsed: bool = False, earlyReturnAllowed: bool = False,
         logMessage: Any = None, intermediateUpdate: Any = None, requiredIntermediateVariables: Any = None,
     ) -> None:  # fmt: skip
-        """Start values; `eventModeUsed` as in FMI 3."""
+        """Start values; `eventModeUsed` and `earlyReturnAllowed` as in FMI 3."""
         self.instance.reset()
         self._event_mode_used = bool(eventModeUsed)
+        self._early_return_allowed = bool(earlyReturnAllowed)
+
+    @refused
+    def setDebugLogging(self, loggingOn: bool, categories: Sequence[str]) -> None:
+        """Nothing to switch: what is wrong is raised, or logged by Python's `logging`. Unknown categories are refused."""
+        known = [category.name for category in self.model_description.logCategories]
+        for name in categories:
+            if name not in known:
+                raise BlockError(f"there is no log category {name}; there are {', '.join(known)}.")
 
     @refused
     def enterInitializationMode(
@@ -65,7 +80,7 @@ class FMI3Block(Face, FMU3Slave):
     def setClock(self, vr: Sequence[int], values: Sequence[bool]) -> None:
         """Activate triggered input clocks; the events happen in `updateDiscreteStates`."""
         self.instance.require("event")
-        numbers = [self.instance.variables.event_number(reference) for reference in vr]
+        numbers = [self.instance.variables.clock_number(reference) for reference in vr]
         for number, value in zip(numbers, values, strict=True):
             (self.instance.events.active.add if value else self.instance.events.active.discard)(number)
 
@@ -73,7 +88,7 @@ class FMI3Block(Face, FMU3Slave):
     def getClock(self, vr: Sequence[int]) -> list[bool]:
         """Whether clocks are active."""
         self.instance.require_alive()
-        return [self.instance.variables.event_number(reference) in self.instance.events.active for reference in vr]
+        return [self.instance.variables.clock_number(reference) in self.instance.events.active for reference in vr]
 
     @refused
     def updateDiscreteStates(self) -> tuple[bool, bool, bool, bool, bool, float]:
@@ -94,13 +109,13 @@ class FMI3Block(Face, FMU3Slave):
         self, currentCommunicationPoint: float, communicationStepSize: float,
         noSetFMUStatePriorToCurrentPoint: bool = True,
     ) -> tuple[bool, bool, bool, float]:  # fmt: skip
-        """Advance by one communication step [s].
+        """Advance by one communication step [s], or, where early return is allowed, to the first periodic instant inside it.
 
         Returns:
             (eventHandlingNeeded, terminateSimulation, earlyReturn, lastSuccessfulTime).
         """
-        self.instance.step(currentCommunicationPoint, communicationStepSize)
-        return False, False, False, self.instance.runtime.t
+        early = self.instance.step(currentCommunicationPoint, communicationStepSize, self._early_return_allowed)
+        return False, False, early, self.instance.runtime.t
 
     # -- values -----------------------------------------------------------------------------------------------------
 
@@ -114,9 +129,36 @@ class FMI3Block(Face, FMU3Slave):
         """Set Float64 variables."""
         self.instance.set(vr, values)
 
+    @refused
+    def getInt32(self, vr: Sequence[int], nValues: int | None = None) -> list[int]:
+        """Values of event counts and integer outputs."""
+        return self.instance.get_whole(vr, INT32)
+
+    @refused
+    def setInt32(self, vr: Sequence[int], values: Sequence[int]) -> None:
+        """Set event counts."""
+        self.instance.set_whole(vr, values, INT32)
+
+    @refused
+    def getInt64(self, vr: Sequence[int], nValues: int | None = None) -> list[int]:
+        """The number of the late policy."""
+        return self.instance.get_whole(vr, INT64)
+
+    @refused
+    def setInt64(self, vr: Sequence[int], values: Sequence[int]) -> None:
+        """Set the late policy by its number."""
+        self.instance.set_whole(vr, values, INT64)
+
     def fmi3SetFloat64(self, _component: object, vr: Iterable[int], _n: int, values: Iterable[float], _n_values: int) -> None:
         """The low-level setter used by fmpy's `Input`."""
         self.setFloat64(list(vr), list(values))
+
+    @refused
+    def getDirectionalDerivative(
+        self, unknowns: Sequence[int], knowns: Sequence[int], seed: Sequence[float], nSensitivity: int | None = None
+    ) -> list[float]:
+        """Directional derivatives of the unknowns by the knowns with this seed."""
+        return self.directional_derivative(unknowns, knowns, seed)
 
     # -- internals --------------------------------------------------------------------------------------------------
 

@@ -13,15 +13,15 @@ from math import inf, isfinite
 import numpy as np
 
 from fmu_observer.block.events import TIME_TOLERANCE, Events
-from fmu_observer.block.policy import LatePolicy
 from fmu_observer.block.state import BlockState, Shape, check_owner
-from fmu_observer.block.variables import BlockError, Mode, Variables
-from plant_models.hybrid import HybridSystem, Runtime, scalar_names
+from fmu_observer.block.variables import COMPUTED, BlockError, Mode, Place, Role, StepDiscarded, Variables
+from fmu_observer.event_protocol import LATE_POLICIES, EventProtocol
+from plant_models.hybrid import HybridSystem, Runtime, Snapshot, scalar_names
 
 STEP_TOLERANCE = 1e-6
 """So much of a step may the master's time be off in addition, for masters that add their steps up [1]."""
 
-DEFAULT_REPLAY_HORIZON = 10.0
+POLICY_NUMBERS = ", ".join(f"{i} ({name})" for i, name in enumerate(LATE_POLICIES, start=1))
 
 
 class Instance:
@@ -30,24 +30,21 @@ class Instance:
     Args:
         system: the hybrid system.
         token: instantiation token of its description; saved states carry it.
-        counts_events: whether events are announced by counts (FMI 2) or by clocks (FMI 3).
+        counts_events: whether events are announced by counts or by clocks.
+        protocol: start values of the parameters that decide about late events.
         preset: preset to start from.
-        late_policy: what to do with events stamped in the past.
-        replay_horizon: how far back `replay` can go [s].
 
     Raises:
-        BlockError: the policy is unknown, or the horizon is not a time.
         ValueError: the preset is unknown.
     """
 
     def __init__(
-        self, system: HybridSystem, token: str, counts_events: bool, preset: str | None = None,
-        late_policy: LatePolicy = "replay", replay_horizon: float = DEFAULT_REPLAY_HORIZON,
-    ) -> None:  # fmt: skip
+        self, system: HybridSystem, token: str, counts_events: bool, protocol: EventProtocol, preset: str | None = None
+    ) -> None:
         self.system, self.preset = system, preset
         self.runtime = Runtime(system)
-        self.events = Events(system, self.runtime, late_policy, replay_horizon)
-        self.variables = Variables(system, self.runtime, self.events.stamps, counts_events)
+        self.events = Events(system, self.runtime, protocol)
+        self.variables = Variables(system, self.runtime, self.events, counts_events)
         self.shape = Shape(token, len(self.runtime.memory), len(self.runtime.ticks), self.events.payloads)
         self.reset()
 
@@ -58,7 +55,8 @@ class Instance:
         self.runtime.p[:] = self.system.start_parameters(self.preset)
         self.events.reset()
         self.mode: Mode = "instantiated"
-        self._stale_outputs = True
+        self.discarded = False  # whether the last step was
+        self.variables.touch()
 
     # -- variables --------------------------------------------------------------------------------------------------
 
@@ -69,8 +67,8 @@ class Instance:
             BlockError: a value reference is unknown or of another type, or the block has been freed.
         """
         self.require_alive()
-        self._refresh_outputs()
-        places = map(self.variables.readable, references)
+        places = [self.variables.readable(reference) for reference in references]
+        self._refresh(places)
         return [self.runtime.t if p.role == "time" else float(p.values[p.index]) for p in places]
 
     def set(self, references: Sequence[int], values: Sequence[float]) -> None:
@@ -84,7 +82,37 @@ class Instance:
         places = [self.variables.settable(reference, self.mode) for reference in references]
         for place, value in zip(places, [float(value) for value in values], strict=True):
             place.values[place.index] = value
-        self._stale_outputs = True
+        self.variables.touch()
+
+    def get_whole(self, references: Sequence[int], roles: Sequence[Role]) -> list[int]:
+        """Values of whole numbers that have one of these roles.
+
+        Raises:
+            BlockError: a value reference is unknown or of another type, or a value is no whole number of 32 bits.
+        """
+        self.require_alive()
+        places = [self.variables.whole(reference, roles) for reference in references]
+        self._refresh(places)
+        return [self._whole_value(place) for place in places]
+
+    def set_whole(self, references: Sequence[int], values: Sequence[int], roles: Sequence[Role]) -> None:
+        """Set whole numbers that have one of these roles; nothing is set unless everything may be.
+
+        Raises:
+            BlockError: a value reference is unknown or of another type, the variable cannot be set now, or not to this value.
+        """
+        if len(references) != len(values):
+            raise BlockError(f"{len(references)} value references but {len(values)} values; all variables are scalars.")
+        for reference, value in zip(references, values, strict=True):
+            place = self.variables.check_settable(reference, self.variables.whole(reference, roles), self.mode)
+            if place.role == "policy" and value not in range(1, len(LATE_POLICIES) + 1):
+                raise BlockError(f"late_policy = {value} is unknown; use {POLICY_NUMBERS}.")
+        for reference, value in zip(references, values, strict=True):
+            place = self.variables.place(reference)
+            if place.role == "count":
+                self.events.counts[place.index] = int(value)
+            else:
+                place.values[place.index] = float(value)
 
     def output_reader(self, references: Sequence[int], values: np.ndarray) -> Callable[[], None]:
         """A call that reads these outputs into `values`, shape (len(references),)."""
@@ -99,12 +127,12 @@ class Instance:
 
     def input_writer(self, references: Sequence[int], values: np.ndarray) -> Callable[[], None]:
         """A call that sets these inputs proper from `values`, shape (len(references),)."""
-        u = self.runtime.u
+        u, touch = self.runtime.u, self.variables.touch
         index = np.array([self.variables.place(reference).index for reference in references], dtype=np.intp)
 
         def write() -> None:
             u[index] = values
-            self._stale_outputs = True
+            touch()
 
         return write
 
@@ -119,7 +147,7 @@ class Instance:
         if not isfinite(start_time):
             raise BlockError(f"the start time {start_time!r} s is not a finite number.")
         self.runtime.t = self.runtime.t0 = float(start_time)
-        self._stale_outputs = True
+        self.variables.touch()
 
     def start(self) -> None:
         """Leave initialisation: time begins to run.
@@ -127,7 +155,11 @@ class Instance:
         Raises:
             BlockError: time cannot run with a parameter.
         """
-        self._stale_outputs = True
+        self.variables.touch()
+        horizon = self.events.protocol[1]
+        if not (isfinite(horizon) and horizon >= 0.0):
+            raise BlockError(f"time cannot run with parameter replay_horizon = {horizon!r}; expected zero or more seconds.")
+        self.events.restore_past(())  # as the policy has it that was set
         try:
             self.runtime.start(self.runtime.t0)
         except ValueError as error:
@@ -135,11 +167,19 @@ class Instance:
         except Exception as error:
             raise _model_failure(error) from error
 
-    def step(self, t: float, h: float) -> None:
+    def step(self, t: float, h: float, early_return: bool = False) -> bool:
         """Advance from `t` by `h` [s], through the events announced and the queued ones whose stamps lie inside.
 
+        Args:
+            t: where the block stands [s]. h: communication step [s].
+            early_return: whether the step may end at the first periodic instant inside it.
+
+        Returns:
+            Whether it did.
+
         Raises:
-            BlockError: the block is not in step mode, `t` is not the current time, `h` is not positive, or the model fails.
+            BlockError: the block is not in step mode, `t` is not the current time, or `h` is not positive.
+            StepDiscarded: the model fails, or its state is not finite afterwards; the block stands where it stood before.
         """
         if self.mode != "step":
             self.require("step")
@@ -147,14 +187,20 @@ class Instance:
             raise BlockError(f"communicationStepSize = {h!r} s is not a positive number.")
         if not abs(t - self.runtime.t) <= TIME_TOLERANCE + STEP_TOLERANCE * h:
             raise BlockError(f"currentCommunicationPoint = {t!r} s, but the block stands at {self.runtime.t!r} s.")
-        self._stale_outputs = True
+        due = self.runtime.next_instant_before(t + h) if early_return else None
+        runtime = self.runtime
+        before, mark = (runtime.memory.copy(), runtime.t, runtime.t0, tuple(runtime.ticks)), self.events.mark()
+        self.variables.touch()
         try:
-            if self.events.counts != self.events.seen:
-                self.events.poll_counts()
-            self.events.advance(t + h)
+            self._move(t + h if due is None else due)
         except Exception as error:
-            raise _model_failure(error) from error
-        self._check_finite()
+            runtime.restore(Snapshot(*before))
+            self.events.undo(mark)
+            self.discarded = True
+            reason = error if isinstance(error, BlockError) else _model_failure(error)
+            raise StepDiscarded(f"{reason} The step is undone.") from reason.__cause__ or (None if reason is error else error)
+        self.discarded = False
+        return due is not None
 
     def tick(self) -> bool:
         """FMI 3: the events of the active clocks happen, in declared order; whether there were any.
@@ -162,15 +208,11 @@ class Instance:
         Raises:
             BlockError: the model fails.
         """
-        ticked = sorted(self.events.active)
-        self.events.active.clear()
-        self._stale_outputs = True
+        self.variables.touch()
         try:
-            for number in ticked:
-                self.events.tell(number)
+            return self.events.tick()
         except Exception as error:
             raise _model_failure(error) from error
-        return bool(ticked)
 
     # -- state ------------------------------------------------------------------------------------------------------
 
@@ -182,6 +224,7 @@ class Instance:
             mode=self.mode,
             active=tuple(sorted(events.active)),
             runtime=self.runtime.snapshot(),
+            protocol=(round(events.protocol[0]), events.protocol[1]),
             records=() if events.journal is None else events.journal.records,
             queue=tuple(events.queue),
             stamps=tuple(events.stamps),
@@ -191,7 +234,7 @@ class Instance:
         )
 
     def load(self, state: BlockState) -> None:
-        """Return to a saved state, exactly; the policy for late events stays that of this block.
+        """Return to a saved state, exactly.
 
         Raises:
             BlockError: it is not a state, or one of another model.
@@ -204,8 +247,10 @@ class Instance:
         events = self.events
         events.active, events.queue, events.stamps[:] = set(state.active), list(state.queue), state.stamps
         events.counts, events.seen, events.counters = list(state.counts), list(state.seen), replace(state.counters)
+        events.protocol[:] = state.protocol
         events.restore_past(state.records)
-        self._stale_outputs = True
+        self.discarded = False
+        self.variables.touch()
 
     # -- life -------------------------------------------------------------------------------------------------------
 
@@ -230,13 +275,33 @@ class Instance:
 
     # -- internals --------------------------------------------------------------------------------------------------
 
+    def _move(self, end: float) -> None:
+        events = self.events
+        if events.counts != events.seen:
+            events.poll_counts()
+        events.advance(end)
+        events.end_step()
+        self._check_finite()
+
+    def _refresh(self, places: Sequence[Place]) -> None:
+        try:
+            for place in places:
+                if place.role in COMPUTED:
+                    self.variables.refresh(place.role)
+        except Exception as error:
+            raise _model_failure(error) from error
+
     def _refresh_outputs(self) -> None:
-        if self._stale_outputs:
-            try:
-                self.runtime.update_outputs()
-            except Exception as error:
-                raise _model_failure(error) from error
-            self._stale_outputs = False
+        try:
+            self.variables.refresh("output")
+        except Exception as error:
+            raise _model_failure(error) from error
+
+    def _whole_value(self, place: Place) -> int:
+        value = self.events.counts[place.index] if place.role == "count" else float(place.values[place.index])
+        if not -(2.0**31) <= value < 2.0**31:
+            raise BlockError(f"{place.name} = {value!r} is not a whole number of 32 bits.")
+        return round(value)
 
     def _check_finite(self) -> None:
         x = self.runtime.x

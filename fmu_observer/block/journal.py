@@ -16,7 +16,13 @@ import numpy as np
 
 from plant_models.hybrid import Runtime
 
+JOURNAL_CAPACITY = 4096
+"""Records remembered at most, as in the exported FMU; an event that lies before them is out of reach."""
+
 SMALLEST_PRUNING = 256
+PRUNING_MARGIN = 1e-6
+"""What ended so much before the horizon [s] is out of reach whatever the tolerance."""
+
 ROUNDING_ULPS = 4.0  # a master's k*H and the sum t + H at which a step ended differ by so many units in the last place at most
 
 
@@ -38,7 +44,7 @@ class Stamped:
 
 
 class Record(NamedTuple):
-    """One thing the runtime did: an advance from `t` to `until` [s], or, with `event`, a jump at `t`.
+    """One thing the runtime did: an advance from `t` to a later `until` [s], with `event` a jump at `t`, else a communication.
 
     `memory` (state, inputs, parameters) and `ticks` are the runtime's before it.
     """
@@ -49,9 +55,18 @@ class Record(NamedTuple):
     ticks: tuple[int, ...]
     event: Stamped | None
 
+    @property
+    def moves(self) -> bool:
+        """Whether it is an advance."""
+        return self.until > self.t
+
+
+Mark = tuple[list[Record], int, int, int]
+"""Where a journal stood: its records, how many, the first that counts, when to prune; see `Journal.mark`."""
+
 
 class Journal:
-    """Records of a runtime, oldest first, at least as far back as the horizon.
+    """Records of a runtime, oldest first: at least as far back as the horizon, but no more than `JOURNAL_CAPACITY`.
 
     Args:
         horizon: how far back a stamp may lie [s].
@@ -61,39 +76,60 @@ class Journal:
     def __init__(self, horizon: float, records: Iterable[Record] = ()) -> None:
         self.horizon = horizon
         self._records = list(records)
+        self._first = 0  # of these, the oldest one that counts
         self._prune_at = max(SMALLEST_PRUNING, 2 * len(self._records))
 
     @property
     def records(self) -> tuple[Record, ...]:
         """All records, as a value."""
-        return tuple(self._records)
+        return tuple(self._records[self._first :])
 
     def append(self, runtime: Runtime, until: float, event: Stamped | None = None) -> None:
-        """Remember where the runtime stands before it advances to `until` [s] or jumps at `event`."""
+        """Remember where the runtime stands before it advances to `until` [s], jumps at `event`, or communicates."""
         if len(self._records) >= self._prune_at:
             self._prune(runtime.t)
         self._records.append(Record(runtime.memory.copy(), runtime.t, until, tuple(runtime.ticks), event))
+        if len(self._records) - self._first > JOURNAL_CAPACITY:
+            self._first += 1
 
-    def cut(self, stamp: float, tolerance: float, now: float) -> list[Record]:
-        """Take out the record in which `stamp` [s] lies and all that follow.
+    def out_of_reach(self, stamp: float, tolerance: float, now: float) -> str:
+        """Why memory does not reach back to `stamp` [s]; empty where it does.
 
         Args:
-            stamp: an instant before `now`; at the border of two records, to rounding, the later one has it.
+            stamp: an instant before `now`.
             tolerance: how far it may lie before the first record or the horizon [s].
             now: the present [s].
+        """
+        if stamp < now - self.horizon - tolerance:
+            return "it lies further back than replay_horizon"
+        if len(self._records) == self._first or stamp < self._records[self._first].t - tolerance:
+            return "it lies before the first of the steps that are remembered"
+        return ""
+
+    def cut(self, stamp: float) -> list[Record]:
+        """Take out the record in which `stamp` [s] lies (at the border of two, to rounding, the later) and all that follow.
 
         Returns:
-            The records taken out, oldest first; empty where memory does not reach back so far.
+            The records taken out, oldest first.
         """
         records = self._records
-        if stamp < now - self.horizon - tolerance or not records or stamp < records[0].t - tolerance:
-            return []
-        index = max(0, bisect_right(records, stamp + ROUNDING_ULPS * ulp(stamp), key=attrgetter("t")) - 1)
-        taken = records[index:]
-        del records[index:]
-        return taken
+        after = bisect_right(records, stamp + ROUNDING_ULPS * ulp(stamp), self._first, key=attrgetter("t"))
+        index = max(self._first, after - 1)
+        self._records = records[:index]  # the old list stays as it is: a mark may hold it
+        return records[index:]
+
+    def mark(self) -> Mark:
+        """Where the journal stands, for `undo`."""
+        return self._records, len(self._records), self._first, self._prune_at
+
+    def undo(self, mark: Mark) -> None:
+        """Forget everything since `mark`."""
+        self._records, length, self._first, self._prune_at = mark
+        del self._records[length:]
 
     def _prune(self, now: float) -> None:
         """Forget what ended before the horizon; next time when as much again has been remembered."""
-        del self._records[: bisect_left(self._records, now - self.horizon, key=attrgetter("until"))]
+        oldest = now - self.horizon - PRUNING_MARGIN
+        self._records = self._records[bisect_left(self._records, oldest, self._first, key=attrgetter("until")) :]
+        self._first = 0
         self._prune_at = max(SMALLEST_PRUNING, 2 * len(self._records))

@@ -8,15 +8,14 @@ comparison only). Knows the runtime and its journal, not FMI.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from fmu_observer.block.journal import Journal, Record, Stamped
+from fmu_observer.event_protocol import LATE_POLICIES, LatePolicy
 from plant_models.hybrid import Runtime, Snapshot
 
-LatePolicy = Literal["replay", "reject", "late"]
-LATE_POLICIES: tuple[LatePolicy, ...] = ("replay", "reject", "late")
+__all__ = ["LATE_POLICIES", "Counters", "LatePolicy", "advance", "communicate", "jump", "replay"]
 
 
 @dataclass
@@ -26,7 +25,7 @@ class Counters:
     Args:
         accepted: events that took effect, on time or not. replayed: of these, the late ones applied at their stamp.
         late: of these, the late ones applied at the time they were told. rejected: late events without effect.
-        lost: events announced (count raised by more than one) of which nothing else is known.
+        lost: events announced (count raised by more than one, or too many waiting) of which nothing else is known.
     """
 
     accepted: int = 0
@@ -45,43 +44,57 @@ def advance(runtime: Runtime, journal: Journal | None, until: float) -> None:
 
 
 def jump(runtime: Runtime, journal: Journal | None, event: Stamped) -> None:
-    """Let a runtime jump now, and remember it."""
+    """Let a runtime jump now, and remember it. The payload is there for the time of the jump; what was set in `u` stays."""
     if journal is not None:
         journal.append(runtime, runtime.t, event)
-    runtime.u[list(event.positions)] = event.payload
+    positions = list(event.positions)
+    standing = runtime.u[positions]
+    runtime.u[positions] = event.payload
     runtime.trigger(event.name)
+    runtime.u[positions] = standing
 
 
-def replay(runtime: Runtime, journal: Journal, event: Stamped, given: np.ndarray, tolerance: float) -> bool:
+def communicate(runtime: Runtime, journal: Journal | None) -> None:
+    """A communication step ends now; remember it where that means something."""
+    if runtime.system.communication_events:
+        if journal is not None:
+            journal.append(runtime, runtime.t)
+        runtime.communicate()
+
+
+def replay(runtime: Runtime, journal: Journal, event: Stamped, given: np.ndarray, tolerance: float) -> str:
     """Live the past again with `event` at its stamp: what comes out is what would be, had it been told in time.
 
     Args:
         runtime: at the present; what it was given is kept.
         journal: rewritten so that the event is part of it.
         event: with a stamp in the past.
-        given: positions in the runtime's `memory` of what is set from outside: inputs proper and parameters.
+        given: positions in the runtime's `memory` of what is set from outside: inputs, payloads and parameters.
         tolerance: how far the stamp may lie before the first record [s].
 
     Returns:
-        False, with nothing changed, where memory does not reach back to the stamp.
+        An empty text, or, with nothing changed, the reason why memory does not reach back to the stamp.
     """
-    past = journal.cut(event.stamp, tolerance, runtime.t)
-    if not past:
-        return False
+    reason = journal.out_of_reach(event.stamp, tolerance, runtime.t)
+    if reason:
+        return reason
+    past = journal.cut(event.stamp)
     present = runtime.memory[given]
     runtime.restore(Snapshot(past[0].memory, past[0].t, runtime.t0, past[0].ticks))
-    if past[0].event is None:
+    if past[0].moves:
         advance(runtime, journal, event.stamp)
     jump(runtime, journal, event)
     for record in past:
         runtime.memory[given] = record.memory[given]
         _repeat(runtime, journal, record)
     runtime.memory[given] = present
-    return True
+    return ""
 
 
 def _repeat(runtime: Runtime, journal: Journal, record: Record) -> None:
     if record.event is not None:
         jump(runtime, journal, record.event)
-    else:
+    elif record.moves:
         advance(runtime, journal, record.until)
+    else:
+        communicate(runtime, journal)

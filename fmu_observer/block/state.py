@@ -17,6 +17,7 @@ import numpy as np
 from fmu_observer.block.journal import Record, Stamped
 from fmu_observer.block.policy import Counters
 from fmu_observer.block.variables import BlockError, Mode
+from fmu_observer.event_protocol import LATE_POLICIES
 from plant_models.hybrid import Snapshot
 
 DOUBLE = np.dtype("<f8")
@@ -30,7 +31,7 @@ class BlockState:
         token: instantiation token of the model it belongs to.
         mode: mode of the life cycle. active: numbers of the active clocks (FMI 3).
         runtime: state, inputs, parameters and time.
-        records: the recent past, for replay.
+        protocol: number of the late policy, and the horizon [s]. records: the recent past, for replay.
         queue: events announced for later. stamps, counts, seen: the event variables.
         counters: what became of the events so far.
     """
@@ -39,6 +40,7 @@ class BlockState:
     mode: Mode
     active: tuple[int, ...]
     runtime: Snapshot
+    protocol: tuple[int, float]
     records: tuple[Record, ...]
     queue: tuple[Stamped, ...]
     stamps: tuple[float, ...]
@@ -72,7 +74,8 @@ def serialize(state: BlockState) -> bytes:
         "mode": state.mode,
         "active": state.active,
         "memory": _encode(runtime.memory),
-        "times": _encode([runtime.t, runtime.t0, *state.stamps]),
+        "times": _encode([runtime.t, runtime.t0, state.protocol[1], *state.stamps]),
+        "late_policy": state.protocol[0],
         "ticks": runtime.ticks,
         "past": {
             "memory": _encode([r.memory for r in state.records]),
@@ -121,12 +124,14 @@ def _decode_state(data: dict[str, Any], shape: Shape) -> BlockState:
     count = len(shape.payloads)
     if data["mode"] not in get_args(Mode):
         raise ValueError(f"unknown mode {data['mode']!r}")
-    t, t0, *stamps = map(float, _decode(data["times"], (2 + count,)))
+    t, t0, horizon, *stamps = map(float, _decode(data["times"], (3 + count,)))
+    (policy,) = _integers([data["late_policy"]], 1, range(1, len(LATE_POLICIES) + 1))
     return BlockState(
         token=shape.token,
         mode=data["mode"],
         active=_integers(data["active"], len(data["active"]), range(count)),
         runtime=Snapshot(_decode(data["memory"], (shape.memory,)), t, t0, _integers(data["ticks"], shape.ticks)),
+        protocol=(policy, horizon),
         records=_decode_records(data["past"], shape),
         queue=tuple(_event(entry, shape) for entry in data["queue"]),
         stamps=tuple(stamps),

@@ -7,19 +7,40 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
 
 from fmu_observer.description import VariableTable, exposed_inputs
-from plant_models.hybrid import HybridSystem, Runtime, Signal
+from plant_models.hybrid import HybridSystem, Runtime, Signal, scalar_names
+
+if TYPE_CHECKING:
+    from fmu_observer.block.events import Events
 
 Mode = Literal["instantiated", "initialization", "event", "step", "terminated", "freed"]
-Role = Literal["time", "input", "payload", "output", "state", "fixed", "tunable", "trigger", "stamp"]
+Role = Literal[
+    "time", "input", "payload", "output", "integer_output", "state", "fixed", "tunable", "clock", "count", "stamp", "policy",
+    "horizon", "derivative", "indicator",
+]  # fmt: skip
 
+COMPUTED: frozenset[Role] = frozenset({"output", "integer_output", "derivative", "indicator"})
 BEFORE_TIME: tuple[Mode, ...] = ("instantiated", "initialization")
+
+
+NOT_REAL: dict[Role, str] = {
+    "clock": "announces an event",
+    "count": "announces an event",
+    "policy": "is an enumeration",
+    "integer_output": "is a whole number",
+}
 
 
 class BlockError(ValueError):
     """Something a block cannot do: what was asked, and what was expected."""
+
+
+class StepDiscarded(BlockError):  # noqa: N818 - FMI's word for it
+    """A communication step that cannot be done; it has left no trace."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,19 +63,46 @@ class Place:
 class Variables:
     """The variables of one runtime by value reference.
 
+    `derivatives` and `indicators` hold what `refresh` has computed last.
+
     Args:
-        system: the hybrid system. runtime: its runtime. stamps: one stamp for each triggered event [s].
-        counts_events: whether events are announced by counts (FMI 2) or by clocks (FMI 3).
+        system: the hybrid system. runtime: its runtime. events: its events.
+        counts_events: whether events are announced by counts or by clocks.
     """
 
-    def __init__(self, system: HybridSystem, runtime: Runtime, stamps: list[float], counts_events: bool) -> None:
+    def __init__(self, system: HybridSystem, runtime: Runtime, events: Events, counts_events: bool) -> None:
         self.table = VariableTable.of(system)
+        self._runtime = runtime
+        self.derivatives, self.indicators = np.zeros(system.continuous_count), np.zeros(len(system.frictions))
         self._places = [Place("time", "time", None, 0), *_system_places(system, runtime)]
         for number, event in enumerate(system.triggered_events):
             count, stamp = event.implied_names
-            self._places.append(Place(count if counts_events else event.name, "trigger", None, number))
-            self._places.append(Place(stamp, "stamp", stamps, number))
+            trigger = Place(count, "count", events, number) if counts_events else Place(event.name, "clock", events, number)
+            self._places += [trigger, Place(stamp, "stamp", events.stamps, number)]
+        if system.triggered_events:
+            self._places.append(Place("late_policy", "policy", events.protocol, 0))
+            self._places.append(Place("replay_horizon", "horizon", events.protocol, 1))
+        self._places += _rate_places(system, self.derivatives, self.indicators)
         self._settable = _settable_modes(counts_events)
+        self._stale: set[Role] = set(COMPUTED)
+
+    def touch(self) -> None:
+        """Something has changed: what is computed when it is read is not up to date."""
+        self._stale |= COMPUTED
+
+    def refresh(self, role: Role) -> None:
+        """Compute the variables of this role, where that is due."""
+        if role not in self._stale:
+            return
+        if role in ("output", "integer_output"):
+            self._runtime.update_outputs()
+            self._stale -= {"output", "integer_output"}
+        elif role == "derivative":
+            self.derivatives[:] = self._runtime.derivatives()
+            self._stale.discard(role)
+        else:
+            self.indicators[:] = self._runtime.friction_indicators()
+            self._stale.discard(role)
 
     def place(self, reference: int) -> Place:
         """Where the variable with this value reference is kept.
@@ -73,8 +121,19 @@ class Variables:
             BlockError: there is no such variable, or it is a clock or a count.
         """
         place = self.place(reference)
-        if place.role == "trigger":
-            raise BlockError(f"{place.name} (value reference {reference}) is not a real variable but announces an event.")
+        if place.role in NOT_REAL:
+            raise BlockError(f"{place.name} (value reference {reference}) is not a real variable but {NOT_REAL[place.role]}.")
+        return place
+
+    def whole(self, reference: int, roles: Sequence[Role]) -> Place:
+        """The place of a whole number that has one of these roles.
+
+        Raises:
+            BlockError: there is no such variable, or it is of another type.
+        """
+        place = self.place(reference)
+        if place.role not in roles:
+            raise BlockError(f"{place.name} (value reference {reference}) is of another type.")
         return place
 
     def settable(self, reference: int, mode: Mode) -> Place:
@@ -83,7 +142,14 @@ class Variables:
         Raises:
             BlockError: there is no such variable, or it cannot be set, or not now.
         """
-        place = self.readable(reference)
+        return self.check_settable(reference, self.readable(reference), mode)
+
+    def check_settable(self, reference: int, place: Place, mode: Mode) -> Place:
+        """The place of a variable, if it may be set in this mode.
+
+        Raises:
+            BlockError: it cannot be set, or not now.
+        """
         modes = self._settable.get(place.role, ())
         if mode not in modes:
             which = f"{place.name} (value reference {reference})"
@@ -93,15 +159,15 @@ class Variables:
             raise BlockError(f"{which} {what} be set in mode '{mode}', only in: {', '.join(modes)}.")
         return place
 
-    def event_number(self, reference: int) -> int:
-        """Number of the triggered event whose clock or count has this value reference.
+    def clock_number(self, reference: int) -> int:
+        """Number of the triggered event whose clock has this value reference.
 
         Raises:
-            BlockError: it is not a clock or count.
+            BlockError: it is not a clock.
         """
         place = self.place(reference)
-        if place.role != "trigger":
-            raise BlockError(f"{place.name} (value reference {reference}) is not the clock or count of an event.")
+        if place.role != "clock":
+            raise BlockError(f"{place.name} (value reference {reference}) is not the clock of an event.")
         return place.index
 
     def have_role(self, references: Sequence[int], role: Role) -> bool:
@@ -113,7 +179,7 @@ def _system_places(system: HybridSystem, runtime: Runtime) -> list[Place]:
     own = len(system.inputs)
     return [
         *_places(exposed_inputs(system), runtime.u, lambda i: "input" if i < own else "payload"),
-        *_places(system.outputs, runtime.y, lambda _: "output"),
+        *_places(system.outputs, runtime.y, lambda i: "integer_output" if system.outputs[i].integer else "output"),
         *_places(system.states, runtime.x, lambda _: "state"),
         *_places(
             system.parameter_signals,
@@ -123,6 +189,12 @@ def _system_places(system: HybridSystem, runtime: Runtime) -> list[Place]:
     ]
 
 
+def _rate_places(system: HybridSystem, derivatives: np.ndarray, indicators: np.ndarray) -> list[Place]:
+    states = scalar_names(system.states)[: system.continuous_count]
+    places = [Place(f"der({name})", "derivative", derivatives, i) for i, name in enumerate(states)]
+    return places + [Place(f"event_indicator.{name}", "indicator", indicators, i) for i, name in enumerate(system.frictions)]
+
+
 def _places(signals: Sequence[Signal], values: Any, role: Callable[[int], Role]) -> list[Place]:
     """Places of signals that stand one after the other in `values`; `role` takes the number of the signal."""
     named = [(name, role(i)) for i, signal in enumerate(signals) for name in signal.scalar_names]
@@ -130,13 +202,16 @@ def _places(signals: Sequence[Signal], values: Any, role: Callable[[int], Role])
 
 
 def _settable_modes(counts_events: bool) -> dict[Role, tuple[Mode, ...]]:
-    """In FMI 2 what comes with an event is set before the step, in FMI 3 in event mode."""
+    """What comes with an event is set before the step where it is announced by a count, in event mode where by a clock."""
     at_events: Mode = "step" if counts_events else "event"
     return {
         "input": (*BEFORE_TIME, "event", "step"),
         "tunable": (*BEFORE_TIME, "event", "step"),
         "payload": (*BEFORE_TIME, at_events),
         "stamp": (*BEFORE_TIME, at_events),
+        "count": (*BEFORE_TIME, "step"),
+        "policy": BEFORE_TIME,
+        "horizon": BEFORE_TIME,
         "state": BEFORE_TIME,
         "fixed": BEFORE_TIME,
     }

@@ -4,10 +4,20 @@
 
 #include "noise.c"
 #include "runtime.c"
-#include "events.c"
+#include "log.c"
+#include "journal.c"
+#include "replay.c"
 #include "instance.c"
+#include "variables.c"
+#include "events.c"
+#include "step.c"
+#include "snapshot.c"
+#include "resource.c"
+#include "exchange.c"
+#include "sensitivity.c"
 
 #if FMI_VERSION == 2
+#include "fmi2_prefix.h"
 #include "fmi2.c"
 #else
 #include "fmi3.c"

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#define TIME_TOLERANCE 1e-9 /* [s] closer than this is the same instant, as in the Python block */
+#include "replay.h"
 
 /* -- the queue: entries (event, stamp, payload) in the order of their stamps ----------------------------------------- */
 
@@ -41,10 +41,32 @@ static void remove_first(Runtime *runtime) {
 
 /* -- announcing -------------------------------------------------------------------------------------------------- */
 
+static Status reject(Instance *instance, int event, double stamp, const char *reason) {
+    instance->rejected += 1;
+    return instance_warn(instance, "event %s: its stamp %.17g s lies before the current time %.17g s; it is rejected (%lld so far): %s",
+                         model.triggered[event].name, stamp, instance->runtime.clock.t, (long long)instance->rejected, reason);
+}
+
+/* In model exchange an event is late when it is told late; one that waits is not, wherever the solver stops. */
+static Status check_exchange(Instance *instance, int event, double *stamp) {
+    const Runtime *runtime = &instance->runtime;
+    if (!instance->exchange || *stamp >= runtime->clock.t - TIME_TOLERANCE)
+        return STATUS_OK;
+    if (*runtime->late_policy == (double)LATE_REJECT)
+        return reject(instance, event, *stamp, "late_policy is reject");
+    if (*runtime->late_policy == (double)LATE_REPLAY)
+        return reject(instance, event, *stamp, "in model exchange the past is the solver's and cannot be replayed");
+    *stamp = runtime->clock.t;
+    return STATUS_OK;
+}
+
 PRIVATE Status events_announce(Instance *instance, int event) {
     Runtime *runtime = &instance->runtime;
     double stamp = runtime->stamps[event] > STAMP_NOW ? runtime->stamps[event] : runtime->clock.t;
     runtime->stamps[event] = STAMP_NOW;
+    Status late = check_exchange(instance, event, &stamp);
+    if (late != STATUS_OK)
+        return late;
     if (*runtime->queue_length >= QUEUE_CAPACITY) {
         instance->lost += 1;
         return instance_warn(instance, "event %s at %.17g s: %d events are waiting already; this one is lost",
@@ -73,48 +95,81 @@ static Status poll_count(Instance *instance, int event) {
 
 PRIVATE Status events_poll_counts(Instance *instance) {
     Status status = STATUS_OK;
-    for (int i = 0; i < model.triggered_count; i++) {
-        Status polled = poll_count(instance, i);
-        status = polled > status ? polled : status;
-    }
+    for (int i = 0; i < model.triggered_count; i++)
+        status = status_worse(status, poll_count(instance, i));
     return status;
 }
 
 /* -- applying ---------------------------------------------------------------------------------------------------- */
 
-/* An event whose stamp lies in the past. The policy is to reject it: it is counted and reported. A policy that goes
-   back to the stamp and integrates forward again takes its place here. */
-static Status late_event(Instance *instance, int event, double stamp) {
-    instance->rejected += 1;
-    return instance_warn(instance, "event %s: its stamp %.17g s lies before the current time %.17g s; it is rejected (%lld so far)",
-                         model.triggered[event].name, stamp, instance->runtime.clock.t, (long long)instance->rejected);
+/* An event whose stamp lies in the past goes by the policy. */
+static Status take_late(Instance *instance, int event, double stamp, double *payload) {
+    Runtime *runtime = &instance->runtime;
+    const char *name = model.triggered[event].name;
+    if (*runtime->late_policy == (double)LATE_REJECT)
+        return reject(instance, event, stamp, "late_policy is reject");
+    if (*runtime->late_policy == (double)LATE_LATE) {
+        move_jump(runtime, &instance->journal, event, payload);
+        instance_note(instance, "event %s of %.17g s applied late at %.17g s", name, stamp, runtime->clock.t);
+        return STATUS_OK;
+    }
+    int reach = move_replay(runtime, &instance->journal, event, stamp, payload);
+    if (reach == BEYOND_HORIZON)
+        return reject(instance, event, stamp, "it lies further back than replay_horizon");
+    if (reach == BEYOND_RECORDS)
+        return reject(instance, event, stamp, "it lies before the first of the steps that are remembered");
+    instance_note(instance, "event %s applied at %.17g s, from %.17g s", name, stamp, runtime->clock.t);
+    return STATUS_OK;
 }
 
 static Status apply_first(Instance *instance) {
     Runtime *runtime = &instance->runtime;
-    const double *first = entry(runtime, 0);
+    double *first = entry(runtime, 0);
     int event = (int)first[0];
     double stamp = first[1];
+    Status status = STATUS_OK;
+    instance->outdated = OUTDATED_ALL;
     if (stamp < runtime->clock.t - TIME_TOLERANCE) {
-        remove_first(runtime);
-        return late_event(instance, event, stamp);
+        status = take_late(instance, event, stamp, first + 2);
+    } else {
+        move_advance(runtime, &instance->journal, stamp);
+        move_jump(runtime, &instance->journal, event, first + 2);
+        instance_note(instance, "event %s applied at %.17g s", model.triggered[event].name, runtime->clock.t);
     }
-    if (stamp > runtime->clock.t)
-        runtime_advance(runtime, stamp);
-    memcpy(runtime->u + model.triggered[event].payload, first + 2, payload_bytes(event));
-    runtime_trigger(runtime, event);
     remove_first(runtime);
-    instance->outputs_outdated = true;
-    instance_note(instance, "event %s applied at %.17g s", model.triggered[event].name, runtime->clock.t);
-    return STATUS_OK;
+    return status;
 }
 
 PRIVATE Status events_apply_until(Instance *instance, double t_end) {
     Runtime *runtime = &instance->runtime;
     Status status = STATUS_OK;
-    while (*runtime->queue_length > 0.0 && entry(runtime, 0)[1] <= t_end + TIME_TOLERANCE) {
-        Status applied = apply_first(instance);
-        status = applied > status ? applied : status;
+    while (*runtime->queue_length > 0.0 && entry(runtime, 0)[1] <= t_end + TIME_TOLERANCE)
+        status = status_worse(status, apply_first(instance));
+    return status;
+}
+
+PRIVATE Status events_poll_clocks(Instance *instance) {
+    Runtime *runtime = &instance->runtime;
+    Status status = STATUS_OK;
+    for (int i = 0; i < model.triggered_count; i++) {
+        if (runtime->active[i] == 0.0)
+            continue;
+        runtime->active[i] = 0.0;
+        status = status_worse(status, events_announce(instance, i));
     }
     return status;
+}
+
+PRIVATE double events_first_stamp(const Runtime *runtime) {
+    return *runtime->queue_length > 0.0 ? entry(runtime, 0)[1] : INFINITY;
+}
+
+PRIVATE void events_apply_here(Instance *instance) {
+    Runtime *runtime = &instance->runtime;
+    double *first = entry(runtime, 0);
+    int event = (int)first[0];
+    move_jump(runtime, &instance->journal, event, first + 2);
+    remove_first(runtime);
+    instance->outdated = OUTDATED_ALL;
+    instance_note(instance, "event %s applied at %.17g s", model.triggered[event].name, runtime->clock.t);
 }

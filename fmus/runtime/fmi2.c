@@ -1,9 +1,15 @@
-/* The FMI 2.0 co-simulation face. All functions of the standard are exported; those of model exchange refuse. */
+/* The FMI 2.0 face, co-simulation and model exchange. All functions of the standard are exported. */
 #include "fmi2Functions.h"
 
 #include <string.h>
 
+#include "exchange.h"
 #include "instance.h"
+#include "resource.h"
+#include "sensitivity.h"
+#include "snapshot.h"
+#include "step.h"
+#include "variables.h"
 
 #define REQUIRE(component, modes)                                                \
     do {                                                                         \
@@ -18,9 +24,17 @@
         return fmi2Error;                                                                \
     } while (0)
 
-#define REFUSE_MODEL_EXCHANGE(component) REFUSE(component, "this FMU was exported for co-simulation only")
+/* What a solver asks for is there once initialisation has begun. */
+#define REQUIRE_EXCHANGE(component)                                                                   \
+    do {                                                                                              \
+        REQUIRE(component, MODE_INITIALIZATION | EXCHANGING | MODE_TERMINATED);                       \
+        if (!((Instance *)(component))->exchange)                                                     \
+            REFUSE(component, "the instance was made for co-simulation");                             \
+    } while (0)
 
-#define READABLE (MODE_INSTANTIATED | MODE_INITIALIZATION | MODE_STEP | MODE_TERMINATED)
+#define EXCHANGING (MODE_EVENT | MODE_CONTINUOUS)
+#define RUNNING (MODE_STEP | EXCHANGING)
+#define READABLE (MODE_INSTANTIATED | MODE_INITIALIZATION | RUNNING | MODE_TERMINATED)
 
 static void log_fmi2(const Instance *instance, Status status, const char *category, const char *message) {
     const fmi2CallbackFunctions *callbacks = instance->callbacks;
@@ -33,7 +47,7 @@ static void log_fmi2(const Instance *instance, Status status, const char *catego
         callbacks->logger(instance->environment, instance->name, (fmi2Status)status, category, "%s", message);
 }
 
-static const Face face = {.counts_events = true, .log = log_fmi2};
+static const Face face = {.solver_sets_reals = false, .log = log_fmi2};
 
 /* -- life -------------------------------------------------------------------------------------------------------- */
 
@@ -47,24 +61,27 @@ const char *fmi2GetVersion(void) {
 
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories, const fmi2String categories[]) {
     REQUIRE(c, MODE_ANY);
-    return (fmi2Status)instance_set_logging(c, loggingOn, nCategories, categories);
+    return (fmi2Status)instance_set_logging(c, __func__, false, loggingOn, nCategories, categories);
 }
 
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID, fmi2String fmuResourceLocation,
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean loggingOn) {
-    (void)fmuResourceLocation, (void)visible;
-    Instance *instance = instance_create(instanceName != NULL && *instanceName != '\0' ? instanceName : model.name, &face);
+    (void)visible;
+    Instance *instance = instance_create(instanceName != NULL && *instanceName != '\0' ? instanceName : model.name, &face, fmuType == fmi2CoSimulation);
     if (instance == NULL)
         return NULL;
     instance->callbacks = functions;
     instance->environment = functions != NULL ? functions->componentEnvironment : NULL;
     instance->debug_logging = loggingOn;
     Status status = STATUS_OK;
-    if (fmuType != fmi2CoSimulation)
-        status = instance_fail(instance, "fmi2Instantiate: this FMU was exported for co-simulation only");
-    else if (!instance_token_fits(fmuGUID))
+    instance->exchange = fmuType == fmi2ModelExchange;
+    if (instance->exchange)
+        status = exchange_check_model(instance, __func__);
+    if (status == STATUS_OK && !instance_token_fits(fmuGUID))
         status = instance_fail(instance, "fmi2Instantiate: GUID %s was expected, %s was given; library and modelDescription.xml do not belong together",
                                model.token, fmuGUID != NULL ? fmuGUID : "none");
+    if (status == STATUS_OK)
+        status = resource_load(instance, fmuResourceLocation);
     if (status == STATUS_OK)
         return instance;
     instance_free(instance);
@@ -90,11 +107,11 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
     REQUIRE(c, MODE_INITIALIZATION);
-    return (fmi2Status)instance_start(c, MODE_STEP);
+    return (fmi2Status)(((Instance *)c)->exchange ? exchange_start(c) : instance_start(c, MODE_STEP));
 }
 
 fmi2Status fmi2Terminate(fmi2Component c) {
-    REQUIRE(c, MODE_STEP);
+    REQUIRE(c, RUNNING);
     ((Instance *)c)->mode = MODE_TERMINATED;
     return fmi2OK;
 }
@@ -112,34 +129,34 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nv
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[]) {
-    REQUIRE(c, MODE_INSTANTIATED | MODE_INITIALIZATION | MODE_STEP);
+    REQUIRE(c, MODE_INSTANTIATED | MODE_INITIALIZATION | RUNNING);
     return (fmi2Status)instance_set_reals(c, __func__, vr, nvr, value);
 }
 
+#define INTEGERS (ROLES(ROLE_COUNT) | ROLES(ROLE_INTEGER_OUTPUT) | ROLES(ROLE_POLICY))
+
 fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Integer value[]) {
     REQUIRE(c, READABLE);
-    Instance *instance = c;
-    if (instance_check_arrays(instance, __func__, vr, nvr, value) != STATUS_OK)
+    if (instance_check_arrays(c, __func__, vr, nvr, value) != STATUS_OK)
         return fmi2Error;
     for (size_t i = 0; i < nvr; i++) {
-        const Variable *variable = instance_variable(instance, __func__, vr[i], ROLE_COUNT);
-        if (variable == NULL)
+        int64_t held = 0;
+        if (instance_get_integer(c, __func__, vr[i], INTEGERS, &held) != STATUS_OK)
             return fmi2Error;
-        value[i] = (fmi2Integer)instance->runtime.raised[variable->index];
+        value[i] = (fmi2Integer)held;
     }
     return fmi2OK;
 }
 
 fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer value[]) {
-    REQUIRE(c, MODE_INSTANTIATED | MODE_INITIALIZATION | MODE_STEP);
-    Instance *instance = c;
-    if (instance_check_arrays(instance, __func__, vr, nvr, value) != STATUS_OK)
+    REQUIRE(c, MODE_INSTANTIATED | MODE_INITIALIZATION | RUNNING);
+    if (instance_check_arrays(c, __func__, vr, nvr, value) != STATUS_OK)
         return fmi2Error;
     for (size_t i = 0; i < nvr; i++)
-        if (instance_variable(instance, __func__, vr[i], ROLE_COUNT) == NULL)
+        if (instance_check_integer(c, __func__, vr[i], INTEGERS, value[i]) != STATUS_OK)
             return fmi2Error;
     for (size_t i = 0; i < nvr; i++)
-        instance->runtime.raised[model.variables[vr[i]].index] = value[i];
+        instance_put_integer(c, vr[i], value[i]);
     return fmi2OK;
 }
 
@@ -205,7 +222,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
                       fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
     (void)noSetFMUStatePriorToCurrentPoint;
     REQUIRE(c, MODE_STEP);
-    return (fmi2Status)instance_do_step(c, __func__, currentCommunicationPoint, communicationStepSize);
+    return (fmi2Status)instance_do_step(c, __func__, currentCommunicationPoint, communicationStepSize, NULL);
 }
 
 fmi2Status fmi2CancelStep(fmi2Component c) {
@@ -246,7 +263,7 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boo
     REQUIRE(c, MODE_ANY);
     if (s != fmi2Terminated || value == NULL)
         REFUSE(c, "only fmi2Terminated is known");
-    *value = fmi2False;
+    *value = ((Instance *)c)->discarded;
     return fmi2OK;
 }
 
@@ -255,60 +272,81 @@ fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2Stri
     REFUSE(c, "there is no status of this type");
 }
 
-/* -- not supported ----------------------------------------------------------------------------------------------- */
+/* -- directional derivatives ----------------------------------------------------------------------------------------------- */
 
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown,
                                         const fmi2ValueReference vKnown_ref[], size_t nKnown, const fmi2Real dvKnown[],
                                         fmi2Real dvUnknown[]) {
-    (void)vUnknown_ref, (void)nUnknown, (void)vKnown_ref, (void)nKnown, (void)dvKnown, (void)dvUnknown;
-    REFUSE(c, "providesDirectionalDerivative = false");
+    REQUIRE(c, MODE_ANY & ~MODE_INSTANTIATED);
+    return (fmi2Status)sensitivity_directional(c, __func__, vUnknown_ref, nUnknown, vKnown_ref, nKnown, dvKnown, dvUnknown);
 }
 
+/* -- model exchange ----------------------------------------------------------------------------------------------- */
+
 fmi2Status fmi2EnterEventMode(fmi2Component c) {
-    REFUSE_MODEL_EXCHANGE(c);
+    REQUIRE(c, MODE_CONTINUOUS);
+    ((Instance *)c)->mode = MODE_EVENT;
+    return fmi2OK;
 }
 
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *fmi2eventInfo) {
-    (void)fmi2eventInfo;
-    REFUSE_MODEL_EXCHANGE(c);
+    REQUIRE(c, MODE_EVENT);
+    if (fmi2eventInfo == NULL)
+        return (fmi2Status)instance_fail(c, "%s: no place for the event information was given", __func__);
+    EventReport report;
+    Status status = exchange_update(c, &report);
+    fmi2eventInfo->newDiscreteStatesNeeded = fmi2False;
+    fmi2eventInfo->terminateSimulation = fmi2False;
+    fmi2eventInfo->nominalsOfContinuousStatesChanged = fmi2False;
+    fmi2eventInfo->valuesOfContinuousStatesChanged = report.states_changed;
+    fmi2eventInfo->nextEventTimeDefined = report.next_defined;
+    fmi2eventInfo->nextEventTime = report.next_time;
+    return (fmi2Status)status;
 }
 
 fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) {
-    REFUSE_MODEL_EXCHANGE(c);
+    REQUIRE(c, MODE_EVENT);
+    ((Instance *)c)->mode = MODE_CONTINUOUS;
+    return fmi2OK;
 }
 
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStatePriorToCurrentPoint, fmi2Boolean *enterEventMode,
                                        fmi2Boolean *terminateSimulation) {
-    (void)noSetFMUStatePriorToCurrentPoint, (void)enterEventMode, (void)terminateSimulation;
-    REFUSE_MODEL_EXCHANGE(c);
+    (void)noSetFMUStatePriorToCurrentPoint;
+    REQUIRE(c, MODE_CONTINUOUS);
+    if (enterEventMode != NULL)
+        *enterEventMode = fmi2False;
+    if (terminateSimulation != NULL)
+        *terminateSimulation = fmi2False;
+    return fmi2OK;
 }
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
-    (void)time;
-    REFUSE_MODEL_EXCHANGE(c);
+    REQUIRE(c, EXCHANGING);
+    return (fmi2Status)exchange_set_time(c, __func__, time);
 }
 
 fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx) {
-    (void)x, (void)nx;
-    REFUSE_MODEL_EXCHANGE(c);
+    REQUIRE(c, MODE_CONTINUOUS);
+    return (fmi2Status)exchange_set_states(c, __func__, x, nx);
 }
 
 fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx) {
-    (void)derivatives, (void)nx;
-    REFUSE_MODEL_EXCHANGE(c);
+    REQUIRE_EXCHANGE(c);
+    return (fmi2Status)exchange_get_derivatives(c, __func__, derivatives, nx);
 }
 
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni) {
-    (void)eventIndicators, (void)ni;
-    REFUSE_MODEL_EXCHANGE(c);
+    REQUIRE_EXCHANGE(c);
+    return (fmi2Status)exchange_get_indicators(c, __func__, eventIndicators, ni);
 }
 
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx) {
-    (void)x, (void)nx;
-    REFUSE_MODEL_EXCHANGE(c);
+    REQUIRE_EXCHANGE(c);
+    return (fmi2Status)exchange_get_states(c, __func__, x, nx);
 }
 
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx) {
-    (void)x_nominal, (void)nx;
-    REFUSE_MODEL_EXCHANGE(c);
+    REQUIRE_EXCHANGE(c);
+    return (fmi2Status)exchange_get_nominals(c, __func__, x_nominal, nx);
 }

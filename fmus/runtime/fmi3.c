@@ -1,8 +1,14 @@
-/* The FMI 3.0 co-simulation face. All functions of the standard are exported; those of other interface types refuse. */
+/* The FMI 3.0 face, co-simulation and model exchange. All functions of the standard are exported; those of scheduled execution refuse. */
 #include "fmi3Functions.h"
 
 #include "events.h"
+#include "exchange.h"
 #include "instance.h"
+#include "resource.h"
+#include "sensitivity.h"
+#include "snapshot.h"
+#include "step.h"
+#include "variables.h"
 
 #define REQUIRE(component, modes)                                          \
     do {                                                                   \
@@ -17,7 +23,16 @@
         return fmi3Error;                                                            \
     } while (0)
 
-#define REFUSE_OTHER_TYPES(component) REFUSE(component, "this FMU was exported for co-simulation only")
+#define REFUSE_SCHEDULED_EXECUTION(component) REFUSE(component, "there is no scheduled execution of this model")
+
+/* What a solver asks for is there once initialisation has begun. */
+#define REQUIRE_EXCHANGE(component)                                                                    \
+    do {                                                                                               \
+        REQUIRE(component, MODE_INITIALIZATION | MODE_EVENT | MODE_CONTINUOUS | MODE_TERMINATED);      \
+        if (!((Instance *)(component))->exchange)                                                      \
+            REFUSE(component, "the instance was made for co-simulation");                              \
+    } while (0)
+
 #define REFUSE_INTERVALS(component) REFUSE(component, "the clocks of this model are triggered, they have no interval")
 
 typedef void (*LogMessage)(fmi3InstanceEnvironment, fmi3Status, fmi3String, fmi3String);
@@ -27,7 +42,7 @@ static void log_fmi3(const Instance *instance, Status status, const char *catego
         ((LogMessage)instance->message_logger)(instance->environment, (fmi3Status)status, category, message);
 }
 
-static const Face face = {.counts_events = false, .log = log_fmi3};
+static const Face face = {.solver_sets_reals = true, .log = log_fmi3};
 
 /* -- life -------------------------------------------------------------------------------------------------------- */
 
@@ -37,11 +52,12 @@ const char *fmi3GetVersion(void) {
 
 fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories, const fmi3String categories[]) {
     REQUIRE(instance, MODE_ANY);
-    return (fmi3Status)instance_set_logging(instance, loggingOn, nCategories, categories);
+    return (fmi3Status)instance_set_logging(instance, __func__, true, loggingOn, nCategories, categories);
 }
 
-static Instance *create(fmi3String name, fmi3Boolean loggingOn, fmi3InstanceEnvironment environment, fmi3LogMessageCallback logMessage) {
-    Instance *instance = instance_create(name != NULL && *name != '\0' ? name : model.name, &face);
+static Instance *create(fmi3String name, bool co_simulation, fmi3Boolean loggingOn, fmi3InstanceEnvironment environment,
+                        fmi3LogMessageCallback logMessage) {
+    Instance *instance = instance_create(name != NULL && *name != '\0' ? name : model.name, &face, co_simulation);
     if (instance != NULL) {
         instance->environment = environment;
         instance->message_logger = (Callback)logMessage;
@@ -50,11 +66,18 @@ static Instance *create(fmi3String name, fmi3Boolean loggingOn, fmi3InstanceEnvi
     return instance;
 }
 
+static Status check_token(const Instance *instance, const char *function, fmi3String token) {
+    if (instance_token_fits(token))
+        return STATUS_OK;
+    return instance_fail(instance, "%s: instantiation token %s was expected, %s was given; library and modelDescription.xml do not belong together",
+                         function, model.token, token != NULL ? token : "none");
+}
+
 /* Log why there will be no instance. */
 static fmi3Instance refuse_type(fmi3String name, fmi3InstanceEnvironment environment, fmi3LogMessageCallback logMessage) {
-    Instance *instance = create(name, false, environment, logMessage);
+    Instance *instance = create(name, false, false, environment, logMessage);
     if (instance != NULL)
-        instance_fail(instance, "this FMU was exported for co-simulation only");
+        instance_fail(instance, "fmi3InstantiateScheduledExecution: there is no scheduled execution of this model");
     instance_free(instance);
     return NULL;
 }
@@ -62,8 +85,20 @@ static fmi3Instance refuse_type(fmi3String name, fmi3InstanceEnvironment environ
 fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken, fmi3String resourcePath,
                                           fmi3Boolean visible, fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment,
                                           fmi3LogMessageCallback logMessage) {
-    (void)instantiationToken, (void)resourcePath, (void)visible, (void)loggingOn;
-    return refuse_type(instanceName, instanceEnvironment, logMessage);
+    (void)visible;
+    Instance *instance = create(instanceName, false, loggingOn, instanceEnvironment, logMessage);
+    if (instance == NULL)
+        return NULL;
+    instance->exchange = true;
+    Status status = exchange_check_model(instance, __func__);
+    if (status == STATUS_OK)
+        status = check_token(instance, __func__, instantiationToken);
+    if (status == STATUS_OK)
+        status = resource_load(instance, resourcePath);
+    if (status == STATUS_OK)
+        return instance;
+    instance_free(instance);
+    return NULL;
 }
 
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3String instantiationToken, fmi3String resourcePath,
@@ -80,17 +115,19 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
                                          fmi3Boolean earlyReturnAllowed, const fmi3ValueReference requiredIntermediateVariables[],
                                          size_t nRequiredIntermediateVariables, fmi3InstanceEnvironment instanceEnvironment,
                                          fmi3LogMessageCallback logMessage, fmi3IntermediateUpdateCallback intermediateUpdate) {
-    (void)resourcePath, (void)visible, (void)earlyReturnAllowed, (void)requiredIntermediateVariables, (void)intermediateUpdate;
-    Instance *instance = create(instanceName, loggingOn, instanceEnvironment, logMessage);
+    (void)visible, (void)requiredIntermediateVariables, (void)intermediateUpdate;
+    Instance *instance = create(instanceName, true, loggingOn, instanceEnvironment, logMessage);
     if (instance == NULL)
         return NULL;
     instance->event_mode_used = eventModeUsed;
+    instance->early_return_allowed = earlyReturnAllowed;
     Status status = STATUS_OK;
     if (nRequiredIntermediateVariables > 0)
         status = instance_fail(instance, "fmi3InstantiateCoSimulation: intermediate variables are not provided (providesIntermediateUpdate = false)");
-    else if (!instance_token_fits(instantiationToken))
-        status = instance_fail(instance, "fmi3InstantiateCoSimulation: instantiation token %s was expected, %s was given; library and modelDescription.xml do not belong together",
-                               model.token, instantiationToken != NULL ? instantiationToken : "none");
+    else
+        status = check_token(instance, __func__, instantiationToken);
+    if (status == STATUS_OK)
+        status = resource_load(instance, resourcePath);
     if (status == STATUS_OK)
         return instance;
     instance_free(instance);
@@ -113,11 +150,13 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance instance) {
     REQUIRE(instance, MODE_INITIALIZATION);
+    if (((Instance *)instance)->exchange)
+        return (fmi3Status)exchange_start(instance);
     return (fmi3Status)instance_start(instance, ((Instance *)instance)->event_mode_used ? MODE_EVENT : MODE_STEP);
 }
 
 fmi3Status fmi3Terminate(fmi3Instance instance) {
-    REQUIRE(instance, MODE_STEP | MODE_EVENT);
+    REQUIRE(instance, MODE_STEP | MODE_EVENT | MODE_CONTINUOUS);
     ((Instance *)instance)->mode = MODE_TERMINATED;
     return fmi3OK;
 }
@@ -130,29 +169,34 @@ fmi3Status fmi3Reset(fmi3Instance instance) {
 /* -- events ------------------------------------------------------------------------------------------------------ */
 
 fmi3Status fmi3EnterEventMode(fmi3Instance instance) {
-    REQUIRE(instance, MODE_STEP);
-    if (!((Instance *)instance)->event_mode_used)
+    REQUIRE(instance, MODE_STEP | MODE_CONTINUOUS);
+    if (((Instance *)instance)->mode == MODE_STEP && !((Instance *)instance)->event_mode_used)
         return (fmi3Status)instance_fail(instance, "%s: the instance was created with eventModeUsed = false", __func__);
     ((Instance *)instance)->mode = MODE_EVENT;
     return fmi3OK;
 }
 
+static Status leave_event_mode(Instance *instance, const char *function, bool exchange, Mode next) {
+    if (instance->exchange != exchange)
+        return instance_fail(instance, "%s: the instance was made for %s", function, exchange ? "co-simulation" : "model exchange");
+    for (int i = 0; i < model.triggered_count; i++)
+        if (instance->runtime.active[i] != 0.0)
+            return instance_fail(instance, "%s: clock %s is active; call fmi3UpdateDiscreteStates first, or the event is lost", function,
+                                 model.triggered[i].name);
+    instance->mode = next;
+    return STATUS_OK;
+}
+
 fmi3Status fmi3EnterStepMode(fmi3Instance instance) {
     REQUIRE(instance, MODE_EVENT);
-    Instance *self = instance;
-    for (int i = 0; i < model.triggered_count; i++)
-        if (self->runtime.active[i] != 0.0)
-            return (fmi3Status)instance_fail(self, "%s: clock %s is active; call fmi3UpdateDiscreteStates first, or the event is lost",
-                                             __func__, model.triggered[i].name);
-    self->mode = MODE_STEP;
-    return fmi3OK;
+    return (fmi3Status)leave_event_mode(instance, __func__, false, MODE_STEP);
 }
 
 static fmi3Status check_clocks(Instance *instance, const char *function, const fmi3ValueReference references[], size_t count, const void *values) {
     if (instance_check_arrays(instance, function, references, count, values) != STATUS_OK)
         return fmi3Error;
     for (size_t i = 0; i < count; i++)
-        if (instance_variable(instance, function, references[i], ROLE_CLOCK) == NULL)
+        if (variables_find_among(instance, function, references[i], ROLES(ROLE_CLOCK)) == NULL)
             return fmi3Error;
     return fmi3OK;
 }
@@ -175,20 +219,11 @@ fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference valueRef
     return fmi3OK;
 }
 
-/* The active clocks tick, in declared order. */
-static Status tick(Instance *instance, bool *ticked) {
-    Status status = STATUS_OK;
-    for (int i = 0; i < model.triggered_count; i++) {
-        if (instance->runtime.active[i] == 0.0)
-            continue;
-        *ticked = true;
-        instance->runtime.active[i] = 0.0;
-        Status announced = events_announce(instance, i);
-        Status applied = events_apply_until(instance, instance->runtime.clock.t);
-        status = announced > status ? announced : status;
-        status = applied > status ? applied : status;
-    }
-    return status;
+static bool any_clock_is_active(const Instance *instance) {
+    for (int i = 0; i < model.triggered_count; i++)
+        if (instance->runtime.active[i] != 0.0)
+            return true;
+    return false;
 }
 
 static void put(fmi3Boolean *place, fmi3Boolean value) {
@@ -196,12 +231,31 @@ static void put(fmi3Boolean *place, fmi3Boolean value) {
         *place = value;
 }
 
+static fmi3Status update_exchange(Instance *instance, fmi3Boolean *discreteStatesNeedUpdate, fmi3Boolean *terminateSimulation,
+                                  fmi3Boolean *nominalsOfContinuousStatesChanged, fmi3Boolean *valuesOfContinuousStatesChanged,
+                                  fmi3Boolean *nextEventTimeDefined, fmi3Float64 *nextEventTime) {
+    EventReport report;
+    Status status = exchange_update(instance, &report);
+    put(discreteStatesNeedUpdate, fmi3False);
+    put(terminateSimulation, fmi3False);
+    put(nominalsOfContinuousStatesChanged, fmi3False);
+    put(valuesOfContinuousStatesChanged, report.states_changed);
+    put(nextEventTimeDefined, report.next_defined);
+    if (nextEventTime != NULL)
+        *nextEventTime = report.next_time;
+    return (fmi3Status)status;
+}
+
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate, fmi3Boolean *terminateSimulation,
                                     fmi3Boolean *nominalsOfContinuousStatesChanged, fmi3Boolean *valuesOfContinuousStatesChanged,
                                     fmi3Boolean *nextEventTimeDefined, fmi3Float64 *nextEventTime) {
     REQUIRE(instance, MODE_EVENT);
-    bool ticked = false;
-    Status status = tick(instance, &ticked);
+    if (((Instance *)instance)->exchange)
+        return update_exchange(instance, discreteStatesNeedUpdate, terminateSimulation, nominalsOfContinuousStatesChanged,
+                               valuesOfContinuousStatesChanged, nextEventTimeDefined, nextEventTime);
+    bool ticked = any_clock_is_active(instance);
+    Status status = events_poll_clocks(instance);
+    status = status_worse(status, events_apply_until(instance, ((Instance *)instance)->runtime.clock.t));
     put(discreteStatesNeedUpdate, fmi3False);
     put(terminateSimulation, fmi3False);
     put(nominalsOfContinuousStatesChanged, fmi3False);
@@ -218,21 +272,58 @@ fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance) {
 
 /* -- variables --------------------------------------------------------------------------------------------------- */
 
+static Status check_scalars(const Instance *instance, const char *function, const void *references, size_t count, const void *values, size_t value_count) {
+    if (value_count != count)
+        return instance_fail(instance, "%s: all variables are scalars; %zu references but %zu values", function, count, value_count);
+    return instance_check_arrays(instance, function, references, count, values);
+}
+
 fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                           fmi3Float64 values[], size_t nValues) {
     REQUIRE(instance, MODE_ANY);
-    if (nValues != nValueReferences)
-        return (fmi3Status)instance_fail(instance, "%s: all variables are scalars; %zu references but %zu values", __func__, nValueReferences, nValues);
+    if (check_scalars(instance, __func__, valueReferences, nValueReferences, values, nValues) != STATUS_OK)
+        return fmi3Error;
     return (fmi3Status)instance_get_reals(instance, __func__, valueReferences, nValueReferences, values);
 }
 
 fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                           const fmi3Float64 values[], size_t nValues) {
     REQUIRE(instance, MODE_ANY & ~MODE_TERMINATED);
-    if (nValues != nValueReferences)
-        return (fmi3Status)instance_fail(instance, "%s: all variables are scalars; %zu references but %zu values", __func__, nValueReferences, nValues);
+    if (check_scalars(instance, __func__, valueReferences, nValueReferences, values, nValues) != STATUS_OK)
+        return fmi3Error;
     return (fmi3Status)instance_set_reals(instance, __func__, valueReferences, nValueReferences, values);
 }
+
+/* Whole numbers: an enumeration is an Int64, all others are Int32. */
+#define WHOLE_NUMBERS(type, roles)                                                                                          \
+    fmi3Status fmi3Get##type(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,    \
+                             fmi3##type values[], size_t nValues) {                                                         \
+        REQUIRE(instance, MODE_ANY);                                                                                        \
+        if (check_scalars(instance, __func__, valueReferences, nValueReferences, values, nValues) != STATUS_OK)             \
+            return fmi3Error;                                                                                               \
+        for (size_t i = 0; i < nValueReferences; i++) {                                                                     \
+            int64_t held = 0;                                                                                               \
+            if (instance_get_integer(instance, __func__, valueReferences[i], (roles), &held) != STATUS_OK)                  \
+                return fmi3Error;                                                                                           \
+            values[i] = (fmi3##type)held;                                                                                   \
+        }                                                                                                                   \
+        return fmi3OK;                                                                                                      \
+    }                                                                                                                       \
+    fmi3Status fmi3Set##type(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,    \
+                             const fmi3##type values[], size_t nValues) {                                                   \
+        REQUIRE(instance, MODE_ANY & ~MODE_TERMINATED);                                                                     \
+        if (check_scalars(instance, __func__, valueReferences, nValueReferences, values, nValues) != STATUS_OK)             \
+            return fmi3Error;                                                                                               \
+        for (size_t i = 0; i < nValueReferences; i++)                                                                       \
+            if (instance_check_integer(instance, __func__, valueReferences[i], (roles), values[i]) != STATUS_OK)            \
+                return fmi3Error;                                                                                           \
+        for (size_t i = 0; i < nValueReferences; i++)                                                                       \
+            instance_put_integer(instance, valueReferences[i], values[i]);                                                  \
+        return fmi3OK;                                                                                                      \
+    }
+
+WHOLE_NUMBERS(Int32, ROLES(ROLE_COUNT) | ROLES(ROLE_INTEGER_OUTPUT))
+WHOLE_NUMBERS(Int64, ROLES(ROLE_POLICY))
 
 /* The other types: no variable of this model has them. */
 #define NO_VARIABLES(get_or_set, type, array)                                                                             \
@@ -253,12 +344,8 @@ NO_VARIABLES(Get, Int16, fmi3Int16)
 NO_VARIABLES(Set, Int16, const fmi3Int16)
 NO_VARIABLES(Get, UInt16, fmi3UInt16)
 NO_VARIABLES(Set, UInt16, const fmi3UInt16)
-NO_VARIABLES(Get, Int32, fmi3Int32)
-NO_VARIABLES(Set, Int32, const fmi3Int32)
 NO_VARIABLES(Get, UInt32, fmi3UInt32)
 NO_VARIABLES(Set, UInt32, const fmi3UInt32)
-NO_VARIABLES(Get, Int64, fmi3Int64)
-NO_VARIABLES(Set, Int64, const fmi3Int64)
 NO_VARIABLES(Get, UInt64, fmi3UInt64)
 NO_VARIABLES(Set, UInt64, const fmi3UInt64)
 NO_VARIABLES(Get, Boolean, fmi3Boolean)
@@ -319,10 +406,11 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
                       fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime) {
     (void)noSetFMUStatePriorToCurrentPoint;
     REQUIRE(instance, MODE_STEP);
-    Status status = instance_do_step(instance, __func__, currentCommunicationPoint, communicationStepSize);
+    bool early = false;
+    Status status = instance_do_step(instance, __func__, currentCommunicationPoint, communicationStepSize, &early);
     put(eventHandlingNeeded, fmi3False);
-    put(terminateSimulation, fmi3False);
-    put(earlyReturn, fmi3False);
+    put(terminateSimulation, ((Instance *)instance)->discarded);
+    put(earlyReturn, early);
     if (lastSuccessfulTime != NULL)
         *lastSuccessfulTime = ((Instance *)instance)->runtime.clock.t;
     return (fmi3Status)status;
@@ -351,8 +439,11 @@ fmi3Status fmi3GetVariableDependencies(fmi3Instance instance, fmi3ValueReference
 fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
                                         const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
                                         size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity) {
-    (void)unknowns, (void)nUnknowns, (void)knowns, (void)nKnowns, (void)seed, (void)nSeed, (void)sensitivity, (void)nSensitivity;
-    REFUSE(instance, "providesDirectionalDerivatives = false");
+    REQUIRE(instance, MODE_ANY & ~MODE_INSTANTIATED);
+    if (nSeed != nKnowns || nSensitivity != nUnknowns)
+        return (fmi3Status)instance_fail(instance, "%s: all variables are scalars; %zu knowns but %zu seeds, %zu unknowns but room for %zu sensitivities",
+                                         __func__, nKnowns, nSeed, nUnknowns, nSensitivity);
+    return (fmi3Status)sensitivity_directional(instance, __func__, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity);
 }
 
 fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
@@ -418,57 +509,71 @@ fmi3Status fmi3SetShiftFraction(fmi3Instance instance, const fmi3ValueReference 
     REFUSE_INTERVALS(instance);
 }
 
+/* -- model exchange ----------------------------------------------------------------------------------------------- */
+
 fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance) {
-    REFUSE_OTHER_TYPES(instance);
+    REQUIRE(instance, MODE_EVENT);
+    return (fmi3Status)leave_event_mode(instance, __func__, true, MODE_CONTINUOUS);
 }
 
 fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
                                        fmi3Boolean *enterEventMode, fmi3Boolean *terminateSimulation) {
-    (void)noSetFMUStatePriorToCurrentPoint, (void)enterEventMode, (void)terminateSimulation;
-    REFUSE_OTHER_TYPES(instance);
+    (void)noSetFMUStatePriorToCurrentPoint;
+    REQUIRE(instance, MODE_CONTINUOUS);
+    put(enterEventMode, fmi3False);
+    put(terminateSimulation, fmi3False);
+    return fmi3OK;
 }
 
 fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time) {
-    (void)time;
-    REFUSE_OTHER_TYPES(instance);
+    REQUIRE_EXCHANGE(instance);
+    REQUIRE(instance, MODE_EVENT | MODE_CONTINUOUS);
+    return (fmi3Status)exchange_set_time(instance, __func__, time);
 }
 
 fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 continuousStates[], size_t nContinuousStates) {
-    (void)continuousStates, (void)nContinuousStates;
-    REFUSE_OTHER_TYPES(instance);
+    REQUIRE(instance, MODE_CONTINUOUS);
+    return (fmi3Status)exchange_set_states(instance, __func__, continuousStates, nContinuousStates);
 }
 
 fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 derivatives[], size_t nContinuousStates) {
-    (void)derivatives, (void)nContinuousStates;
-    REFUSE_OTHER_TYPES(instance);
+    REQUIRE_EXCHANGE(instance);
+    return (fmi3Status)exchange_get_derivatives(instance, __func__, derivatives, nContinuousStates);
 }
 
 fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 eventIndicators[], size_t nEventIndicators) {
-    (void)eventIndicators, (void)nEventIndicators;
-    REFUSE_OTHER_TYPES(instance);
+    REQUIRE_EXCHANGE(instance);
+    return (fmi3Status)exchange_get_indicators(instance, __func__, eventIndicators, nEventIndicators);
 }
 
 fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 continuousStates[], size_t nContinuousStates) {
-    (void)continuousStates, (void)nContinuousStates;
-    REFUSE_OTHER_TYPES(instance);
+    REQUIRE_EXCHANGE(instance);
+    return (fmi3Status)exchange_get_states(instance, __func__, continuousStates, nContinuousStates);
 }
 
 fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 nominals[], size_t nContinuousStates) {
-    (void)nominals, (void)nContinuousStates;
-    REFUSE_OTHER_TYPES(instance);
+    REQUIRE_EXCHANGE(instance);
+    return (fmi3Status)exchange_get_nominals(instance, __func__, nominals, nContinuousStates);
+}
+
+static fmi3Status count(Instance *instance, const char *function, size_t *place, int value) {
+    if (instance_require(instance, function, MODE_ANY) != STATUS_OK)
+        return fmi3Error;
+    if (!instance->exchange || place == NULL)
+        return (fmi3Status)instance_fail(instance, "%s: %s", function, place == NULL ? "no place for the number was given" : "the instance was made for co-simulation");
+    *place = (size_t)value;
+    return fmi3OK;
 }
 
 fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventIndicators) {
-    (void)nEventIndicators;
-    REFUSE_OTHER_TYPES(instance);
+    return count(instance, __func__, nEventIndicators, model.friction_count);
 }
 
 fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nContinuousStates) {
-    (void)nContinuousStates;
-    REFUSE_OTHER_TYPES(instance);
+    return count(instance, __func__, nContinuousStates, model.continuous);
 }
 
 fmi3Status fmi3ActivateModelPartition(fmi3Instance instance, fmi3ValueReference clockReference, fmi3Float64 activationTime) {
     (void)clockReference, (void)activationTime;
-    REFUSE_OTHER_TYPES(instance);
+    REFUSE_SCHEDULED_EXECUTION(instance);
 }

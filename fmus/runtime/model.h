@@ -5,6 +5,8 @@
 #ifndef MODEL_H
 #define MODEL_H
 
+#include <stdbool.h>
+
 #include "private.h"
 
 /* A generated function: pointers to its arguments and results, work vectors, and a memory index that is always 0. */
@@ -27,31 +29,49 @@ typedef struct {
     int payload_count;
 } TriggeredEvent;
 
+/* A vector parameter that is read from a column of a CSV file among the FMU's resources. */
+typedef struct {
+    const char *file;
+    const char *column;
+    int parameter; /* position of its first entry in p */
+    int count;     /* entries */
+} Resource;
+
 /* What a variable is, which decides where its value lies and when it may be set. */
 typedef enum {
     ROLE_TIME,
     ROLE_INPUT,
     ROLE_PAYLOAD, /* input that belongs to a triggered event */
     ROLE_OUTPUT,
+    ROLE_INTEGER_OUTPUT, /* kept as a double, a whole number to the outside */
     ROLE_STATE,
     ROLE_FIXED,   /* parameter, fixed after initialisation */
     ROLE_TUNABLE, /* parameter, may change between steps */
-    ROLE_COUNT,   /* FMI 2: integer that announces an event when it is raised */
-    ROLE_CLOCK,   /* FMI 3: triggered input clock */
-    ROLE_STAMP    /* instant of an event */
+    ROLE_COUNT,      /* integer that announces an event when it is raised */
+    ROLE_CLOCK,      /* FMI 3: triggered input clock */
+    ROLE_STAMP,      /* instant of an event */
+    ROLE_POLICY,     /* enumeration: what to do with late events */
+    ROLE_HORIZON,    /* how far back late events can be replayed [s] */
+    ROLE_DERIVATIVE, /* of a continuous state */
+    ROLE_INDICATOR   /* event indicator of a state with dry friction */
 } Role;
 
 typedef struct {
     const char *name;
     Role role;
-    int index; /* position in u, y, x or p, or number of the triggered event */
+    int index; /* position in u, y, x, p, derivatives or indicators, or number of the triggered event */
 } Variable;
+
+/* What to do with an event stamped before the current time; the numbers of the enumeration in the model description. */
+typedef enum { LATE_REPLAY = 1, LATE_REJECT = 2, LATE_LATE = 3 } LatePolicy;
 
 typedef struct {
     const char *name;
     const char *token; /* GUID (FMI 2) or instantiation token (FMI 3) */
-    int states;        /* length of x */
+    int states;        /* length of x: continuous states, then memory */
+    int continuous;    /* of these, the continuous ones */
     int inputs;        /* length of u: inputs, payloads, noises */
+    int own_inputs;    /* of these, the inputs proper, which come first */
     int noise_offset;  /* position of the first noise in u */
     int outputs;       /* length of y */
     int parameters;    /* length of p */
@@ -68,6 +88,19 @@ typedef struct {
     const PeriodicEvent *periodic;
     int triggered_count;
     const TriggeredEvent *triggered;
+    bool counts_events;    /* events are announced by counts, not by clocks */
+    LatePolicy late_policy; /* start values of the parameters of the same name */
+    double replay_horizon;
+    int communication_count;
+    const ModelFunction *communications; /* jumps at the end of every communication step: (t, x, u, p) -> x */
+    int resource_count;
+    const Resource *resources;
+    int friction_count;
+    const int *frictions;           /* positions in x of the states with dry friction */
+    ModelFunction friction_balance; /* (t, x, u, p) -> what drives them, then what holds them; or NULL */
+    ModelFunction derivative; /* (t, x, u, p, s) -> derivatives of the continuous states, s the signs of the states with
+                                 dry friction; or NULL where nothing flows */
+    ModelFunction tangent;    /* (t, x, u, p, s, dt, dx, du, dp) -> dy, then d derivative; or NULL where both are empty */
     unsigned variable_count;
     const Variable *variables; /* by value reference */
 } Model;

@@ -25,11 +25,23 @@ static size_t queue_size(void) {
 
 PRIVATE size_t runtime_memory_length(void) {
     size_t length = (size_t)model.states + (size_t)model.inputs + (size_t)model.parameters;
-    return length + 3 * (size_t)model.periodic_count + 4 * (size_t)model.triggered_count + 1 + queue_size();
+    length += 3 * (size_t)model.periodic_count + 1 + (size_t)model.friction_count;
+    return length + 4 * (size_t)model.triggered_count + 3 + queue_size();
+}
+
+PRIVATE size_t runtime_used_length(const Runtime *runtime) {
+    size_t waiting = (size_t)*runtime->queue_length * runtime_queue_stride();
+    return (size_t)(runtime->queue - runtime->memory) + waiting;
+}
+
+PRIVATE size_t runtime_seed_length(void) {
+    return 1 + (size_t)model.states + (size_t)model.inputs + (size_t)model.parameters;
 }
 
 PRIVATE size_t runtime_total_length(void) {
-    return runtime_memory_length() + (size_t)model.outputs + (size_t)model.states + (size_t)model.real_work;
+    size_t results = (size_t)model.outputs + (size_t)model.states + (size_t)model.continuous + 4 * (size_t)model.friction_count;
+    results += 2 * (size_t)model.continuous + runtime_seed_length() + (size_t)model.outputs;
+    return runtime_memory_length() + results + (size_t)model.real_work;
 }
 
 static double *take(double **place, size_t count) {
@@ -47,14 +59,25 @@ PRIVATE void runtime_place(Runtime *runtime, double *numbers, int *integers) {
     runtime->periods = take(&place, (size_t)model.periodic_count);
     runtime->offsets = take(&place, (size_t)model.periodic_count);
     runtime->ticks = take(&place, (size_t)model.periodic_count);
+    runtime->resolved = take(&place, 1);
+    runtime->signs = take(&place, (size_t)model.friction_count);
     runtime->active = take(&place, (size_t)model.triggered_count);
     runtime->raised = take(&place, (size_t)model.triggered_count);
     runtime->seen = take(&place, (size_t)model.triggered_count);
     runtime->stamps = take(&place, (size_t)model.triggered_count);
+    runtime->late_policy = take(&place, 1);
+    runtime->horizon = take(&place, 1);
     runtime->queue_length = take(&place, 1);
     runtime->queue = take(&place, queue_size());
     runtime->y = take(&place, (size_t)model.outputs);
     runtime->x_next = take(&place, (size_t)model.states);
+    runtime->derivatives = take(&place, (size_t)model.continuous);
+    runtime->indicators = take(&place, (size_t)model.friction_count);
+    runtime->signs_now = take(&place, (size_t)model.friction_count);
+    runtime->balance = take(&place, 2 * (size_t)model.friction_count);
+    runtime->x_before = take(&place, (size_t)model.continuous);
+    runtime->seeds = take(&place, runtime_seed_length());
+    runtime->tangent = take(&place, (size_t)model.outputs + (size_t)model.continuous);
     runtime->real_work = take(&place, (size_t)model.real_work);
     runtime->integer_work = integers;
     runtime_reset(runtime);
@@ -72,6 +95,8 @@ PRIVATE void runtime_reset(Runtime *runtime) {
     copy(runtime->p, model.start_p, model.parameters);
     for (int i = 0; i < model.triggered_count; i++)
         runtime->stamps[i] = STAMP_NOW;
+    *runtime->late_policy = model.late_policy;
+    *runtime->horizon = model.replay_horizon;
     runtime->clock.t = runtime->clock.t0 = 0.0;
     runtime->clock.h = runtime->p[model.internal_step];
 }
@@ -107,6 +132,41 @@ PRIVATE void runtime_update_outputs(Runtime *runtime) {
     model.output(arguments, results, runtime->integer_work, runtime->real_work, 0);
 }
 
+PRIVATE const double *runtime_signs(Runtime *runtime) {
+    if (*runtime->resolved != 0.0)
+        return runtime->signs;
+    for (int i = 0; i < model.friction_count; i++) {
+        double value = runtime->x[model.frictions[i]];
+        runtime->signs_now[i] = (double)((value > 0.0) - (value < 0.0));
+    }
+    return runtime->signs_now;
+}
+
+PRIVATE void runtime_update_derivatives(Runtime *runtime) {
+    if (model.derivative == NULL)
+        return;
+    const double *arguments[] = {&runtime->clock.t, runtime->x, runtime->u, runtime->p, runtime_signs(runtime)};
+    double *results[] = {runtime->derivatives};
+    model.derivative(arguments, results, runtime->integer_work, runtime->real_work, 0);
+}
+
+PRIVATE void runtime_update_balance(Runtime *runtime) {
+    if (model.friction_balance == NULL)
+        return;
+    const double *arguments[] = {&runtime->clock.t, runtime->x, runtime->u, runtime->p};
+    double *results[] = {runtime->balance};
+    model.friction_balance(arguments, results, runtime->integer_work, runtime->real_work, 0);
+}
+
+PRIVATE void runtime_update_indicators(Runtime *runtime) {
+    const double *signs = runtime_signs(runtime);
+    runtime_update_balance(runtime);
+    for (int i = 0; i < model.friction_count; i++) {
+        double left = runtime->balance[model.friction_count + i] - fabs(runtime->balance[i]);
+        runtime->indicators[i] = signs[i] == 0.0 ? left : signs[i] * runtime->x[model.frictions[i]];
+    }
+}
+
 /* -- periodic events --------------------------------------------------------------------------------------------- */
 
 PRIVATE double runtime_tolerance(const Runtime *runtime, double t) {
@@ -118,7 +178,7 @@ static double instant(const Runtime *runtime, int i) {
     return runtime->clock.t0 + runtime->offsets[i] + runtime->ticks[i] * runtime->periods[i];
 }
 
-static double next_due(const Runtime *runtime) {
+PRIVATE double runtime_next_due(const Runtime *runtime) {
     double due = INFINITY;
     for (int i = 0; i < model.periodic_count; i++)
         due = fmin(due, instant(runtime, i));
@@ -133,7 +193,7 @@ static void draw_noises(Runtime *runtime, int event, int position) {
     }
 }
 
-static void fire_due(Runtime *runtime) {
+PRIVATE void runtime_fire_due(Runtime *runtime) {
     int position = model.noise_offset;
     for (int i = 0; i < model.periodic_count; i++) {
         if (instant(runtime, i) <= runtime->clock.t + runtime_tolerance(runtime, runtime->clock.t)) {
@@ -168,7 +228,8 @@ PRIVATE int runtime_start(Runtime *runtime, double t0) {
         return model.seed;
     runtime->clock.t = runtime->clock.t0 = t0;
     runtime->clock.h = runtime->p[model.internal_step];
-    fire_due(runtime);
+    runtime_fire_due(runtime);
+    runtime_communicate(runtime);
     return -1;
 }
 
@@ -206,13 +267,24 @@ static void integrate(Runtime *runtime, double target) {
 
 PRIVATE void runtime_advance(Runtime *runtime, double t_end) {
     for (;;) {
-        double due = next_due(runtime);
+        double due = runtime_next_due(runtime);
         if (due > t_end + runtime_tolerance(runtime, t_end))
             break;
         integrate(runtime, due);
-        fire_due(runtime);
+        runtime_fire_due(runtime);
     }
     integrate(runtime, t_end);
+}
+
+PRIVATE double runtime_next_instant_before(const Runtime *runtime, double t_end) {
+    double due = runtime_next_due(runtime), now = runtime->clock.t;
+    bool between = due > now + runtime_tolerance(runtime, now) && due < t_end - runtime_tolerance(runtime, t_end);
+    return between ? due : INFINITY;
+}
+
+PRIVATE void runtime_communicate(Runtime *runtime) {
+    for (int i = 0; i < model.communication_count; i++)
+        jump(runtime, model.communications[i]);
 }
 
 PRIVATE void runtime_trigger(Runtime *runtime, int event) {
@@ -222,6 +294,10 @@ PRIVATE void runtime_trigger(Runtime *runtime, int event) {
 PRIVATE bool runtime_memory_is_sane(const double *memory) {
     const double *end = memory + runtime_memory_length();
     const double *queue = end - queue_size(), *length = queue - 1;
+    const double *signs = memory + model.states + model.inputs + model.parameters + 3 * model.periodic_count + 1;
+    for (int i = 0; i < model.friction_count; i++)
+        if (!(signs[i] == -1.0 || signs[i] == 0.0 || signs[i] == 1.0))
+            return false;
     if (!(*length >= 0.0 && *length <= (model.triggered_count > 0 ? QUEUE_CAPACITY : 0)))
         return false;
     for (int i = 0; i < (int)*length; i++) {

@@ -11,7 +11,7 @@
 #include "model.h"
 
 #define STAMP_NOW (-1e30)  /* a stamp of this, or less, means: at the current time */
-#define QUEUE_CAPACITY 16  /* events waiting at once */
+#define QUEUE_CAPACITY 64  /* events waiting at once, as in the Python block */
 
 typedef struct {
     double t;  /* now [s] */
@@ -24,10 +24,16 @@ typedef struct {
     double *memory; /* `runtime_memory_length()` numbers; the arrays down to `queue` lie in it */
     double *x, *u, *p;
     double *periods, *offsets, *ticks; /* by periodic event; a tick is a whole number */
+    double *resolved, *signs;          /* model exchange: 1 once dry friction is resolved; then signs of the states that have it */
     double *active, *raised, *seen;    /* by triggered event: clock active (FMI 3), count (FMI 2), count handled */
     double *stamps;                    /* by triggered event: instant [s] of the next announcement */
+    double *late_policy, *horizon;     /* parameters: a LatePolicy, and how far back late events can be replayed [s] */
     double *queue_length, *queue;      /* events announced and not yet applied; see events.c */
     double *y, *x_next;                /* results; decide nothing */
+    double *derivatives, *indicators;  /* results */
+    double *signs_now, *balance;       /* of the states with dry friction: sign, then what drives and what holds them */
+    double *x_before;                  /* continuous states before an event */
+    double *seeds, *tangent;           /* of a directional derivative: of t, x, u and p; then by outputs and derivatives */
     double *real_work;
     int *integer_work;
 } Runtime;
@@ -35,6 +41,12 @@ typedef struct {
 /* Number of doubles in `memory`, and of all doubles a runtime needs. */
 PRIVATE size_t runtime_memory_length(void);
 PRIVATE size_t runtime_total_length(void);
+
+/* Of `memory`, how many doubles are in use: the queue comes last and ends where its last entry does. */
+PRIVATE size_t runtime_used_length(const Runtime *runtime);
+
+/* Doubles in `seeds`. */
+PRIVATE size_t runtime_seed_length(void);
 
 /* Doubles of one entry of the queue: event, stamp, payload. */
 PRIVATE size_t runtime_queue_stride(void);
@@ -45,18 +57,40 @@ PRIVATE void runtime_place(Runtime *runtime, double *numbers, int *integers);
 /* Back to the start values, at time zero. */
 PRIVATE void runtime_reset(Runtime *runtime);
 
-/* Begin at t0 [s] and fire the periodic events due there. Returns -1, or the position in p of a parameter with which
-   time cannot run: a step or period that is not positive, an offset that is not finite, a seed outside [0, 2^53). */
+/* Begin at t0 [s], fire the periodic events due there, then the communication events. Returns -1, or the position in p of a
+   parameter with which time cannot run: a step or period that is not positive, an offset that is not finite, a seed outside [0, 2^53). */
 PRIVATE int runtime_start(Runtime *runtime, double t0);
 
 /* Integrate to t_end [s] and fire the periodic events on the way and at the end. */
 PRIVATE void runtime_advance(Runtime *runtime, double t_end);
+
+/* The next periodic instant [s] that lies after now and before t_end [s], or INFINITY. */
+PRIVATE double runtime_next_instant_before(const Runtime *runtime, double t_end);
+
+/* A communication step ends now: fire the communication events. */
+PRIVATE void runtime_communicate(Runtime *runtime);
 
 /* Jump at a triggered event now, with the payload in u. */
 PRIVATE void runtime_trigger(Runtime *runtime, int event);
 
 /* Compute y from t, x, u, p. */
 PRIVATE void runtime_update_outputs(Runtime *runtime);
+
+/* Fire the periodic events due now, and the next instant [s] of one, or INFINITY. */
+PRIVATE void runtime_fire_due(Runtime *runtime);
+PRIVATE double runtime_next_due(const Runtime *runtime);
+
+/* Signs by which dry friction is resolved now: those of the last event in model exchange, else those of the states. */
+PRIVATE const double *runtime_signs(Runtime *runtime);
+
+/* Compute what drives the states with dry friction and, after that, what holds them, into `balance`. */
+PRIVATE void runtime_update_balance(Runtime *runtime);
+
+/* Compute the derivatives of the continuous states, dry friction resolved. */
+PRIVATE void runtime_update_derivatives(Runtime *runtime);
+
+/* Compute how far each state with dry friction is from a change: its magnitude while it moves, the friction left at rest. */
+PRIVATE void runtime_update_indicators(Runtime *runtime);
 
 /* Closer in time than this [s] is the same instant. */
 PRIVATE double runtime_tolerance(const Runtime *runtime, double t);

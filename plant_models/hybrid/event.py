@@ -1,7 +1,8 @@
 """Events: the declared instants at which a hybrid system jumps.
 
 Triggered events come from outside with a payload (a balise). Periodic events happen at instants given by parameters
-(a sampled odometer) and may draw noise. This file imports only the signal vocabulary.
+(a sampled odometer) and may draw noise. Communication events end every communication step. This file imports only the
+signal vocabulary.
 """
 
 from __future__ import annotations
@@ -63,4 +64,20 @@ class PeriodicEvent:
     description: str = ""
 
 
-Event = TriggeredEvent | PeriodicEvent
+@dataclass(frozen=True, slots=True)
+class CommunicationEvent:
+    """An event at the start, and at the end of every communication step, after all others due there.
+
+    For a system that works on what a master hands over from step to step and on nothing in between (the balise reader). How
+    such a system moves depends on the communication steps; it has no place in model exchange.
+
+    Args:
+        name: identifier.
+        description: one line for the user.
+    """
+
+    name: str
+    description: str = ""
+
+
+Event = TriggeredEvent | PeriodicEvent | CommunicationEvent

@@ -156,14 +156,22 @@ def _traced_functions(system: HybridSystem) -> dict[str, ca.Function]:
         traced = TracedSystem(system)
         cached = {"step": traced.step, "steps": traced.steps(BATCH_OF_STEPS), "output": traced.output}
         cached |= {f"jump_{event.name}": traced.jump(event.name) for event in system.events}
-        _check_payloads(system, cached)
+        check_payloads(system, cached)
         cached = {name: _dense(function) for name, function in cached.items()}
         system.__dict__["_traced_functions"] = cached
     return cached
 
 
-def _check_payloads(system: HybridSystem, functions: dict[str, ca.Function]) -> None:
-    """Refuse a system that reads the payload of an event before or without that event: it would depend on when it was told."""
+def check_payloads(system: HybridSystem, functions: dict[str, ca.Function]) -> None:
+    """Refuse a system that reads the payload of an event before or without that event: it would depend on when it was told.
+
+    Args:
+        system: the hybrid system.
+        functions: its traced functions with an argument ``u``: ``step`` and ``jump_<event>`` by these names.
+
+    Raises:
+        ValueError: a function other than the jump at the event reads its payload.
+    """
     names = scalar_names(system.input_signals)
     own = {f"jump_{e.name}": set(scalar_names(e.payload)) for e in system.triggered_events}
     payloads = set().union(*own.values())

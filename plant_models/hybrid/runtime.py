@@ -11,6 +11,7 @@ from math import floor, inf, isfinite, ulp
 
 import numpy as np
 
+from plant_models.hybrid.integration import effective_flow
 from plant_models.hybrid.kernel import Kernel, make_kernel
 from plant_models.hybrid.noise import standard_normal
 from plant_models.hybrid.signal import scalar_names
@@ -36,7 +37,8 @@ class Runtime:
     1. `x`, `u`, `p`, `y` are flat arrays in the declared order; write inputs into `u` before `advance`.
     2. `advance(t_end)` integrates on the absolute grid ``t0 + k * internal_step``, so that splitting a step changes
        nothing, and hits every periodic instant in ``(t, t_end]`` exactly, in the declared order.
-    3. `start(t0)` fires the periodic events that are due at ``t0``.
+    3. `start(t0)` fires the periodic events that are due at ``t0``, then the communication events; `communicate()` fires these
+       at the end of a communication step.
     4. `trigger(event)` jumps now, with the payload that stands in `u`.
     5. `snapshot` / `restore` are exact: what follows a restore is bit-identical to what followed the snapshot.
 
@@ -66,7 +68,7 @@ class Runtime:
         self._read_timing()
 
     def start(self, t0: float) -> None:
-        """Begin at `t0` [s] with the values that stand in `x`, `u`, `p`, and fire the periodic events due there.
+        """Begin at `t0` [s] with the values that stand in `x`, `u`, `p`, and fire the events due there.
 
         Raises:
             ValueError: time cannot run with a parameter: the internal step, a period, an offset or the seed.
@@ -76,6 +78,7 @@ class Runtime:
         self.ticks = [0] * len(self.ticks)
         self._read_timing()
         self._fire_due()
+        self.communicate()
 
     def advance(self, t_end: float) -> None:
         """Integrate to `t_end` [s] and fire the periodic events on the way and at the end."""
@@ -85,6 +88,15 @@ class Runtime:
             self._fire_due()
         self._integrate(t_end, tolerance)
 
+    def next_instant_before(self, t_end: float) -> float | None:
+        """The next periodic instant [s] that lies after now and before `t_end` [s], or None."""
+        return self._due if self.t + self._tolerance(self.t) < self._due < t_end - self._tolerance(t_end) else None
+
+    def communicate(self) -> None:
+        """A communication step ends now: fire the communication events, in the declared order."""
+        for event in self.system.communication_events:
+            self._kernel.jump(event.name, self.t)
+
     def trigger(self, event: str) -> None:
         """Jump at a triggered event now, with the payload in `u`."""
         self._kernel.jump(event, self.t)
@@ -93,6 +105,23 @@ class Runtime:
         """Compute and return `y`, shape (q,)."""
         self._kernel.output(self.t)
         return self.y
+
+    def derivatives(self) -> np.ndarray:
+        """Derivatives of the continuous states now, dry friction resolved, shape (nc,)."""
+        signs = np.sign(self.x[self.system.friction_indices()]) if self.system.frictions else None
+        return np.asarray(effective_flow(self.system, self.t, self.x, self.u, self.p, signs), dtype=float)
+
+    def friction_indicators(self) -> np.ndarray:
+        """How far each state with dry friction is from a change, shape (len(frictions),): its magnitude while it moves, the
+        friction it has left at rest."""
+        system = self.system
+        values = self.x[system.friction_indices()]
+        if not len(values):
+            return values
+        flow = np.asarray(system.state_derivative(self.t, self.x, self.u, self.p))[system.friction_indices()]
+        left = np.asarray(system.friction_vector(self.t, self.x, self.u, self.p)) - np.abs(flow)
+        indicators: np.ndarray = np.where(values == 0.0, left, np.abs(values))
+        return indicators
 
     def snapshot(self) -> Snapshot:
         """A copy of everything that decides the future."""

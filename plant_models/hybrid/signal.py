@@ -31,9 +31,11 @@ class Signal:
         description: one line for the user.
         size: None for a scalar, else the number of elements of a vector, named ``name[1]`` ... ``name[size]``.
         display_unit: unit to show at the user's edge, e.g. ``km/h``.
+        integer: a whole number to the outside; only a discrete output can be one.
 
     Raises:
-        ValueError: the name is not an identifier or is a keyword, or the start does not fit the size.
+        ValueError: the name is not an identifier or is a keyword, the start does not fit the size, or an integer is no discrete
+            output.
     """
 
     name: str
@@ -46,8 +48,11 @@ class Signal:
     description: str = ""
     size: int | None = None
     display_unit: str | None = None
+    integer: bool = False
 
     def __post_init__(self) -> None:
+        if self.integer and (self.causality, self.variability) != ("output", "discrete"):
+            raise ValueError(f"Signal {self.name!r} is an integer; only a discrete output can be one.")
         if not self.name.isidentifier():
             raise ValueError(f"Signal name {self.name!r} is not a legal identifier: use letters, digits and '_'.")
         if iskeyword(self.name) or self.name.startswith("_"):  # it becomes a field of the named tuples `u` and `p`
@@ -98,10 +103,10 @@ def input_signal(
 
 def output_signal(
     name: str, unit: str, description: str = "", *, variability: Variability = "continuous",
-    display_unit: str | None = None, size: int | None = None,
+    display_unit: str | None = None, size: int | None = None, integer: bool = False,
 ) -> Signal:  # fmt: skip
     """An output, computed from time, state, input and parameters."""
-    return Signal(name, unit, "output", variability, 0.0, None, None, description, size, display_unit)
+    return Signal(name, unit, "output", variability, 0.0, None, None, description, size, display_unit, integer)
 
 
 def parameter(

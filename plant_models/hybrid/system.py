@@ -14,13 +14,14 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from plant_models.hybrid.event import Event, PeriodicEvent, TriggeredEvent
+from plant_models.hybrid.event import CommunicationEvent, Event, PeriodicEvent, TriggeredEvent
+from plant_models.hybrid.resource import Resource
 from plant_models.hybrid.signal import Signal, parameter, scalar_names, width
 
 Array = Any  # a NumPy array, or a symbolic array with NumPy's shapes and broadcasting
 Method = Literal["rk4", "rosenbrock"]
 
-RESERVED_NAMES = frozenset({"time", "internal_step", "seed"})
+RESERVED_NAMES = frozenset({"time", "internal_step", "seed", "late_policy", "replay_horizon"})
 
 
 def vector(*components: Array) -> Array:
@@ -54,7 +55,8 @@ class HybridSystem:
        `friction(...)` against its sign. The integrator lets it stop exactly at zero and stay there while the flow is
        smaller than the friction.
     6. Numbers that shape the equations themselves (an order, a mode) are constructor arguments, listed in `options`.
-    7. A system that cannot be traced says ``traceable = False`` and may then use any Python.
+    7. A vector parameter that an exported model reads from a file of its own is listed in `resources`.
+    8. A system that cannot be traced says ``traceable = False`` and may then use any Python.
     """
 
     name: str = ""
@@ -66,6 +68,7 @@ class HybridSystem:
     parameters: tuple[Signal, ...] = ()
     events: tuple[Event, ...] = ()
     frictions: tuple[str, ...] = ()
+    resources: tuple[Resource, ...] = ()
     presets: Mapping[str, Mapping[str, Any]] = {}
     default_preset: str | None = None
     method: Method = "rk4"
@@ -116,6 +119,11 @@ class HybridSystem:
     def periodic_events(self) -> tuple[PeriodicEvent, ...]:
         """Events at periodic instants."""
         return tuple(e for e in self.events if isinstance(e, PeriodicEvent))
+
+    @cached_property
+    def communication_events(self) -> tuple[CommunicationEvent, ...]:
+        """Events at the end of every communication step."""
+        return tuple(e for e in self.events if isinstance(e, CommunicationEvent))
 
     @cached_property
     def noises(self) -> tuple[Signal, ...]:
@@ -249,6 +257,10 @@ class HybridSystem:
                     raise ValueError(
                         f"{where}: event {event.name!r} refers to unknown parameter {reference!r}; expected a scalar one."
                     )
+        vectors = {s.name for s in self.parameters if s.size is not None}
+        for resource in self.resources:
+            if resource.parameter not in vectors:
+                raise ValueError(f"{where}: {resource.file} is to set {resource.parameter!r}; expected a vector parameter.")
         known = {s.name for s in (*self.parameter_signals, *self.states)}
         for preset, values in self.presets.items():
             unknown = sorted(set(values) - known)

@@ -32,6 +32,7 @@ class _Symbols:
     x: ca.SX
     u: ca.SX
     p: ca.SX
+    signs: ca.SX
 
 
 class TracedSystem:
@@ -54,6 +55,7 @@ class TracedSystem:
             ca.SX.sym("x", system.state_count),
             ca.SX.sym("u", len(system.start_inputs())),
             ca.SX.sym("p", len(system.start_parameters())),
+            ca.SX.sym("s", len(system.frictions)),
         )
 
     @cached_property
@@ -82,6 +84,36 @@ class TracedSystem:
         """Derivatives of the continuous states without dry friction: ``(t, x, u, p) -> dx``."""
         s = self._symbols
         return ca.Function("flow", [s.t, s.x, s.u, s.p], [self._trace("state_derivative")], ["t", "x", "u", "p"], ["dx"])
+
+    @cached_property
+    def derivative(self) -> ca.Function:
+        """Derivatives of the continuous states, dry friction resolved: ``(t, x, u, p, s) -> dx``.
+
+        `s` holds the signs (-1, 0, 1) of the states with dry friction, shape (len(frictions),).
+        """
+        s = self._symbols
+        return ca.Function("derivative", [s.t, s.x, s.u, s.p, s.signs], [self._derivative_expression()])
+
+    @cached_property
+    def friction_balance(self) -> ca.Function:
+        """What drives and what holds each state with dry friction: ``(t, x, u, p) -> (flows, frictions)``, stacked.
+
+        Only for a system that declares dry friction.
+        """
+        s = self._symbols
+        flows = ca.SX(self._trace("state_derivative"))[self.system.friction_indices()]
+        frictions = ca.SX(self._trace("friction_vector"))
+        return ca.Function("friction_balance", [s.t, s.x, s.u, s.p], [ca.vertcat(flows, frictions)])
+
+    @cached_property
+    def tangent(self) -> ca.Function:
+        """Exact directional derivative: ``(t, x, u, p, s, dt, dx, du, dp) -> (dy, d derivative)``, stacked, with `s` held."""
+        s = self._symbols
+        knowns = [s.t, s.x, s.u, s.p]
+        seeds = [ca.SX.sym(name, *k.shape) for name, k in zip(("dt", "dx", "du", "dp"), knowns, strict=True)]
+        unknowns = ca.vertcat(ca.SX(self._trace("output_vector")), self._derivative_expression())
+        direction = ca.jtimes(unknowns, ca.vertcat(*knowns), ca.vertcat(*seeds))
+        return ca.Function("tangent", [s.t, s.x, s.u, s.p, s.signs, *seeds], [ca.densify(direction)])
 
     def jump(self, event: str) -> ca.Function:
         """State after an event: ``(t, x, u, p) -> x``."""
@@ -113,9 +145,17 @@ class TracedSystem:
         return hashlib.sha256(function.serialize().encode()).hexdigest()
 
     def dependencies(self, function: str, by: str) -> np.ndarray:
-        """Structural dependence of `flow` or `output` on a variable group: boolean array, shape (rows, columns)."""
+        """Structural dependence on a variable group: boolean array, shape (rows, columns).
+
+        Args:
+            function: ``flow``, ``output`` or ``derivative`` (the flow with dry friction resolved).
+            by: ``t``, ``x``, ``u`` or ``p``.
+        """
         s = self._symbols
-        expression = self._trace("state_derivative" if function == "flow" else "output_vector")
+        if function == "derivative":
+            expression = self._derivative_expression()
+        else:
+            expression = self._trace("state_derivative" if function == "flow" else "output_vector")
         pattern = ca.DM(ca.jacobian_sparsity(expression, getattr(s, by)), 1)
         dependent: np.ndarray = np.asarray(ca.densify(pattern), dtype=float).reshape(expression.numel(), -1) != 0.0
         return dependent
@@ -148,6 +188,13 @@ class TracedSystem:
             return SYMBOLIC(ca.densify(by_x), shape=(count, count)), SYMBOLIC(ca.densify(by_t), shape=(count,))
 
         return self._guarded("flow", lambda: integration.step(self.system, t, h, x, u, p, jacobian))
+
+    def _derivative_expression(self) -> ca.SX:
+        t, _, x, u, p = self._arrays()
+        signs = SYMBOLIC(self._symbols.signs, shape=(len(self.system.frictions),)) if self.system.frictions else None
+        if not self.system.continuous_count:
+            return ca.SX(0, 1)
+        return self._guarded("flow", lambda: integration.effective_flow(self.system, t, x, u, p, signs))
 
     def _effective_jacobian_expression(self) -> tuple[ca.SX, ca.SX]:
         t, _, x, u, p = self._arrays()

@@ -254,7 +254,8 @@ class FMI2(Mock):
 
     version = 2
 
-    def doStep(self, t: float, h: float) -> None:
+    def doStep(self, t: float, h: float, noSetFMUStatePriorToCurrentPoint: bool = True) -> None:
+        self.may_forget = noSetFMUStatePriorToCurrentPoint
         super().doStep(t, h)
 
     def getBooleanStatus(self, kind: int) -> bool:

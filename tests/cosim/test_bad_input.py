@@ -215,9 +215,29 @@ def test_nonsense_is_refused_with_its_place(setting: str, value: Any, message: s
 
 
 @pytest.mark.compiler
-def test_a_late_policy_for_a_sealed_receiver_is_refused() -> None:
-    with pytest.raises(CosimError, match="late_policy belongs to blocks"):
-        small().run(overrides={"observer.as": "fmu3", "observer.late_policy": "reject"})
+@pytest.mark.compiler
+def test_a_late_policy_for_an_fmu_that_has_none_is_refused() -> None:
+    """The locomotive has no triggered events, so no parameter for late ones."""
+    with pytest.raises(CosimError, match=r"components\.locomotive: this FMU has no parameter late_policy"):
+        small().run(overrides={"locomotive.as": "fmu3", "locomotive.late_policy": "reject"})
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ("forget", r"observer\.late_policy has no item 'forget'; "),
+        (4, r"observer\.late_policy = 4 is no item of the enumeration: replay \(1\), reject \(2\), late \(3\)"),
+    ],
+)
+def test_an_enumeration_takes_its_items_only(value: Any, message: str) -> None:
+    with pytest.raises(CosimError, match=message):
+        small().run(overrides={"observer.as": "fmu3", "observer.parameters": {"late_policy": value}})
+
+
+def test_a_text_for_a_number_is_refused() -> None:
+    with pytest.raises(CosimError, match=r"locomotive\.train_speed: expected a number, .* \(got 'fast'\)"):
+        small().run(overrides={"locomotive.train_speed": "fast"})
 
 
 @pytest.mark.parametrize(

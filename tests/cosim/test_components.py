@@ -186,3 +186,11 @@ def test_seconds_and_calls_are_counted() -> None:
     assert made.seconds > 0.0
     assert made.time == 0.5
     assert np.isfinite(made.seconds)
+
+
+def test_an_fmi2_slave_is_not_told_that_it_may_forget_its_past() -> None:
+    """The localiser sets states back; a slave that had thrown its past away could not follow."""
+    slave = Train2()
+    made = started(slave)
+    made.advance(0.0, 0.1)
+    assert slave.may_forget is False

@@ -13,7 +13,7 @@ from fmpy.fmi1 import FMICallException
 from mock_slaves import ERROR, FMI2, Counter, EventMode, Mock, Train, component
 
 from cosim.components.loading import load_fmu
-from cosim.components.probe import ProbeReport, probe
+from fmus.check.probe import ProbeReport, probe
 
 H = 0.01
 

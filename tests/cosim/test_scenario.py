@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
+import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from small_scenarios import small
 
 from cosim import Scenario, shipped_scenarios
-from cosim.errors import CertificateError
+from cosim.errors import CertificateError, CosimError
+from fmus import cached_fmu, recipe
 
 TOML = """
 title = "Small"
@@ -152,12 +156,52 @@ def test_what_ships_is_valid(name: str) -> None:
 
 
 @pytest.mark.compiler
-def test_late_telegrams_to_a_sealed_receiver_are_warned_about() -> None:
-    scenario = small().set("balises.latency", 0.1)
-    assert not any("late" in w for w in scenario.run().warnings)
-    assert any(
-        "observer: an exported observer rejects late stamps" in w for w in scenario.set("observer.as", "fmu3").run().warnings
-    )
+@pytest.mark.parametrize("realisation", ["fmu2", "fmu3"])
+@pytest.mark.parametrize("policy", [None, "reject", "late"])
+def test_sealed_receivers_treat_late_telegrams_as_blocks_do(realisation: str, policy: str | None) -> None:
+    """By the FMU's own parameter; the block of the same FMI version does the same, but for roundings of a divided cell."""
+    changes: dict[str, Any] = {"stop": 0.8, "balises.latency": 0.1, "balises.latency_jitter": 0.1}
+    changes |= {} if policy is None else {"observer.late_policy": policy, "observer.replay_horizon": 4.0}
+    runs = []
+    for kind in (realisation, realisation.replace("fmu", "block")):
+        outcome = small().run(overrides=changes | {"observer.as": kind})
+        assert outcome.failure is None
+        assert not any("late" in w for w in outcome.warnings if "rejected" not in w)
+        runs.append(outcome.result.table)
+    sealed, block = runs
+    for name in ("observer.position", "observer.speed"):
+        np.testing.assert_allclose(sealed[name], block[name], rtol=1e-12, atol=1e-12)
+    told = small().run(overrides={"stop": 0.8}).result.table
+    same = np.allclose(sealed["observer.position"][-1], told["observer.position"][-1], rtol=1e-9, atol=0.0)
+    assert same == (policy is None)
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("value", ["reject", 2])
+def test_an_enumeration_is_set_by_the_name_or_the_number_of_an_item(value: str | int) -> None:
+    changes = {"observer.as": "fmu3", "balises.latency": 0.1}
+    by_key = small().run(overrides=changes | {"observer.late_policy": "reject"}).result.table
+    by_parameter = small().run(overrides=changes | {"observer.parameters": {"late_policy": value, "estimated_speed": 10.0}})
+    np.testing.assert_array_equal(by_parameter.result.table["observer.position"], by_key["observer.position"])
+
+
+@pytest.mark.compiler
+def test_an_fmu_that_does_not_say_what_it_does_with_late_telegrams_is_warned_about(file: Path) -> None:
+    """As a vendor's: the parameter is hidden in the description."""
+    vendor = file.parent / "vendor.fmu"
+    with zipfile.ZipFile(cached_fmu(recipe("takagi_sugeno_cdo"), 3)) as source, zipfile.ZipFile(vendor, "w") as target:
+        for entry in source.infolist():
+            content = source.read(entry)
+            if entry.filename == "modelDescription.xml":
+                content = re.sub(rb'<Enumeration name="late_policy".*?/>', b"", content, flags=re.DOTALL)
+            target.writestr(entry, content)
+    file.write_text(TOML.replace('observer = "takagi_sugeno_cdo"', 'fmu = "vendor.fmu"'))
+    scenario = Scenario.load(file)
+    warnings = scenario.run(overrides={"balises.latency": 0.1}).warnings
+    assert any("observer: a sealed FMU without a parameter late_policy" in w for w in warnings)
+    assert not any("late_policy" in w for w in scenario.run().warnings)  # nothing is late
+    with pytest.raises(CosimError, match="this FMU has no parameter late_policy"):
+        scenario.run(overrides={"observer.late_policy": "reject"})
 
 
 def test_doubts_are_told_before_the_first_step() -> None:

@@ -197,10 +197,16 @@ class Driven:
         self.block.enterStepMode()
 
     def everything(self) -> np.ndarray:
-        """Time, outputs, state, inputs and parameters."""
+        """All real variables."""
         description = self.block.model_description
         real = [v.name for v in description.modelVariables if v.type in ("Real", "Float64")]
         return self.get(*real)
+
+    def what_matters(self) -> np.ndarray:
+        """All real variables but the payloads: those stand as they were set last and are read only at their own events."""
+        payloads = {name for event in self.block.system.triggered_events for name in scalar_names(event.payload)}
+        variables = self.block.model_description.modelVariables
+        return self.get(*(v.name for v in variables if v.type in ("Real", "Float64") and v.name not in payloads))
 
 
 class Reference:

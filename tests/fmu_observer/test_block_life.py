@@ -258,7 +258,7 @@ def test_a_state_that_is_no_number_any_more_is_named(version: int) -> None:
     driven.event("kick", H, kick(1.0) | {"kick_impulse": float("nan")})
     with pytest.raises(BlockCallError, match="state rate is not a finite number; check inputs, payloads") as caught:
         driven.step(0.0)
-    assert str(caught.value).startswith("doStep: swing at t = 0.05 s")
+    assert str(caught.value).startswith("doStep: swing at t = 0.0 s")  # where it stands again
 
 
 def test_an_equation_that_escapes_is_reported_and_a_huge_state_is_not() -> None:
@@ -287,7 +287,7 @@ def test_unknown_and_foreign_value_references_are_refused_by_name(version: int) 
     with pytest.raises(BlockCallError, match="2 value references but 1 values"):
         put(driven.vr("torque", "damping"), [1.0])
     events = block.setInteger if version == 2 else (lambda vr, v: (block.enterEventMode(), block.setClock(vr, v)))
-    with pytest.raises(BlockCallError, match=r"torque .* is not the clock or count of an event"):
+    with pytest.raises(BlockCallError, match=r"torque .* is (of another type|not the clock of an event)"):
         events(driven.vr("torque"), [1])
 
 
@@ -296,9 +296,8 @@ def test_calls_that_a_block_does_not_have_are_refused_with_fmpys_exception() -> 
     for name, call in {
         "fmi2GetBoolean": lambda: fmi2.getBoolean([1]),
         "fmi2SetString": lambda: fmi2.setString([1], ["a"]),
-        "fmi2GetDirectionalDerivative": lambda: fmi2.getDirectionalDerivative([1], [2], [1.0]),
         "fmi2SetRealInputDerivatives": lambda: fmi2.setRealInputDerivatives([1], [1], [0.0]),
-        "fmi3GetInt32": lambda: fmi3.getInt32([1]),
+        "fmi3GetInt16": lambda: fmi3.getInt16([1]),
         "fmi3SetBoolean": lambda: fmi3.setBoolean([1], [True]),
         "fmi3GetOutputDerivatives": lambda: fmi3.getOutputDerivatives([1], [1]),
     }.items():

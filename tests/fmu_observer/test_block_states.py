@@ -297,6 +297,7 @@ def _garbage(content: bytes) -> dict[str, bytes]:
         "cut off": content[:-20],
         "a key missing": json.dumps({k: v for k, v in data.items() if k != "queue"}).encode(),
         "unknown mode": changed(mode="flying"),
+        "unknown policy": changed(late_policy=4),
         "unknown clock": changed(active=[7]),
         "negative clock": changed(active=[-1]),
         "too little memory": changed(memory=data["memory"][:-16]),
@@ -344,17 +345,23 @@ def test_the_state_of_another_model_preset_or_version_is_refused() -> None:
         driven.block.setFMUState(b"")
 
 
-@pytest.mark.parametrize("policy", ["reject", "late"])
-def test_a_state_with_a_past_does_not_change_the_policy_of_the_block_that_takes_it(policy: Any) -> None:
-    source, taker = Driven(SWING, 3), Driven(SWING, 3, late_policy=policy)
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_state_brings_its_policy_and_its_horizon_with_it(version: int) -> None:
+    """They are parameters: a block that is started with others goes on by those of the state."""
+    source, taker = Driven(SWING, version), Driven(SWING, version)
     _to_step(source)
-    taker.instantiate().block.setFMUState(source.block.getFMUState())
-    taker.event("kick", 5.0 * H, kick(1.0))
-    assert taker.block.counters.replayed == source.block.counters.replayed
-    back = Driven(SWING, 3).instantiate()
-    back.block.setFMUState(taker.block.getFMUState())  # and the other way: without a past, replay begins here
-    back.event("kick", 5.0 * H, kick(1.0))
-    assert back.block.counters.rejected == taker.block.counters.rejected + 1
+    taker.instantiate()
+    setter = taker.block.setInteger if version == 2 else taker.block.setInt64
+    setter(taker.vr("late_policy"), [2])
+    taker.set(replay_horizon=0.0)
+    taker.enter_initialization()
+    taker.exit_initialization()
+    taker.block.setFMUState(source.block.getFMUState())
+    getter = taker.block.getInteger if version == 2 else taker.block.getInt64
+    assert (getter(taker.vr("late_policy")), taker.get("replay_horizon").tolist()) == ([1], [10.0])
+    taker.event("mark", 5.0 * H)
+    taker.step(8 * H)
+    assert taker.block.counters.replayed == source.block.counters.replayed + {2: 2, 3: 1}[version]  # FMI 2: one was announced
 
 
 @pytest.mark.parametrize("version", [2, 3])

@@ -69,8 +69,8 @@ def test_traced_or_not_the_block_does_the_same() -> None:
 @BOTH
 def test_every_output_depends_on_every_input_where_nobody_can_tell(version: int) -> None:
     description = Driven(Doorman(), version).block.model_description
-    for unknown in description.outputs:
-        assert [v.name for v in unknown.dependencies] == ["speed", "stop_length"]
+    for unknown in (*description.outputs, *description.derivatives):
+        assert [v.name for v in unknown.dependencies] == ["time", "speed", "stop_length", "travelled"]
 
 
 @BOTH

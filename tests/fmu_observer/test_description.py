@@ -11,9 +11,10 @@ from block_systems import SWING, Doorman, Swing
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmu_observer import OBSERVERS
-from fmu_observer.description import STAMP_NOW, VariableTable, describe, exposed_inputs
+from fmu_observer.description import STAMP_NOW, VariableTable, can_exchange, describe, exposed_inputs
+from fmu_observer.event_protocol import EventProtocol
 from plant_models import PLANTS
-from plant_models.hybrid import HybridSystem, parameter, scalar_names, state
+from plant_models.hybrid import CommunicationEvent, HybridSystem, output_signal, parameter, scalar_names, state
 from plant_models.hybrid.units import parse_unit
 
 BOTH = pytest.mark.parametrize("version", [2, 3])
@@ -65,13 +66,87 @@ def test_every_variable_is_as_the_table_says(version: Any) -> None:
 
 
 @BOTH
-def test_event_variables_come_last(version: Any) -> None:
-    variables = describe(SWING, version).modelVariables[len(TABLE) :]
+def test_event_variables_follow(version: Any) -> None:
+    variables = describe(SWING, version).modelVariables[len(TABLE) : len(TABLE) + 4]
     assert [(v.name, v.type) for v in variables] == EVENTS[version]
     for trigger, stamp in zip(variables[::2], variables[1::2], strict=True):
         assert (trigger.causality, trigger.variability) == (stamp.causality, stamp.variability) == ("input", "discrete")
         assert (stamp.unit, float(stamp.start)) == ("s", STAMP_NOW)
         assert (trigger.start, trigger.intervalVariability) == (("0", None) if version == 2 else (None, "triggered"))
+
+
+@BOTH
+def test_the_event_protocol_follows_and_then_the_derivatives(version: Any) -> None:
+    late = EventProtocol(late_policy="late", replay_horizon=3.0)
+    policy, horizon, *rates = describe(SWING, version, protocol=late).modelVariables[len(TABLE) + 4 :]
+    assert (policy.name, policy.type, policy.causality, policy.start) == ("late_policy", "Enumeration", "parameter", "3")
+    assert [item.name for item in policy.declaredType.items] == ["replay", "reject", "late"]
+    assert (horizon.name, horizon.unit, horizon.start) == ("replay_horizon", "s", "3.0")
+    found = [(v.name, v.causality, v.initial, v.unit, v.derivative.name) for v in rates]
+    assert found == [
+        ("der(angle)", "local", "calculated", "rad/s", "angle"),
+        ("der(rate)", "local", "calculated", "rad/s2", "rate"),
+    ]
+
+
+@BOTH
+def test_a_state_with_dry_friction_has_an_event_indicator(version: Any) -> None:
+    locomotive, table = PLANTS["locomotive"](), VariableTable.of(PLANTS["locomotive"]())
+    description = describe(locomotive, version)
+    names = [v.name for v in description.modelVariables[table.indicators :]]
+    assert names == ["event_indicator.train_speed", "event_indicator.wheel_rate"]
+    assert [u.variable.name for u in description.eventIndicators] == names
+    assert description.numberOfEventIndicators == 2
+
+
+def test_counts_can_announce_events_in_fmi_3() -> None:
+    description = describe(SWING, 3, protocol=EventProtocol("counts"))
+    variables = _by_name(description)
+    assert (variables["kick_count"].type, variables["mark_count"].start) == ("Int32", "0")
+    assert not any(v.clocks or v.type == "Clock" for v in variables.values())
+    assert not description.coSimulation.hasEventMode
+    with pytest.raises(ValueError, match="FMI 2 has no clocks"):
+        describe(SWING, 2, protocol=EventProtocol("clocks"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"announcement": "letters"}, "announcement 'letters' is unknown"),
+        ({"late_policy": "forget"}, "late_policy 'forget' is unknown; use one of replay, reject, late"),
+        ({"replay_horizon": -1.0}, "replay_horizon = -1.0 s; expected zero or more"),
+        ({"replay_horizon": float("inf")}, "replay_horizon = inf s"),
+    ],
+)
+def test_an_impossible_protocol_is_refused(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        EventProtocol(**arguments)
+
+
+def test_an_integer_output_is_a_whole_number_to_the_outside() -> None:
+    class Counting(Swing):
+        name = "counting"
+        outputs = (*Swing.outputs, output_signal("marks_count", "1", variability="discrete", integer=True))
+
+        def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+            return super().output(t, x, u, p) | {"marks_count": x[4]}
+
+    assert [_by_name(describe(Counting(), v))["marks_count"].type for v in (2, 3)] == ["Integer", "Int32"]  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="'speed' is an integer; only a discrete output can be one"):
+        output_signal("speed", "m/s", integer=True)
+
+
+@BOTH
+def test_model_exchange_is_only_for_what_can_be_one(version: Any) -> None:
+    class Listening(Swing):
+        events = (*Swing.events, CommunicationEvent("heard"))
+
+    exchange = describe(SWING, version, model_exchange=True).modelExchange
+    assert (exchange.modelIdentifier, exchange.providesDirectionalDerivative) == ("swing", True)
+    assert describe(SWING, version).modelExchange is None
+    assert (can_exchange(SWING), can_exchange(Listening()), can_exchange(Doorman())) == (True, False, False)
+    with pytest.raises(ValueError, match="swing: a system with communication events"):
+        describe(Listening(), version, model_exchange=True)
 
 
 def test_what_comes_with_an_event_carries_its_clock() -> None:
@@ -99,7 +174,11 @@ def test_value_references_are_contiguous_and_in_the_order_of_the_runtime(system:
         expected = list(scalar_names(signals))
         assert names[first : first + len(expected)] == expected
     assert table.inputs == 1
-    assert table.end - table.events == 2 * len(system.triggered_events)
+    assert table.protocol - table.events == 2 * len(system.triggered_events)
+    assert table.derivatives - table.protocol == (2 if system.triggered_events else 0)
+    assert names[table.derivatives : table.indicators] == [
+        f"der({n})" for n in scalar_names(system.states)[: system.continuous_count]
+    ]
     assert not set(names) & {s.name for s in system.noises}
 
 
@@ -129,9 +208,16 @@ def test_display_units_convert_as_the_standard_defines() -> None:
 @BOTH
 def test_dependencies_of_outputs_are_exact(version: Any) -> None:
     description = describe(SWING, version)
-    found = {u.variable.name: [v.name for v in u.dependencies] for u in description.outputs}
-    assert found == {"energy": [], "last_sample": [], "net_torque": ["torque", "wind[2]"]}
-    for unknown in description.outputs:
+    structure = [*description.outputs, *description.derivatives]
+    found = {u.variable.name: [v.name for v in u.dependencies] for u in structure}
+    assert found == {
+        "energy": ["angle", "rate"],
+        "last_sample": [],
+        "net_torque": ["torque", "wind[2]", "rate"],
+        "der(angle)": ["rate"],
+        "der(rate)": ["time", "torque", "wind[1]", "wind[2]", "angle", "rate"],
+    }
+    for unknown in structure:
         assert unknown.dependenciesKind == ["dependent"] * len(unknown.dependencies)
         assert unknown.index == unknown.variable.valueReference + 1  # FMI 2 counts from one
     assert [u.variable.name for u in description.initialUnknowns] == list(found)
@@ -150,8 +236,8 @@ HAND = {  # read off the equations of the observers
 @BOTH
 @pytest.mark.parametrize("name", sorted(HAND))
 def test_dependencies_of_shipped_observers(name: str, version: Any) -> None:
-    found = {u.variable.name: [v.name for v in u.dependencies] for u in describe(OBSERVERS[name](), version).outputs}
-    assert found == HAND[name]
+    outputs = describe(OBSERVERS[name](), version).outputs
+    assert {u.variable.name: [v.name for v in u.dependencies if v.causality == "input"] for u in outputs} == HAND[name]
 
 
 @BOTH
@@ -238,6 +324,9 @@ def test_the_token_names_the_content() -> None:
         "largest value": describe(_variant(parameters=(_limited(Swing.parameters[0]), *Swing.parameters[1:])), 3),
         "offset of an event": describe(_variant(events=(Swing.events[0], _without_offset(), Swing.events[2])), 3),
         "dependency": describe(_Direct(), 3),
+        "announcement": describe(SWING, 3, protocol=EventProtocol("counts")),
+        "late policy": describe(SWING, 3, protocol=EventProtocol(late_policy="reject")),
+        "communication event": describe(_variant(events=(*Swing.events, CommunicationEvent("heard"))), 3),
     }
     tokens = {what: description.instantiationToken for what, description in changed.items()} | {"none": token}
     assert len(set(tokens.values())) == len(tokens), tokens

@@ -8,12 +8,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from exchange_importer import Exchange
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi3 import FMU3Slave
 
+from fmu_observer.event_protocol import EventProtocol
 from fmus import RECIPES, cached_fmu, recipe
 from plant_models.hybrid import (
+    CommunicationEvent,
     HybridSystem,
     PeriodicEvent,
     Runtime,
@@ -150,7 +153,62 @@ class Gain(HybridSystem):
         return {"twice": 2.0 * u.force + t}
 
 
-SMALL: dict[str, type[HybridSystem]] = {cls.name: cls for cls in (Oscillator, Slider, Sampler, Tracker, Gain)}
+class Hopper(HybridSystem):
+    """Everything that can be part of a replay: friction, a tunable parameter, noise, communication events, an integer output."""
+
+    name = "hopper"
+    states = (
+        state("position", "m"),
+        state("speed", "m/s", 0.4),
+        memory("sample", "m"),
+        memory("handed", "m"),
+        memory("steps", "1"),
+        memory("marks", "1"),
+    )
+    inputs = (input_signal("force", "N"), input_signal("wind", "N", (0.1, -0.2), size=2))
+    outputs = (output_signal("position_out", "m"), output_signal("marks_out", "1", variability="discrete", integer=True))
+    parameters = (
+        parameter("grip", "N", 0.3),
+        parameter("drag", "N.s/m", 0.2, variability="tunable"),
+        parameter("lift", "1", (0.5, 0.1), variability="tunable", size=2),
+        parameter("period", "s", 0.07),
+        parameter("offset", "s", 0.013),
+    )
+    events = (
+        TriggeredEvent(
+            "kick",
+            (
+                input_signal("kick_impulse", "N.s", variability="discrete"),
+                input_signal("kick_share", "1", (0.5, 0.25), variability="discrete", size=2),
+            ),
+        ),
+        PeriodicEvent("sampling", "period", "offset", (input_signal("jitter", "1", variability="discrete"),)),
+        CommunicationEvent("handover"),
+        TriggeredEvent("mark"),
+    )
+    frictions = ("speed",)
+    internal_step = 0.01
+
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
+        return vector(x[1], 5.0 * u.force + u.wind[0] * t - u.wind[1] - p.drag * x[1] - 3.0 * x[0] + 0.1 * x[3])
+
+    def friction(self, t: Any, x: Any, u: Any, p: Any) -> Any:
+        return vector(p.grip)
+
+    def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"position_out": x[0] + p.lift[1] * x[2], "marks_out": x[5]}
+
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
+        if event == "kick":
+            return vector(x[0], 0.9 * x[1] + u.kick_share[0] * u.kick_impulse, x[2] + u.kick_share[1], x[3], x[4], x[5])
+        if event == "mark":
+            return vector(x[0], p.lift[0] * x[1], x[2], x[3], x[4], x[5] + 1.0)
+        if event == "handover":
+            return vector(x[0], x[1], x[2], 0.5 * x[3] + x[0], x[4] + 1.0, x[5])
+        return vector(x[0], x[1], x[0] + 0.1 * u.jitter, x[3], x[4], x[5])
+
+
+SMALL: dict[str, type[HybridSystem]] = {cls.name: cls for cls in (Oscillator, Slider, Sampler, Tracker, Gain, Hopper)}
 SHIPPED = tuple(RECIPES)
 
 
@@ -196,6 +254,7 @@ class Component:
             "instanceName": "component",
         }
         self.slave: Any = FMU2Slave(**identity) if self.version == 2 else FMU3Slave(**identity)
+        self.early_return = False
         self.event_mode = self.version == 3 and self.description.coSimulation.hasEventMode
 
     def instantiate(self, logging: bool = False) -> None:
@@ -205,7 +264,10 @@ class Component:
             self.slave.instantiate(callbacks=self._callbacks, loggingOn=logging)
         else:
             self.slave.instantiate(
-                eventModeUsed=self.event_mode, loggingOn=logging, logMessage=lambda *a: self.log.append(_text(a[3]))
+                eventModeUsed=self.event_mode,
+                earlyReturnAllowed=self.early_return,
+                loggingOn=logging,
+                logMessage=lambda *a: self.log.append(_text(a[3])),
             )
 
     def initialize(self, start_time: float = 0.0, **starts: float) -> None:
@@ -230,29 +292,45 @@ class Component:
         setter(self.references(list(values)), list(values.values()))
 
     def get(self, *names: str) -> np.ndarray:
-        getter = self.slave.getReal if self.version == 2 else self.slave.getFloat64
-        return np.array(getter(self.references(names)))
+        return np.array([self._getter(name)(self.references([name]))[0] for name in names], dtype=float)
+
+    def _getter(self, name: str) -> Callable[..., Any]:
+        real = self.slave.getReal if self.version == 2 else self.slave.getFloat64
+        others = {"Integer": "getInteger", "Int32": "getInt32", "Enumeration": "getInteger" if self.version == 2 else "getInt64"}
+        kind = self.by_name[name].type
+        return getattr(self.slave, others[kind]) if kind in others else real
 
     def values(self) -> np.ndarray:
-        """All outputs and states."""
-        return self.get(*(v.name for v in self.description.modelVariables if v.causality in {"output", "local"}))
+        """All outputs and states; not what is derived from them."""
+        derived = ("der(", "event_indicator.")
+        names = [v.name for v in self.description.modelVariables if v.causality in {"output", "local"}]
+        return self.get(*(name for name in names if not name.startswith(derived)))
 
     def step(self, t: float, h: float) -> None:
         self.slave.doStep(t, h)
 
     def event(self, name: str, stamp: float | None = None, **payload: float) -> None:
-        """FMI 2: announce for the next step. FMI 3: event mode, now."""
+        """By count: announce for the next step. By clock: event mode, now."""
         stamps = {} if stamp is None else {f"{name}_time": stamp}
-        if self.version == 2:
-            reference = self.references([f"{name}_count"])
-            self.set(**payload, **stamps)
-            self.slave.setInteger(reference, [self.slave.getInteger(reference)[0] + 1])
+        if f"{name}_count" in self.by_name:
+            self.set_all(payload | stamps)
+            self.raise_count(name)
             return
         self.slave.enterEventMode()
         self.slave.setClock(self.references([name]), [True])
-        self.set(**payload, **stamps)
+        self.set_all(payload | stamps)
         self.slave.updateDiscreteStates()
         self.slave.enterStepMode()
+
+    def raise_count(self, name: str, by: int = 1) -> None:
+        """Raise the count of an event."""
+        reference, slave = self.references([f"{name}_count"]), self.slave
+        get, put = (slave.getInteger, slave.setInteger) if self.version == 2 else (slave.getInt32, slave.setInt32)
+        put(reference, [get(reference)[0] + by])
+
+    def set_policy(self, number: int) -> None:
+        """Set the parameter `late_policy`."""
+        (self.slave.setInteger if self.version == 2 else self.slave.setInt64)(self.references(["late_policy"]), [number])
 
     def save(self) -> Any:
         return self.slave.getFMUstate() if self.version == 2 else self.slave.getFMUState()
@@ -305,15 +383,19 @@ class Reference:
 
     def step(self, t: float, h: float) -> None:
         self.runtime.advance(t + h)
+        self.runtime.communicate()
 
 
 @pytest.fixture
 def component(unpacked: Callable[[Path], Path]) -> Iterator[Callable[..., Component]]:
-    """Instances of FMUs, freed at the end: ``component(name or system, fmi_version)``; not yet initialised."""
+    """Instances of FMUs, freed at the end: ``component(name, system or path, fmi_version)``; not yet initialised. With `counts`,
+    one that is told of events by counts in FMI 3 too."""
     alive: list[Component] = []
 
-    def make(system: str | HybridSystem, version: int, logging: bool = False) -> Component:
-        fmu = cached_fmu(make_system(system) if isinstance(system, str) else system, version)  # type: ignore[arg-type]
+    def make(system: str | HybridSystem | Path, version: int, logging: bool = False, counts: bool = False) -> Component:
+        given = make_system(system) if isinstance(system, str) else system
+        protocol = EventProtocol("counts" if counts else None)
+        fmu = given if isinstance(given, Path) else cached_fmu(given, version, protocol=protocol)  # type: ignore[arg-type]
         made = Component(fmu, unpacked(fmu))
         made.instantiate(logging)
         alive.append(made)
@@ -322,6 +404,23 @@ def component(unpacked: Callable[[Path], Path]) -> Iterator[Callable[..., Compon
     yield make
     for one in alive:
         one.slave.freeInstance()
+
+
+@pytest.fixture
+def exchange(unpacked: Callable[[Path], Path]) -> Iterator[Callable[..., Exchange]]:
+    """Model exchange instances, freed at the end: ``exchange(name, system or path, fmi_version)``; not yet initialised."""
+    alive: list[Exchange] = []
+
+    def make(system: str | HybridSystem | Path, version: int, logging: bool = False) -> Exchange:
+        known = make_system(system) if isinstance(system, str) else system
+        fmu = known if isinstance(known, Path) else cached_fmu(known, version)  # type: ignore[arg-type]
+        made = Exchange(fmu, unpacked(fmu), logging)
+        alive.append(made)
+        return made
+
+    yield make
+    for one in alive:
+        one.model.freeInstance()
 
 
 @pytest.fixture
@@ -367,7 +466,7 @@ def _inputs(one: Component | Reference, t: float) -> dict[str, float]:
     """Continuous and discrete inputs as smooth functions of time, of a size that makes the systems move."""
     if isinstance(one, Component):
         names = [v.name for v in one.description.modelVariables if v.causality == "input"]
-        payloads = {name for name in names if name.startswith(("balise", "telegram"))}
+        payloads = {name for name in names if name.startswith(("balise", "telegram", "kick", "mark"))}
     else:
         names = list(scalar_names(one.system.inputs))
         payloads = set()

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fmus.build import plan_fmu, runtime_sources
-from fmus.compile import compile_library, find_compiler, header_folder
+from fmus.toolchain.compile import compile_library, find_compiler, header_folder
 from plant_models.hybrid import HybridSystem
 from plant_models.hybrid.noise import philox4x32, standard_normal
 

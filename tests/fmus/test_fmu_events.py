@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fmu_observer.block import make_block
+from fmu_observer.block.events import QUEUE_CAPACITY
 
 pytestmark = pytest.mark.compiler
 
@@ -134,6 +135,7 @@ def test_event_ahead_waits_for_its_step(version: int, component: Callable[..., A
 
 def test_late_event_is_rejected_and_reported(version: int, component: Callable[..., Any]) -> None:
     made, plain = component("tracker", version), component("tracker", version)
+    made.set_policy(2)
     for one in (made, plain):
         one.initialize()
         one.step(0.0, 0.5)
@@ -141,7 +143,7 @@ def test_late_event_is_rejected_and_reported(version: int, component: Callable[.
     made.step(0.5, 0.1)
     plain.step(0.5, 0.1)
     np.testing.assert_array_equal(made.values(), plain.values())
-    assert [line for line in made.log if "balise" in line and "rejected (1 so far)" in line]
+    assert [line for line in made.log if "balise" in line and "rejected (1 so far): late_policy is reject" in line]
 
 
 def test_stamp_is_used_up(version: int, component: Callable[..., Any]) -> None:
@@ -173,10 +175,10 @@ def test_lost_counts_are_reported(component: Callable[..., Any]) -> None:
 def test_queue_overflow_is_reported(component: Callable[..., Any]) -> None:
     made = component("tracker", 3)
     made.initialize()
-    for i in range(17):
+    for i in range(QUEUE_CAPACITY + 1):
         made.event("balise", stamp=100.0 + i, balise_position=1.0)
     assert len(made.log) == 1
-    assert "16 events are waiting already; this one is lost" in made.log[0]
+    assert f"{QUEUE_CAPACITY} events are waiting already; this one is lost" in made.log[0]
 
 
 def test_applied_events_are_noted_on_request(version: int, component: Callable[..., Any]) -> None:
@@ -198,7 +200,7 @@ def test_fmu_and_block_treat_events_alike(
 ) -> None:
     """Events on time, ahead and too late, through the same calls; 1e-12 as in `test_fmu_numbers`."""
     made = component(name, version)
-    block = make_block(reference(name).system, version, late_policy="reject")  # type: ignore[arg-type]
+    block = make_block(reference(name).system, version)  # type: ignore[arg-type]
     twin = component(name, version)  # borrows the handle, then drives the block
     twin.slave.freeInstance()
     twin.slave = block
@@ -217,4 +219,4 @@ def test_fmu_and_block_treat_events_alike(
         runs.append(np.array(rows))
     assert np.ptp(runs[0], axis=0).max() > 1.0
     np.testing.assert_allclose(runs[0], runs[1], rtol=1e-12, atol=1e-12)
-    assert block.counters.rejected == 1
+    assert (block.counters.replayed, block.counters.rejected) == (1, 0)

@@ -13,10 +13,11 @@ from typing import Any
 import fmpy
 import pytest
 
-import fmus.cache
+import fmus.folders
 from fmus import CompilationError, CompilerMissing, GenerationError, build_fmu, cache_folder, cached_fmu
-from fmus.compile import find_compiler
+from fmus.build import MAIN_SOURCE
 from fmus.pack import pack_fmu
+from fmus.toolchain.compile import compile_library, find_compiler, header_folder
 from plant_models.hybrid import HybridSystem, TracingError, vector
 
 
@@ -45,8 +46,12 @@ def test_content(tracker: HybridSystem, version: int, tmp_path: Path) -> None:
     assert names == sorted(names)
     assert f"{platform}/tracker{fmpy.sharedLibraryExtension}" in names
     assert {"modelDescription.xml", "sources/model.c", "sources/runtime.c", f"sources/fmi{version}.c"} <= set(names)
-    assert f"sources/fmi{5 - version}.c" not in names
+    assert [name for name in names if name.startswith(f"sources/fmi{5 - version}")] == []
     assert ("sources/buildDescription.xml" in names) == (version == 3)
+    headers = {f"sources/{path.name}" for path in header_folder().glob(f"fmi{version}*.h")}
+    assert len(headers) == 3
+    assert headers <= set(names)
+    assert {"documentation/index.html", "documentation/licenses/license.txt"} <= set(names)
     assert list(fmu.parent.iterdir()) == [fmu]
 
 
@@ -55,9 +60,6 @@ def test_sources_in_the_fmu_give_its_library(tracker: HybridSystem, version: int
     fmu = build_fmu(tracker, tmp_path / "one.fmu", version)  # type: ignore[arg-type]
     with zipfile.ZipFile(fmu) as archive:
         archive.extractall(tmp_path)
-    from fmus.build import MAIN_SOURCE
-    from fmus.compile import compile_library
-
     library = next((tmp_path / "binaries").rglob("tracker.*"))
     again = compile_library(find_compiler(), tmp_path / "sources", [MAIN_SOURCE], library.name)
     assert again.read_bytes() == library.read_bytes()
@@ -109,13 +111,13 @@ def test_cache_serves_many_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 def test_cache_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(fmus.cache.sys, "platform", "linux")
+    monkeypatch.setattr(fmus.folders.sys, "platform", "linux")
     monkeypatch.delenv("FMU_OBSERVER_CACHE")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert cache_folder() == tmp_path / "fmu-observer"
     monkeypatch.delenv("XDG_CACHE_HOME")
     assert cache_folder() == Path.home() / ".cache" / "fmu-observer"
-    monkeypatch.setattr(fmus.cache.sys, "platform", "win32")
+    monkeypatch.setattr(fmus.folders.sys, "platform", "win32")
     monkeypatch.setenv("LOCALAPPDATA", str(tmp_path))
     assert cache_folder() == tmp_path / "fmu-observer" / "Cache"
 
@@ -146,6 +148,7 @@ def test_interrupted_packing_leaves_nothing(tmp_path: Path) -> None:
 def test_missing_compiler_says_what_to_install(tracker: HybridSystem, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setitem(sys.modules, "ziglang", None)
     with pytest.raises(CompilerMissing, match="Install one"):
         build_fmu(tracker, tmp_path)
     monkeypatch.setenv("CC", "no-such-compiler -O1")

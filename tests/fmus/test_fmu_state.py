@@ -118,7 +118,7 @@ def test_damaged_bytes_are_refused(version: int, component: Callable[..., Any]) 
     ):
         with pytest.raises(FMICallException):
             made.deserialize(damaged)
-    queue_length = np.frombuffer(content).size - 1 - 16 * 4  # 16 entries of event, stamp and two numbers of payload
+    queue_length = np.frombuffer(content).size - 1 - 64 * 4  # 64 entries of event, stamp and two numbers of payload
     numbers = np.frombuffer(content).copy()
     numbers[queue_length] = 1e6
     with pytest.raises(FMICallException):

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
+from xml.etree.ElementTree import fromstring
 
 import pytest
 from fmpy import read_model_description
 from fmpy.model_description import ModelDescription, ModelVariable, Unknown, read_build_description
 
-from fmu_observer.description import describe
+from fmu_observer.description import LOG_CATEGORIES, can_exchange, describe
 from fmus.build import MAIN_SOURCE
-from fmus.xml import LOG_CATEGORIES, build_description_xml, model_description_xml
+from fmus.content.xml import build_description_xml, model_description_xml
 from plant_models.hybrid import HybridSystem
 
 VARIABLE = (
@@ -32,7 +33,7 @@ VARIABLE = (
 @pytest.fixture
 def both(system: HybridSystem, version: Any, tmp_path: Path) -> tuple[ModelDescription, ModelDescription]:
     """A description, and what fmpy reads from its XML (validated against the schema)."""
-    written = describe(system, version)
+    written = describe(system, version, model_exchange=can_exchange(system))
     file = tmp_path / "modelDescription.xml"
     file.write_text(model_description_xml(written, [MAIN_SOURCE]), encoding="utf-8")
     return written, read_model_description(str(file), validate=True, validate_variable_names=True, validate_model_structure=True)
@@ -45,8 +46,27 @@ def test_head_and_capabilities(both: tuple[ModelDescription, ModelDescription]) 
     assert read.coSimulation.modelIdentifier == written.coSimulation.modelIdentifier
     for name in ("canHandleVariableCommunicationStepSize", "canGetAndSetFMUstate", "canSerializeFMUstate", "hasEventMode"):
         assert getattr(read.coSimulation, name) == getattr(written.coSimulation, name), name
+    assert (read.modelExchange is None) == (written.modelExchange is None)
+    if read.modelExchange is not None:
+        for name in ("modelIdentifier", "canGetAndSetFMUstate", "canSerializeFMUstate"):
+            assert getattr(read.modelExchange, name) == getattr(written.modelExchange, name), name
+    if read.fmiMajorVersion == 3 or written.modelExchange is not None:  # FMI 2 tells of them for model exchange only
+        assert read.numberOfEventIndicators == written.numberOfEventIndicators
     assert {c.name for c in read.logCategories} == set(LOG_CATEGORIES)
     assert read.defaultExperiment.stepSize == written.defaultExperiment.stepSize
+
+
+def test_what_fmpy_does_not_read(system: HybridSystem, version: Any) -> None:
+    """Directional derivatives (FMI 3 spells them in the plural) and `reinit`, from the XML itself."""
+    root = fromstring(model_description_xml(describe(system, version, model_exchange=can_exchange(system)), [MAIN_SOURCE]))
+    flag = "providesDirectionalDerivative" + ("s" if version == 3 else "")
+    kinds = ("ModelExchange", "CoSimulation") if can_exchange(system) else ("CoSimulation",)
+    assert [root.find(tag).get(flag) for tag in kinds] == ["true"] * len(kinds)  # type: ignore[union-attr]
+    jumping = can_exchange(system) and bool(system.events or system.frictions)
+    holders = root.iterfind("ModelVariables/ScalarVariable/Real" if version == 2 else "ModelVariables/Float64")
+    assert len([e for e in holders if e.get("reinit") == "true"]) == (system.continuous_count if jumping else 0)
+    plain = fromstring(model_description_xml(describe(system, version), [MAIN_SOURCE]))
+    assert not any(e.get("reinit") for e in plain.iter())
 
 
 def test_variables(both: tuple[ModelDescription, ModelDescription]) -> None:
@@ -57,6 +77,13 @@ def test_variables(both: tuple[ModelDescription, ModelDescription]) -> None:
             assert getattr(got, name) == getattr(wanted, name), (wanted.name, name)
         assert [_reference(clock) for clock in got.clocks or []] == list(wanted.clocks)
         assert got.intervalVariability == wanted.intervalVariability
+        assert getattr(got.derivative, "name", None) == getattr(wanted.derivative, "name", None)
+        assert getattr(got.declaredType, "name", None) == getattr(wanted.declaredType, "name", None)
+
+
+def test_enumerations(both: tuple[ModelDescription, ModelDescription]) -> None:
+    got, wanted = ([(t.name, [(i.name, i.value) for i in t.items]) for t in d.typeDefinitions] for d in both)
+    assert got == wanted
 
 
 def test_units(both: tuple[ModelDescription, ModelDescription]) -> None:
@@ -67,7 +94,7 @@ def test_units(both: tuple[ModelDescription, ModelDescription]) -> None:
 
 def test_structure(both: tuple[ModelDescription, ModelDescription]) -> None:
     written, read = both
-    for name in ("outputs", "initialUnknowns"):
+    for name in ("outputs", "derivatives", "initialUnknowns", *(["eventIndicators"] if read.fmiMajorVersion == 3 else [])):
         got, wanted = ([_unknown(u) for u in getattr(d, name)] for d in (read, written))
         assert got == wanted
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import zipfile
 from pathlib import Path
 
+import fmpy
 import pytest
 
 from fmus import RECIPES, UnknownRecipeError, cached_fmu, recipe
@@ -23,12 +24,33 @@ def test_list_shows_every_model(capsys: Output) -> None:
 @pytest.mark.compiler
 def test_build_and_info(tmp_path: Path, capsys: Output) -> None:
     assert main(["build", "odometer", "--fmi", "2", "-o", str(tmp_path)]) == 0
-    built = Path(capsys.readouterr().out.strip())
+    said = capsys.readouterr()
+    built = Path(said.out.strip())
     assert built == tmp_path / "odometer.fmu"
+    assert f"odometer: FMI 2.0, {built.stat().st_size / 1000:.0f} kB, {fmpy.platform}" in said.err
     assert main(["info", str(built)]) == 0
     shown = capsys.readouterr().out
     assert "odometer: FMI 2.0, co-simulation" in shown
     assert "wheel_speed = " in shown
+
+
+@pytest.mark.compiler
+def test_build_several_for_both_versions(tmp_path: Path, capsys: Output) -> None:
+    assert main(["build", "odometer", "slip_indicator", "--fmi", "both", "-o", str(tmp_path)]) == 0
+    built = [Path(line) for line in capsys.readouterr().out.splitlines()]
+    assert built == [tmp_path / f"fmi{v}" / f"{name}.fmu" for v in (2, 3) for name in ("odometer", "slip_indicator")]
+    versions = [fmpy.read_model_description(str(path)).fmiVersion for path in built]
+    assert versions == ["2.0", "2.0", "3.0", "3.0"]
+
+
+@pytest.mark.compiler
+def test_build_all(tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
+    for registry, names in (("PLANTS", ["odometer"]), ("OBSERVERS", ["slip_indicator"])):  # all of them would take long
+        monkeypatch.setattr(f"fmus.recipes.{registry}", {name: RECIPES[name] for name in names})
+    assert main(["build", "--all", "-o", str(tmp_path)]) == 0
+    assert (
+        {Path(line).stem for line in capsys.readouterr().out.splitlines()} == set(RECIPES) == {p.stem for p in tmp_path.iterdir()}
+    )
 
 
 @pytest.mark.compiler
@@ -76,7 +98,7 @@ def test_mistakes_end_with_two_and_advice(arguments: list[str], words: str, caps
     assert "Traceback" not in said
 
 
-@pytest.mark.parametrize("arguments", [[], ["build"], ["bake", "locomotive"], ["build", "locomotive", "--fmi", "1"]])
+@pytest.mark.parametrize("arguments", [[], ["bake", "locomotive"], ["build", "locomotive", "--fmi", "1"]])
 def test_wrong_usage_ends_with_two(arguments: list[str], capsys: Output) -> None:
     with pytest.raises(SystemExit) as stopped:
         main(arguments)

@@ -104,7 +104,13 @@ def test_a_dependency_has_a_line_that_is_true(dependency: str) -> None:
 def test_nothing_is_imported_that_is_not_a_dependency() -> None:
     import sys
 
-    known = {*requirements(PROJECT["project"]["dependencies"]), *PACKAGES, *sys.stdlib_module_names}
+    extras = PROJECT["project"]["optional-dependencies"]
+    known = {
+        *requirements(PROJECT["project"]["dependencies"]),
+        *requirements(extras["hosted"]),
+        *PACKAGES,
+        *sys.stdlib_module_names,
+    }
     assert imported_packages() - known == set()
 
 

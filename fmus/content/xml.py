@@ -5,16 +5,10 @@ A transcription: every name, value reference, start and dependency comes from `f
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from fmpy.model_description import BaseUnit, ModelDescription, ModelVariable, Unit, Unknown
-
-LOG_CATEGORIES = {
-    "logStatusError": "Calls that were refused, and why",
-    "logStatusWarning": "Events that came too late or were lost",
-    "logEvents": "Events that were applied",
-}
 
 _CAPABILITIES_2 = {
     "canHandleVariableCommunicationStepSize": "canHandleVariableCommunicationStepSize",
@@ -28,7 +22,11 @@ _CAPABILITIES_3 = {
     "canSerializeFMUstate": "canSerializeFMUState",
     "providesDirectionalDerivative": "providesDirectionalDerivatives",
     "hasEventMode": "hasEventMode",
+    "mightReturnEarlyFromDoStep": "mightReturnEarlyFromDoStep",
 }
+_EXCHANGE_2 = (
+    "canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative", "completedIntegratorStepNotNeeded",
+)  # fmt: skip
 
 
 def model_description_xml(description: ModelDescription, sources: Sequence[str] = ()) -> str:
@@ -39,18 +37,20 @@ def model_description_xml(description: ModelDescription, sources: Sequence[str] 
         sources: names of the C files in ``sources/`` (FMI 2.0 lists them here, FMI 3.0 in buildDescription.xml).
     """
     root = _head(description)
-    _interface(root, description, sources)
+    _interfaces(root, description, sources)
     _units(root, description.unitDefinitions)
+    _types(root, description)
     categories = SubElement(root, "LogCategories")
-    for name, text in LOG_CATEGORIES.items():
-        SubElement(categories, "Category", name=name, description=text)
+    for category in description.logCategories:
+        _element(categories, "Category", {"name": category.name, "description": category.description})
     experiment = description.defaultExperiment
     if experiment is not None:
         names = ("startTime", "stopTime", "tolerance", "stepSize")
         _element(root, "DefaultExperiment", {name: getattr(experiment, name) for name in names})
     variables = SubElement(root, "ModelVariables")
+    write = _variable_2 if _is_2(description) else _variable_3
     for variable in description.modelVariables:
-        (_variable_2 if _is_2(description) else _variable_3)(variables, variable)
+        write(variables, variable, description.modelExchange is not None)
     (_structure_2 if _is_2(description) else _structure_3)(root, description)
     return _document(root)
 
@@ -82,24 +82,46 @@ def _head(description: ModelDescription) -> Element:
     names = ("description", "author", "version", "copyright", "license", "generationTool", "variableNamingConvention")
     attributes = {"fmiVersion": description.fmiVersion, "modelName": description.modelName, token: description.instantiationToken}
     attributes |= {name: getattr(description, name) for name in names}
+    if _is_2(description) and description.modelExchange is not None:
+        attributes["numberOfEventIndicators"] = description.numberOfEventIndicators
     root = Element("fmiModelDescription")
     _set(root, attributes)
     return root
 
 
-def _interface(root: Element, description: ModelDescription, sources: Sequence[str]) -> None:
-    cosimulation = description.coSimulation
-    assert cosimulation is not None
-    names = _CAPABILITIES_2 if _is_2(description) else _CAPABILITIES_3
-    attributes = {"modelIdentifier": cosimulation.modelIdentifier}
-    attributes |= {written: "true" for held, written in names.items() if getattr(cosimulation, held)}
-    if _is_2(description):
-        attributes["canNotUseMemoryManagementFunctions"] = "true"  # the runtime allocates for itself, once
-    element = _element(root, "CoSimulation", attributes)
-    if _is_2(description) and sources:
-        files = SubElement(element, "SourceFiles")
-        for name in sources:
-            SubElement(files, "File", name=name)
+def _interfaces(root: Element, description: ModelDescription, sources: Sequence[str]) -> None:
+    """Model exchange, then co-simulation: FMI 3 wants this order."""
+    cosimulation, exchange, is_2 = description.coSimulation, description.modelExchange, _is_2(description)
+    renamed = _CAPABILITIES_2 if is_2 else _CAPABILITIES_3
+    groups = ((exchange, "ModelExchange", {name: renamed.get(name, name) for name in _EXCHANGE_2 if is_2 or name in renamed}),
+              (cosimulation, "CoSimulation", renamed))  # fmt: skip
+    for interface, tag, names in groups:
+        if interface is None:
+            continue
+        attributes = {"modelIdentifier": interface.modelIdentifier}
+        attributes |= {written: "true" for held, written in names.items() if getattr(interface, held)}
+        if is_2:
+            attributes["canNotUseMemoryManagementFunctions"] = "true"  # the runtime allocates for itself, once
+        element = _element(root, tag, attributes)
+        if is_2 and sources:
+            files = SubElement(element, "SourceFiles")
+            for name in sources:
+                SubElement(files, "File", name=name)
+
+
+def _types(root: Element, description: ModelDescription) -> None:
+    """The enumerations; no other type is declared."""
+    if not description.typeDefinitions:
+        return
+    definitions = SubElement(root, "TypeDefinitions")
+    for kind in description.typeDefinitions:
+        attributes = {"name": kind.name, "description": kind.description}
+        if _is_2(description):
+            element = SubElement(_element(definitions, "SimpleType", attributes), "Enumeration")
+        else:
+            element = _element(definitions, "EnumerationType", attributes)
+        for item in kind.items:
+            _element(element, "Item", {"name": item.name, "value": item.value, "description": item.description})
 
 
 def _units(root: Element, units: Sequence[Unit]) -> None:
@@ -128,13 +150,14 @@ def _base_unit(unit: BaseUnit) -> dict[str, str | None]:
 # -- variables ----------------------------------------------------------------------------------------------------------
 
 
-def _variable_2(parent: Element, variable: ModelVariable) -> None:
+def _variable_2(parent: Element, variable: ModelVariable, exchanged: bool) -> None:
     names = ("name", "valueReference", "description", "causality", "variability", "initial")
     element = _element(parent, "ScalarVariable", {name: getattr(variable, name) for name in names})
-    _element(element, variable.type, {name: getattr(variable, name) for name in _value_attributes(variable)})
+    derivative = None if variable.derivative is None else variable.derivative.valueReference + 1  # counted from one
+    _element(element, variable.type, _values(variable, exchanged) | {"derivative": derivative})
 
 
-def _variable_3(parent: Element, variable: ModelVariable) -> None:
+def _variable_3(parent: Element, variable: ModelVariable, exchanged: bool) -> None:
     names = ["name", "valueReference", "description", "causality", "variability"]
     attributes = {name: getattr(variable, name) for name in names}
     if variable.clocks:
@@ -142,12 +165,21 @@ def _variable_3(parent: Element, variable: ModelVariable) -> None:
     if variable.type == "Clock":
         attributes["intervalVariability"] = variable.intervalVariability
     else:
-        attributes |= {name: getattr(variable, name) for name in ("initial", *_value_attributes(variable))}
+        derivative = None if variable.derivative is None else variable.derivative.valueReference
+        attributes |= {"initial": variable.initial, **_values(variable, exchanged), "derivative": derivative}
     _element(parent, variable.type, attributes)
 
 
-def _value_attributes(variable: ModelVariable) -> tuple[str, ...]:
-    return ("min", "max", "start") if variable.type == "Integer" else ("unit", "displayUnit", "min", "max", "nominal", "start")
+def _values(variable: ModelVariable, exchanged: bool) -> dict[str, object]:
+    """Attributes of the value; `exchanged`: in a model exchange FMU, where states may be set anew at events."""
+    kinds = {"Integer": ("min", "max", "start"), "Int32": ("min", "max", "start"), "Enumeration": ("start",)}
+    names = kinds.get(variable.type, ("unit", "displayUnit", "min", "max", "nominal", "start"))
+    values: dict[str, object] = {name: getattr(variable, name) for name in names}
+    if variable.declaredType is not None:
+        values["declaredType"] = variable.declaredType.name
+    if exchanged and variable.reinit:
+        values["reinit"] = "true"
+    return values
 
 
 # -- structure ----------------------------------------------------------------------------------------------------------
@@ -175,6 +207,7 @@ def _structure_3(root: Element, description: ModelDescription) -> None:
         ("Output", description.outputs),
         ("ContinuousStateDerivative", description.derivatives),
         ("InitialUnknown", description.initialUnknowns),
+        ("EventIndicator", description.eventIndicators),
     )
     for group, unknowns in groups:
         for unknown in unknowns:
@@ -193,13 +226,13 @@ def _unknown(parent: Element, tag: str, key: dict[str, int], unknown: Unknown, k
 # -- elements -----------------------------------------------------------------------------------------------------------
 
 
-def _element(parent: Element, tag: str, attributes: dict[str, object] | dict[str, str | None]) -> Element:
+def _element(parent: Element, tag: str, attributes: Mapping[str, object]) -> Element:
     element = SubElement(parent, tag)
     _set(element, attributes)
     return element
 
 
-def _set(element: Element, attributes: dict[str, object] | dict[str, str | None]) -> None:
+def _set(element: Element, attributes: Mapping[str, object]) -> None:
     for name, value in attributes.items():
         if value is not None:
             element.set(name, str(value))

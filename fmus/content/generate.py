@@ -16,7 +16,9 @@ import numpy as np
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmu_observer.description import VariableTable, exposed_inputs
+from fmus.content.casadi_source import private_source
 from plant_models.hybrid import HybridSystem, TracedSystem, scalar_names, width
+from plant_models.hybrid.kernel import check_payloads
 
 
 class GenerationError(ValueError):
@@ -31,15 +33,22 @@ class Equations:
         step: ``(t, h, x, u, p) -> x``, or None where nothing flows.
         output: ``(t, x, u, p) -> y``, or None without outputs.
         jumps: by event name, ``(t, x, u, p) -> x``.
+        derivative: ``(t, x, u, p, s) -> derivatives``, or None where nothing flows.
+        friction_balance: ``(t, x, u, p) -> flows, frictions``, or None without dry friction.
+        tangent: ``(t, x, u, p, s, dt, dx, du, dp) -> dy, d derivative``, or None where both are empty.
     """
 
     step: ca.Function | None
     output: ca.Function | None
     jumps: dict[str, ca.Function]
+    derivative: ca.Function | None
+    friction_balance: ca.Function | None
+    tangent: ca.Function | None
 
     def functions(self) -> list[ca.Function]:
         """All of them, in a fixed order."""
-        return [f for f in (self.step, self.output, *self.jumps.values()) if f is not None]
+        single = (self.step, self.output, self.derivative, self.friction_balance, self.tangent)
+        return [f for f in (*single, *self.jumps.values()) if f is not None]
 
     def digest(self) -> str:
         """A digest that changes with any of the equations, much cheaper than generating their C."""
@@ -52,18 +61,24 @@ def trace_equations(system: HybridSystem) -> Equations:
     Raises:
         GenerationError: the system declares that it cannot be traced.
         TracingError: one of its functions cannot be traced, or returns the wrong number of values.
+        ValueError: it reads the payload of an event outside that event.
     """
     if not system.traceable:
         raise GenerationError(
             f"{system.name}: it uses Python that cannot be traced (traceable = False), so no C can be generated from it. "
-            "Step it as a block in Python instead."
+            "Step it as a block in Python, or export it with Python inside: fmus build ... --hosted."
         )
     traced = TracedSystem(system)
-    prefix = system.name
+    jumps = {f"jump_{event.name}": traced.jump(event.name) for event in system.events}
+    check_payloads(system, {"step": traced.step} | jumps if system.continuous_count else jumps)
+    prefix, flows, outputs = system.name, bool(system.continuous_count), bool(width(system.outputs))
     return Equations(
-        step=_dense(traced.step, f"{prefix}_step") if system.continuous_count else None,
-        output=_dense(traced.output, f"{prefix}_output") if width(system.outputs) else None,
-        jumps={event.name: _dense(traced.jump(event.name), f"{prefix}_jump_{event.name}") for event in system.events},
+        step=_dense(traced.step, f"{prefix}_step") if flows else None,
+        output=_dense(traced.output, f"{prefix}_output") if outputs else None,
+        jumps={event.name: _dense(jumps[f"jump_{event.name}"], f"{prefix}_jump_{event.name}") for event in system.events},
+        derivative=_dense(traced.derivative, f"{prefix}_derivative") if flows else None,
+        friction_balance=_dense(traced.friction_balance, f"{prefix}_friction") if system.frictions else None,
+        tangent=_dense(traced.tangent, f"{prefix}_tangent") if flows or outputs else None,
     )
 
 
@@ -85,7 +100,7 @@ def generate_model(system: HybridSystem, equations: Equations, description: Mode
         _start_arrays(system, preset),
         _event_tables(system, equations),
         _variable_table(system, description),
-        _model_table(system, equations, str(description.instantiationToken)),
+        _model_table(system, equations, description),
     ]
     return "\n".join(parts)
 
@@ -103,7 +118,7 @@ def _equations_source(name: str, equations: Equations) -> str:
     generator = ca.CodeGenerator(f"{name}.c", options)
     for function in equations.functions():
         generator.add(function)
-    source: str = generator.dump()
+    source = private_source(generator.dump(), {function.name() for function in equations.functions()})
     return source.strip() + "\n"
 
 
@@ -132,44 +147,64 @@ def _event_tables(system: HybridSystem, equations: Equations) -> str:
         count = width(event.payload)
         triggered.append(f"{_text(event.name)}, {equations.jumps[event.name].name()}, {payload}, {count}")
         payload += count
-    return _table("PeriodicEvent", "periodic", periodic) + _table("TriggeredEvent", "triggered", triggered)
+    communications = [equations.jumps[event.name].name() for event in system.communication_events]
+    tables = (
+        ("PeriodicEvent", "periodic", periodic),
+        ("TriggeredEvent", "triggered", triggered),
+        ("ModelFunction", "communications", communications),
+        ("Resource", "resources", _resource_rows(system)),
+        ("int", "frictions", [str(i) for i in system.friction_indices()]),
+    )
+    return "".join(_table(*table) for table in tables)
+
+
+def _resource_rows(system: HybridSystem) -> list[str]:
+    first = {s.name: width(system.parameter_signals[:i]) for i, s in enumerate(system.parameter_signals)}
+    sizes = {s.name: s.width for s in system.parameter_signals}
+    return [f"{_text(r.file)}, {_text(r.column)}, {first[r.parameter]}, {sizes[r.parameter]}" for r in system.resources]
 
 
 def _variable_table(system: HybridSystem, description: ModelDescription) -> str:
     variables: Sequence[ModelVariable] = description.modelVariables
     if [v.valueReference for v in variables] != list(range(len(variables))):
         raise GenerationError(f"{system.name}: value references must count up from 0 in the order of the variables.")
-    rows = [f"{_text(v.name)}, {_role(system, v)}" for v in variables]
+    table = VariableTable.of(system)
+    rows = [f"{_text(v.name)}, {_role(system, table, v)}" for v in variables]
     return _table("Variable", "variables", rows)
 
 
-def _role(system: HybridSystem, variable: ModelVariable) -> str:
+def _role(system: HybridSystem, table: VariableTable, variable: ModelVariable) -> str:
     """Role and index of a variable, as in `runtime/model.h`."""
-    table, reference = VariableTable.of(system), int(variable.valueReference)
-    if reference == 0:
-        return "ROLE_TIME, 0"
-    if reference >= table.events:
-        announcer = "ROLE_COUNT" if variable.type == "Integer" else "ROLE_CLOCK"
+    reference = int(variable.valueReference)
+    if table.events <= reference < table.protocol:
         number, is_stamp = divmod(reference - table.events, 2)
-        return f"{'ROLE_STAMP' if is_stamp else announcer}, {number}"
-    if reference >= table.parameters:
-        return f"{'ROLE_TUNABLE' if variable.variability == 'tunable' else 'ROLE_FIXED'}, {reference - table.parameters}"
-    if reference >= table.states:
-        return f"ROLE_STATE, {reference - table.states}"
-    if reference >= table.outputs:
-        return f"ROLE_OUTPUT, {reference - table.outputs}"
-    position = reference - table.inputs
-    return f"{'ROLE_INPUT' if position < width(system.inputs) else 'ROLE_PAYLOAD'}, {position}"
+        return f"{'ROLE_STAMP' if is_stamp else 'ROLE_CLOCK' if variable.type == 'Clock' else 'ROLE_COUNT'}, {number}"
+    if table.protocol <= reference < table.derivatives:
+        return f"{'ROLE_POLICY' if reference == table.protocol else 'ROLE_HORIZON'}, 0"
+    payload = table.inputs + width(system.inputs)
+    blocks = (
+        (table.indicators, "ROLE_INDICATOR"),
+        (table.derivatives, "ROLE_DERIVATIVE"),
+        (table.parameters, "ROLE_TUNABLE" if variable.variability == "tunable" else "ROLE_FIXED"),
+        (table.states, "ROLE_STATE"),
+        (table.outputs, "ROLE_OUTPUT" if variable.type in ("Real", "Float64") else "ROLE_INTEGER_OUTPUT"),
+        (table.inputs, "ROLE_INPUT" if reference < payload else "ROLE_PAYLOAD"),
+        (0, "ROLE_TIME"),
+    )
+    first, role = next(block for block in blocks if reference >= block[0])
+    return f"{role}, {reference - first}"
 
 
-def _model_table(system: HybridSystem, equations: Equations, token: str) -> str:
+def _model_table(system: HybridSystem, equations: Equations, description: ModelDescription) -> str:
     parameters = scalar_names(system.parameter_signals)
     functions = equations.functions()
     fields = {
         "name": _text(system.name),
-        "token": _text(token),
+        "token": _text(str(description.instantiationToken)),
         "states": system.state_count,
+        "continuous": system.continuous_count,
         "inputs": width(system.input_signals),
+        "own_inputs": width(system.inputs),
         "noise_offset": width(exposed_inputs(system)),
         "outputs": width(system.outputs),
         "parameters": len(parameters),
@@ -180,12 +215,22 @@ def _model_table(system: HybridSystem, equations: Equations, token: str) -> str:
         "start_x": "start_x",
         "start_u": "start_u",
         "start_p": "start_p",
-        "step": "NULL" if equations.step is None else equations.step.name(),
-        "output": "NULL" if equations.output is None else equations.output.name(),
+        "step": _name(equations.step),
+        "output": _name(equations.output),
         "periodic_count": len(system.periodic_events),
         "periodic": "periodic",
         "triggered_count": len(system.triggered_events),
         "triggered": "triggered",
+        **_protocol(system, description),
+        "communication_count": len(system.communication_events),
+        "communications": "communications",
+        "resource_count": len(system.resources),
+        "resources": "resources",
+        "friction_count": len(system.frictions),
+        "frictions": "frictions",
+        "friction_balance": _name(equations.friction_balance),
+        "derivative": _name(equations.derivative),
+        "tangent": _name(equations.tangent),
         "variable_count": VariableTable.of(system).end,
         "variables": "variables",
     }
@@ -193,9 +238,24 @@ def _model_table(system: HybridSystem, equations: Equations, token: str) -> str:
     return f"#include <stddef.h>\n\nPRIVATE const Model model = {{\n{rows}}};\n"
 
 
+def _protocol(system: HybridSystem, description: ModelDescription) -> dict[str, str]:
+    """How events are told, from the description: the start values of its parameters are those of the library."""
+    if not system.triggered_events:
+        return {"counts_events": "false", "late_policy": "LATE_REJECT", "replay_horizon": "0.0"}
+    table, variables = VariableTable.of(system), description.modelVariables
+    policy, horizon = variables[table.protocol : table.protocol + 2]
+    counts = "false" if variables[table.events].type == "Clock" else "true"
+    return {"counts_events": counts, "late_policy": f"(LatePolicy){policy.start}", "replay_horizon": str(horizon.start)}
+
+
+def _name(function: ca.Function | None) -> str:
+    return "NULL" if function is None else str(function.name())
+
+
 def _table(kind: str, name: str, rows: Iterable[str]) -> str:
     """A constant array; C knows no empty one, so it gets one row of zeros that nobody reads."""
-    lines = "".join(f"    {{{row}}},\n" for row in rows) or "    {0},\n"
+    opened, closed = ("", "") if kind in ("int", "ModelFunction") else ("{", "}")
+    lines = "".join(f"    {opened}{row}{closed},\n" for row in rows) or f"    {opened}0{closed},\n"
     return f"static const {kind} {name}[] = {{\n{lines}}};\n\n"
 
 

@@ -1,0 +1,58 @@
+"""Event protocol: how a model with triggered events is told of them, and what it does with one that is told too late.
+
+The same words for the Python block and the exported FMU. Standard library only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import Literal
+
+Announcement = Literal["clocks", "counts"]
+LatePolicy = Literal["replay", "reject", "late"]
+LATE_POLICIES: tuple[LatePolicy, ...] = ("replay", "reject", "late")
+"""In the order of their numbers in an FMU, where they count from one."""
+
+DEFAULT_REPLAY_HORIZON = 10.0
+
+
+@dataclass(frozen=True)
+class EventProtocol:
+    """How events are announced, and what becomes of late ones.
+
+    Args:
+        announcement: by ``clocks`` (FMI 3 only: a triggered input clock, set in event mode) or by ``counts`` (an input
+            ``<event>_count`` that is raised by one before the step; for masters that know no event mode); None for what is usual
+            in the FMI version: clocks in FMI 3, counts in FMI 2.
+        late_policy: what to do with an event stamped before the current time: ``replay``, ``reject`` or ``late``. In an FMU it
+            is the start value of the parameter ``late_policy``.
+        replay_horizon: how far back ``replay`` can go [s]; the start value of the parameter ``replay_horizon``.
+
+    Raises:
+        ValueError: an unknown announcement or policy, or a horizon that is not a finite time.
+    """
+
+    announcement: Announcement | None = None
+    late_policy: LatePolicy = "replay"
+    replay_horizon: float = DEFAULT_REPLAY_HORIZON
+
+    def __post_init__(self) -> None:
+        if self.announcement not in (None, "clocks", "counts"):
+            raise ValueError(f"announcement {self.announcement!r} is unknown; use 'clocks' or 'counts'.")
+        if self.late_policy not in LATE_POLICIES:
+            raise ValueError(f"late_policy {self.late_policy!r} is unknown; use one of {', '.join(LATE_POLICIES)}.")
+        if not (isfinite(self.replay_horizon) and self.replay_horizon >= 0.0):
+            raise ValueError(f"replay_horizon = {self.replay_horizon!r} s; expected zero or more seconds.")
+
+    def counts(self, fmi_version: int) -> bool:
+        """Whether events are announced by counts in this FMI version.
+
+        Raises:
+            ValueError: clocks are asked for in FMI 2, which has none.
+        """
+        if self.announcement is None:
+            return fmi_version == 2
+        if self.announcement == "clocks" and fmi_version == 2:
+            raise ValueError("FMI 2 has no clocks; events are announced by counts there.")
+        return self.announcement == "counts"

@@ -1,0 +1,30 @@
+"""What an FMU really does, whatever it says about itself: ``fmus check``, and the probe of the master in `probe.py`.
+
+Importing it costs nothing; what does the work is loaded when it is first used. It may use `plant_models`, `fmu_observer` and
+the rest of `fmus`, never `cosim`.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from fmus.check.findings import Finding, Verdict
+    from fmus.check.run import CheckReport, check_fmu
+
+__all__ = ["CheckReport", "Finding", "Verdict", "check_fmu"]
+
+_HOMES = {
+    "CheckReport": "fmus.check.run",
+    "Finding": "fmus.check.findings",
+    "Verdict": "fmus.check.findings",
+    "check_fmu": "fmus.check.run",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(_HOMES[name]), name)
+    return value

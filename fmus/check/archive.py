@@ -1,0 +1,147 @@
+"""Archives: an FMU file is looked at before anything of it is unpacked, and refused where it is broken, dangerous or foreign."""
+
+from __future__ import annotations
+
+import posixpath
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from tempfile import TemporaryDirectory
+
+import fmpy
+from fmpy.model_description import ModelDescription
+
+from fmus.check.description import FILE, read_description
+
+MAX_UNPACKED_BYTES = 2 * 1024**3
+MAX_FILES = 100_000
+MAX_DESCRIPTION_BYTES = 256 * 1024**2
+ENCRYPTED = 1
+INTERFACES = {"coSimulation": "co-simulation", "modelExchange": "model exchange", "scheduledExecution": "scheduled execution"}
+
+
+class NotAnFmuError(ValueError):
+    """A file is not an FMU, or one that cannot be run here; the message says what was expected."""
+
+
+@dataclass(frozen=True)
+class Archive:
+    """An FMU file that may be unpacked.
+
+    Args:
+        path: the file.
+        description: its model description.
+        platforms: platforms it has a library for, as the folders in ``binaries/`` are named.
+    """
+
+    path: Path
+    description: ModelDescription
+    platforms: tuple[str, ...]
+
+    @property
+    def interfaces(self) -> list[str]:
+        """Interface types it offers, as fmpy calls them."""
+        return [name for name in INTERFACES if getattr(self.description, name) is not None]
+
+    @property
+    def here(self) -> list[str]:
+        """Those of its platforms that are this one."""
+        return [name for name in self.platforms if name == platform_folder(self.description)]
+
+    def demand_this_platform(self) -> None:
+        """Refuse an FMU without a library for this platform.
+
+        Raises:
+            NotAnFmuError: there is none; the message says what there is and what was needed.
+        """
+        if not self.here:
+            has = ", ".join(self.platforms) or "none"
+            needed = f"binaries/{platform_folder(self.description)}"
+            raise NotAnFmuError(f"{self.path} has no library for this platform ({needed} is needed); it offers: {has}.")
+
+    @contextmanager
+    def unpacked(self) -> Iterator[Path]:
+        """The folder with its content, removed at the end.
+
+        Raises:
+            NotAnFmuError: the archive is corrupt.
+        """
+        with TemporaryDirectory(prefix="fmus-check-", ignore_cleanup_errors=True) as name:
+            try:
+                with zipfile.ZipFile(self.path) as archive:
+                    archive.extractall(name)
+            except (zipfile.BadZipFile, OSError, EOFError, ValueError, RuntimeError, NotImplementedError) as error:
+                raise NotAnFmuError(f"{self.path} is a corrupt archive: {error}") from error
+            yield Path(name)
+
+
+def platform_folder(description: ModelDescription) -> str:
+    """Name of this platform's folder in ``binaries/``."""
+    return str(fmpy.platform if str(description.fmiVersion).startswith("2") else fmpy.platform_tuple)
+
+
+def open_archive(path: Path, max_bytes: int = MAX_UNPACKED_BYTES) -> Archive:
+    """Look at an FMU file; nothing is unpacked.
+
+    Args:
+        path: the file.
+        max_bytes: refuse what declares to unpack to more.
+
+    Raises:
+        NotAnFmuError: it is missing, broken, dangerous, no FMU, or of an FMI version that is not known here.
+    """
+    if not path.is_file():
+        what = "is a folder, expected an .fmu file" if path.is_dir() else "does not exist"
+        raise NotAnFmuError(f"FMU {path} {what}.")
+    try:
+        with zipfile.ZipFile(path) as archive:
+            entries = archive.infolist()
+    except (zipfile.BadZipFile, OSError, EOFError, ValueError, NotImplementedError) as error:
+        raise NotAnFmuError(f"{path} is not a readable FMU: not a zip archive, or a broken one ({error}).") from error
+    _demand_harmless(path, entries, max_bytes)
+    description = _description(path, [entry.filename for entry in entries])
+    return Archive(path, description, _platforms(description, entries))
+
+
+def _demand_harmless(path: Path, entries: list[zipfile.ZipInfo], max_bytes: int) -> None:
+    size = sum(entry.file_size for entry in entries)
+    if size > max_bytes or len(entries) > MAX_FILES:
+        limit = f"{max_bytes / 1e9:.1f} GB and {MAX_FILES} files"
+        raise NotAnFmuError(f"{path} would unpack to {size / 1e9:.1f} GB; refused: {len(entries)} files, the limit is {limit}.")
+    for entry in entries:
+        name = entry.orig_filename
+        if name.startswith("/") or ":" in name or "\\" in name or ".." in PurePosixPath(name).parts or "\0" in name:
+            raise NotAnFmuError(f"{path} holds a file named {name!r}, which leads outside of the archive; refused.")
+        if entry.flag_bits & ENCRYPTED:
+            raise NotAnFmuError(f"{path} holds the encrypted file {name!r}; an FMU must not be encrypted.")
+        if name == FILE and entry.file_size > MAX_DESCRIPTION_BYTES:
+            raise NotAnFmuError(f"{path} has a modelDescription.xml of {entry.file_size / 1e9:.1f} GB; refused.")
+
+
+def _description(path: Path, names: list[str]) -> ModelDescription:
+    if FILE not in names:
+        raise NotAnFmuError(f"{path} is not a readable FMU: it has no modelDescription.xml.")
+    try:
+        description = read_description(path)
+    except Exception as error:  # whatever a broken file makes the parser throw
+        raise NotAnFmuError(f"{path} is not a readable FMU: modelDescription.xml cannot be parsed ({error}).") from error
+    version = str(description.fmiVersion)
+    if not version.startswith(("2.", "3.")):
+        raise NotAnFmuError(f"{path} is FMI {version}; FMI 2.0 and 3.0 are supported.")
+    if all(getattr(description, name) is None for name in INTERFACES):
+        raise NotAnFmuError(f"{path} offers no interface: neither {', '.join(INTERFACES.values())}.")
+    return description
+
+
+def _platforms(description: ModelDescription, entries: list[zipfile.ZipInfo]) -> tuple[str, ...]:
+    """Folders in ``binaries/`` that hold a library with a model identifier's name."""
+    declared = [getattr(description, name) for name in INTERFACES]
+    identifiers = {interface.modelIdentifier for interface in declared if interface is not None}
+    found = set()
+    for entry in entries:
+        parts = PurePosixPath(entry.filename).parts
+        if len(parts) == 3 and parts[0] == "binaries" and posixpath.splitext(parts[2])[0] in identifiers:
+            found.add(parts[1])
+    return tuple(sorted(found))

@@ -1,0 +1,153 @@
+"""Behaviour: steps of any length, saved states, resets. Each check returns what is wrong in words, or nothing.
+
+The master's probe and ``fmus check`` both judge by these functions, so that they cannot disagree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fmus.check.bench import WARM_UP_STEPS, Bench, elsewhere
+
+STEP_TOLERANCE = 0.01
+"""A divided step may differ from a whole one by this share of the change: far above any integration error, far below a lie."""
+
+UNEVEN = 0.3137
+"""Where the whole step is divided: no simple fraction, so that it is no multiple of an internal step."""
+
+MICRO = 1e-4
+"""A step of this share of the whole one must move the outputs, and by about that share of the change."""
+
+MICRO_EXCESS = 20.0
+"""By how much more a tiny step may move an output than its share: an output may start to move faster than on average."""
+
+ENOUGH = 0.5
+"""Share of the moving outputs that must behave; a sampled one among them need not move in a tiny step."""
+
+RESOLUTION = 1e-9
+"""An output that changes by less than this share of itself over a step does not move."""
+
+DIVISIONS = ((0.5, 0.5), (UNEVEN, 1.0 - UNEVEN))
+
+
+def repeatable(bench: Bench) -> str:
+    """After a reset the same steps must give the identical outputs. From here on the bench resets where that works."""
+    pattern = (bench.h,) * (2 * WARM_UP_STEPS)
+    bench.begin()
+    first = bench.steps(pattern)
+    bench.reset_works = True
+    bench.begin()
+    problem = difference(bench, first, bench.steps(pattern))
+    bench.reset_works = not problem
+    return problem and f"after a reset {problem}"
+
+
+def divided_steps(bench: Bench, scale: float = 1.0) -> str:
+    """A whole step against the same step in two parts, even and uneven.
+
+    Args:
+        bench: the instance.
+        scale: the whole step, in communication steps of the bench.
+    """
+    h, warm_up = scale * bench.h, (bench.h,) * WARM_UP_STEPS
+    bench.begin()
+    start, whole = bench.steps((*warm_up, h))[-2:]
+    change = np.abs(whole - start)
+    moving = change > RESOLUTION * np.abs(whole)
+    for parts in DIVISIONS:
+        bench.begin()
+        divided = bench.steps((*warm_up, *(h * part for part in parts)))[-1]
+        same = np.abs(divided - whole) <= STEP_TOLERANCE * change + RESOLUTION * np.abs(whole)
+        if not _enough(same, moving):
+            shares = " and ".join(f"{part:g}" for part in parts)
+            found = worst(bench, whole, divided)
+            return f"the outputs differ: a step of {h:g} s and one in parts of {shares} of it end apart, {found}"
+    return ""
+
+
+def short_step(bench: Bench) -> str:
+    """The first change after a short step: a tiny step must move the outputs, by about its share of a whole one."""
+    h, warm_up = bench.h, (bench.h,) * WARM_UP_STEPS
+    bench.begin()
+    start, whole = bench.steps((*warm_up, h))[-2:]
+    change = np.abs(whole - start)
+    moving = change > RESOLUTION * np.abs(whole)
+    bench.begin()
+    at = np.array(bench.steps((*warm_up, h * UNEVEN, h * MICRO, h * MICRO))[-3:])
+    moved = np.abs(np.diff(at, axis=0))
+    small = np.all((moved > 0.0) & (moved <= MICRO_EXCESS * MICRO * change), axis=0)
+    if not moving.any() or _enough(small, moving):
+        return ""
+    still = bool(np.all(moved[:, moving & ~small] == 0.0))
+    what = "nothing moves in it" if still else "it moves the outputs by more than its share"
+    return f"the outputs differ: after a step of {h * UNEVEN:g} s a tiny one of {h * MICRO:g} s is not done, {what}"
+
+
+def honest_step(bench: Bench) -> str:
+    """Steps of any length do what they say: divided ones and tiny ones, at the communication step of the bench."""
+    return divided_steps(bench) or short_step(bench)
+
+
+def exact_state(bench: Bench) -> str:
+    """Save, go on, go elsewhere under other inputs, restore twice: the same steps must give the same outputs.
+
+    Several steps are compared, because a part of the state that was not restored may take time to show, and one of them is
+    short where the FMU takes such steps.
+    """
+    path = continuation(bench)
+    bench.begin()
+    bench.steps((bench.h,) * WARM_UP_STEPS)
+    component = bench.component
+    state, saved_at = component.save(), bench.now
+    try:
+        first = bench.steps(path)
+        for _ in range(2):
+            go_elsewhere(bench)
+            component.restore(state)
+            problem = difference(bench, first, again(bench, saved_at, path))
+            if problem:
+                return f"after a restored state {problem}"
+        return ""
+    finally:
+        component.release(state)
+
+
+def continuation(bench: Bench) -> tuple[float, ...]:
+    """The steps [s] by which continuations are compared."""
+    h = bench.h
+    return (h, UNEVEN * h, h, h) if bench.component.can_vary_step else (h, h, h)
+
+
+def go_elsewhere(bench: Bench) -> None:
+    """Some steps under other inputs, so that a restored state has something to undo."""
+    bench.set_inputs(elsewhere(bench.amplitude))
+    bench.steps((bench.h,) * WARM_UP_STEPS)
+
+
+def again(bench: Bench, saved_at: float, path: Sequence[float]) -> list[np.ndarray]:
+    """Steps from a restored state of time `saved_at` [s] under the inputs of before."""
+    bench.now = saved_at
+    bench.set_inputs(bench.amplitude)
+    return bench.steps(path)
+
+
+def difference(bench: Bench, first: Sequence[np.ndarray], second: Sequence[np.ndarray]) -> str:
+    """Where two runs that must be identical part, in words; nothing where they do not."""
+    for number, (a, b) in enumerate(zip(first, second, strict=True), start=1):
+        if not np.array_equal(a, b, equal_nan=True):
+            return f"the outputs differ: in step {number} of {len(first)}, {worst(bench, a, b)}"
+    return ""
+
+
+def worst(bench: Bench, a: np.ndarray, b: np.ndarray) -> str:
+    """The output that differs most between two rows, in words."""
+    apart = np.abs(a - b) / np.maximum(np.maximum(np.abs(a), np.abs(b)), np.finfo(float).tiny)
+    place = int(np.argmax(np.where(np.isnan(apart), np.inf, apart)))
+    return f"{bench.output_names[place]} {float(a[place])!r} and {float(b[place])!r}"
+
+
+def _enough(good: np.ndarray, moving: np.ndarray) -> bool:
+    """Whether most of the moving outputs are good; of outputs that do not move, all must be."""
+    return bool(np.mean(good[moving]) >= ENOUGH) if moving.any() else bool(np.all(good))

@@ -1,0 +1,45 @@
+"""The check of directional derivatives in co-simulation: outputs along inputs, where the slave stands between two steps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fmus.check.bench import WARM_UP_STEPS
+from fmus.check.checks_life import real_names
+from fmus.check.context import Context
+from fmus.check.derivatives import compare
+from fmus.check.findings import Outcome, skipped
+from fmus.check.slave import FmuSlave
+
+
+def slave_derivatives(context: Context) -> Outcome:
+    """Directional derivatives of the outputs along the inputs between two steps."""
+    if not context.description.coSimulation.providesDirectionalDerivative:
+        return skipped("does not declare providesDirectionalDerivative")
+    bench = context.bench
+    bench.begin()
+    bench.steps((bench.h,) * WARM_UP_STEPS)
+    slave = bench.component
+    assert isinstance(slave, FmuSlave)
+    inputs, outputs = real_names(slave, "input"), real_names(slave, "output")
+    if not inputs or not outputs:
+        return skipped("has no pair of a continuous input and a continuous output")
+    values = dict(zip(inputs, slave.read(inputs).tolist(), strict=True))
+
+    def evaluate(name: str, value: float) -> np.ndarray:
+        write, buffer = slave.writer(inputs)
+        buffer[:] = [value if n == name else v for n, v in values.items()]
+        write()
+        return slave.read(outputs)
+
+    nominal = {n: nominal_of(slave.variables[n]) for n in inputs}
+    try:
+        return compare(evaluate, lambda n: slave.derivative(outputs, n), values, outputs, nominal)
+    finally:
+        evaluate(inputs[0], values[inputs[0]])
+
+
+def nominal_of(variable: object) -> float:
+    """The nominal value of a variable, 1 where it declares none."""
+    declared = getattr(variable, "nominal", None)
+    return abs(float(declared)) if declared else 1.0

@@ -1,0 +1,107 @@
+"""Checks of events in co-simulation: triggered input clocks (FMI 3), and counted events, which this package writes into FMUs.
+
+A counted event ``e`` is an integer input ``e_count`` with a real input ``e_time``, the stamp: raising the count before a step
+announces that the event happens at the stamp, inside that step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fmus.check.behaviour import RESOLUTION, STEP_TOLERANCE, UNEVEN, divided_steps, worst
+from fmus.check.bench import WARM_UP_STEPS, Bench
+from fmus.check.checks_life import listed, not_finite
+from fmus.check.context import Context
+from fmus.check.findings import Outcome, failed, passed, skipped, warned
+from fmus.check.instance import REAL_TYPES, FmuInstance
+from fmus.check.slave import FmuSlave
+
+NONE = "declares neither a triggered input clock nor a counted event"
+
+
+def events(context: Context) -> Outcome:
+    """Every declared event happens once, and the run goes on."""
+    slave = context.bench.component
+    assert isinstance(slave, FmuSlave)
+    counted = counted_events(slave)
+    if slave.clocks:
+        return _clocks(context, slave.clocks) if slave.has_event_mode else _no_event_mode(slave.clocks)
+    if counted:
+        return _counted(context, counted)
+    return skipped(NONE)
+
+
+def counted_events(instance: FmuInstance) -> list[str]:
+    """Names of the counted events."""
+    inputs = set(instance.names("input"))
+    names = [name.removesuffix("_count") for name in instance.names("input") if name.endswith("_count")]
+    variables = instance.variables
+    return [
+        name
+        for name in names
+        if f"{name}_time" in inputs
+        and variables[f"{name}_count"].type not in REAL_TYPES
+        and variables[f"{name}_time"].type in REAL_TYPES
+    ]
+
+
+def _no_event_mode(clocks: Sequence[str]) -> Outcome:
+    return failed(f"declares the triggered input clocks {listed(clocks)} but no event mode")
+
+
+def _clocks(context: Context, clocks: Sequence[str]) -> Outcome:
+    """Each clock ticks once, with the values its inputs have."""
+    bench = context.fresh_bench()
+    try:
+        bench.begin()
+        for clock in clocks:
+            bench.steps((bench.h,))
+            assert isinstance(bench.component, FmuSlave)
+            bench.component.activate(clock)
+        rows = bench.steps((bench.h,) * WARM_UP_STEPS)
+    finally:
+        bench.put_away()
+    bad = not_finite(bench.output_names, np.sum(rows, axis=0))
+    if bad:
+        return warned(f"not finite after a tick with the start values of its inputs: {listed(bad)}")
+    return passed(f"its input clocks tick in event mode and the run goes on: {listed(clocks)}")
+
+
+def _counted(context: Context, names: Sequence[str]) -> Outcome:
+    """An event inside a step against the same one where two shorter steps meet."""
+    bench = context.bench
+    divisible = bench.component.can_vary_step and not divided_steps(bench)
+    for name in names:
+        start = _warmed_up(bench)
+        whole = _passing(bench, name, (), (bench.h,))
+        bad = not_finite(bench.output_names, whole)
+        if bad:
+            return warned(f"not finite after event {name} with the start values of its payload: {listed(bad)}")
+        slack = STEP_TOLERANCE * np.abs(whole - start) + RESOLUTION * np.abs(whole)
+        until, rest = UNEVEN * bench.h, (1.0 - UNEVEN) * bench.h
+        for before, after in (((), (until, rest)), ((until,), (rest,))) if divisible else ():
+            _warmed_up(bench)
+            split = _passing(bench, name, before, after)
+            if np.any(np.abs(whole - split) > slack):
+                return failed(f"event {name} inside a step does not happen at its stamp: {worst(bench, whole, split)}")
+    exact = "happen at their stamps inside a step" if divisible else "are taken"
+    return passed(f"its counted events {exact}: {listed(names)}")
+
+
+def _warmed_up(bench: Bench) -> np.ndarray:
+    bench.begin()
+    return bench.steps((bench.h,) * WARM_UP_STEPS)[-1]
+
+
+def _passing(bench: Bench, name: str, before: Sequence[float], after: Sequence[float]) -> np.ndarray:
+    """Outputs after steps of lengths [s], the event announced between `before` and `after`, always with the same stamp."""
+    stamp = bench.now + UNEVEN * bench.h
+    bench.steps(before)
+    slave = bench.component
+    assert isinstance(slave, FmuSlave)
+    write, buffer = slave.writer([f"{name}_time", f"{name}_count"])
+    buffer[:] = stamp, slave.read([f"{name}_count"])[0] + 1.0
+    write()
+    return bench.steps(after)[-1]

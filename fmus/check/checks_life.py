@@ -1,0 +1,180 @@
+"""Checks of an instance's life in co-simulation: symbols, start, values, steps, resets, logging, speed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from statistics import median
+from time import perf_counter
+
+import numpy as np
+from fmpy.model_description import ModelVariable
+
+from fmus.check.behaviour import difference, repeatable
+from fmus.check.bench import WARM_UP_STEPS
+from fmus.check.context import Context
+from fmus.check.findings import Outcome, failed, passed, skipped, warned
+from fmus.check.instance import REAL_TYPES, FmuInstance, SlaveError
+from fmus.check.library import functions_of_capabilities
+
+STEPS = 50
+SHARE_OF_BUDGET = 0.4
+TIMED_STEPS = 200
+NAMES_SHOWN = 4
+
+
+def exported_symbols(instance: FmuInstance) -> Outcome:
+    """The functions of the standard that the library exports, against what the FMU declares."""
+    try:
+        missing = {name.lower(): name for name in instance.missing_functions}
+    finally:
+        instance.free()
+    if not missing:
+        return passed("the library exports every function of the interface")
+    needed: dict[str, str] = {}
+    for capability, function in functions_of_capabilities(instance.description, instance.interface):
+        needed.setdefault(missing.pop(function, ""), capability)
+    needed.pop("", None)
+    if needed:
+        lies = "; ".join(f"declares {capability} but does not export {name}" for name, capability in needed.items())
+        return failed(lies)
+    return warned(f"does not export {listed(sorted(missing.values()))}; some masters refuse such a library")
+
+
+def slave_symbols(context: Context) -> Outcome:
+    """`exported_symbols` for co-simulation."""
+    return exported_symbols(context.slave())
+
+
+def initialise(context: Context) -> Outcome:
+    """Instantiate, initialise, terminate, free."""
+    bench = context.quiet_bench()
+    try:
+        bench.begin(excited=False)
+    finally:
+        bench.put_away()
+    return passed("instantiates, initialises, terminates and is freed")
+
+
+def values_at_start(context: Context) -> Outcome:
+    """NaN or infinite outputs and local variables after initialisation, under the start values of the inputs."""
+    bench = context.quiet_bench()
+    try:
+        bench.begin(excited=False)
+        slave = bench.component
+        assert isinstance(slave, FmuInstance)
+        outputs, locals_ = slave.names("output"), slave.names("local")
+        bad_outputs = not_finite(outputs, slave.read(outputs))
+        bad_locals = not_finite(locals_, slave.read(locals_))
+    finally:
+        bench.put_away()
+    if bad_outputs:
+        return failed(f"not finite after initialisation: {listed(bad_outputs)}")
+    if bad_locals:
+        return warned(f"not finite after initialisation: the local variables {listed(bad_locals)}")
+    return passed(f"{len(outputs)} outputs and {len(locals_)} local variables are finite")
+
+
+def getters(context: Context) -> Outcome:
+    """Every variable can be read by the getter of its type."""
+    bench = context.quiet_bench()
+    try:
+        bench.begin(excited=False)
+        slave = bench.component
+        assert isinstance(slave, FmuInstance)
+        readable = [v for v in slave.variables.values() if v.type != "Clock" and not v.clocks]
+        problems = list(filter(None, (_unreadable(slave, variable) for variable in readable)))
+    finally:
+        bench.put_away()
+    left_out = len(slave.variables) - len(readable)
+    note = f"; {left_out} clocks and clocked variables not tried" if left_out else ""
+    if problems:
+        return failed(f"{len(problems)} of {len(readable)} variables cannot be read: {problems[0]}{note}")
+    return passed(f"{len(readable)} variables are read{note}")
+
+
+def _unreadable(slave: FmuInstance, variable: ModelVariable) -> str:
+    try:
+        slave.get(variable)
+    except SlaveError as error:
+        return str(error)
+    return ""
+
+
+def stepping(context: Context) -> Outcome:
+    """A run of steps without an error, all outputs finite."""
+    bench = context.bench
+    bench.begin()
+    rows: list[np.ndarray] = []
+    since = perf_counter()
+    while len(rows) < STEPS and perf_counter() - since < SHARE_OF_BUDGET * context.budget:
+        rows += bench.steps((bench.h,))
+    bad = not_finite(bench.output_names, np.sum(rows, axis=0))
+    if bad:
+        return failed(f"not finite while stepping: {listed(bad)}")
+    if not bench.output_names:
+        return warned("has no scalar numeric output; what follows cannot see much")
+    if not bench.excited:
+        return warned(f"{len(rows)} steps of {bench.h:g} s; no input made the outputs move, what follows is weak")
+    return passed(f"{len(rows)} steps of {bench.h:g} s, inputs at {bench.amplitude:g}")
+
+
+def reset(context: Context) -> Outcome:
+    """After a reset the same steps give the identical outputs."""
+    return by(repeatable(context.bench), "the same run after a reset is identical")
+
+
+def logging(context: Context) -> Outcome:
+    """The outputs must not depend on whether the FMU is asked to log."""
+    if context.only_once:
+        return skipped("declares canBeInstantiatedOnlyOncePerProcess")
+    bench = context.bench
+    bench.begin()
+    quiet = bench.steps((bench.h,) * WARM_UP_STEPS)
+    talking = bench.twin(lambda: context.slave(logging=True))
+    try:
+        talking.begin()
+        loud = talking.steps((bench.h,) * WARM_UP_STEPS)
+    finally:
+        talking.put_away()
+    problem = difference(bench, quiet, loud)
+    return by(problem and f"with logging on {problem}", "logging changes no output")
+
+
+def time_per_step(context: Context) -> Outcome:
+    """Median time of one step."""
+    bench = context.bench
+    bench.begin()
+    seconds: list[float] = []
+    advance, since = bench.component.advance, perf_counter()
+    while len(seconds) < TIMED_STEPS and perf_counter() - since < SHARE_OF_BUDGET * context.budget:
+        t = bench.t0 + len(seconds) * bench.h
+        begin = perf_counter()
+        advance(t, t + bench.h)
+        seconds.append(perf_counter() - begin)
+    return passed(f"median {median(seconds) * 1e6:.3g} microseconds for a step of {bench.h:g} s, the call from Python included")
+
+
+# -- helpers ------------------------------------------------------------------------------------------------------------
+
+
+def by(problem: str, good: str) -> Outcome:
+    """Failed with the problem where there is one, else passed."""
+    return failed(problem) if problem else passed(good)
+
+
+def not_finite(names: Sequence[str], values: np.ndarray) -> list[str]:
+    """The names whose values are NaN or infinite, with the values."""
+    return [f"{n} = {float(v):g}" for n, v in zip(names, values, strict=True) if not math.isfinite(v)]
+
+
+def listed(names: Sequence[str]) -> str:
+    """The first few, and how many more."""
+    more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
+    return ", ".join(names[:NAMES_SHOWN]) + more
+
+
+def real_names(instance: FmuInstance, causality: str) -> list[str]:
+    """Names of its scalar continuous real variables of one causality."""
+    found = (instance.variables[n] for n in instance.names(causality))
+    return [v.name for v in found if v.type in REAL_TYPES and v.variability in (None, "continuous")]

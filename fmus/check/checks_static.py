@@ -1,0 +1,30 @@
+"""Checks of what lies in the archive, without running anything but fmpy's validation."""
+
+from __future__ import annotations
+
+import warnings
+
+from fmpy.validation import validate_fmu
+
+from fmus.check.archive import Archive
+from fmus.check.findings import Outcome, failed, passed
+
+SHOWN = 3
+
+
+def validation(archive: Archive) -> Outcome:
+    """The XML schema and fmpy's validation of the model description."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # libraries below warn about what the FMU did
+        problems = [" ".join(str(p).split()) for p in validate_fmu(str(archive.path))]
+    if not problems:
+        return passed("the model description is valid against the schema and fmpy's rules")
+    more = f"; and {len(problems) - SHOWN} more" if len(problems) > SHOWN else ""
+    return failed(f"{len(problems)} problems: " + "; ".join(problems[:SHOWN]) + more)
+
+
+def platforms(archive: Archive) -> Outcome:
+    """The platforms there are libraries for."""
+    others = [p for p in archive.platforms if p not in archive.here]
+    foreign = f"; not checked here: {', '.join(others)}" if others else ""
+    return passed(f"a library for this platform ({', '.join(archive.here)}){foreign}")

@@ -1,0 +1,111 @@
+"""Checks of steps in co-simulation: divided ones, tiny ones, and sizes no master should ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from fmus.check.behaviour import divided_steps, short_step
+from fmus.check.checks_life import by, listed, not_finite
+from fmus.check.context import Context
+from fmus.check.findings import Outcome, failed, passed, skipped, warned
+from fmus.check.slave import FmuSlave, RawStep
+
+SCALES = (1.0, 0.37, 3.0)
+TINY = 1e-9
+HUGE = 1000.0
+NO_VARIABLE_STEP = "does not declare canHandleVariableCommunicationStepSize"
+
+
+def divided(context: Context) -> Outcome:
+    """A step of h against 2 x h/2 and an uneven split, for several h."""
+    bench = context.bench
+    if not bench.component.can_vary_step:
+        return skipped(NO_VARIABLE_STEP)
+    for scale in SCALES:
+        problem = divided_steps(bench, scale)
+        if problem:
+            return failed(problem)
+    return passed(f"whole and divided steps agree, for h = {', '.join(f'{s * bench.h:g}' for s in SCALES)} s")
+
+
+def short(context: Context) -> Outcome:
+    """The first change after a short step."""
+    if not context.bench.component.can_vary_step:
+        return skipped(NO_VARIABLE_STEP)
+    return by(short_step(context.bench), "tiny steps after a short one move the outputs by their share")
+
+
+def tiny(context: Context) -> Outcome:
+    """A step of a billionth of a second."""
+    return _odd(context, lambda _h: TINY, _done_or_refused)
+
+
+def huge(context: Context) -> Outcome:
+    """A step a thousand times the communication step."""
+    return _odd(context, lambda h: HUGE * h, _done_or_refused)
+
+
+def zero(context: Context) -> Outcome:
+    """A step of length zero, which the standard does not know."""
+    return _odd(context, lambda _h: 0.0, _still_or_refused)
+
+
+def negative(context: Context) -> Outcome:
+    """A step back in time, which the standard forbids."""
+    return _odd(context, lambda h: -h, _must_refuse)
+
+
+def wrong_time(context: Context) -> Outcome:
+    """A step from a currentCommunicationPoint where the FMU does not stand."""
+    return _odd(context, lambda h: h, _done_or_refused, lambda h: 0.5 * h)
+
+
+Judge = Callable[[str, bool, str], Outcome]
+
+
+def _odd(
+    context: Context, size: Callable[[float], float], judge: Judge, shift: Callable[[float], float] = lambda _h: 0.0
+) -> Outcome:
+    """One odd step on an instance of its own after three ordinary ones; the judge says what it thinks of it."""
+    bench = context.fresh_bench()
+    try:
+        bench.begin()
+        before = bench.steps((bench.h,) * 3)[-1]
+        slave = bench.component
+        assert isinstance(slave, FmuSlave)
+        bench.set_inputs(bench.amplitude)
+        said = slave.raw_step(bench.now + shift(bench.h), size(bench.h))
+        if said.refused:
+            return _refusal(said)
+        after = bench.outputs()
+        bad = not_finite(bench.output_names, after) if np.isfinite(before).all() else []
+        moved = not np.array_equal(before, after, equal_nan=True)
+        what = f"a step of {size(bench.h):g} s" + (f" from {shift(bench.h):g} s too late" if shift(bench.h) else "")
+        return judge(what, moved, listed(bad))
+    finally:
+        bench.put_away()
+
+
+def _refusal(said: RawStep) -> Outcome:
+    if said.status == "fatal":
+        return warned("refused with status fatal: the instance is lost")
+    return passed(f"refused with status {said.status}")
+
+
+def _done_or_refused(what: str, moved: bool, bad: str) -> Outcome:
+    if bad:
+        return failed(f"accepts {what} and is not finite after it: {bad}")
+    return passed(f"accepts {what}, " + ("the outputs move" if moved else "the outputs stay"))
+
+
+def _still_or_refused(what: str, moved: bool, bad: str) -> Outcome:
+    if bad or moved:
+        return warned(f"accepts {what}, and the outputs move" + (f": {bad}" if bad else ""))
+    return passed(f"accepts {what}, the outputs stay")
+
+
+def _must_refuse(what: str, moved: bool, bad: str) -> Outcome:
+    effect = f"not finite: {bad}" if bad else "the outputs move" if moved else "the outputs stay"
+    return warned(f"accepts {what} instead of refusing it; {effect}")

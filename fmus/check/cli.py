@@ -1,0 +1,84 @@
+"""Command line: ``fmus check FILE.fmu``.
+
+Exit codes: 0 all passed or was skipped, 1 something failed or warned, 2 the file cannot be checked or a mistake of the user.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+CLEAN, PROBLEMS = 0, 1
+TRUTH = {"true": 1.0, "false": 0.0}
+
+
+def add_parser(commands: Any) -> None:
+    """Add the subcommand to what `argparse.ArgumentParser.add_subparsers` returned."""
+    parser: argparse.ArgumentParser = commands.add_parser("check", help="how far an FMU can be trusted: validity and behaviour")
+    parser.add_argument("file", type=Path, metavar="FILE", help="an FMU, FMI 2.0 or 3.0")
+    parser.add_argument("--step", type=float, metavar="H", help="communication step in s (default: the FMU's own)")
+    parser.add_argument("--start", action="append", default=[], metavar="K=V", help="start value; may be repeated")
+    parser.add_argument("--timeout", type=float, default=30.0, metavar="S", help="time limit of each check in s (default 30)")
+    parser.add_argument("--json", metavar="FILE", help="write the report as JSON; '-' prints it in place of the table")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Check a file and print the report.
+
+    Args:
+        options: what the parser of `add_parser` understood.
+
+    Returns:
+        The exit code.
+
+    Raises:
+        ValueError, OSError: the file cannot be checked, or a mistake of the user; the program ends with 2 then.
+    """
+    report = _checked(options)
+    reporting = import_module("fmus.check.report")
+    if options.json:
+        _write_json(options.json, reporting.as_data(report))
+    if options.json != "-":
+        print(reporting.table(report))
+    return CLEAN if report.clean else PROBLEMS
+
+
+def _checked(options: argparse.Namespace) -> Any:
+    running, archives = import_module("fmus.check.run"), import_module("fmus.check.archive")
+    starts = _starts(options.start)
+    archive = archives.open_archive(options.file)
+    tqdm = import_module("tqdm").tqdm
+    with tqdm(total=running.check_count(archive), unit="check", leave=False, disable=None, file=sys.stderr) as bar:
+
+        def progress(name: str) -> None:
+            bar.set_description(name)
+            bar.update()
+
+        return running.check_fmu(options.file, step=options.step, starts=starts, timeout=options.timeout, progress=progress)
+
+
+def _starts(words: Sequence[str]) -> dict[str, float]:
+    starts = {}
+    for word in words:
+        name, equals, value = word.partition("=")
+        try:
+            if not equals or not name:
+                raise ValueError
+            starts[name] = TRUTH[value.lower()] if value.lower() in TRUTH else float(value)
+        except ValueError:
+            raise ValueError(f"--start {word!r}: write it as name=number, e.g. --start mass=80e3.") from None
+    return starts
+
+
+def _write_json(target: str, data: dict[str, Any]) -> None:
+    text = json.dumps(data, indent=2, ensure_ascii=False) + "\n"
+    if target == "-":
+        sys.stdout.write(text)
+    else:
+        Path(target).write_text(text, encoding="utf-8")

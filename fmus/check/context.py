@@ -1,0 +1,71 @@
+"""Context: all that a check function needs: the unpacked FMU, how to run it, and a bench that the checks of one process share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+
+from fmpy.model_description import ModelDescription
+
+from fmus.check.bench import Bench
+from fmus.check.model import FmuModel
+from fmus.check.slave import FmuSlave
+
+
+class Context:
+    """What is checked and how.
+
+    Args:
+        folder: where the FMU was unpacked.
+        description: its model description.
+        step: communication step [s].
+        start_time: [s].
+        starts: start values by name.
+        budget: time that one check may take [s]; checks that count on stop well before.
+    """
+
+    def __init__(
+        self, folder: Path, description: ModelDescription, step: float, start_time: float,
+        starts: Mapping[str, float], budget: float,
+    ) -> None:  # fmt: skip
+        self.folder, self.description = folder, description
+        self.step, self.start_time, self.starts, self.budget = step, start_time, dict(starts), budget
+        self._made = 0
+
+    def slave(self, *, logging: bool = False) -> FmuSlave:
+        """A fresh co-simulation instance, not yet instantiated, with a name of its own."""
+        self._made += 1
+        return FmuSlave(self.folder, self.description, f"checked_{self._made}", logging=logging)
+
+    def model(self) -> FmuModel:
+        """A fresh model exchange instance, not yet instantiated."""
+        self._made += 1
+        return FmuModel(self.folder, self.description, f"checked_{self._made}")
+
+    def quiet_bench(self) -> Bench:
+        """A bench that has not been stepped to find an excitation; the caller puts it away."""
+        return Bench(self.slave, self.starts, self.start_time, self.step)
+
+    @cached_property
+    def bench(self) -> Bench:
+        """The shared bench, excited where some input moves the outputs."""
+        bench = self.quiet_bench()
+        bench.excite()
+        return bench
+
+    def fresh_bench(self) -> Bench:
+        """A bench with an instance of its own, to be spoiled; the caller puts it away."""
+        if self.only_once:
+            self.bench.park()
+        return self.bench.twin(self.slave)
+
+    @property
+    def only_once(self) -> bool:
+        """Whether the FMU allows one instance per process only."""
+        return bool(self.description.coSimulation.canBeInstantiatedOnlyOncePerProcess)
+
+    def close(self) -> None:
+        """Free the shared bench."""
+        if "bench" in self.__dict__:
+            self.bench.put_away()

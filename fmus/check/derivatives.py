@@ -1,0 +1,53 @@
+"""Directional derivatives against finite differences, for both interface types."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from fmus.check.findings import Outcome, failed, passed
+
+RELATIVE_STEP = 1e-6
+"""Of a finite difference: near the cube root of the rounding unit, where central differences are best."""
+
+TOLERANCE = 1e-3
+"""Between a derivative and its finite difference, as a share of either: far above what differences lose, far below a mistake."""
+
+ROUNDING = 1e3 * np.finfo(float).eps
+"""What evaluation loses, as a share of the values; internal sums and functions cost some digits."""
+
+NOTHING = 1e-9
+"""A change of an unknown over the nominal range of a known that counts as none: at a flat point both sides are rounding."""
+
+
+def compare(
+    evaluate: Callable[[str, float], np.ndarray], directional: Callable[[str], np.ndarray],
+    knowns: Mapping[str, float], unknowns: Sequence[str], nominal: Mapping[str, float],
+) -> Outcome:  # fmt: skip
+    """Compare column by column.
+
+    Args:
+        evaluate: values of the unknowns with one known set to a value; the known is put back by the caller's next call.
+        directional: what the FMU says, by known.
+        knowns: their present values. unknowns: names for messages. nominal: size of each known.
+
+    A kink between the two points is no mistake: a derivative between the two one-sided differences is right.
+    """
+    pairs = 0
+    for name, value in knowns.items():
+        said = directional(name)
+        delta = RELATIVE_STEP * max(abs(value), nominal[name])
+        above, here, below = (evaluate(name, value + d) for d in (delta, 0.0, -delta))
+        right, left = (above - here) / delta, (here - below) / delta
+        low, high = np.minimum(left, right), np.maximum(left, right)
+        size = np.max(np.abs([above, here, below]), axis=0)
+        slack = TOLERANCE * np.maximum(np.abs(said), np.maximum(np.abs(low), np.abs(high))) + ROUNDING * size / delta
+        slack += NOTHING / nominal[name]
+        bad = ~((said >= low - slack) & (said <= high + slack))
+        pairs += len(said)
+        if bad.any():
+            k = int(np.argmax(bad))
+            found = 0.5 * (right[k] + left[k])
+            return failed(f"the derivative of {unknowns[k]} along {name} is said to be {said[k]:g}, differences give {found:g}")
+    return passed(f"{pairs} derivatives agree with finite differences")

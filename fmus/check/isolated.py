@@ -1,0 +1,182 @@
+"""Isolation: checks run in a child process with a time limit, so that an FMU that crashes, hangs or prints takes nothing down.
+
+A child costs about half a second to start. One that dies or stays silent costs the check it was in; another child does the rest.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory, TemporaryFile
+from typing import IO, Any
+
+from fmus.check.catalogue import CATALOGUE
+from fmus.check.findings import Finding, Verdict
+from fmus.check.job import Job
+from fmus.check.worker import unrun
+
+START_LIMIT = 60.0
+"""Time a child may take to start before its first check [s]; a loaded machine takes seconds."""
+
+GRACE = 5.0
+"""Time a child may take to end after its last finding [s]."""
+
+CONSOLE = "console output"
+SHOWN = 80
+PACKAGE_ROOT = Path(__file__).resolve().parents[2]
+
+
+@dataclass
+class _Child:
+    """What came of one child process.
+
+    Args:
+        findings: what it told. current: the check it was in when it ended, empty where it did all. end: how it ended, in words.
+    """
+
+    findings: list[Finding] = field(default_factory=list)
+    current: str = ""
+    end: str = ""
+
+
+def run_isolated(job: Job, progress: Callable[[str], None] = lambda _: None) -> list[Finding]:
+    """Run a job in child processes.
+
+    Args:
+        job: which checks of which unpacked FMU; its budget is the time limit of each check.
+        progress: is called with the name of each check that begins.
+
+    Returns:
+        A finding for each check of the job, and one about what the FMU printed.
+    """
+    found: list[Finding] = []
+    basis = {check.name for check in CATALOGUE[job.interface] if check.basis}
+    left = job.checks
+    with TemporaryFile() as console:
+        while left:
+            child = _run_child(job.only(left), console, progress)
+            found += child.findings
+            left = tuple(name for name in left if name not in {f.check for f in found})
+            if not left:
+                break
+            lost = child.current or left[0]
+            found.append(Finding(lost, Verdict.FAIL, f"{child.end} in '{lost}'"))
+            left = tuple(name for name in left if name != lost)
+            if lost in basis:
+                found += [unrun(name, lost) for name in left]
+                left = ()
+        found.append(_console(console))
+    order = {name: place for place, name in enumerate(job.checks)}
+    return sorted(found, key=lambda f: order.get(f.check, len(order)))
+
+
+def _run_child(job: Job, console: IO[bytes], progress: Callable[[str], None]) -> _Child:
+    seen = _Child()
+    with _process(console) as process:
+        lines = _reader(process)
+        assert process.stdin is not None
+        with suppress(OSError):  # a child that died at once is seen below
+            process.stdin.write((job.to_json() + "\n").encode())
+            process.stdin.close()
+        limit = START_LIMIT
+        while True:
+            try:
+                line = lines.get(timeout=limit)
+            except queue.Empty:
+                seen.end = f"no answer within {limit:g} s"
+                return seen
+            message = _parsed(line)
+            if line is None or "done" in message:
+                seen.end = _ending(process)
+                return seen
+            if "start" in message:
+                seen.current, limit = str(message["start"]), job.budget
+                progress(seen.current)
+            elif "finding" in message:
+                seen.findings.append(Finding.from_dict(message["finding"]))
+                seen.current = ""
+
+
+@contextmanager
+def _process(console: IO[bytes]) -> Iterator[subprocess.Popen[bytes]]:
+    """A child in a folder and a session of its own; it and what it started are ended here."""
+    with TemporaryDirectory(prefix="fmus-check-", ignore_cleanup_errors=True) as folder:
+        paths = [str(PACKAGE_ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
+        process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "fmus.check.worker"],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=console, cwd=folder, start_new_session=True,
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(paths), "PYTHONWARNINGS": "ignore"},
+        )  # fmt: skip
+        try:
+            yield process
+        finally:
+            _end(process)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    if process.poll() is None:
+        process.kill()
+    if hasattr(os, "killpg"):
+        with suppress(OSError):
+            os.killpg(process.pid, signal.SIGKILL)  # what the FMU itself has started
+    process.wait()
+    for pipe in (process.stdin, process.stdout):
+        if pipe is not None:
+            with suppress(OSError):
+                pipe.close()
+
+
+def _reader(process: subprocess.Popen[bytes]) -> queue.Queue[bytes | None]:
+    """Lines of the child as they come, None at the end; a thread reads them, so that waiting can have a limit."""
+    lines: queue.Queue[bytes | None] = queue.Queue()
+
+    def read() -> None:
+        assert process.stdout is not None
+        with suppress(ValueError, OSError):
+            for line in process.stdout:
+                lines.put(line)
+        lines.put(None)
+
+    threading.Thread(target=read, daemon=True).start()
+    return lines
+
+
+def _parsed(line: bytes | None) -> dict[str, Any]:
+    try:
+        message = json.loads(line or b"{}")
+    except ValueError:
+        return {}
+    return message if isinstance(message, dict) else {}
+
+
+def _ending(process: subprocess.Popen[bytes]) -> str:
+    try:
+        code = process.wait(timeout=GRACE)
+    except subprocess.TimeoutExpired:
+        return f"does not end within {GRACE:g} s"
+    if code < 0:
+        try:
+            name = signal.Signals(-code).name
+        except ValueError:
+            name = "unknown"
+        return f"crashed with signal {-code} ({name})"
+    return f"ended the process with exit code {code}"
+
+
+def _console(console: IO[bytes]) -> Finding:
+    """What the FMU printed past its logger; everything a child prints comes from the FMU or from Python dying under it."""
+    size = console.seek(0, os.SEEK_END)
+    console.seek(0)
+    first = console.readline().decode("utf-8", "replace").strip()[:SHOWN]
+    if not size:
+        return Finding(CONSOLE, Verdict.PASS, "nothing is printed past the logger")
+    return Finding(CONSOLE, Verdict.WARN, f"{size} bytes were printed past the logger, beginning with: {first!r}")

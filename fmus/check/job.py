@@ -1,0 +1,42 @@
+"""A job for the child process: which checks of which unpacked FMU, as plain data. Standard library only."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+
+
+@dataclass(frozen=True)
+class Job:
+    """What a child process is asked to do.
+
+    Args:
+        folder: where the FMU was unpacked.
+        interface: ``coSimulation`` or ``modelExchange``.
+        checks: names of the checks, in order.
+        step: communication step [s]. start_time: [s]. starts: start values by name.
+        budget: time that one check may take [s].
+    """
+
+    folder: str
+    interface: str
+    checks: tuple[str, ...]
+    step: float
+    start_time: float
+    budget: float
+    starts: Mapping[str, float] = field(default_factory=dict)
+
+    def only(self, checks: tuple[str, ...]) -> Job:
+        """The same job with other checks."""
+        return replace(self, checks=checks)
+
+    def to_json(self) -> str:
+        """As one line of text."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def from_json(cls, text: str) -> Job:
+        """The job that `to_json` wrote."""
+        data = json.loads(text)
+        return cls(**data | {"checks": tuple(data["checks"])})

@@ -1,0 +1,49 @@
+"""Report: the findings as a table of text and as plain data for JSON."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fmus.check.archive import INTERFACES
+from fmus.check.findings import Verdict
+from fmus.check.run import CheckReport
+
+LINE = 118
+
+
+def table(report: CheckReport) -> str:
+    """The report for people: what was checked, one line a finding, what to trust."""
+    width = max(len(finding.check) for finding in report.findings)
+    lines = [_heading(report), ""]
+    lines += [f"{f.check:{width}}  {f.verdict:7}  {f.detail}".rstrip() for f in report.findings]
+    lines += ["", f"What to trust ({_counts(report)}, {report.seconds:.1f} s):"]
+    return "\n".join([*lines, *(f"  {sentence}" for sentence in report.trust)])
+
+
+def as_data(report: CheckReport) -> dict[str, Any]:
+    """The report as plain data, ready for JSON."""
+    return {
+        "file": str(report.archive.path),
+        "model": report.archive.description.modelName,
+        "fmiVersion": report.archive.description.fmiVersion,
+        "generationTool": report.archive.description.generationTool,
+        "interfaces": report.archive.interfaces,
+        "platforms": list(report.archive.platforms),
+        "communicationStepSize": report.step,
+        "starts": dict(report.starts),
+        "verdict": "pass" if report.clean else "problems",
+        "findings": [finding.to_dict() for finding in report.findings],
+        "trust": list(report.trust),
+        "seconds": round(report.seconds, 3),
+    }
+
+
+def _heading(report: CheckReport) -> str:
+    description = report.archive.description
+    interfaces = ", ".join(INTERFACES[name] for name in report.archive.interfaces)
+    return f"{description.modelName}: FMI {description.fmiVersion}, {interfaces}; communication step {report.step:g} s"
+
+
+def _counts(report: CheckReport) -> str:
+    numbers = {verdict: sum(f.verdict is verdict for f in report.findings) for verdict in Verdict}
+    return ", ".join(f"{number} {verdict}" for verdict, number in numbers.items() if number)

@@ -1,0 +1,81 @@
+"""Trust: what a master can rely on, in sentences, from the findings. Knows the names of the checks and nothing of FMUs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from fmus.check.findings import Finding, Verdict
+
+
+def what_to_trust(findings: Iterable[Finding]) -> list[str]:
+    """Sentences for people who will step this FMU.
+
+    Args:
+        findings: all findings of a run.
+    """
+    by_name = {finding.check: finding for finding in findings}
+    if "stepping" not in by_name:
+        return _no_steps(by_name)
+    if by_name["stepping"].verdict in (Verdict.FAIL, Verdict.SKIPPED):
+        return ["Nothing: it could not be stepped."]
+    sentences = [
+        _variable_step(by_name), _rollback(by_name), _reset(by_name), _instances(by_name), _events(by_name), _process(by_name)
+    ]  # fmt: skip
+    return [sentence for sentence in sentences if sentence]
+
+
+def _good(findings: Mapping[str, Finding], *names: str) -> bool:
+    return all(name in findings and findings[name].verdict is Verdict.PASS for name in names)
+
+
+def _failed(findings: Mapping[str, Finding], *names: str) -> bool:
+    return any(name in findings and findings[name].verdict is Verdict.FAIL for name in names)
+
+
+def _no_steps(findings: Mapping[str, Finding]) -> list[str]:
+    if _good(findings, "model exchange: initialise", "model exchange: values at start"):
+        state = _good(findings, "model exchange: state round trip")
+        return [
+            "It has model exchange only: a solver can integrate it"
+            + (" and restore its state exactly." if state else "; do not rely on saved states.")
+        ]
+    return ["Nothing: it was not run."]
+
+
+def _variable_step(findings: Mapping[str, Finding]) -> str:
+    if _good(findings, "divided steps", "short step"):
+        return "Variable step: yes. A master may shorten a step to hit an instant."
+    reason = "it declares them and does something else" if _failed(findings, "divided steps", "short step") else "not declared"
+    return f"Variable step: no ({reason}). Keep to one communication step; an event inside it can only be interpolated."
+
+
+def _rollback(findings: Mapping[str, Finding]) -> str:
+    if _good(findings, "state round trip"):
+        return "Rollback: yes. A restored state gives the identical continuation, so steps may be redone."
+    reason = "states are not restored exactly" if _failed(findings, "state round trip") else "not declared"
+    return f"Rollback: no ({reason}). Do not redo steps."
+
+
+def _reset(findings: Mapping[str, Finding]) -> str:
+    if _good(findings, "reset and re-run"):
+        return "Reset: yes. A run after a reset is identical."
+    return "Reset: no. Make a new instance for each run."
+
+
+def _instances(findings: Mapping[str, Finding]) -> str:
+    if _good(findings, "two instances"):
+        return "Several instances in one process: yes."
+    return "Several instances in one process: no. Give each a process of its own."
+
+
+def _events(findings: Mapping[str, Finding]) -> str:
+    if _good(findings, "events"):
+        return f"Events: yes; {findings['events'].detail}."
+    if "events" in findings and findings["events"].verdict is not Verdict.SKIPPED:
+        return f"Events: no; {findings['events'].detail}."
+    return "Events: none are declared; what happens inside a step reaches it through ordinary inputs at the next one."
+
+
+def _process(findings: Mapping[str, Finding]) -> str:
+    lost = [f.check for f in findings.values() if f.detail.startswith(("crashed", "no answer", "ended the process"))]
+    return f"Run it in a process of its own: it died or hung in {', '.join(lost)}." if lost else ""

@@ -1,0 +1,7 @@
+"""``python -m fmus.cli``."""
+
+import sys
+
+from fmus.cli import main
+
+sys.exit(main())

@@ -1,0 +1,191 @@
+"""Command line: ``fmus build NAME ...``. Asks for models by name, builds them, and says what was written."""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Literal
+
+from fmu_observer.event_protocol import LATE_POLICIES, EventProtocol
+
+Version = Literal[2, 3]
+VERSIONS: dict[str, tuple[Version, ...]] = {"2": (2,), "3": (3,), "both": (2, 3)}
+EPILOG = """\
+examples:
+  fmus build takagi_sugeno_cdo --fmi 3 --platform all -o out/
+  fmus build locomotive odometer driver --fmi both -o out/
+  fmus build my_model.py:Trolley --platform host,x86_64-windows
+  fmus build my_model.py:Classifier --hosted
+"""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One FMU to build: what, for which version of FMI, and where to."""
+
+    system: Any
+    fmi_version: Version
+    target: Path
+
+
+def add_parser(commands: Any) -> None:
+    """Add the subcommand to what `argparse.ArgumentParser.add_subparsers` returned."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "build", help="export models as native FMUs", epilog=EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("names", nargs="*", metavar="NAME", help="model name, see 'fmus list', or path/to/file.py:ClassName")
+    parser.add_argument("--all", action="store_true", help="all models that 'fmus list' shows")
+    parser.add_argument(
+        "--fmi", choices=tuple(VERSIONS), default="3", help="FMI version (default 3); both: folders fmi2 and fmi3"
+    )
+    parser.add_argument("--platform", default="host", metavar="P", help="host (default), all, or names separated by commas, "
+                        "e.g. x86_64-linux,win64; named ones need the extra 'cross'")  # fmt: skip
+    parser.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="folder or .fmu file (default: here)")
+    parser.add_argument("--preset", metavar="P", help="preset whose values become the start values")
+    parser.add_argument("--option", action="append", default=[], metavar="K=V", help="option of the model; may be repeated")
+    parser.add_argument("--events", choices=("clocks", "counts"), help="how an FMI 3 FMU is told of events: by clocks, in event "
+                        "mode (default), or by counts, for tools without event mode")  # fmt: skip
+    parser.add_argument("--late-policy", choices=LATE_POLICIES, default=LATE_POLICIES[0], help="what to do with late events; "
+                        "start value of the parameter late_policy (default replay)")  # fmt: skip
+    parser.add_argument("--hosted", action="store_true", help="FMI 2.0 with Python inside, for a model that cannot be traced")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Build what was asked for; the paths go to standard output, everything else to standard error.
+
+    Raises:
+        ValueError, LookupError, OSError, RuntimeError, TypeError: a mistake of the user, or a build that failed.
+    """
+    if options.hosted:
+        return _run_hosted(options)
+    building, targets = import_module("fmus.build"), import_module("fmus.toolchain.targets")
+    jobs, protocol = _jobs(options), EventProtocol(options.events, options.late_policy)
+    for job in jobs:
+        protocol.counts(job.fmi_version)  # refuses clocks in FMI 2 before anything is built
+        import_module("fmus.pack").check_target(building.fmu_path(job.system, job.target))
+    libraries = len(targets.choose_targets(options.platform)) * len(jobs)
+    with _bar(libraries) as bar:
+        for job in jobs:
+
+            def progress(platform: str, job: Job = job) -> None:
+                bar.set_description(f"{job.system.name} {platform}")
+                bar.update()
+
+            path = building.build_fmu(
+                job.system,
+                job.target,
+                job.fmi_version,
+                options.preset,
+                platforms=options.platform,
+                protocol=protocol,
+                progress=progress,
+            )
+            bar.clear()
+            print(_summary(job, path), file=sys.stderr, flush=True)
+            print(path, flush=True)
+    return 0
+
+
+def _run_hosted(options: argparse.Namespace) -> int:
+    """FMUs with Python inside, see `fmus.hosted`; a file of the user's goes into them."""
+    hosted, own = import_module("fmus.hosted"), import_module("fmus.cli.user_system")
+    if options.platform != "host":
+        raise ValueError("--hosted builds for this machine only; leave --platform out.")
+    for name in _names(options):
+        model = _system(name, options.option)
+        if own.names_a_file(name):
+            chosen = dict(_option(text, type(model).option_choices) for text in options.option)
+            place = f"{name.rpartition('.py')[0]}.py:{type(model).__name__}"
+            path = hosted.build_hosted_fmu(place, options.output, options=chosen, preset=options.preset)
+        else:
+            path = hosted.build_hosted_fmu(model, options.output, preset=options.preset)
+        print(f"{model.name}: FMI 2.0, {path.stat().st_size / 1000:.0f} kB, runs in Python", file=sys.stderr, flush=True)
+        print(path, flush=True)
+    return 0
+
+
+@contextmanager
+def _bar(libraries: int) -> Iterator[Any]:
+    """A progress bar in libraries; appears only where somebody can see it and there is something to wait for."""
+    tqdm = import_module("tqdm").tqdm
+    hidden = libraries < 2 or not sys.stderr.isatty()
+    with tqdm(total=libraries, unit="library", leave=False, disable=hidden, file=sys.stderr) as bar:
+        yield bar
+
+
+def _summary(job: Job, path: Path) -> str:
+    platforms = import_module("fmus.report").platforms_of(path)
+    return f"{job.system.name}: FMI {job.fmi_version}.0, {path.stat().st_size / 1000:.0f} kB, {', '.join(platforms)}"
+
+
+# -- what to build ------------------------------------------------------------------------------------------------------
+
+
+def _jobs(options: argparse.Namespace) -> list[Job]:
+    names, versions = _names(options), VERSIONS[options.fmi]
+    if len(names) > 1 and (options.preset or options.option):
+        raise ValueError("--preset and --option belong to one model; build the models one by one.")
+    several = len(names) * len(versions) > 1
+    if several and options.output.suffix.lower() == ".fmu":
+        raise ValueError(f"-o {options.output} is one file, but several FMUs were asked for; give a folder.")
+    systems = [_system(name, options.option) for name in names]
+    repeated = sorted({s.name for s in systems if [t.name for t in systems].count(s.name) > 1})
+    if repeated:
+        raise ValueError(f"Several models have the name {', '.join(repeated)} and would overwrite each other.")
+    folders = {version: options.output / f"fmi{version}" if len(versions) > 1 else options.output for version in versions}
+    return [Job(system, version, folders[version]) for version in versions for system in systems]
+
+
+def _names(options: argparse.Namespace) -> list[str]:
+    if options.all == bool(options.names):
+        raise ValueError("Give the names of models, see 'fmus list', or --all.")
+    if not options.all:
+        return list(options.names)
+    recipes = import_module("fmus.recipes").RECIPES
+    return [name for name in recipes if recipes[name].traceable]
+
+
+def _system(name: str, words: Sequence[str]) -> Any:
+    own, recipes = import_module("fmus.cli.user_system"), import_module("fmus.recipes")
+    if own.names_a_file(name):
+        cls = own.load_class(name)
+        return own.make_system(cls, dict(_option(text, cls.option_choices) for text in words))
+    choices = recipes.RECIPES[name].option_choices if name in recipes.RECIPES else {}
+    return recipes.recipe(name, **dict(_option(text, choices) for text in words))
+
+
+def _option(text: str, known: dict[str, Sequence[Any]]) -> tuple[str, Any]:
+    key, equals, value = text.partition("=")
+    if not equals or not key:
+        raise ValueError(f"--option {text!r}: write it as name=value, e.g. --option premise=live.")
+    choices = known.get(key, ())
+    for choice in choices:
+        if str(choice) == value:
+            return key, choice
+    if choices:
+        raise ValueError(f"--option {text!r} is not legal: {key}{legal(choices)}.")
+    return key, _literal(value)
+
+
+def legal(choices: Sequence[Any] | None) -> str:
+    """The legal values of an option in words; empty where any is legal."""
+    if not choices:
+        return ""
+    if isinstance(choices, range):
+        return f", {choices[0]} to {choices[-1]}"
+    return f", one of {', '.join(map(str, choices))}"
+
+
+def _literal(text: str) -> Any:
+    """A Python number, truth value or tuple where it is one, else the text itself."""
+    try:
+        return ast.literal_eval(text)
+    except (ValueError, SyntaxError):
+        return text

@@ -1,0 +1,225 @@
+"""The Python end of a hosted FMU. This file is copied into the FMU under a name of its own and run by pythonfmu's library there.
+
+It may import pythonfmu, which lies beside it, and the standard library; `fmu-observer` only after the check that it is there.
+Nothing here may raise: pythonfmu would be left with broken references. A failure is a message with status error in the log
+queue, which the front (front.c) turns into fmi2Error.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import site
+import sys
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from importlib.util import find_spec
+from math import nan
+from pathlib import Path
+from typing import Any, ClassVar
+
+from pythonfmu.enums import Fmi2Status
+from pythonfmu.fmi2slave import Fmi2Slave
+
+DISCARD = 2
+HELD: list[dict[str, Any]] = []
+
+
+def hold(names: dict[str, Any]) -> None:
+    """Keep a reference to the names of the entry module, which pythonfmu's library runs anew at every instantiation.
+
+    Each time, pythonfmu 0.7 gives up a reference to these names that it does not own; without this they would be freed.
+    """
+    HELD.append(names)
+
+
+class Hosted(Fmi2Slave):
+    """The object that pythonfmu's library calls; hands every call on to `fmus.hosted.host.Host`.
+
+    Args:
+        kwargs: what pythonfmu's library gives: `instance_name`, `resources`, `visible`.
+    """
+
+    host_of_class: ClassVar[Any] = None
+    problems: ClassVar[dict[int, str]] = {}  # of calls that pythonfmu makes without an instance, by thread
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self.host: Any = None
+        resources = str(kwargs["resources"])
+        with suppress(ValueError):
+            sys.path.remove(resources)  # pythonfmu put it there to find this file
+        self._guard("fmi2Instantiate", lambda: self._open(Path(resources)))
+
+    def _open(self, resources: Path) -> None:
+        recipe = json.loads((resources / "hosted.json").read_text(encoding="utf-8"))
+        check_python(recipe)
+        from fmus.hosted.host import Host  # noqa: PLC0415 - only now is it known to be there
+
+        self.host = type(self).host_of_class = Host(recipe, resources, self.instance_name)
+
+    # -- life -------------------------------------------------------------------------------------------------------
+
+    def setup_experiment(self, start_time: float, stop_time: float | None = None, tolerance: float | None = None) -> None:
+        """fmi2SetupExperiment."""
+        self._hand_on("setupExperiment", None, tolerance, start_time, stop_time)
+
+    def enter_initialization_mode(self) -> None:
+        """fmi2EnterInitializationMode."""
+        self._hand_on("enterInitializationMode")
+
+    def exit_initialization_mode(self) -> None:
+        """fmi2ExitInitializationMode."""
+        self._hand_on("exitInitializationMode")
+
+    def terminate(self) -> None:
+        """fmi2Terminate."""
+        self._hand_on("terminate")
+
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        """fmi2DoStep; False is fmi2Discard."""
+        done = self._guard("fmi2DoStep", lambda: self.host.block.doStep(current_time, step_size), current_time)
+        return bool(done != DISCARD)
+
+    # -- values -----------------------------------------------------------------------------------------------------
+
+    def get_real(self, vrs: list[int]) -> list[float]:
+        """fmi2GetReal."""
+        return list(map(float, self._hand_on("getReal", [nan] * len(vrs), vrs)))
+
+    def get_integer(self, vrs: list[int]) -> list[int]:
+        """fmi2GetInteger; without value references it only reports what else went wrong."""
+        problem = self.problems.pop(threading.get_ident(), None)
+        if problem is not None:
+            self._report(problem)
+        return list(map(int, self._hand_on("getInteger", [0] * len(vrs), vrs))) if vrs else []
+
+    def get_boolean(self, vrs: list[int]) -> list[bool]:
+        """fmi2GetBoolean."""
+        return list(map(bool, self._hand_on("getBoolean", [False] * len(vrs), vrs)))
+
+    def get_string(self, vrs: list[int]) -> list[str]:
+        """fmi2GetString."""
+        return [_text(value) for value in self._hand_on("getString", [""] * len(vrs), vrs)]
+
+    def set_real(self, vrs: list[int], values: list[float]) -> None:
+        """fmi2SetReal."""
+        self._hand_on("setReal", None, vrs, values)
+
+    def set_integer(self, vrs: list[int], values: list[int]) -> None:
+        """fmi2SetInteger."""
+        self._hand_on("setInteger", None, vrs, values)
+
+    def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
+        """fmi2SetBoolean."""
+        self._hand_on("setBoolean", None, vrs, values)
+
+    def set_string(self, vrs: list[int], values: list[str]) -> None:
+        """fmi2SetString."""
+        self._hand_on("setString", None, vrs, values)
+
+    # -- state: all of it, not the registered variables that pythonfmu would save --------------------------------------
+
+    def _get_fmu_state(self) -> Any:
+        return self._hand_on("getFMUstate")
+
+    def _set_fmu_state(self, state: Any) -> None:
+        self._hand_on("setFMUstate", None, state)
+
+    @staticmethod
+    def _fmu_state_to_bytes(state: Any) -> bytes:
+        content: bytes = _without_instance("fmi2SerializeFMUstate", b"", lambda host: host.block.serializeFMUstate(state))
+        return content
+
+    @staticmethod
+    def _fmu_state_from_bytes(state: bytes) -> Any:
+        return _without_instance("fmi2DeSerializeFMUstate", None, lambda host: host.block.deSerializeFMUstate(state))
+
+    # -- failures ---------------------------------------------------------------------------------------------------
+
+    def _hand_on(self, method: str, otherwise: Any = None, *arguments: Any) -> Any:
+        """Call the block's method; `otherwise` where it fails, which is then reported."""
+        name = f"fmi2{method[0].upper()}{method[1:]}"
+        return self._guard(name, lambda: getattr(self.host.block, method)(*arguments), otherwise=otherwise)
+
+    def _guard(self, function: str, call: Callable[[], Any], t: float | None = None, otherwise: Any = None) -> Any:
+        try:
+            if self.host is None and function != "fmi2Instantiate":
+                raise RuntimeError("the instance could not be made; see the message of fmi2Instantiate")
+            return call()
+        except BaseException as error:  # SystemExit and KeyboardInterrupt would break pythonfmu just the same
+            if (
+                getattr(error, "status", None) == DISCARD and error.__cause__ is None
+            ):  # the block's own; where Python raised, it is an error
+                self.log(str(error), Fmi2Status.discard, "logStatusDiscard")
+                return DISCARD
+            self._report(describe_failure(self.host, function, error, t))
+            return otherwise
+
+    def _report(self, text: str) -> None:
+        self.log(text.replace("\0", " "), Fmi2Status.error, "logStatusError")
+
+
+def _without_instance(function: str, otherwise: Any, call: Callable[[Any], Any]) -> Any:
+    host = Hosted.host_of_class
+    try:
+        return call(host)
+    except BaseException as error:
+        Hosted.problems[threading.get_ident()] = describe_failure(host, function, error, None)
+        return otherwise
+
+
+def _text(value: Any) -> str:
+    return value.decode() if isinstance(value, bytes) else str(value)
+
+
+def describe_failure(host: Any, function: str, error: BaseException, t: float | None) -> str:
+    """What to log: the call, the error and, where it came from the model's own files, function, line and time."""
+    if host is None:
+        return f"{function}: {error}" if isinstance(error, Missing) else f"{function}: {type(error).__name__}: {error}"
+    text: str = host.describe_failure(function, error, t)
+    return text
+
+
+# -- what must be installed -----------------------------------------------------------------------------------------------
+
+
+class Missing(RuntimeError):  # noqa: N818 - says what is the matter better than with a suffix
+    """The Python in this process lacks something; the message says what, and how to get it."""
+
+
+def check_python(recipe: dict[str, Any]) -> None:
+    """Refuse a Python that is too old or lacks `fmu-observer`.
+
+    Args:
+        recipe: what hosted.json holds.
+
+    Raises:
+        Missing: with what is needed and what was found.
+    """
+    needed, here = recipe["python"], ".".join(map(str, sys.version_info[:3]))
+    if sys.version_info[:2] < tuple(needed):
+        raise Missing(f"this FMU needs Python {'.'.join(map(str, needed))} or later; the Python in this process is {here}.")
+    _enter_virtual_environment()
+    missing = _missing()
+    if missing:
+        raise Missing(
+            f"this FMU needs the Python package fmu-observer {recipe['package']} in the Python of this process "
+            f"({here} in {sys.prefix}); missing: {', '.join(missing)}. Install it there (pip install fmu-observer), "
+            "or set PYTHONPATH to where it is installed."
+        )
+
+
+def _missing() -> list[str]:
+    return [name for name in ("plant_models", "fmu_observer", "fmus", "numpy", "fmpy") if find_spec(name) is None]
+
+
+def _enter_virtual_environment() -> None:
+    """In a program that is not Python nobody has looked at the activated environment yet."""
+    folder = os.environ.get("VIRTUAL_ENV")
+    if folder and _missing():
+        version = f"python{sys.version_info[0]}.{sys.version_info[1]}"
+        for packages in (Path(folder, "lib", version, "site-packages"), Path(folder, "Lib", "site-packages")):
+            if packages.is_dir():
+                site.addsitedir(str(packages))

@@ -1,0 +1,76 @@
+/* The log of an instance. Messages are made on the stack; nothing is allocated. */
+#include "log.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "instance.h"
+
+#define MESSAGE_LENGTH 512
+
+static const char *const category_names[] = {"logStatusError", "logStatusDiscard", "logStatusWarning", "logEvents"};
+enum { CATEGORY_ERROR, CATEGORY_DISCARD, CATEGORY_WARNING, CATEGORY_EVENTS, CATEGORY_COUNT };
+
+static Status log_message(const Instance *instance, Status status, int category, const char *format, va_list arguments) {
+    char message[MESSAGE_LENGTH];
+    vsnprintf(message, sizeof message, format, arguments);
+    instance->face->log(instance, status, category_names[category], message);
+    return status;
+}
+
+PRIVATE Status instance_fail(const Instance *instance, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    Status status = log_message(instance, STATUS_ERROR, CATEGORY_ERROR, format, arguments);
+    va_end(arguments);
+    return status;
+}
+
+PRIVATE Status instance_discard(const Instance *instance, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    Status status = log_message(instance, STATUS_DISCARD, CATEGORY_DISCARD, format, arguments);
+    va_end(arguments);
+    return status;
+}
+
+PRIVATE Status instance_warn(const Instance *instance, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    Status status = log_message(instance, STATUS_WARNING, CATEGORY_WARNING, format, arguments);
+    va_end(arguments);
+    return status;
+}
+
+PRIVATE void instance_note(const Instance *instance, const char *format, ...) {
+    if (!instance->debug_logging)
+        return;
+    va_list arguments;
+    va_start(arguments, format);
+    log_message(instance, STATUS_OK, CATEGORY_EVENTS, format, arguments);
+    va_end(arguments);
+}
+
+static bool is_category(const char *name) {
+    for (int i = 0; i < CATEGORY_COUNT; i++)
+        if (strcmp(name, category_names[i]) == 0)
+            return true;
+    return false;
+}
+
+PRIVATE Status instance_set_logging(Instance *instance, const char *function, bool strict, bool on, size_t count, const char *const categories[]) {
+    bool wanted = count == 0;
+    for (size_t i = 0; i < count; i++) {
+        const char *name = categories != NULL && categories[i] != NULL ? categories[i] : "(none)";
+        if (strict && !is_category(name))
+            return instance_fail(instance, "%s: there is no log category %s", function, name);
+        wanted = wanted || strcmp(name, category_names[CATEGORY_EVENTS]) == 0;
+    }
+    instance->debug_logging = on && wanted;
+    return STATUS_OK;
+}
+
+PRIVATE Status status_worse(Status one, Status other) {
+    return one > other ? one : other;
+}

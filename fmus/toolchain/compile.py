@@ -1,0 +1,159 @@
+"""Compilation: C files become the shared library of an FMU, with the system's C compiler or with the cross compiler."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import fmpy
+
+from fmus.toolchain.cross import EXTRA, LINK_FLAGS, ZIG_FLAGS, zig_command, zig_environment, zig_is_installed, zig_version
+from fmus.toolchain.platforms import Platform, host_platform
+
+CANDIDATES = ("cc", "gcc", "clang")
+
+FLAGS = (
+    "-std=c11",
+    "-O2",
+    "-ffp-contract=off",  # a fused multiply-add would round differently from Python
+    "-fvisibility=hidden",
+    "-ffunction-sections",
+    "-fdata-sections",
+    "-g0",
+)
+"""The same everywhere: the numbers must be those of the Python runtime, bit for bit."""
+
+
+class CompilerMissing(RuntimeError):  # noqa: N818 - says what is the matter better than with a suffix
+    """No C compiler was found; the message says what to install."""
+
+
+class CompilationError(RuntimeError):
+    """The compiler refused the sources; the message carries what it said."""
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """A C compiler with the command line of gcc.
+
+    Args:
+        command: program and fixed arguments.
+        version: what it says about itself, first line.
+        flags: further flags that it needs, compiling and linking.
+        zig: whether it is the cross compiler.
+    """
+
+    command: tuple[str, ...]
+    version: str
+    flags: tuple[str, ...] = ()
+    zig: bool = False
+
+    def identity(self) -> str:
+        """All of it that decides the bytes of a library."""
+        return " ".join((*self.command, self.version, *FLAGS, *self.flags))
+
+
+def find_compiler() -> Compiler:
+    """The compiler for this machine: ``$CC``, else the first of cc, gcc, clang, else the cross compiler.
+
+    Raises:
+        CompilerMissing: there is none, or ``$CC`` names one that does not exist.
+    """
+    wanted = os.environ.get("CC", "").strip()
+    if wanted:
+        command = tuple(shlex.split(wanted))
+        if shutil.which(command[0]) is None:
+            raise CompilerMissing(f"The environment variable CC names the compiler {wanted!r}, which does not exist. {_advice()}")
+        return _identified(command)
+    for candidate in CANDIDATES:
+        found = shutil.which(candidate)
+        if found is not None:
+            return _identified((found,))
+    if zig_is_installed() and host_platform().target is not None:
+        return cross_compiler(host_platform())
+    raise CompilerMissing(f"No C compiler was found (looked for {', '.join(CANDIDATES)}). {_advice()}")
+
+
+def cross_compiler(platform: Platform) -> Compiler:
+    """The compiler of the package ``ziglang`` for a platform.
+
+    Raises:
+        CompilerMissing: the package is not installed, or it cannot build for the platform.
+    """
+    if platform.target is None:
+        raise CompilerMissing(f"Libraries for {platform.name} can be built on such a machine only.")
+    if not zig_is_installed():
+        raise CompilerMissing(
+            f"Building for {platform.name} needs the package ziglang, which the extra 'cross' brings: {EXTRA}. "
+            "Without it, --platform host builds for this machine with the system's compiler."
+        )
+    return Compiler(zig_command(platform.target), zig_version(), (*ZIG_FLAGS, *LINK_FLAGS[platform.system]), zig=True)
+
+
+def compile_library(compiler: Compiler, folder: Path, sources: Sequence[str], library: str) -> Path:
+    """Compile C files into one shared library.
+
+    Args:
+        compiler: see `find_compiler` and `cross_compiler`.
+        folder: where the sources lie and the library goes; names are given relative to it, so that no path of this
+            machine gets into the library. Headers of FMI are taken from there, else from fmpy.
+        sources: names of the C files.
+        library: file name of the library.
+
+    Returns:
+        Path of the library.
+
+    Raises:
+        CompilationError: the compiler refused.
+    """
+    command = [*compiler.command, *FLAGS, *compiler.flags, f"-I{header_folder()}", *sources, "-o", library, "-lm"]
+    with tempfile.TemporaryDirectory(prefix="fmus-scratch-") as scratch:
+        environment = zig_environment(Path(scratch)) if compiler.zig else None
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace", check=False, env=environment)
+    if done.returncode != 0:
+        raise CompilationError(
+            f"{shlex.join(command)} failed with code {done.returncode}:\n{done.stderr.strip() or done.stdout.strip()}"
+        )
+    return folder / library
+
+
+def header_folder() -> Path:
+    """The folder with the headers of the FMI standard that fmpy carries."""
+    return Path(fmpy.__file__).parent / "c-code"
+
+
+def library_name(identifier: str) -> str:
+    """File name of the shared library of a model on this platform."""
+    return identifier + host_platform().extension
+
+
+def _system_flags() -> tuple[str, ...]:
+    if sys.platform == "win32":
+        return ("-shared", "-static-libgcc", "-Wl,--no-insert-timestamp", "-s")
+    if sys.platform == "darwin":
+        return ("-shared", "-fPIC", "-Wl,-dead_strip", "-Wl,-x")
+    return ("-shared", "-fPIC", "-Wl,--gc-sections", "-Wl,--build-id=none", "-Wl,--no-undefined", "-s")
+
+
+def _advice() -> str:
+    bring = f"install the one that the extra 'cross' brings ({EXTRA}), or set CC to yours."
+    if sys.platform == "win32":
+        return f"Install one, e.g. 'winget install BrechtSanders.WinLibs.POSIX.UCRT' (gcc) or LLVM (clang), {bring}"
+    if sys.platform == "darwin":
+        return f"Install one with 'xcode-select --install', {bring}"
+    return f"Install one, e.g. 'sudo apt install gcc' (Debian, Ubuntu) or 'sudo dnf install gcc' (Fedora), {bring}"
+
+
+@lru_cache(maxsize=8)
+def _identified(command: tuple[str, ...]) -> Compiler:
+    done = subprocess.run([*command, "--version"], capture_output=True, text=True, errors="replace", check=False)
+    lines = (done.stdout or done.stderr).splitlines()
+    return Compiler(command, lines[0].strip() if lines else "unknown", _system_flags())

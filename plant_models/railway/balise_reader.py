@@ -1,0 +1,218 @@
+"""The balise reader: position and speed of a train, from one communication step to the next, become balise events.
+
+A sensor as a hybrid system of its own; knows the hybrid foundation, the layouts and the cubic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Literal, NamedTuple
+
+import numpy as np
+
+from plant_models.hybrid import (
+    CommunicationEvent,
+    HybridSystem,
+    Resource,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+    vector,
+)
+from plant_models.hybrid.system import Array
+from plant_models.railway.balise_layout import BaliseLayout, Positions, Spacing
+from plant_models.railway.hermite_cubic import HermiteCubic
+
+LayoutShape = Literal["spacing", "positions"]
+
+_EXAMPLE = (100.0, 350.0, 600.0, 1100.0)  # an example, so that the file in the FMU shows its form
+
+
+class _Stretch(NamedTuple):
+    """A part of a step in which the train does not turn: bracket of s, positions at its ends [m], direction, balises in it."""
+
+    low: Array
+    high: Array
+    before: Array
+    after: Array
+    direction: Array
+    count: Array
+
+
+class BaliseReader(HybridSystem):
+    """Finds the instants at which a train passes balises, inside a communication step, and announces them.
+
+    At every communication point the reader takes `position` and `speed`. Between two of them the position is the cubic
+    Hermite polynomial of both; where it crosses a balise, forwards or backwards, is a passing. Its error is of order
+    ``h^4`` in the position, none at all under constant acceleration. A passing belongs to ``(before, after]``: a train that
+    stops on a balise has passed it, and has not passed it again when it moves on, or starts there.
+
+    One passing is announced in each communication step, the oldest first: `balise_count` goes up by one, `balise_time` is the
+    instant, `balise_position` the place. Wired to the inputs of the same names of an observer, that is the event protocol of
+    FMI 2. Others wait, up to `pending_capacity`; what is more is lost and counted in `lost_count`. The stamp makes a late
+    announcement exact: the observer replays.
+
+    What the inputs mean depends on the master. `input_instant` = 1: they belong to the end of the step, as where a sequential
+    (Gauss-Seidel) master steps the plant first and hands its new outputs on before it steps the reader; passings lie in the
+    step just taken. `input_instant` = 0: they belong to the start of the step, as in a parallel (Jacobi) master; passings lie
+    in the step before, and are announced one step later with the same stamps. With the wrong value all stamps are off by one
+    step. At the start the inputs must hold the plant's start position and speed: by an exchange in initialisation mode, or by
+    start values; with 0 the first step brings them all the same. Steps may vary.
+
+    Args:
+        layout: ``spacing``: balises at equal distances; ``positions``: a list, which an FMU reads from its file
+            ``resources/balises.csv`` (column ``position`` [m], increasing) if that is there.
+        positions: start values of the list [m], increasing.
+        balise_capacity: entries of the list.
+        pending_capacity: passings that can be found in one step, and that can wait.
+
+    Raises:
+        ValueError: an unknown layout, a capacity below one, or a list of positions that is not one.
+
+    Source: the balises of Bouchama 2024, section 3.4, sampled where they are passed; the localisation is ours.
+    """
+
+    name = "balise_reader"
+    description = "Balise reader: position and speed of a train in, balise events with their own time stamps out"
+    source = "Bouchama 2024, section 3.4 (balises as aperiodic samples); the localisation is ours"
+    internal_step = 1e-2  # nothing flows
+    inputs = (
+        input_signal("position", "m", 0.0, "Position of the train, at the instant that input_instant names"),
+        input_signal("speed", "m/s", 0.0, "Speed of the train at the same instant", display_unit="km/h"),
+    )
+    outputs = (
+        output_signal("balise_count", "1", "Goes up by one with every balise announced", variability="discrete", integer=True),
+        output_signal("balise_time", "s", "Instant at which the balise was passed", variability="discrete"),
+        output_signal("balise_position", "m", "Position of the balise passed", variability="discrete"),
+        output_signal("lost_count", "1", "Passings that found no room", variability="discrete", integer=True),
+    )
+    events = (CommunicationEvent("reading", "Position and speed are taken"),)
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "layout": ("spacing", "positions"),
+        "balise_capacity": range(1, 257),
+        "pending_capacity": range(1, 17),
+    }
+
+    def __init__(
+        self, *, layout: LayoutShape = "spacing", positions: Sequence[float] = _EXAMPLE, balise_capacity: int = 64,
+        pending_capacity: int = 8,
+    ) -> None:  # fmt: skip
+        if layout not in self.option_choices["layout"]:
+            raise ValueError(f"Unknown layout {layout!r}; choose one of: spacing, positions.")
+        if pending_capacity < 1:
+            raise ValueError(f"balise_reader: pending_capacity must be at least 1, got {pending_capacity}.")
+        self.pending_capacity = pending_capacity
+        self._layout: BaliseLayout = Spacing() if layout == "spacing" else Positions(balise_capacity, positions)
+        self.resources = (Resource("positions", "balises.csv", "position"),) if layout == "positions" else ()
+        self.parameters = (_INPUT_INSTANT, *self._layout.parameters)
+        self.states = (*_SAMPLE, *_announcements(pending_capacity))
+        super().__init__(
+            layout=layout, positions=tuple(positions), balise_capacity=balise_capacity, pending_capacity=pending_capacity
+        )
+
+    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Take a sample, find what was passed since the last one, announce the oldest; shape (n,) or (n, members)."""
+        last_communication, t0, p0, v0, primed = (x[i] for i in range(len(_SAMPLE)))
+        known = primed > 0.0
+        instant = np.where(known, np.where(p.input_instant > 0.5, t, last_communication), t)
+        h = np.where(known, np.maximum(instant - t0, 0.0), 0.0)
+        # A second sample at one instant replaces the first: the train did not move in no time.
+        cubic = HermiteCubic.of(h, np.where(h > 0.0, p0, u.position), v0, u.position, u.speed)
+        stretches = self._stretches(cubic, u.position, p)
+        places, fractions = self._passings(cubic, stretches, p)
+        found = stretches[0].count + stretches[1].count
+        stamps = [np.where(found > j, np.minimum(t0 + s * h, instant), 0.0) for j, s in enumerate(fractions)]
+        places = [np.where(found > j, place, 0.0) for j, place in enumerate(places)]
+        sample = (t, instant, u.position, u.speed, 1.0)
+        return vector(*sample, *self._announce(x, found, stamps, places))
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """The last announcement and the number of all, and of the lost."""
+        count, time, position, lost = (x[len(_SAMPLE) + i] for i in range(4))
+        return {"balise_count": count, "balise_time": time, "balise_position": position, "lost_count": lost}
+
+    def _stretches(self, cubic: HermiteCubic, after: Array, p: Any) -> tuple[_Stretch, _Stretch]:
+        """The step, divided where the train turns; the second stretch is empty where it does not."""
+        turn = cubic.turn()
+        place = np.where(turn < 1.0, cubic.p0 + cubic.rise(turn), after)
+        first, second = _direction(cubic.p0, place), _direction(place, after)
+        return (
+            _Stretch(0.0, turn, cubic.p0, place, first, self._layout.count(cubic.p0, place, first, p)),
+            _Stretch(turn, 1.0, place, after, second, self._layout.count(place, after, second, p)),
+        )
+
+    def _passings(self, cubic: HermiteCubic, stretches: tuple[_Stretch, _Stretch], p: Any) -> tuple[list[Array], list[Array]]:
+        """Places [m] and fractions of the step of the first passings; what lies beyond their number means nothing."""
+        one, two = stretches
+        places: list[Array] = []
+        fractions: list[Array] = []
+        place = one.before
+        for j in range(self.pending_capacity):
+            beyond = one.count <= j
+            direction = np.where(beyond, two.direction, one.direction)
+            place = self._layout.next(np.where(one.count == j, two.before, place), direction, p)
+            bracket = (np.where(beyond, two.low, one.low), np.where(beyond, two.high, one.high))
+            places.append(place)
+            fractions.append(cubic.crossing(place, direction, *bracket))
+        return places, fractions
+
+    def _announce(self, x: Array, found: Array, stamps: list[Array], places: list[Array]) -> list[Array]:
+        """Memory of the announcements after the passings found have joined the queue and its head has left it."""
+        first, n = len(_SAMPLE), self.pending_capacity
+        count, time, position, lost, waiting = (x[first + i] for i in range(5))
+        times = _joined([x[first + 5 + i] for i in range(n)], waiting, stamps)
+        positions = _joined([x[first + 5 + n + i] for i in range(n)], waiting, places)
+        room = n - waiting
+        waiting = waiting + np.minimum(found, room)
+        some = waiting > 0.0
+        head = (
+            count + np.where(some, 1.0, 0.0),
+            np.where(some, times[0], time),
+            np.where(some, positions[0], position),
+            lost + np.maximum(found - room, 0.0),
+            waiting - np.where(some, 1.0, 0.0),
+        )
+        queues = [np.where(some, queue[i + 1] if i + 1 < n else 0.0, queue[i]) for queue in (times, positions) for i in range(n)]
+        return [*head, *queues]
+
+
+def _announcements(capacity: int) -> tuple[Any, ...]:
+    return (
+        memory("announced", "1", 0.0, "Balises announced so far"),
+        memory("announced_time", "s", 0.0, "Instant of the last one announced"),
+        memory("announced_position", "m", 0.0, "Position of the last one announced"),
+        memory("lost", "1", 0.0, "Passings that found no room"),
+        memory("waiting", "1", 0.0, "Passings that wait to be announced"),
+        memory("waiting_time", "s", 0.0, "Instants of those that wait, oldest first", size=capacity),
+        memory("waiting_position", "m", 0.0, "Positions of those that wait", size=capacity),
+    )
+
+
+_SAMPLE = (
+    memory("last_communication", "s", 0.0, "Last communication point"),
+    memory("sample_time", "s", 0.0, "Instant of the last sample"),
+    memory("sample_position", "m", 0.0, "Position at the last sample"),
+    memory("sample_speed", "m/s", 0.0, "Speed at the last sample"),
+    memory("primed", "1", 0.0, "1 after the first sample"),
+)
+
+_INPUT_INSTANT = parameter(
+    "input_instant", "1", 1.0, "Inputs at a step belong to its end (1, sequential master) or to its start (0, parallel master)",
+    min=0.0, max=1.0,
+)  # fmt: skip
+
+
+def _direction(before: Array, after: Array) -> Array:
+    return np.where(after >= before, 1.0, -1.0)
+
+
+def _joined(queue: list[Array], waiting: Array, new: list[Array]) -> list[Array]:
+    """The queue with the new ones behind those that wait, as far as there is room."""
+    joined = []
+    for i, old in enumerate(queue):
+        value = old
+        for j in range(i + 1):
+            value = np.where(waiting == i - j, new[j], value)
+        joined.append(value)
+    return joined

@@ -1,0 +1,241 @@
+"""The loop of train, odometer, driver, reader and observer in two masters of other people, and a fine solution to compare with.
+
+`container` is the FMU container of fmu-manipulation-toolbox, itself an FMU; `libcosim` the master of the Open Simulation
+Platform. Both step FMI 2.0 with events by counts, and know nothing of events.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from fmpy import read_model_description, simulate_fmu
+
+from fmu_observer import OBSERVERS
+from fmus import cached_fmu, recipe
+from plant_models import Locomotive
+from plant_models.hybrid import HybridSystem, Runtime, scalar_names
+
+STEP, STEPS = 0.01, 4000
+SPACING = 5.0
+PLANT_PRESET = "chapter_3_four_axles"
+TRAIN = {"n_axles": 4.0, "davis_b": 32.0, "davis_c": 1.7}
+
+MODELS: dict[str, tuple[str, str | None, dict[str, float]]] = {
+    "train": ("locomotive", PLANT_PRESET, {}),
+    "odometer": ("odometer", None, {}),
+    "driver": ("driver", None, {}),
+    "reader": ("balise_reader", None, {"first_balise": SPACING, "balise_spacing": SPACING}),
+    "observer": ("takagi_sugeno_cdo", None, TRAIN),
+}
+LINKS = (
+    ("driver.effort", "train.effort"),
+    ("driver.effort", "observer.effort"),
+    ("train.wheel_speed", "odometer.wheel_speed"),
+    ("odometer.reading", "driver.odometer"),
+    ("odometer.reading", "observer.odometer"),
+    ("train.position", "reader.position"),
+    ("train.speed", "reader.speed"),
+    ("reader.balise_count", "observer.balise_count"),
+    ("reader.balise_time", "observer.balise_time"),
+    ("reader.balise_position", "observer.balise_position"),
+)
+RECORDED = (
+    "train.position", "train.speed", "driver.effort", "odometer.reading", "reader.balise_count", "reader.balise_time",
+    "reader.balise_position", "reader.lost_count", "observer.position", "observer.speed", "observer.adhesion_force",
+)  # fmt: skip
+
+
+def starts(input_instant: int) -> Iterator[tuple[str, str, float]]:
+    """Component, parameter, value."""
+    for name, (_, _, values) in MODELS.items():
+        for parameter, value in (values | ({"input_instant": float(input_instant)} if name == "reader" else {})).items():
+            yield name, parameter, value
+
+
+def fmus_in(folder: Path) -> dict[str, Path]:
+    """The FMUs of the loop under the names of its components."""
+    return {
+        name: Path(shutil.copy(cached_fmu(recipe(model), 2, preset), folder / f"{name}.fmu"))
+        for name, (model, preset, _) in MODELS.items()
+    }
+
+
+def empty_table(rows: int) -> np.ndarray:
+    return np.zeros(rows, dtype=[(name, float) for name in ("time", *RECORDED)])
+
+
+def container(folder: Path, sequential: bool, input_instant: int) -> np.ndarray:
+    """The loop as one container FMU, run by fmpy; components in the order listed when sequential, else in parallel."""
+    from fmu_manipulation_toolbox.container import FMUContainer
+
+    fmus_in(folder)
+    made = FMUContainer("loop", folder, fmi_version=2)
+    for name in MODELS:
+        made.get_fmu(f"{name}.fmu")
+    for source, target in LINKS:
+        made.add_link(*_file_and_port(source), *_file_and_port(target))
+    for name in RECORDED:
+        made.add_output(*_file_and_port(name), f"out_{name.replace('.', '_')}")  # a link already has the plain name
+    for name, parameter, value in starts(input_instant):
+        made.add_start_value(f"{name}.fmu", parameter, repr(value))
+    made.make_fmu("loop.fmu", step_size=STEP, sequential=sequential)
+    result = simulate_fmu(str(folder / "loop.fmu"), stop_time=STEPS * STEP, step_size=STEP, output_interval=STEP,
+                          output=[f"out_{name.replace('.', '_')}" for name in RECORDED])  # fmt: skip
+    table = empty_table(len(result))
+    table["time"] = np.arange(len(result)) * STEP
+    for name in RECORDED:
+        table[name] = result[f"out_{name.replace('.', '_')}"]
+    return table
+
+
+def _file_and_port(variable: str) -> tuple[str, str]:
+    name, port = variable.split(".")
+    return f"{name}.fmu", port
+
+
+def libcosim(folder: Path, input_instant: int) -> np.ndarray:
+    """The loop in libcosim's fixed-step algorithm: all components step at once, then outputs are handed on (Jacobi).
+
+    The system goes in as a file: `connect_integer_variables` of libcosimpy 0.0.6 fails with an AttributeError.
+    """
+    from libcosimpy.CosimExecution import CosimExecution
+    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
+    from libcosimpy.CosimObserver import CosimObserver
+
+    files = fmus_in(folder)
+    log_output_level(CosimLogLevel.FATAL)
+    (folder / "OspSystemStructure.xml").write_text(_system_structure(input_instant), encoding="utf-8")
+    execution = CosimExecution.from_osp_config_file(str(folder))
+    observer = CosimObserver.create_last_value()
+    execution.add_observer(observer)
+    places = {name: _place(execution, files, name) for name in RECORDED}
+    table = empty_table(STEPS + 1)
+    for k in range(1, STEPS + 1):
+        assert execution.step(1)
+        table["time"][k] = k * STEP
+        for name, (slave, reference, integer) in places.items():
+            read = observer.last_integer_values if integer else observer.last_real_values
+            (table[name][k],) = read(slave, [reference])
+    return table
+
+
+def _place(execution: Any, files: dict[str, Path], variable: str) -> tuple[int, int, bool]:
+    name, port = variable.split(".")
+    description = read_model_description(str(files[name]), validate=False)
+    found = next(v for v in description.modelVariables if v.name == port)
+    return execution.slave_index_from_instance_name(name), int(found.valueReference), found.type == "Integer"
+
+
+def _system_structure(input_instant: int) -> str:
+    values: dict[str, list[str]] = {name: [] for name in MODELS}
+    for name, parameter, value in starts(input_instant):
+        values[name].append(f'<InitialValue variable={quoteattr(parameter)}><Real value="{value!r}"/></InitialValue>')
+    lines = ['<OspSystemStructure xmlns="http://opensimulationplatform.com/MSMI/OSPSystemStructure" version="0.1">']
+    lines += ["<StartTime>0.0</StartTime>", f"<BaseStepSize>{STEP}</BaseStepSize>", "<Algorithm>fixedStep</Algorithm>"]
+    lines += ["<Simulators>"]
+    for name, given in values.items():
+        initial = f"<InitialValues>{''.join(given)}</InitialValues>" if given else ""
+        lines += [f'<Simulator name="{name}" source="{name}.fmu" stepSize="{STEP}">{initial}</Simulator>']
+    lines += ["</Simulators>", "<Connections>"]
+    for link in LINKS:
+        ends = "".join('<Variable simulator="{}" name="{}"/>'.format(*end.split(".")) for end in link)
+        lines += [f"<VariableConnection>{ends}</VariableConnection>"]
+    return "\n".join([*lines, "</Connections>", "</OspSystemStructure>", ""])
+
+
+# -- the fine solution ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Passings:
+    """What the reader announced: row of the announcement, stamp [s], place [m]."""
+
+    rows: np.ndarray
+    stamps: np.ndarray
+    places: np.ndarray
+
+    @classmethod
+    def of(cls, table: np.ndarray) -> Passings:
+        """The passings in a result."""
+        rows = np.flatnonzero(np.diff(table["reader.balise_count"]) > 0) + 1
+        return cls(rows, table["reader.balise_time"][rows], table["reader.balise_position"][rows])
+
+
+def _runtime(system: HybridSystem, preset: str | None = None, **values: float) -> Runtime:
+    runtime = Runtime(system)
+    runtime.p[:] = system.start_parameters(preset)
+    runtime.x[:] = system.start_state(preset)
+    names = scalar_names(system.parameter_signals)
+    for name, value in values.items():
+        runtime.p[names.index(name)] = value
+    return runtime
+
+
+def fine_crossings(table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The plant alone, driven by the recorded effort, halved down to its crossings: instants [s], positions at the rows [m]."""
+    plant = _runtime(Locomotive(), PLANT_PRESET)
+    plant.u[:] = table["driver.effort"][0]
+    plant.start(0.0)
+    instants, positions, next_place = [], [0.0], SPACING
+    for k in range(len(table) - 1):
+        plant.u[:] = table["driver.effort"][k]
+        before = plant.snapshot()
+        plant.advance((k + 1) * STEP)
+        positions.append(float(plant.x[0]))
+        if plant.x[0] >= next_place:
+            after = plant.snapshot()
+            instants.append(_halved(plant, before, k * STEP, (k + 1) * STEP, next_place))
+            plant.restore(after)
+            next_place += SPACING
+    return np.array(instants), np.array(positions)
+
+
+def _halved(plant: Runtime, before: Any, low: float, high: float, place: float) -> float:
+    start = low
+    while low < (middle := 0.5 * (low + high)) < high:
+        plant.restore(before)
+        if middle - start > 1e-12:  # closer than this is on the point itself
+            plant.advance(middle)
+        low, high = (low, middle) if plant.x[0] >= place else (middle, high)
+    return high
+
+
+def exact_observer(table: np.ndarray, instants: np.ndarray, lag: int) -> dict[str, np.ndarray]:
+    """The observer told of each passing at its own instant, with the recorded inputs: of the end of each step, or, with a `lag`
+    of 1, of its start. Position [m] and speed [m/s] at the rows."""
+    system = OBSERVERS["takagi_sugeno_cdo"]()
+    observer = _runtime(system, None, **TRAIN)
+    names = scalar_names(system.input_signals)
+    effort, odometer, place = (names.index(name) for name in ("effort", "odometer", "balise_position"))
+    columns = [scalar_names(system.outputs).index(name) for name in ("position", "speed")]
+    rows, told = np.zeros((len(table), 2)), 0
+    observer.start(0.0)
+    rows[0] = observer.update_outputs()[columns]
+    for k in range(len(table) - 1):
+        row = k + 1 - lag
+        observer.u[[effort, odometer]] = table["driver.effort"][row], table["odometer.reading"][row]
+        while told < len(instants) and instants[told] <= (k + 1) * STEP:
+            observer.advance(float(instants[told]))
+            observer.u[place] = SPACING * (told + 1)
+            observer.trigger("balise")
+            told += 1
+        observer.advance((k + 1) * STEP)
+        rows[k + 1] = observer.update_outputs()[columns]
+    return {"position": rows[:, 0], "speed": rows[:, 1]}
+
+
+def in_time(table: np.ndarray, instants: np.ndarray, lag: int) -> np.ndarray:
+    """Rows at which the observer has been told of every passing so far: all but those between a passing and its telegram, and
+    the first, which not every master records."""
+    passings = Passings.of(table)
+    known = np.ones(len(table), dtype=bool)
+    known[0] = False
+    for row, instant in zip(passings.rows, instants, strict=True):
+        known[int(np.ceil(instant / STEP - 1e-9)) : row + lag] = False
+    return known

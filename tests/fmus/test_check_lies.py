@@ -1,0 +1,154 @@
+"""`fmus check` against FMUs that lie in one way each: every lie is caught by name, and the honest one passes clean."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from lying_fmus import SLAVE, STATES, build, description
+
+from fmus.check import CheckReport, Verdict, check_fmu
+
+PASS, WARN, FAIL, SKIPPED = Verdict.PASS, Verdict.WARN, Verdict.FAIL, Verdict.SKIPPED
+
+pytestmark = pytest.mark.compiler
+
+
+def checked(folder: Path, *lies: str, xml: str | None = None, timeout: float = 30.0) -> CheckReport:
+    return check_fmu(build(folder, *lies, xml=xml), timeout=timeout)
+
+
+def problems(report: CheckReport) -> dict[str, str]:
+    """Detail by name of everything that neither passed nor was skipped."""
+    return {f.check: f.detail for f in report.findings if f.verdict in (WARN, FAIL)}
+
+
+def test_the_honest_one_passes_clean(tmp_path: Path) -> None:
+    report = checked(tmp_path, xml=description(SLAVE, STATES))
+    assert problems(report) == {}
+    assert report.clean
+    assert {f.check for f in report.findings if f.verdict is SKIPPED} == set()
+    text = " ".join(report.trust)
+    promises = ("Variable step: yes", "Rollback: yes", "Reset: yes", "Several instances in one process: yes")
+    assert [promise for promise in promises if promise not in text] == []
+
+
+@pytest.mark.parametrize(
+    ("lie", "check", "words"),
+    [
+        ("UNSHORTENED", "divided steps", "the outputs differ: a step of 0.01 s and one in parts of 0.5 and 0.5"),
+        ("OWN_STEP", "short step", "nothing moves in it"),
+        ("HALF_RESTORED", "state round trip", "after a restored state the outputs differ"),
+        ("SERIALISES_HALF", "serialised state", "after a state restored from bytes the outputs differ"),
+        ("SERIALISES_HALF", "state in another instance", "after a state restored in another instance the outputs differ"),
+        ("RESET_KEEPS", "reset and re-run", "after a reset the outputs differ"),
+        ("NAN_AT_START", "values at start", "not finite after initialisation: position = nan"),
+        ("NAN_LATER", "stepping", "not finite while stepping: position = nan, speed = nan"),
+        ("NO_STATE_SYMBOLS", "exported symbols", "declares canGetAndSetFMUstate but does not export fmi2FreeFMUstate"),
+        ("NO_STATE_SYMBOLS", "state round trip", "does not export fmi2GetFMUstate"),
+        ("LEAKS_FILES", "repeated instantiation", "leaks file descriptors: 40 more are open after 40 more instances"),
+        ("LEAKS_MEMORY", "repeated instantiation", "leaks memory"),
+        ("SHARED", "two instances", "beside a second instance the outputs differ"),
+        ("LOGGING_CHANGES", "logging", "with logging on the outputs differ"),
+        ("LATE_EVENT", "events", "event pulse inside a step does not happen at its stamp"),
+        ("GETTER", "getters", "getReal of rate failed"),
+        ("REFUSES_START", "initialise", "fmi2ExitInitializationMode failed with status 3"),
+        ("CRASH_AT_START", "initialise", "crashed with signal 6 (SIGABRT) in 'initialise'"),
+        ("CRASH_IN_STEP", "stepping", "crashed with signal 11 (SIGSEGV) in 'stepping'"),
+        ("EXITS", "stepping", "ended the process with exit code 3 in 'stepping'"),
+        ("CRASH_ON_ZERO", "zero step", "crashed with signal 6 (SIGABRT) in 'zero step'"),
+    ],
+)
+def test_a_lie_is_caught_by_name(lie: str, check: str, words: str, tmp_path: Path) -> None:
+    finding = checked(tmp_path, lie).finding(check)
+    assert finding.verdict is FAIL, finding
+    assert words in finding.detail
+
+
+@pytest.mark.parametrize(
+    ("lie", "known"),
+    [
+        ("UNSHORTENED", {"divided steps", "short step"}),
+        ("HALF_RESTORED", {"state round trip", "serialised state", "state in another instance"}),
+        ("RESET_KEEPS", {"reset and re-run"}),
+        ("LEAKS_FILES", {"repeated instantiation"}),
+        ("LOGGING_CHANGES", {"logging"}),
+        ("CRASH_ON_ZERO", {"zero step"}),
+    ],
+)
+def test_a_lie_spoils_no_other_finding(lie: str, known: set[str], tmp_path: Path) -> None:
+    assert set(problems(checked(tmp_path, lie))) == known
+
+
+def test_a_hang_costs_its_time_limit_and_no_more(tmp_path: Path) -> None:
+    report = checked(tmp_path, "HANG", timeout=2.0)
+    assert report.finding("stepping").verdict is FAIL
+    assert report.finding("stepping").detail == "no answer within 2 s in 'stepping'"
+    assert report.finding("divided steps").detail == "not run, because 'stepping' failed"
+    assert report.finding("getters").verdict is PASS
+    assert report.trust == ("Nothing: it could not be stepped.",)
+
+
+def test_a_crash_is_part_of_what_to_trust(tmp_path: Path) -> None:
+    report = checked(tmp_path, "CRASH_ON_ZERO")
+    assert "Run it in a process of its own: it died or hung in zero step." in report.trust
+    assert "Rollback: yes" in " ".join(report.trust)
+
+
+def test_prints_are_seen_and_do_not_disturb(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    report = checked(tmp_path, "PRINTS")
+    assert set(problems(report)) == {"console output"}
+    assert "beginning with: 'stepping to 0.01'" in report.finding("console output").detail
+    assert capfd.readouterr() == ("", "")
+
+
+def test_steps_that_must_be_refused(tmp_path: Path) -> None:
+    report = checked(tmp_path, "ACCEPTS_ANYTHING")
+    assert set(problems(report)) == {"negative step"}
+    assert "accepts a step of -0.01 s instead of refusing it" in report.finding("negative step").detail
+
+
+def test_what_is_not_declared_is_not_tried(tmp_path: Path) -> None:
+    report = checked(tmp_path, "UNSHORTENED", "NO_STATE_SYMBOLS", xml=description({}))
+    reasons = {f.check: f.detail for f in report.findings if f.verdict is SKIPPED}
+    assert reasons["divided steps"] == "does not declare canHandleVariableCommunicationStepSize"
+    assert reasons["state round trip"] == "does not declare canGetAndSetFMUstate"
+    assert reasons["directional derivatives"] == "does not declare providesDirectionalDerivative"
+    assert set(problems(report)) == {"exported symbols"}
+    assert report.finding("exported symbols").verdict is WARN  # the standard wants them, but nothing was promised
+
+
+def test_one_instance_in_a_process(tmp_path: Path) -> None:
+    report = checked(tmp_path, "LEAKS_FILES", xml=description(SLAVE | {"canBeInstantiatedOnlyOncePerProcess": "true"}))
+    assert problems(report) == {}
+    reason = "declares canBeInstantiatedOnlyOncePerProcess"
+    several = ("two instances", "repeated instantiation", "state in another instance", "logging")
+    assert {report.finding(name).detail for name in several} == {reason}
+
+
+@pytest.mark.parametrize(
+    ("lie", "check", "words"),
+    [
+        ("STATES_NOT_SET", "states", "not what is read back"),
+        ("DERIVATIVES_DRIFT", "states", "the derivatives at the same states differ"),
+        ("NAN_DERIVATIVE", "values at start", "derivatives [2] = nan"),
+        (
+            "DERIVATIVE",
+            "directional derivatives",
+            "of rate along speed is said to be -0.505, differences give -0.5",
+        ),
+        ("NO_STATE_SYMBOLS", "state round trip", "does not export fmi2GetFMUstate"),
+        ("REFUSES_START", "initialise", "fmi2ExitInitializationMode failed"),
+    ],
+)
+def test_model_exchange_lies(lie: str, check: str, words: str, tmp_path: Path) -> None:
+    report = checked(tmp_path, lie, xml=description(None, STATES))
+    finding = report.finding(f"model exchange: {check}")
+    assert finding.verdict is FAIL, finding
+    assert words in finding.detail
+
+
+def test_honest_model_exchange_alone(tmp_path: Path) -> None:
+    report = checked(tmp_path, xml=description(None, STATES))
+    assert problems(report) == {}
+    assert report.trust == ("It has model exchange only: a solver can integrate it and restore its state exactly.",)

@@ -1,0 +1,169 @@
+"""Model exchange and co-simulation are two ways along one trajectory: they meet as the co-simulation's internal step shrinks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from exchange_importer import Exchange, Importer, Told
+from fmpy import simulate_fmu
+from fmpy.validation import validate_fmu
+
+from fmu_observer.block import make_block
+from fmu_observer.description import can_exchange
+from fmus import RECIPES, cached_fmu, recipe
+from plant_models.hybrid import HybridSystem, scalar_names
+
+pytestmark = pytest.mark.compiler
+
+SMALL = ("oscillator", "slider", "sampler", "tracker", "gain")
+EXCHANGED = (*SMALL, *(name for name in RECIPES if can_exchange(recipe(name))))
+"""Everything that has model exchange; the balise reader, which works on communication steps, has none."""
+
+STEP, STEPS = 0.1, 10
+EVENT_TIME = 0.337
+"""Of the told events [s]: on no grid."""
+
+ORDER = {"locomotive": 2, "slider": 2, "differentiator_cdo": 1}
+"""Of the internal method; 4 for the others. The differentiator's right-hand side has roots and signs, which leaves order 1."""
+
+TOLERANCE = 1e-11
+FLOOR = 2e-10
+"""What the solver itself may be wrong by, relative: some tens of steps with local errors of `TOLERANCE`."""
+
+GAIN = 0.55
+"""Share of the asymptotic gain of a halved step that must be seen: events cut internal steps, and the cuts fall elsewhere. More
+than half tells an order from the one below."""
+
+INPUTS = {"effort": 2.0e4, "force": 4.0}
+STARTS: Mapping[str, Mapping[str, float]] = {"locomotive": {"train_speed": 10.0, "wheel_rate": 20.2}}
+PAYLOADS = {"balise": {"balise_position": 3.4}, "telegram": {"telegram_speed": 12.0, "telegram_weight": 0.3}}
+
+
+def _starts(name: str, system: HybridSystem) -> dict[str, float]:
+    inputs = {signal: INPUTS.get(signal, 9.0 + k) for k, signal in enumerate(scalar_names(system.inputs))}
+    return inputs | dict(STARTS.get(name, {}))
+
+
+def _told(system: HybridSystem) -> list[Told]:
+    return [Told(EVENT_TIME, event.name, PAYLOADS[event.name]) for event in system.triggered_events]
+
+
+def _values(description: Any) -> list[str]:
+    """Names of the outputs and states."""
+    exact = [v.name for v in description.modelVariables if v.causality == "local" and v.initial == "exact"]
+    return [v.name for v in description.modelVariables if v.causality == "output"] + exact
+
+
+def _exchanged(model: Exchange, name: str, system: HybridSystem) -> np.ndarray:
+    update = model.initialize(**_starts(name, system))
+    solver = "Radau" if system.method == "rosenbrock" else "DOP853"
+    importer = Importer(model, update, method=solver, rtol=TOLERANCE, atol=TOLERANCE)
+    told = _told(system)
+    for k in range(1, STEPS + 1):
+        if told and (k - 1) * STEP < EVENT_TIME <= k * STEP:
+            importer.advance(EVENT_TIME)
+            importer.happen(told)
+        importer.advance(k * STEP)
+        importer.record(*_values(model.description))
+    return importer.run.values()
+
+
+def _cosimulated(made: Any, name: str, system: HybridSystem, factor: float) -> np.ndarray:
+    made.initialize(**_starts(name, system), internal_step=system.internal_step * factor)
+    rows = []
+    for k in range(STEPS):
+        if k * STEP < EVENT_TIME <= (k + 1) * STEP:
+            for told in _told(system):
+                made.event(told.name, stamp=EVENT_TIME, **told.payload)
+        made.step(k * STEP, STEP)
+        rows.append(made.get(*_values(made.description)))
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("name", EXCHANGED)
+def test_cosimulation_converges_to_model_exchange_at_its_order(
+    name: str, version: int, exchange: Callable[..., Exchange], component: Callable[..., Any], reference: Callable[[str], Any]
+) -> None:
+    system = reference(name).system
+    expected = _exchanged(exchange(name, version), name, system)
+    size = np.maximum(np.abs(expected).max(axis=0), 1.0)
+    errors = []
+    for factor in (4.0, 2.0, 1.0):
+        got = _cosimulated(component(name, version), name, system, factor)
+        errors.append(float((np.abs(got - expected).max(axis=0) / size).max()))
+    assert np.ptp(expected, axis=0).max() > 0.0 or name == "gain"  # something moved
+    gain = GAIN * 2.0 ** ORDER.get(name, 4)
+    for coarse, fine in pairwise(errors):
+        assert fine < max(coarse / gain, FLOOR), errors
+
+
+@pytest.mark.parametrize("name", EXCHANGED)
+def test_fmpy_simulates_it_in_model_exchange(name: str, version: int, reference: Callable[[str], Any]) -> None:
+    system = reference(name).system
+    fmu = str(cached_fmu(system, version))  # type: ignore[arg-type]
+    assert validate_fmu(fmu) == []
+    common: dict[str, Any] = {"stop_time": 1.0, "output_interval": STEP, "start_values": _starts(name, system)}
+    outputs = list(scalar_names(system.outputs)) + list(scalar_names(system.states))
+    solved = simulate_fmu(
+        fmu, fmi_type="ModelExchange", solver="CVode", relative_tolerance=1e-9, output=outputs, record_events=False, **common
+    )
+    common["start_values"] = {**common["start_values"], "internal_step": system.internal_step / 4.0}
+    stepped = simulate_fmu(fmu, fmi_type="CoSimulation", output=outputs, **common)
+    np.testing.assert_allclose(solved["time"], stepped["time"], rtol=0.0, atol=1e-12)
+    for output in outputs:
+        # CVode with tolerance 1e-9 adds up a hundred local errors; the differentiator's internal steps are of order 1
+        atol = (2e-3 if name == "differentiator_cdo" else 3e-7) * max(np.abs(solved[output]).max(), 1.0)
+        np.testing.assert_allclose(solved[output], stepped[output], rtol=0.0, atol=atol, err_msg=output)
+
+
+@pytest.mark.parametrize("name", ["odometer", "discrete_uio", "multirate_cdo", "sampler", "tracker"])
+def test_time_events_are_hit_exactly(
+    name: str, version: int, exchange: Callable[..., Exchange], reference: Callable[[str], Any]
+) -> None:
+    system, model, start = reference(name).system, exchange(name, version), 3.7
+    importer = Importer(model, model.initialize(start))
+    importer.advance(start + 1.0)
+    instants = set()
+    for event in system.periodic_events:
+        period, offset = model.get(event.period)[0], 0.0 if event.offset is None else model.get(event.offset)[0]
+        instants |= {start + offset + k * period for k in range(round(1.0 / period) + 1)}  # as the grid is defined, to the bit
+    expected = sorted(t for t in instants if start < t <= start + 1.0)
+    assert importer.run.time_events == expected
+
+
+@pytest.mark.parametrize("name", ["takagi_sugeno_cdo", "discrete_uio", "multirate_cdo"])
+def test_observer_with_balises_follows_its_block(
+    name: str, version: int, exchange: Callable[..., Exchange], reference: Callable[[str], Any]
+) -> None:
+    system, model = reference(name).system, exchange(name, version)
+    starts, names = {"effort": 3.0e4, "odometer": 10.0}, list(scalar_names(system.outputs))
+    balises = [(0.31 * k + 0.1234, 3.1 * k + 1.5) for k in range(4)]
+    block: Any = make_block(recipe(name, **system.options), fmi_version=3)
+    references = [next(v.valueReference for v in block.model_description.modelVariables if v.name == n) for n in names]
+    by_name = {v.name: v.valueReference for v in block.model_description.modelVariables}
+    block.instantiate(eventModeUsed=True)
+    block.setFloat64([by_name[n] for n in (*starts, "internal_step")], [*starts.values(), system.internal_step / 2.0])
+    block.enterInitializationMode()
+    block.exitInitializationMode()
+    block.enterStepMode()
+    importer = Importer(model, model.initialize(**starts), rtol=TOLERANCE, atol=TOLERANCE)
+    now = 0.0
+    for instant, position in balises:
+        importer.advance(instant)
+        importer.happen([Told(instant, "balise", {"balise_position": position})])
+        block.doStep(now, instant - now)
+        block.enterEventMode()
+        block.setClock([by_name["balise"]], [True])
+        block.setFloat64([by_name["balise_position"]], [position])
+        block.updateDiscreteStates()
+        block.enterStepMode()
+        now = instant
+        got, expected = model.get(*names), np.array(block.getFloat64(references))
+        # half the internal step leaves 1e-11 of the block's error of order 4, the solver as much; times the size of forces
+        np.testing.assert_allclose(got, expected, rtol=1e-9, atol=1e-8)
+    assert len(importer.run.time_events) == (10 if system.periodic_events else 0)
+    assert abs(model.get("innovation")[0]) > 0.01  # the balises told something
