@@ -28,7 +28,7 @@ from fmpy.model_description import (
     Unknown,
 )
 
-from fmu_observer.event_protocol import LATE_POLICIES, EventProtocol
+from fmu_observer.event_protocol import JOURNAL_CAPACITY, LATE_POLICIES, EventProtocol
 from plant_models.hybrid import HybridSystem, Signal, TracedSystem, TriggeredEvent, width
 from plant_models.hybrid.units import BASE_SYMBOLS, conversion, parse_unit
 
@@ -46,6 +46,9 @@ LOG_CATEGORIES = {
 
 VERSION_STRINGS = {2: "2.0", 3: "3.0"}
 LATE_POLICY_TYPE = "LatePolicy"
+DISPLAY_UNITS = {"m/s": "km/h"}
+"""Units to show at the user's edge where a signal names none."""
+
 TOKEN_ATTRIBUTES = (
     "name", "valueReference", "type", "causality", "variability", "initial", "start", "min", "max", "unit", "displayUnit",
 )  # fmt: skip
@@ -207,7 +210,7 @@ def _signal_variable(signal: Signal, name: str, reference: int, real: str, start
     kind = real if not signal.integer else ("Integer" if real == "Real" else "Int32")
     unit = None if signal.integer else signal.unit
     variable = _variable(name, reference, kind, signal.causality, signal.variability, initial, unit, start, signal.description)
-    variable.displayUnit = signal.display_unit
+    variable.displayUnit = signal.display_unit or DISPLAY_UNITS.get(signal.unit)
     variable.min = None if signal.min is None else repr(float(signal.min))
     variable.max = None if signal.max is None else repr(float(signal.max))
     return variable
@@ -233,7 +236,7 @@ def _protocol_variables(protocol: EventProtocol, reference: int, real: str) -> l
     text = "What to do with an event stamped before the current time"
     policy = _variable("late_policy", reference, "Enumeration", "parameter", "fixed", "exact", None, number, text)
     policy.declaredType = _late_policy_type()
-    text = "How far back late events can be replayed"
+    text = f"How far back late events can be replayed, at most {JOURNAL_CAPACITY} records"
     horizon = _variable("replay_horizon", reference + 1, real, "parameter", "fixed", "exact", "s", protocol.replay_horizon, text)
     horizon.min = "0.0"
     return [policy, horizon]

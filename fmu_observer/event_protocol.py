@@ -16,6 +16,9 @@ LATE_POLICIES: tuple[LatePolicy, ...] = ("replay", "reject", "late")
 
 DEFAULT_REPLAY_HORIZON = 10.0
 
+JOURNAL_CAPACITY = 4096
+"""Records of the past remembered at most, in the block and in the exported FMU; an event before them is out of reach."""
+
 
 @dataclass(frozen=True)
 class EventProtocol:

@@ -126,12 +126,14 @@ def write_fmu(plan: Plan, targets: Sequence[Target], path: Path, progress: Progr
     """Carry out a plan: generate, compile, pack.
 
     Raises:
+        TextRefusedError: a name or a description holds a character that XML forbids.
         CompilationError: a compiler refused the sources.
     """
+    description = plan.description_xml().encode()  # first: a text that XML cannot hold is refused before anything is compiled
     sources = plan.source_files() | plan.header_files()
     libraries = compile_targets(targets, sources, plan.sources, plan.system.name, progress)
     content = {f"sources/{name}": text for name, text in sources.items()}
-    content["modelDescription.xml"] = plan.description_xml().encode()
+    content["modelDescription.xml"] = description
     if plan.fmi_version == 3:
         content["sources/buildDescription.xml"] = build_description_xml(plan.system.name, plan.sources).encode()
     content |= resource_files(plan.system, plan.preset)

@@ -44,6 +44,9 @@ def pack_fmu(files: Mapping[str, bytes], target: Path) -> Path:
 
     Returns:
         `target`.
+
+    Raises:
+        OSError: it cannot be written, for example to a full disk; names the target, and an older file there is as it was.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=".part", dir=target.parent)
@@ -54,6 +57,8 @@ def pack_fmu(files: Mapping[str, bytes], target: Path) -> Path:
                 archive.writestr(_entry(inner), files[inner], compresslevel=9)
         draft.chmod(0o644)
         draft.replace(target)
+    except OSError as error:  # a full disk does not say which file it was
+        raise OSError(error.errno, f"{error.strerror or error}; the FMU was not written", str(target)) from error
     finally:
         with suppress(FileNotFoundError):
             draft.unlink()

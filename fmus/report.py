@@ -6,10 +6,10 @@ import zipfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from fmpy import read_model_description
 from fmpy.model_description import ModelDescription, ModelVariable
 from fmpy.validation import validate_fmu
 
+from fmus.check.description import read_description
 from fmus.toolchain.machine_code import platforms_of_library
 from fmus.toolchain.platforms import host_platform
 
@@ -23,8 +23,16 @@ _CAPABILITIES = (
     "canGetAndSetFMUstate",
     "canSerializeFMUstate",
     "hasEventMode",
+    "mightReturnEarlyFromDoStep",
     "providesDirectionalDerivative",
+    "completedIntegratorStepNotNeeded",
 )
+_NAMES_3 = {
+    "canGetAndSetFMUstate": "canGetAndSetFMUState",
+    "canSerializeFMUstate": "canSerializeFMUState",
+    "providesDirectionalDerivative": "providesDirectionalDerivatives",
+}
+"""Capabilities that FMI 3.0 spells differently from FMI 2.0 and fmpy."""
 _SHOWN = ("input", "output", "parameter")
 _EXTENSIONS = (".so", ".dll", ".dylib")
 _FOLDERS = {
@@ -54,7 +62,7 @@ def describe_file(path: Path) -> list[str]:
                 _platforms(archive),
                 any(n.startswith("sources/") and n.endswith(".c") for n in archive.namelist()),
             )
-        description = read_model_description(str(path), validate=False)
+        description = read_description(path)
     except Exception as error:
         raise ValueError(f"{path} cannot be read as an FMU: {_reason(error)}") from error
     lines = [
@@ -62,7 +70,7 @@ def describe_file(path: Path) -> list[str]:
         *([description.description] if description.description else []),
         f"platforms: {', '.join(platforms) or 'none'}",
         _on_this_machine(description, platforms, has_sources),
-        f"capabilities: {', '.join(_capabilities(description)) or 'none'}",
+        *_capabilities(description),
     ]
     for causality in _SHOWN:
         chosen = [v for v in description.modelVariables if v.causality == causality]
@@ -137,8 +145,14 @@ def _interfaces(description: ModelDescription) -> list[str]:
 
 
 def _capabilities(description: ModelDescription) -> list[str]:
-    cosimulation = description.coSimulation
-    return [] if cosimulation is None else [name for name in _CAPABILITIES if getattr(cosimulation, name)]
+    """A line for each interface, in the words of the FMI version."""
+    renamed, lines = _NAMES_3 if str(description.fmiVersion).startswith("3") else {}, []
+    for held, text in _INTERFACES:
+        interface = getattr(description, held)
+        if interface is not None:
+            names = [renamed.get(name, name) for name in _CAPABILITIES if getattr(interface, name, False)]
+            lines.append(f"capabilities in {text}: {', '.join(names) or 'none'}")
+    return lines
 
 
 def _variables(variables: Iterable[ModelVariable]) -> list[str]:
@@ -146,5 +160,8 @@ def _variables(variables: Iterable[ModelVariable]) -> list[str]:
 
 
 def _value(variable: ModelVariable) -> str:
-    start = "" if variable.start is None else f" = {variable.start}"
+    items = {str(item.value): item.name for item in getattr(variable.declaredType, "items", None) or ()}
+    start = "" if variable.start is None else f" = {items.get(str(variable.start), variable.start)}"
+    if items:
+        return f"{variable.name}{start} [{', '.join(items.values())}]"
     return f"{variable.name}{start} [{variable.unit or ('clock' if variable.type == 'Clock' else '1')}]"

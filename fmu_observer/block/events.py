@@ -9,6 +9,7 @@ import logging
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from math import isfinite
 
 import numpy as np
 
@@ -124,8 +125,12 @@ class Events:
 
     def _announce(self, number: int) -> None:
         name = self._names[number]
-        stamp = self.stamps[number] if self.stamps[number] > STAMP_NOW else self._runtime.t
+        stamp = self._runtime.t if self.stamps[number] <= STAMP_NOW else self.stamps[number]
         self.stamps[number] = STAMP_NOW
+        if not isfinite(stamp):
+            self.counters.lost += 1
+            _log.warning("event %s: its stamp %r s is not a finite number; it is lost", name, stamp)
+            return
         if len(self.queue) >= QUEUE_CAPACITY:
             self.counters.lost += 1
             _log.warning("event %s at %r s: %d events are waiting already; this one is lost", name, stamp, QUEUE_CAPACITY)

@@ -104,6 +104,7 @@ class Face:
         self.instanceName = instance_name or system.name
         self.modelIdentifier = system.name
         self.instance = Instance(system, self.guid, counts_events, protocol, preset)
+        self._counts_events = counts_events
         self._sensitivity = Sensitivity(system, self.model_description.modelVariables)
         self._folder: str | None = None
 
@@ -227,7 +228,7 @@ class Face:
     @refused
     def deserializeFMUState(self, serializedState: bytes, state: BlockState | None = None) -> BlockState:
         """The state that `serializeFMUState` wrote."""
-        return deserialize(serializedState, self.instance.shape)
+        return self.instance.check(deserialize(serializedState, self.instance.shape))
 
     # -- internals --------------------------------------------------------------------------------------------------
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -12,6 +13,8 @@ from fmu_observer.block.variables import BlockError, Mode, Role
 
 INT32: tuple[Role, ...] = ("count", "integer_output")
 INT64: tuple[Role, ...] = ("policy",)
+
+_log = logging.getLogger(__name__)
 
 
 class FMI3Block(Face, FMU3Slave):
@@ -159,6 +162,18 @@ class FMI3Block(Face, FMU3Slave):
     ) -> list[float]:
         """Directional derivatives of the unknowns by the knowns with this seed."""
         return self.directional_derivative(unknowns, knowns, seed)
+
+    @refused
+    def exitInitializationMode(self) -> None:
+        """End initialisation; time begins to run. A warning where nobody will be able to tell the events of the block."""
+        super().exitInitializationMode()
+        if self._event_mode_used is False and self.system.triggered_events and not self._counts_events:
+            names = ", ".join(event.name for event in self.system.triggered_events)
+            _log.warning(
+                "%s: eventModeUsed is False, but events (%s) are announced by clocks: none can be told; a block with "
+                "announcement='counts' (an FMU built with `--events counts`) is for masters without event mode",
+                self.instanceName, names,
+            )  # fmt: skip
 
     # -- internals --------------------------------------------------------------------------------------------------
 

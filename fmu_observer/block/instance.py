@@ -14,7 +14,8 @@ import numpy as np
 
 from fmu_observer.block.events import TIME_TOLERANCE, Events
 from fmu_observer.block.state import BlockState, Shape, check_owner
-from fmu_observer.block.variables import COMPUTED, BlockError, Mode, Place, Role, StepDiscarded, Variables
+from fmu_observer.block.timing import MOST_INTERNAL_STEPS, Timing
+from fmu_observer.block.variables import BEFORE_TIME, COMPUTED, BlockError, Mode, Place, Role, StepDiscarded, Variables
 from fmu_observer.event_protocol import LATE_POLICIES, EventProtocol
 from plant_models.hybrid import HybridSystem, Runtime, Snapshot, scalar_names
 
@@ -45,6 +46,7 @@ class Instance:
         self.runtime = Runtime(system)
         self.events = Events(system, self.runtime, protocol)
         self.variables = Variables(system, self.runtime, self.events, counts_events)
+        self._timing = Timing(system)
         self.shape = Shape(token, len(self.runtime.memory), len(self.runtime.ticks), self.events.payloads)
         self.reset()
 
@@ -160,6 +162,7 @@ class Instance:
         if not (isfinite(horizon) and horizon >= 0.0):
             raise BlockError(f"time cannot run with parameter replay_horizon = {horizon!r}; expected zero or more seconds.")
         self.events.restore_past(())  # as the policy has it that was set
+        self.events.seen = list(self.events.counts)  # what stands there already is no event
         try:
             self.runtime.start(self.runtime.t0)
         except ValueError as error:
@@ -179,7 +182,8 @@ class Instance:
 
         Raises:
             BlockError: the block is not in step mode, `t` is not the current time, or `h` is not positive.
-            StepDiscarded: the model fails, or its state is not finite afterwards; the block stands where it stood before.
+            StepDiscarded: the model fails, its state is not finite afterwards, or the step is so large that no end of it is to be
+                seen; the block stands where it stood before.
         """
         if self.mode != "step":
             self.require("step")
@@ -187,8 +191,9 @@ class Instance:
             raise BlockError(f"communicationStepSize = {h!r} s is not a positive number.")
         if not abs(t - self.runtime.t) <= TIME_TOLERANCE + STEP_TOLERANCE * h:
             raise BlockError(f"currentCommunicationPoint = {t!r} s, but the block stands at {self.runtime.t!r} s.")
-        due = self.runtime.next_instant_before(t + h) if early_return else None
         runtime = self.runtime
+        due = runtime.next_instant_before(t + h) if early_return else None
+        self._check_size(h, t + h if due is None else due)
         before, mark = (runtime.memory.copy(), runtime.t, runtime.t0, tuple(runtime.ticks)), self.events.mark()
         self.variables.touch()
         try:
@@ -233,6 +238,18 @@ class Instance:
             counters=replace(events.counters),
         )
 
+    def check(self, state: BlockState) -> BlockState:
+        """The state, if time can run on from it.
+
+        Raises:
+            BlockError: it cannot.
+        """
+        horizon = state.protocol[1]
+        started = state.mode not in BEFORE_TIME
+        if started and not (isfinite(horizon) and horizon >= 0.0 and self._timing.can_run(state.runtime)):
+            raise BlockError("time cannot run on from this state: its step, periods, offsets, seed or horizon are damaged.")
+        return state
+
     def load(self, state: BlockState) -> None:
         """Return to a saved state, exactly.
 
@@ -274,6 +291,16 @@ class Instance:
             raise BlockError("the block has been freed; begin anew with instantiate().")
 
     # -- internals --------------------------------------------------------------------------------------------------
+
+    def _check_size(self, h: float, end: float) -> None:
+        runtime = self.runtime
+        if not self._timing.count_steps(end, runtime.t, runtime.t0, runtime.p, runtime.ticks) <= MOST_INTERNAL_STEPS:
+            self.discarded = True
+            step = float(runtime.p[self._timing.step_position])
+            raise StepDiscarded(
+                f"communicationStepSize = {h!r} s holds more than {MOST_INTERNAL_STEPS:.0f} internal steps or periods "
+                f"(internal_step = {step!r} s); make it smaller."
+            )
 
     def _move(self, end: float) -> None:
         events = self.events

@@ -14,10 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fmu_observer.event_protocol import JOURNAL_CAPACITY
 from plant_models.hybrid import Runtime
-
-JOURNAL_CAPACITY = 4096
-"""Records remembered at most, as in the exported FMU; an event that lies before them is out of reach."""
 
 SMALLEST_PRUNING = 256
 PRUNING_MARGIN = 1e-6

@@ -10,6 +10,8 @@ import base64
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from itertools import chain, pairwise
+from math import isfinite
 from typing import Any, get_args
 
 import numpy as np
@@ -21,6 +23,7 @@ from fmu_observer.event_protocol import LATE_POLICIES
 from plant_models.hybrid import Snapshot
 
 DOUBLE = np.dtype("<f8")
+TICKS = range(2**53)  # whole numbers that are exact as floats
 
 
 @dataclass(frozen=True)
@@ -125,12 +128,14 @@ def _decode_state(data: dict[str, Any], shape: Shape) -> BlockState:
     if data["mode"] not in get_args(Mode):
         raise ValueError(f"unknown mode {data['mode']!r}")
     t, t0, horizon, *stamps = map(float, _decode(data["times"], (3 + count,)))
+    if not (isfinite(t) and isfinite(t0)):
+        raise ValueError(f"the times {t!r} s and {t0!r} s are not finite")
     (policy,) = _integers([data["late_policy"]], 1, range(1, len(LATE_POLICIES) + 1))
     return BlockState(
         token=shape.token,
         mode=data["mode"],
         active=_integers(data["active"], len(data["active"]), range(count)),
-        runtime=Snapshot(_decode(data["memory"], (shape.memory,)), t, t0, _integers(data["ticks"], shape.ticks)),
+        runtime=Snapshot(_decode(data["memory"], (shape.memory,)), t, t0, _integers(data["ticks"], shape.ticks, TICKS)),
         protocol=(policy, horizon),
         records=_decode_records(data["past"], shape),
         queue=tuple(_event(entry, shape) for entry in data["queue"]),
@@ -146,7 +151,10 @@ def _decode_records(past: dict[str, Any], shape: Shape) -> tuple[Record, ...]:
     memory = _decode(past["memory"], (count, shape.memory))
     times = _decode(past["times"], (count, 2)).tolist()
     events = {int(i): _event(entry, shape) for i, entry in past["events"].items()}
-    ticks = [_integers(entry, shape.ticks) for entry in past["ticks"]]
+    instants = list(chain.from_iterable(times))
+    if not all(map(isfinite, instants)) or any(later < earlier for earlier, later in pairwise(instants)):
+        raise ValueError("the records are not in the order of time")
+    ticks = [_integers(entry, shape.ticks, TICKS) for entry in past["ticks"]]
     return tuple(Record(memory[i], t, until, ticks[i], events.get(i)) for i, (t, until) in enumerate(times))
 
 
@@ -158,6 +166,8 @@ def _event(entry: Sequence[Any], shape: Shape) -> Stamped:
     name, numbers = entry
     positions = shape.payloads[name]
     stamp, *payload = map(float, _decode(numbers, (1 + len(positions),)))
+    if not isfinite(stamp):
+        raise ValueError(f"the stamp {stamp!r} s of event {name} is not finite")
     return Stamped(name, stamp, positions, tuple(payload))
 
 

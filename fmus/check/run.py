@@ -12,7 +12,7 @@ from fmpy.model_description import ModelDescription
 
 from fmus.check.archive import Archive, open_archive
 from fmus.check.catalogue import CATALOGUE
-from fmus.check.checks_static import platforms, validation
+from fmus.check.checks.static import platforms, validation
 from fmus.check.findings import Finding, Verdict
 from fmus.check.instance import NUMERIC_TYPES
 from fmus.check.isolated import run_isolated

@@ -1,6 +1,7 @@
 """Command line ``fmus``: list, build, check, info.
 
-Exit codes: 0 done, 1 the FMU has problems, 2 a mistake of the user or a build that failed.
+Exit codes: 0 done, 1 the FMU has problems, 2 a mistake of the user or a build that failed or was interrupted, 141 nobody reads
+the output any more.
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ from pathlib import Path
 
 from fmus.check import cli as check_cli
 from fmus.cli import build as build_cli
+from fmus.cli.failures import EXPECTED, words
+from fmus.cli.signals import BROKEN_PIPE, forget_output, interruptible
 
 OK, PROBLEMS, FAILED = 0, 1, 2
 
@@ -28,9 +31,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     options = _parser().parse_args(arguments)
     try:
-        code: int = options.run(options)
-    except (ValueError, LookupError, OSError, RuntimeError, TypeError) as error:
-        print(f"fmus: {error}", file=sys.stderr)
+        with interruptible():
+            code: int = options.run(options)
+            sys.stdout.flush()
+    except BrokenPipeError:
+        forget_output()
+        return BROKEN_PIPE
+    except EXPECTED as error:
+        print(f"fmus: {words(error, options)}", file=sys.stderr)
         return FAILED
     except KeyboardInterrupt:
         print("fmus: interrupted.", file=sys.stderr)

@@ -69,6 +69,11 @@ def trace_equations(system: HybridSystem) -> Equations:
             "Step it as a block in Python, or export it with Python inside: fmus build ... --hosted."
         )
     traced = TracedSystem(system)
+    if traced.digest() != TracedSystem(system).digest():
+        raise GenerationError(
+            f"{system.name}: its functions give other equations each time they are traced. They must depend on t, x, u and p "
+            "only: no random numbers, no clock, nothing kept on self; declare noise at a periodic event."
+        )
     jumps = {f"jump_{event.name}": traced.jump(event.name) for event in system.events}
     check_payloads(system, {"step": traced.step} | jumps if system.continuous_count else jumps)
     prefix, flows, outputs = system.name, bool(system.continuous_count), bool(width(system.outputs))

@@ -10,6 +10,8 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from fmpy.model_description import BaseUnit, ModelDescription, ModelVariable, Unit, Unknown
 
+from fmus.content.characters import check_text, number_text
+
 _CAPABILITIES_2 = {
     "canHandleVariableCommunicationStepSize": "canHandleVariableCommunicationStepSize",
     "canGetAndSetFMUstate": "canGetAndSetFMUstate",
@@ -35,6 +37,9 @@ def model_description_xml(description: ModelDescription, sources: Sequence[str] 
     Args:
         description: what `fmu_observer.description.describe` returns, for FMI 2.0 or 3.0.
         sources: names of the C files in ``sources/`` (FMI 2.0 lists them here, FMI 3.0 in buildDescription.xml).
+
+    Raises:
+        TextRefusedError: a name or a description holds a character that XML forbids.
     """
     root = _head(description)
     _interfaces(root, description, sources)
@@ -133,7 +138,7 @@ def _units(root: Element, units: Sequence[Unit]) -> None:
         if unit.baseUnit is not None:
             _element(element, "BaseUnit", _base_unit(unit.baseUnit))
         for display in unit.displayUnits:
-            attributes = {"name": display.name, "factor": repr(float(display.factor)), "offset": repr(float(display.offset))}
+            attributes = {"name": display.name, "factor": number_text(display.factor), "offset": number_text(display.offset)}
             _element(element, "DisplayUnit", attributes)
 
 
@@ -141,9 +146,9 @@ def _base_unit(unit: BaseUnit) -> dict[str, str | None]:
     powers = {symbol: getattr(unit, symbol) for symbol in ("kg", "m", "s", "A", "K", "mol", "cd", "rad")}
     attributes: dict[str, str | None] = {symbol: str(power) for symbol, power in powers.items() if power}
     if unit.factor != 1.0:
-        attributes["factor"] = repr(float(unit.factor))
+        attributes["factor"] = number_text(unit.factor)
     if unit.offset != 0.0:
-        attributes["offset"] = repr(float(unit.offset))
+        attributes["offset"] = number_text(unit.offset)
     return attributes
 
 
@@ -233,9 +238,12 @@ def _element(parent: Element, tag: str, attributes: Mapping[str, object]) -> Ele
 
 
 def _set(element: Element, attributes: Mapping[str, object]) -> None:
+    owner = attributes.get("name", attributes.get("modelName", ""))
     for name, value in attributes.items():
         if value is not None:
-            element.set(name, str(value))
+            text = str(value)
+            check_text(text, f"modelDescription.xml: the {name} of {element.tag} {owner!r}")
+            element.set(name, text)
 
 
 def _document(root: Element) -> str:

@@ -12,7 +12,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable, Mapping
-from importlib.metadata import distribution
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
@@ -23,6 +22,7 @@ from fmpy.model_description import Category, CoSimulation, ModelDescription
 from fmu_observer.description import LOG_CATEGORIES
 from fmus.content.xml import model_description_xml
 from fmus.hosted.host import HostError, make_hosted_block, package_version
+from fmus.hosted.licences import hosted_licences
 from fmus.hosted.source import HostedExportError, Model, Source, find_source
 from fmus.hosted.wording import description_text, page
 from fmus.pack import check_target, pack_fmu
@@ -34,6 +34,9 @@ __all__ = ["HostedExportError", "build_hosted_fmu"]
 OLDEST_PYTHON = (3, 11)
 LIBRARIES = {"x86_64-linux": "linux64/libpythonfmu-export.so"}
 """Of pythonfmu's libraries, those that the front has been tried with, by platform tuple."""
+
+MAIN_SOURCE = "all.c"
+"""The one file of the front to compile; it includes the others."""
 
 ENTRY = "from {0} import Hosted, hold\n\nhold(globals())\n"
 
@@ -85,7 +88,8 @@ def build_hosted_fmu(
     path = path if path.suffix.lower() == ".fmu" else path / f"{description.coSimulation.modelIdentifier}.fmu"
     check_target(path)
     content = {f"resources/{inner}": text for inner, text in resources.items()}
-    return pack_fmu(content | _front(description) | _papers(description, source), path)
+    content |= _papers(description, source)  # first: a text that XML cannot hold is refused before anything is compiled
+    return pack_fmu(content | _front(description), path)
 
 
 # -- parts of the file --------------------------------------------------------------------------------------------------
@@ -139,25 +143,25 @@ def _front(description: ModelDescription) -> dict[str, bytes]:
     name = library_name(identifier)
     with tempfile.TemporaryDirectory(prefix="fmus-hosted-") as place:
         folder = Path(place)
-        (folder / "front.c").write_bytes((files("fmus.hosted") / "front.c").read_bytes())
+        _write(front_sources(), folder)
         (folder / "hosted_model.h").write_text("".join(f"#define {key} {value}\n" for key, value in header.items()))
-        binary = compile_library(find_compiler(), folder, ["front.c"], name).read_bytes()
+        binary = compile_library(find_compiler(), folder, [MAIN_SOURCE], name).read_bytes()
     return {f"binaries/{host_platform().fmi2_folder}/{name}": binary}
+
+
+def front_sources() -> dict[str, bytes]:
+    """The C files of the front, by name."""
+    return {entry.name: entry.read_bytes() for entry in (files("fmus.hosted") / "front").iterdir()}
 
 
 def _papers(description: ModelDescription, source: Source) -> dict[str, bytes]:
     text = f"the file resources/model/{source.file}" if source.file else f"imported from the installed module {source.module}"
-    licence = "".join(p.read_text() for p in _licences())
     html = page(description, f"{source.name}, {text}", package_version(), OLDEST_PYTHON, sys.version_info[1])
     return {
         "modelDescription.xml": _xml(description).encode(),
         "documentation/index.html": html.encode(),
-        "documentation/licenses/pythonfmu.txt": licence.encode(),
+        **{f"documentation/licenses/{name}": text.encode() for name, text in hosted_licences(source).items()},
     }
-
-
-def _licences() -> list[Any]:
-    return [p for p in distribution("pythonfmu").files or () if p.name == "LICENSE"]
 
 
 def _library_file() -> str:

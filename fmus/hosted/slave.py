@@ -2,7 +2,7 @@
 
 It may import pythonfmu, which lies beside it, and the standard library; `fmu-observer` only after the check that it is there.
 Nothing here may raise: pythonfmu would be left with broken references. A failure is a message with status error in the log
-queue, which the front (front.c) turns into fmi2Error.
+queue, which the front (the C files in front/) turns into fmi2Error.
 """
 
 from __future__ import annotations

@@ -62,8 +62,12 @@ static Status check_exchange(Instance *instance, int event, double *stamp) {
 
 PRIVATE Status events_announce(Instance *instance, int event) {
     Runtime *runtime = &instance->runtime;
-    double stamp = runtime->stamps[event] > STAMP_NOW ? runtime->stamps[event] : runtime->clock.t;
+    double stamp = runtime->stamps[event] <= STAMP_NOW ? runtime->clock.t : runtime->stamps[event];
     runtime->stamps[event] = STAMP_NOW;
+    if (!isfinite(stamp)) {
+        instance->lost += 1;
+        return instance_warn(instance, "event %s: its stamp %g s is not a finite number; it is lost", model.triggered[event].name, stamp);
+    }
     Status late = check_exchange(instance, event, &stamp);
     if (late != STATUS_OK)
         return late;

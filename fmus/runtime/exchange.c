@@ -101,7 +101,7 @@ PRIVATE Status exchange_get_derivatives(Instance *instance, const char *function
     int broken = first_broken(instance->runtime.derivatives, model.continuous);
     if (broken >= 0)
         return instance_discard(instance, "%s: the derivative of %s is not a finite number at %.17g s; check states, inputs and parameters",
-                                function, variables_name(ROLE_STATE, broken), instance->runtime.clock.t);
+                                function, variables_name(ROLES(ROLE_STATE), broken), instance->runtime.clock.t);
     copy_out(derivatives, instance->runtime.derivatives, count);
     return STATUS_OK;
 }
@@ -119,7 +119,7 @@ PRIVATE Status exchange_get_indicators(Instance *instance, const char *function,
     int broken = first_broken(instance->runtime.indicators, model.friction_count);
     if (broken >= 0)
         return instance_discard(instance, "%s: the event indicator of %s is not a finite number at %.17g s; check states, inputs and parameters",
-                                function, variables_name(ROLE_STATE, model.frictions[broken]), instance->runtime.clock.t);
+                                function, variables_name(ROLES(ROLE_STATE), model.frictions[broken]), instance->runtime.clock.t);
     for (size_t i = 0; i < count; i++)
         indicators[i] = unchanged(instance->runtime.indicators[i]);
     return STATUS_OK;

@@ -37,14 +37,14 @@
 #define READABLE (MODE_INSTANTIATED | MODE_INITIALIZATION | RUNNING | MODE_TERMINATED)
 
 static void log_fmi2(const Instance *instance, Status status, const char *category, const char *message) {
-    const fmi2CallbackFunctions *callbacks = instance->callbacks;
-    if (callbacks == NULL || callbacks->logger == NULL)
+    fmi2CallbackLogger logger = (fmi2CallbackLogger)instance->message_logger;
+    if (logger == NULL)
         return;
     /* Many importers show the format as it is and never look at the arguments after it. */
     if (strchr(message, '%') == NULL)
-        callbacks->logger(instance->environment, instance->name, (fmi2Status)status, category, message);
+        logger(instance->environment, instance->name, (fmi2Status)status, category, message);
     else
-        callbacks->logger(instance->environment, instance->name, (fmi2Status)status, category, "%s", message);
+        logger(instance->environment, instance->name, (fmi2Status)status, category, "%s", message);
 }
 
 static const Face face = {.solver_sets_reals = false, .log = log_fmi2};
@@ -70,7 +70,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     Instance *instance = instance_create(instanceName != NULL && *instanceName != '\0' ? instanceName : model.name, &face, fmuType == fmi2CoSimulation);
     if (instance == NULL)
         return NULL;
-    instance->callbacks = functions;
+    instance->message_logger = functions != NULL ? (Callback)functions->logger : NULL;
     instance->environment = functions != NULL ? functions->componentEnvironment : NULL;
     instance->debug_logging = loggingOn;
     Status status = STATUS_OK;

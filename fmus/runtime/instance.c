@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "resource.h"
+#include "variables.h"
 
 /* -- life -------------------------------------------------------------------------------------------------------- */
 
@@ -88,15 +89,6 @@ PRIVATE Status instance_require(const Instance *instance, const char *function, 
 
 /* -- the beginning of time --------------------------------------------------------------------------------------- */
 
-static const char *parameter_name(int index) {
-    for (unsigned i = 0; i < model.variable_count; i++) {
-        Role role = model.variables[i].role;
-        if ((role == ROLE_FIXED || role == ROLE_TUNABLE) && model.variables[i].index == index)
-            return model.variables[i].name;
-    }
-    return "?";
-}
-
 static Status cannot_run(const Instance *instance, const char *name, double value) {
     return instance_fail(instance, "time cannot run with parameter %s = %.17g; set it to a legal value", name, value);
 }
@@ -107,7 +99,7 @@ PRIVATE Status instance_start(Instance *instance, Mode next) {
         return cannot_run(instance, "replay_horizon", horizon);
     int refused = runtime_start(&instance->runtime, instance->start_time);
     if (refused >= 0)
-        return cannot_run(instance, parameter_name(refused), instance->runtime.p[refused]);
+        return cannot_run(instance, variables_name(ROLES(ROLE_FIXED) | ROLES(ROLE_TUNABLE), refused), instance->runtime.p[refused]);
     instance->mode = next;
     instance->outdated = OUTDATED_ALL;
     return STATUS_OK;

@@ -55,8 +55,7 @@ struct Instance {
     bool discarded;            /* the last step was */
     bool debug_logging;
     void *environment; /* of the importer, for its logger */
-    const void *callbacks;   /* FMI 2: the importer's callback table */
-    Callback message_logger; /* FMI 3: the importer's logger */
+    Callback message_logger; /* the importer's; a copy, as the table in which FMI 2 hands it over may be gone */
     double *resource_values; /* parameters as they were read from the FMU's resources */
     char *name;
 };

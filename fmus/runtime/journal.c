@@ -250,18 +250,33 @@ PRIVATE void journal_load(Journal *journal, JournalMark range, const double *num
     journal->range = range;
 }
 
-static bool is_sane_record(const double *place) {
-    double kind = place[2];
+static bool is_sane_record(const double *place, double earliest, double h) {
+    double t = place[0], until = place[1], kind = place[2];
     bool known = kind >= RECORD_COMMUNICATION && kind < model.triggered_count && kind == floor(kind);
-    return known && isfinite(place[0]) && isfinite(place[1]);
+    bool ordered = isfinite(t) && isfinite(until) && t >= earliest && until >= t;
+    return known && ordered && (until - t) / h <= MOST_INTERNAL_STEPS;
 }
 
-PRIVATE bool journal_is_sane(JournalMark range, const double *numbers) {
-    size_t place = 0, record = saved_record_length();
-    for (int64_t i = 0; i < range.end; i++, place += record) {
-        place += i % JOURNAL_SPACING == 0 ? snapshot_length() : 0;
-        if (!is_sane_record(numbers + place))
+static bool is_sane_snapshot(const double *place) {
+    const double *ticks = place + (size_t)model.states + noise_count();
+    for (int i = 0; i < model.periodic_count; i++)
+        if (!(ticks[i] >= 0.0 && ticks[i] < LARGEST_WHOLE && ticks[i] == floor(ticks[i])))
             return false;
-    }
     return true;
+}
+
+PRIVATE bool journal_is_sane(JournalMark range, const double *numbers, const Clock *clock) {
+    size_t place = 0, record = saved_record_length();
+    double earliest = -INFINITY;
+    for (int64_t i = 0; i < range.end; i++, place += record) {
+        if (i % JOURNAL_SPACING == 0) {
+            if (!is_sane_snapshot(numbers + place))
+                return false;
+            place += snapshot_length();
+        }
+        if (!is_sane_record(numbers + place, earliest, clock->h))
+            return false;
+        earliest = numbers[place + 1];
+    }
+    return earliest <= clock->t;
 }

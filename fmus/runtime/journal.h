@@ -80,6 +80,6 @@ PRIVATE JournalMark journal_saved_range(const Journal *journal, const Runtime *r
 PRIVATE size_t journal_saved_length(JournalMark range);
 PRIVATE void journal_save(const Journal *journal, JournalMark range, double *numbers);
 PRIVATE void journal_load(Journal *journal, JournalMark range, const double *numbers);
-PRIVATE bool journal_is_sane(JournalMark range, const double *numbers);
+PRIVATE bool journal_is_sane(JournalMark range, const double *numbers, const Clock *clock);
 
 #endif

@@ -50,7 +50,8 @@ static double *take(double **place, size_t count) {
     return taken;
 }
 
-PRIVATE void runtime_place(Runtime *runtime, double *numbers, int *integers) {
+/* The arrays that lie in `memory`; what follows them. */
+static double *place_memory(Runtime *runtime, double *numbers) {
     double *place = numbers;
     runtime->memory = numbers;
     runtime->x = take(&place, (size_t)model.states);
@@ -69,6 +70,11 @@ PRIVATE void runtime_place(Runtime *runtime, double *numbers, int *integers) {
     runtime->horizon = take(&place, 1);
     runtime->queue_length = take(&place, 1);
     runtime->queue = take(&place, queue_size());
+    return place;
+}
+
+PRIVATE void runtime_place(Runtime *runtime, double *numbers, int *integers) {
+    double *place = place_memory(runtime, numbers);
     runtime->y = take(&place, (size_t)model.outputs);
     runtime->x_next = take(&place, (size_t)model.states);
     runtime->derivatives = take(&place, (size_t)model.continuous);
@@ -224,10 +230,11 @@ PRIVATE int runtime_start(Runtime *runtime, double t0) {
         if (!isfinite(runtime->offsets[i]))
             return offset;
     }
-    if (model.seed >= 0 && !(runtime->p[model.seed] >= 0.0 && runtime->p[model.seed] < 0x1p53))
+    if (model.seed >= 0 && !(runtime->p[model.seed] >= 0.0 && runtime->p[model.seed] < LARGEST_WHOLE))
         return model.seed;
     runtime->clock.t = runtime->clock.t0 = t0;
     runtime->clock.h = runtime->p[model.internal_step];
+    copy(runtime->seen, runtime->raised, model.triggered_count); /* what stands there already is no event */
     runtime_fire_due(runtime);
     runtime_communicate(runtime);
     return -1;
@@ -276,6 +283,13 @@ PRIVATE void runtime_advance(Runtime *runtime, double t_end) {
     integrate(runtime, t_end);
 }
 
+PRIVATE double runtime_count_steps(const Runtime *runtime, double t_end) {
+    double count = (t_end - runtime->clock.t) / runtime->clock.h;
+    for (int i = 0; i < model.periodic_count; i++)
+        count = fmax(count, (t_end + runtime_tolerance(runtime, t_end) - instant(runtime, i)) / runtime->periods[i]);
+    return count;
+}
+
 PRIVATE double runtime_next_instant_before(const Runtime *runtime, double t_end) {
     double due = runtime_next_due(runtime), now = runtime->clock.t;
     bool between = due > now + runtime_tolerance(runtime, now) && due < t_end - runtime_tolerance(runtime, t_end);
@@ -291,21 +305,56 @@ PRIVATE void runtime_trigger(Runtime *runtime, int event) {
     jump(runtime, model.triggered[event].jump);
 }
 
-PRIVATE bool runtime_memory_is_sane(const double *memory) {
-    const double *end = memory + runtime_memory_length();
-    const double *queue = end - queue_size(), *length = queue - 1;
-    const double *signs = memory + model.states + model.inputs + model.parameters + 3 * model.periodic_count + 1;
-    for (int i = 0; i < model.friction_count; i++)
-        if (!(signs[i] == -1.0 || signs[i] == 0.0 || signs[i] == 1.0))
-            return false;
-    if (!(*length >= 0.0 && *length <= (model.triggered_count > 0 ? QUEUE_CAPACITY : 0)))
+/* -- from outside ------------------------------------------------------------------------------------------------ */
+
+static bool is_whole(double value, double from, double to) {
+    return value >= from && value <= to && value == floor(value);
+}
+
+static bool queue_is_sane(const Runtime *runtime) {
+    if (!is_whole(*runtime->queue_length, 0.0, model.triggered_count > 0 ? QUEUE_CAPACITY : 0))
         return false;
-    for (int i = 0; i < (int)*length; i++) {
-        double event = queue[(size_t)i * runtime_queue_stride()];
-        if (!(event >= 0.0 && event < model.triggered_count))
+    for (int i = 0; i < (int)*runtime->queue_length; i++) {
+        const double *entry = runtime->queue + (size_t)i * runtime_queue_stride();
+        if (!is_whole(entry[0], 0.0, model.triggered_count - 1) || !isfinite(entry[1]))
             return false;
     }
     return true;
+}
+
+static bool events_are_sane(const Runtime *runtime) {
+    for (int i = 0; i < model.triggered_count; i++) {
+        bool counts = is_whole(runtime->raised[i], INT32_MIN, INT32_MAX) && is_whole(runtime->seen[i], INT32_MIN, INT32_MAX);
+        if (!counts || !is_whole(runtime->active[i], 0.0, 1.0))
+            return false;
+    }
+    return is_whole(*runtime->late_policy, LATE_REPLAY, LATE_LATE) && queue_is_sane(runtime);
+}
+
+/* With which time runs on; before it has started these are not what it will run with. */
+static bool timing_is_sane(const Runtime *runtime) {
+    for (int i = 0; i < model.periodic_count; i++)
+        if (!is_positive(runtime->periods[i]) || !isfinite(runtime->offsets[i]) || !is_whole(runtime->ticks[i], 0.0, LARGEST_WHOLE - 1.0))
+            return false;
+    if (model.seed >= 0 && !(runtime->p[model.seed] >= 0.0 && runtime->p[model.seed] < LARGEST_WHOLE))
+        return false;
+    bool horizon = *runtime->horizon >= 0.0 && isfinite(*runtime->horizon);
+    return horizon && runtime_count_steps(runtime, runtime->clock.t) <= MOST_INTERNAL_STEPS;
+}
+
+PRIVATE bool runtime_is_sane(const Clock *clock, const double *memory, bool started) {
+    Runtime view;
+    memset(&view, 0, sizeof view);
+    place_memory(&view, (double *)memory); /* only read */
+    view.clock = *clock;
+    if (!isfinite(clock->t) || !isfinite(clock->t0) || !is_positive(clock->h))
+        return false;
+    for (int i = 0; i < model.friction_count; i++)
+        if (!is_whole(view.signs[i], -1.0, 1.0))
+            return false;
+    if (!is_whole(*view.resolved, 0.0, started ? 1.0 : 0.0) || !events_are_sane(&view))
+        return false;
+    return !started || timing_is_sane(&view);
 }
 
 PRIVATE int runtime_first_broken_state(const Runtime *runtime) {

@@ -12,6 +12,8 @@
 
 #define STAMP_NOW (-1e30)  /* a stamp of this, or less, means: at the current time */
 #define QUEUE_CAPACITY 64  /* events waiting at once, as in the Python block */
+#define LARGEST_WHOLE 0x1p53 /* whole numbers below are exact */
+#define MOST_INTERNAL_STEPS 1e9 /* in one communication step, and instants of one periodic event, as in the Python block */
 
 typedef struct {
     double t;  /* now [s] */
@@ -64,6 +66,9 @@ PRIVATE int runtime_start(Runtime *runtime, double t0);
 /* Integrate to t_end [s] and fire the periodic events on the way and at the end. */
 PRIVATE void runtime_advance(Runtime *runtime, double t_end);
 
+/* How many internal steps, or instants of one periodic event, lie between now and t_end [s]; the larger of the two. */
+PRIVATE double runtime_count_steps(const Runtime *runtime, double t_end);
+
 /* The next periodic instant [s] that lies after now and before t_end [s], or INFINITY. */
 PRIVATE double runtime_next_instant_before(const Runtime *runtime, double t_end);
 
@@ -95,8 +100,9 @@ PRIVATE void runtime_update_indicators(Runtime *runtime);
 /* Closer in time than this [s] is the same instant. */
 PRIVATE double runtime_tolerance(const Runtime *runtime, double t);
 
-/* Whether what serves as an index in a `memory` that came from outside is within its bounds. */
-PRIVATE bool runtime_memory_is_sane(const double *memory);
+/* Whether a clock and a `memory` that came from outside are such that time can run from there, or, before it has `started`, begin;
+   whatever serves as an index or a count is within its bounds. */
+PRIVATE bool runtime_is_sane(const Clock *clock, const double *memory, bool started);
 
 /* Position in x of the first state that is not a finite number, or -1. */
 PRIVATE int runtime_first_broken_state(const Runtime *runtime);

@@ -1,6 +1,7 @@
 /* Snapshots of an instance: a head, the memory of the runtime, then the part of the journal that is within reach. */
 #include "snapshot.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -36,6 +37,8 @@ static bool is_own(const Snapshot *snapshot) {
 static Status not_own(const Instance *instance, const char *function) {
     return instance_fail(instance, "%s: this is not a state of this model", function);
 }
+
+#define BEFORE_TIME (MODE_INSTANTIATED | MODE_INITIALIZATION)
 
 /* -- states ------------------------------------------------------------------------------------------------------ */
 
@@ -73,7 +76,14 @@ PRIVATE Status instance_save(const Instance *instance, const char *function, voi
 static bool fits_type(const Instance *instance, const Snapshot *snapshot) {
     const Runtime *runtime = &instance->runtime;
     bool exchange = snapshot->memory[runtime->resolved - runtime->memory] != 0.0;
-    return snapshot->mode & (MODE_INSTANTIATED | MODE_INITIALIZATION) || exchange == instance->exchange;
+    return snapshot->mode & BEFORE_TIME || exchange == instance->exchange;
+}
+
+/* Modes in which an instance can be: a step needs the memory by which it is undone, which only co-simulation has. */
+static int modes_of(const Instance *instance) {
+    if (instance->exchange)
+        return MODE_ANY & ~MODE_STEP;
+    return MODE_ANY & ~(MODE_CONTINUOUS | (instance->event_mode_used ? 0 : MODE_EVENT));
 }
 
 PRIVATE Status instance_restore(Instance *instance, const char *function, const void *state) {
@@ -83,6 +93,9 @@ PRIVATE Status instance_restore(Instance *instance, const char *function, const 
     if (!fits_type(instance, snapshot))
         return instance_fail(instance, "%s: the state was saved in %s, the instance was made for %s", function,
                              instance->exchange ? "co-simulation" : "model exchange", instance->exchange ? "model exchange" : "co-simulation");
+    if (!(snapshot->mode & modes_of(instance)))
+        return instance_fail(instance, "%s: the state is one of %s, in which this instance for %s cannot be", function, mode_name(snapshot->mode),
+                             instance->exchange ? "model exchange" : instance->event_mode_used ? "co-simulation" : "co-simulation without event mode");
     instance->mode = snapshot->mode;
     instance->rejected = snapshot->rejected;
     instance->lost = snapshot->lost;
@@ -122,7 +135,12 @@ PRIVATE Status instance_serialize(const Instance *instance, const char *function
     return STATUS_OK;
 }
 
-/* Bytes that come from outside: everything that later serves as an index is checked, the lengths before all else. */
+static bool is_counter(int64_t value) {
+    return value >= 0 && value < INT64_MAX / 2;
+}
+
+/* Bytes that come from outside: everything that later serves as an index or decides how time runs is checked, the lengths before
+   all else. */
 static bool is_sane(const Snapshot *snapshot, size_t size) {
     JournalMark past = snapshot->past;
     bool within = past.first >= 0 && past.first < JOURNAL_SPACING && past.end >= past.first && past.end - past.first <= JOURNAL_CAPACITY;
@@ -130,7 +148,10 @@ static bool is_sane(const Snapshot *snapshot, size_t size) {
         return false;
     int64_t mode = snapshot->mode;
     bool known = mode > 0 && mode <= MODE_ANY && (mode & (mode - 1)) == 0;
-    return known && runtime_memory_is_sane(snapshot->memory) && journal_is_sane(past, snapshot->memory + runtime_memory_length());
+    if (!known || !is_counter(snapshot->rejected) || !is_counter(snapshot->lost) || !isfinite(snapshot->start_time))
+        return false;
+    return runtime_is_sane(&snapshot->clock, snapshot->memory, !(mode & BEFORE_TIME)) &&
+           journal_is_sane(past, snapshot->memory + runtime_memory_length(), &snapshot->clock);
 }
 
 PRIVATE Status instance_deserialize(const Instance *instance, const char *function, const void *bytes, size_t size, void **state) {

@@ -6,6 +6,7 @@
 
 #include "events.h"
 #include "replay.h"
+#include "variables.h"
 
 #define STEP_TOLERANCE 1e-6 /* so much of a step may the importer's time be off in addition, as in the Python block */
 
@@ -17,13 +18,6 @@ static Status check_step(const Instance *instance, const char *function, double 
     if (!(fabs(current - t) <= TIME_TOLERANCE + STEP_TOLERANCE * size))
         return instance_fail(instance, "%s: currentCommunicationPoint = %.17g s, but the model stands at %.17g s", function, current, t);
     return STATUS_OK;
-}
-
-static const char *state_name(int index) {
-    for (unsigned i = 0; i < model.variable_count; i++)
-        if (model.variables[i].role == ROLE_STATE && model.variables[i].index == index)
-            return model.variables[i].name;
-    return "?";
 }
 
 /* -- undoing ----------------------------------------------------------------------------------------------------- */
@@ -58,11 +52,24 @@ static Status move(Instance *instance, double end) {
     return status_worse(counts, events);
 }
 
+/* Not to be seen an end of is a step that cannot be done. */
+static Status check_size(Instance *instance, const char *function, double size, double end) {
+    instance->discarded = !(runtime_count_steps(&instance->runtime, end) <= MOST_INTERNAL_STEPS);
+    if (!instance->discarded)
+        return STATUS_OK;
+    return instance_discard(instance, "%s: communicationStepSize = %.17g s holds more than %.0f internal steps or periods (internal_step = "
+                            "%.17g s); make it smaller", function, size, MOST_INTERNAL_STEPS, instance->runtime.clock.h);
+}
+
 PRIVATE Status instance_do_step(Instance *instance, const char *function, double current, double size, bool *early) {
+    if (instance->exchange)
+        return instance_fail(instance, "%s: the instance was made for model exchange", function);
     if (check_step(instance, function, current, size) != STATUS_OK)
         return STATUS_ERROR;
     double end = current + size;
     double due = instance->early_return_allowed ? runtime_next_instant_before(&instance->runtime, end) : INFINITY;
+    if (check_size(instance, function, size, fmin(due, end)) != STATUS_OK)
+        return STATUS_DISCARD;
     remember(instance);
     instance->outdated = OUTDATED_ALL;
     Status status = move(instance, fmin(due, end));
@@ -76,5 +83,5 @@ PRIVATE Status instance_do_step(Instance *instance, const char *function, double
     }
     undo_step(instance);
     return instance_discard(instance, "%s: state %s is not a finite number at %.17g s; the step is undone; check inputs, parameters "
-                            "and internal_step", function, state_name(broken), fmin(due, end));
+                            "and internal_step", function, variables_name(ROLES(ROLE_STATE), broken), fmin(due, end));
 }

@@ -13,9 +13,9 @@ PRIVATE const Variable *variables_find(const Instance *instance, const char *fun
     return NULL;
 }
 
-PRIVATE const char *variables_name(Role role, int index) {
+PRIVATE const char *variables_name(unsigned roles, int index) {
     for (unsigned i = 0; i < model.variable_count; i++)
-        if (model.variables[i].role == role && model.variables[i].index == index)
+        if ((ROLES(model.variables[i].role) & roles) && model.variables[i].index == index)
             return model.variables[i].name;
     return "?";
 }

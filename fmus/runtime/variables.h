@@ -23,9 +23,9 @@ PRIVATE Status instance_get_integer(Instance *instance, const char *function, un
 PRIVATE Status instance_check_integer(const Instance *instance, const char *function, unsigned reference, unsigned roles, int64_t value);
 PRIVATE void instance_put_integer(Instance *instance, unsigned reference, int64_t value);
 
-/* The variable behind a reference, or NULL with a message; and the name of the one with this role and index. */
+/* The variable behind a reference, or NULL with a message; and the name of the one with one of these roles and this index. */
 PRIVATE const Variable *variables_find(const Instance *instance, const char *function, unsigned reference);
-PRIVATE const char *variables_name(Role role, int index);
+PRIVATE const char *variables_name(unsigned roles, int index);
 
 /* The variable behind a reference if it has one of these roles, else NULL with a message. */
 PRIVATE const Variable *variables_find_among(const Instance *instance, const char *function, unsigned reference, unsigned roles);

@@ -197,6 +197,8 @@ class HybridSystem:
     def output_vector(self, t: Array, x: Array, u: Array, p: Array) -> Array:
         """`output` on flat arrays, stacked in the declared order, shape (q,)."""
         values = self.output(t, x, self.unpack_inputs(u), self.unpack_parameters(p))
+        if not isinstance(values, Mapping):
+            raise TypeError(f"{self.name}: output() returns a {type(values).__name__}; expected a dictionary of values by name.")
         missing = [s.name for s in self.outputs if s.name not in values]
         if missing or len(values) != len(self.outputs):
             extra = sorted(set(values) - {s.name for s in self.outputs})
@@ -246,6 +248,7 @@ class HybridSystem:
         repeated = sorted({n for n in names if names.count(n) > 1} | (RESERVED_NAMES & set(names)))
         if repeated:
             raise ValueError(f"{where}: names used twice or reserved: {', '.join(repeated)}.")
+        self._check_causalities(where)
         self._check_event_prefixes(where)
         variabilities = [s.variability for s in self.states]
         if variabilities != sorted(variabilities):  # "continuous" sorts before "discrete"
@@ -267,6 +270,16 @@ class HybridSystem:
             if unknown:
                 raise ValueError(f"{where}: preset {preset!r} sets unknown parameters {unknown}.")
 
+    def _check_causalities(self, where: str) -> None:
+        lists = (("states", "local"), ("inputs", "input"), ("outputs", "output"), ("parameters", "parameter"))
+        for attribute, causality in lists:
+            for signal in getattr(self, attribute):
+                if signal.causality != causality:
+                    raise ValueError(
+                        f"{where}: {signal.name!r} is listed in {attribute} but has causality {signal.causality!r}, "
+                        f"expected {causality!r}."
+                    )
+
     def _check_event_prefixes(self, where: str) -> None:
         """A master finds the payload of an event by its prefix; nothing else that it sees may begin so."""
         for event in self.triggered_events:
@@ -278,6 +291,9 @@ class HybridSystem:
                 raise ValueError(f"{where}: {', '.join(confusing)} would be taken for payload of event {event.name!r}; rename.")
 
     def _checked(self, function: str, values: Array, count: int) -> Array:
+        if not getattr(values, "shape", ()):
+            kind = type(values).__name__
+            raise TypeError(f"{self.name}: {function} returns a {kind}; expected an array of {count} values, as of vector(...).")
         if values.shape[0] != count:  # a vector of one element would be broadcast in silence
             raise ValueError(f"{self.name}: {function} returns {values.shape[0]} values, expected {count}.")
         return values

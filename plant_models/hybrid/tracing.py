@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import hashlib
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -19,6 +22,14 @@ from plant_models.hybrid import integration
 from plant_models.hybrid.system import HybridSystem
 
 SYMBOLIC = ca.ArrayInterface.SX
+FOUNDATION = Path(__file__).parent
+WRITTEN_AS = {"state_derivative": "flow", "output_vector": "output", "jump_vector": "jump", "friction_vector": "friction"}
+"""What the user wrote, by what is traced."""
+
+ADVICE = (
+    "Write it in plain NumPy without branching on values: np.where instead of 'if', vector(...) instead of np.array([...]), "
+    "np.sin instead of math.sin."
+)
 
 
 class TracingError(TypeError):
@@ -206,15 +217,39 @@ class TracedSystem:
 
     def _guarded(self, function: str, call: Any) -> ca.SX:
         try:
-            value = call()
+            with _symbols_are_no_numbers():
+                value = call()
         except Exception as error:
             raise TracingError(self._explain(function, error)) from error
         return ca.SX(value) if getattr(value, "size", 1) else ca.SX(0, 1)
 
     def _explain(self, function: str, error: Exception) -> str:
         own = [f for f in traceback.extract_tb(error.__traceback__) if "casadi" not in f.filename and "numpy" not in f.filename]
-        place = f"{own[-1].filename}:{own[-1].lineno}: {own[-1].line}" if own else "unknown place"
-        return (
-            f"{self.system.name}: cannot trace {function}: {error} (at {place}). "
-            "Write it without branching on values: np.where instead of 'if', vector(...) instead of np.array([...])."
-        )
+        users = [f for f in own if Path(f.filename).parent != FOUNDATION]
+        if users:
+            place = f"{users[-1].filename}:{users[-1].lineno}: {users[-1].line}"
+        else:  # it returned something wrong, and is no longer on the stack
+            code = getattr(type(self.system), WRITTEN_AS.get(function, function)).__code__
+            place = f"{code.co_filename}:{code.co_firstlineno}"
+        of_kind = isinstance(error, (AttributeError, NameError, LookupError)) or not users
+        advice = "" if of_kind else f" {ADVICE}"
+        reason = str(error).removeprefix(f"{self.system.name}: ").removesuffix(".")
+        return f"{self.system.name}: cannot trace {WRITTEN_AS.get(function, function)}: {reason} (at {place}).{advice}"
+
+
+@contextmanager
+def _symbols_are_no_numbers() -> Iterator[None]:
+    """While a function is traced, ``float(x[0])`` and ``math.sin(x[0])`` are refused: CasADi would make NaN of them silently."""
+    symbolic: Any = ca.ArrayInterface
+    usual = symbolic.__float__
+
+    def refuse(array: Any) -> float:
+        if not ca.SX(array).is_constant():
+            raise TypeError("a traced value has no number, so float() and the functions of math do not work on it")
+        return float(usual(array))
+
+    symbolic.__float__ = refuse
+    try:
+        yield
+    finally:
+        symbolic.__float__ = usual

@@ -36,7 +36,7 @@ class BaliseLayout(Protocol):
 
 
 class Spacing:
-    """Balises at ``first_balise + k * balise_spacing``, k = 0 ... ``balise_total - 1``."""
+    """Balises at ``first_balise + k * balise_spacing``, k = 0 ... ``balise_total - 1``; none if the spacing is not positive."""
 
     parameters: tuple[Signal, ...] = (
         parameter("first_balise", "m", 100.0, "Position of the first balise"),
@@ -52,24 +52,24 @@ class Spacing:
     def next(self, position: Array, direction: Array, p: Any) -> Array:
         """See `BaliseLayout`."""
         k = np.where(direction > 0.0, self._up_to(position, p), self._before(position, p) - 1.0)
-        laid = np.where(k >= 0.0, np.where(k < p.balise_total, 1.0, 0.0), 0.0)
+        laid = np.where(k >= 0.0, np.where(k < _total(p), 1.0, 0.0), 0.0)
         return np.where(laid > 0.0, _place(k, p), direction * UNUSED)
 
     @staticmethod
     def _up_to(position: Array, p: Any) -> Array:
         """Number of balises at or before a position. The quotient may be off by one through rounding; the places decide."""
-        k = np.floor((position - p.first_balise) / p.balise_spacing) + 1.0
+        k = np.floor((position - p.first_balise) / _spacing(p)) + 1.0
         k = k + np.where(_place(k, p) <= position, 1.0, 0.0)
         k = k - np.where(_place(k - 1.0, p) > position, 1.0, 0.0)
-        return np.clip(k, 0.0, p.balise_total)
+        return np.clip(k, 0.0, _total(p))
 
     @staticmethod
     def _before(position: Array, p: Any) -> Array:
         """Number of balises before a position."""
-        k = np.floor((position - p.first_balise) / p.balise_spacing) + 1.0
+        k = np.floor((position - p.first_balise) / _spacing(p)) + 1.0
         k = k - np.where(_place(k - 1.0, p) >= position, 1.0, 0.0)
         k = k + np.where(_place(k, p) < position, 1.0, 0.0)
-        return np.clip(k, 0.0, p.balise_total)
+        return np.clip(k, 0.0, _total(p))
 
 
 class Positions:
@@ -116,4 +116,13 @@ class Positions:
 
 
 def _place(k: Array, p: Any) -> Array:
-    return p.first_balise + k * p.balise_spacing
+    return p.first_balise + k * _spacing(p)
+
+
+def _spacing(p: Any) -> Array:
+    """A distance to divide by [m]: any where it is not positive, and no balise is laid."""
+    return np.where(p.balise_spacing > 0.0, p.balise_spacing, 1.0)
+
+
+def _total(p: Any) -> Array:
+    return np.where(p.balise_spacing > 0.0, p.balise_total, 0.0)

@@ -1,4 +1,6 @@
-"""Benchmark: what native FMUs cost. Sections: ``build`` (time to compile and size, by platform), ``step`` (see `native_step`).
+"""Benchmark: what native FMUs cost and how exact they are in other masters.
+
+Sections: ``build`` (time to compile and size, by platform), ``step`` (see `native_step`), ``foreign`` (see `native_foreign`).
 
 Run it with ``python tests/benchmarks/native_fmu.py [SECTION ...]``; without a section, all of them. Nothing is asserted.
 A further section is a function in `SECTIONS` that prints.
@@ -13,6 +15,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from native_foreign import foreign
 from native_step import step
 
 from fmus import build_fmu, recipe
@@ -26,7 +29,8 @@ REPETITIONS = 5
 
 def build() -> None:
     """Time to compile one library and its size by platform; the C libraries of the targets are built before it is measured."""
-    build_everything(Path(tempfile.mkdtemp(prefix="native-fmu-")))
+    with tempfile.TemporaryDirectory(prefix="native-fmu-") as folder:
+        build_everything(Path(folder))
     for model in MODELS:
         for version in (2, 3):
             plan = plan_fmu(recipe(model), version)  # type: ignore[arg-type]
@@ -54,7 +58,7 @@ def build_everything(folder: Path) -> None:
         print(f"{MODELS[0]}, FMI 3, all platforms, {attempt} time: {seconds:.1f} s, FMU of {fmu.stat().st_size / 1000:.0f} kB")
 
 
-SECTIONS: dict[str, Callable[[], None]] = {"build": build, "step": step}
+SECTIONS: dict[str, Callable[[], None]] = {"build": build, "step": step, "foreign": foreign}
 
 
 def main() -> None:

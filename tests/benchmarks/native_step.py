@@ -26,7 +26,11 @@ CALLS = 20_000
 
 def step() -> None:
     """Cost of doStep at 1 ms steps, of events on time and late, of saving and restoring."""
-    folder = Path(tempfile.mkdtemp(prefix="native-step-"))
+    with tempfile.TemporaryDirectory(prefix="native-step-") as folder:
+        _step(Path(folder))
+
+
+def _step(folder: Path) -> None:
     made = {version: _unpack(folder, version) for version in (2, 3)}
     print(f"{MODEL}, FMI 2, raw calls from C")
     _raw(folder, *made[2])

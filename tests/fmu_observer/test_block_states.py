@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import json
+import math
 import os
 import pickle
 import subprocess
@@ -19,6 +21,7 @@ from hypothesis import strategies as st
 
 from fmu_observer import OBSERVERS
 from fmu_observer.block import BlockCallError
+from plant_models.hybrid import scalar_names
 
 Passing = Callable[[Driven, Any], Driven]
 
@@ -281,6 +284,12 @@ def test_another_process_goes_on_from_the_bytes() -> None:
         np.testing.assert_array_equal(row, expected)
 
 
+def _doubles(text: str, place: int, value: float) -> str:
+    numbers = np.frombuffer(base64.b64decode(text), dtype="<f8").copy()
+    numbers[place] = value
+    return base64.b64encode(numbers.tobytes()).decode()
+
+
 def _garbage(content: bytes) -> dict[str, bytes]:
     data = json.loads(content)
 
@@ -309,6 +318,12 @@ def _garbage(content: bytes) -> dict[str, bytes]:
         "counts missing": changed(counts=[]),
         "unknown counter": changed(counters={"accepted": 1, "eaten": 2}),
         "past without events": changed(past={k: v for k, v in data["past"].items() if k != "events"}),
+        "time that is no number": changed(times=_doubles(data["times"], 0, math.nan)),
+        "start that is not finite": changed(times=_doubles(data["times"], 1, math.inf)),
+        "negative tick": changed(ticks=[-1]),
+        "tick that is not exact": changed(ticks=[2**53]),
+        "stamp waiting for ever": changed(queue=[["mark", _doubles(data["queue"][0][1], 0, math.inf)[:12]]]),
+        "past in no order": changed(past=data["past"] | {"times": _doubles(data["past"]["times"], 0, 1e300)}),
         "past of wrong size": changed(past=data["past"] | {"ticks": data["past"]["ticks"][1:]}),
     }
 
@@ -389,3 +404,20 @@ def test_reset_and_instantiate_return_to_the_preset_and_forget_active_clocks() -
         again()
         assert driven.get("angle", "stiffness[1]", "seed", "time").tolist() == [1.5, 0.5, 7.0, 0.0]
         assert driven.block.getClock(driven.vr("kick")) == [False]
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("internal_step", 0.0), ("internal_step", 1e300), ("period", -1.0), ("offset", -1e300), ("seed", -1.0)]
+)
+def test_a_state_with_which_time_cannot_run_is_refused(name: str, value: float) -> None:
+    driven = _waiting()
+    content = driven.block.serializeFMUState(driven.block.getFMUState())
+    data = json.loads(content)
+    parameters = list(scalar_names(SWING.parameter_signals))
+    data["memory"] = _doubles(data["memory"], parameters.index(name) - len(parameters), value)
+    with pytest.raises(BlockCallError, match="time cannot run on from this state"):
+        driven.block.deserializeFMUState(json.dumps(data).encode())
+    data = json.loads(content)
+    data["times"] = _doubles(data["times"], 2, -1.0)
+    with pytest.raises(BlockCallError, match="horizon"):
+        driven.block.deserializeFMUState(json.dumps(data).encode())

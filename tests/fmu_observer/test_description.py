@@ -206,6 +206,13 @@ def test_display_units_convert_as_the_standard_defines() -> None:
 
 
 @BOTH
+@pytest.mark.parametrize("system", SHIPPED, ids=lambda s: s.name)
+def test_every_speed_is_shown_in_km_per_hour(system: HybridSystem, version: Any) -> None:
+    signals = [v for v in describe(system, version).modelVariables if v.unit == "m/s" and v.derivative is None]
+    assert {v.displayUnit for v in signals} <= {"km/h"}
+
+
+@BOTH
 def test_dependencies_of_outputs_are_exact(version: Any) -> None:
     description = describe(SWING, version)
     structure = [*description.outputs, *description.derivatives]

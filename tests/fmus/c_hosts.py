@@ -22,7 +22,8 @@ WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Wno-sign-conversion", "-Wshado
 def compile_host(name: str, folder: Path, extra: Sequence[str] = ()) -> Path:
     """One of the programs of the folder ``hosts``."""
     target = folder / name
-    sources = [str(HOSTS / source) for source in (f"{name}.c", *SHARED)]
+    own = (f"{name}.c", *(part.name for part in sorted(HOSTS.glob(f"{name}_*.c"))))
+    sources = [str(HOSTS / source) for source in (*own, *SHARED)]
     flags = ["-std=c11", "-D_POSIX_C_SOURCE=200809L", "-g", "-O1", *WARNINGS, *extra, f"-I{header_folder()}"]
     run([*find_compiler().command, *flags, *sources, "-o", str(target), "-ldl", "-lm", "-lpthread"])
     return target

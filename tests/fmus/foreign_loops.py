@@ -1,7 +1,7 @@
-"""The loop of train, odometer, driver, reader and observer in two masters of other people, and a fine solution to compare with.
+"""The loop of train, odometer, driver, reader and observer in masters that know nothing of this package, and a fine solution.
 
 `container` is the FMU container of fmu-manipulation-toolbox, itself an FMU; `libcosim` the master of the Open Simulation
-Platform. Both step FMI 2.0 with events by counts, and know nothing of events.
+Platform, `program` the one in C beside the tests. All step FMI 2.0 with events by counts, and know nothing of events.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
+from c_hosts import Unpacked, Wiring, compile_host, run
 from fmpy import read_model_description, simulate_fmu
 
 from fmu_observer import OBSERVERS
@@ -147,6 +148,66 @@ def _system_structure(input_instant: int) -> str:
         ends = "".join('<Variable simulator="{}" name="{}"/>'.format(*end.split(".")) for end in link)
         lines += [f"<VariableConnection>{ends}</VariableConnection>"]
     return "\n".join([*lines, "</Connections>", "</OspSystemStructure>", ""])
+
+
+def program(folder: Path, input_instant: int) -> np.ndarray:
+    """The loop in the program in C of the folder ``hosts``, which steps the components in the order listed."""
+    wiring = Wiring()
+    for name, file in fmus_in(folder).items():
+        values = {parameter: value for owner, parameter, value in starts(input_instant) if owner == name}
+        wiring.slave(name, Unpacked.of(file, folder / name), **values)
+    wiring.connect(*(f"{source} -> {target}" for source, target in LINKS)).record(*RECORDED)
+    file, result = wiring.write(folder / "loop.txt", 0.0, STEP, STEPS), folder / "loop.csv"
+    run([str(compile_host("loop", folder)), str(file), str(result)])
+    return wiring.read(result)
+
+
+# -- the masters ----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Master:
+    """A master that knows nothing of this package.
+
+    Args:
+        package: what it needs. lag: whether its inputs are a step old: 0 in sequence, 1 in parallel.
+    """
+
+    package: str
+    lag: int
+
+
+MASTERS = {
+    "container-sequential": Master("fmu_manipulation_toolbox", 0),
+    "container-parallel": Master("fmu_manipulation_toolbox", 1),
+    "libcosim-parallel": Master("libcosimpy", 1),
+    "program-sequential": Master("fmpy", 0),
+}
+
+
+def run_master(name: str, input_instant: int, folder: Path) -> np.ndarray:
+    """The loop in one of `MASTERS`."""
+    tool, _, order = name.partition("-")
+    if tool == "container":
+        return container(folder, order == "sequential", input_instant)
+    return {"libcosim": libcosim, "program": program}[tool](folder, input_instant)
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """Largest errors of a run: of stamps [s], and of observed position [m] and speed [m/s] at the rows it has been told at."""
+
+    stamps: float
+    position: float
+    speed: float
+
+
+def accuracy(table: np.ndarray, lag: int) -> Accuracy:
+    """Stamps against the plant's own crossings, the observer against one that is told at these instants."""
+    instants, _ = fine_crossings(table)
+    exact, told = exact_observer(table, instants, lag), in_time(table, instants, lag)
+    errors = {name: np.abs(table[f"observer.{name}"] - exact[name])[told].max() for name in ("position", "speed")}
+    return Accuracy(float(np.abs(Passings.of(table).stamps - instants).max()), float(errors["position"]), float(errors["speed"]))
 
 
 # -- the fine solution ----------------------------------------------------------------------------------------------

@@ -6,14 +6,16 @@ import os
 import subprocess
 import sys
 import zipfile
+from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from fmus import CompilerMissing, build_fmu, cached_fmu, recipe
+from fmus import CompilerMissing, UnknownRecipeError, build_fmu, cached_fmu, recipe
 from fmus.cli import main
+from fmus.cli.failures import words
 from fmus.content.names import NameRefusedError
 from fmus.pack import check_target
 from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, output_signal, state, vector
@@ -116,6 +118,7 @@ def test_what_cannot_be_traced(
         ("own.py:Trolley", {'name = "trolley"': 'name = "double"'}, "'double' is a word of C"),
         ("own.py:Trolley", {'"effort", "N"': '"kraft_größe", "N"'}, "'kraft_größe' of a signal is not legal in C and FMI"),
         ("own.py:Trolley", {'"effort", "N"': '"effort", "furlong"'}, "furlong"),
+        ("own.py:Trolley", {'"effort", "N"': '"effort", "N", 0.0, "Pull\\x01"'}, "'effort' holds the character U+0001"),
     ],
 )
 def test_mistakes_in_a_users_file(
@@ -232,14 +235,14 @@ def test_a_target_that_can_be_written_is_left_as_it_was(tmp_path: Path) -> None:
 # -- a disk that is full, and a user who has had enough --------------------------------------------------------------------
 
 FULL = """
-import os, resource, sys
+import errno, os, resource, sys
 from pathlib import Path
 from fmus.pack import pack_fmu
 resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
 try:
     pack_fmu({"binaries/x/noise.so": os.urandom(100000)}, Path(sys.argv[1]))
 except OSError as error:
-    print("refused", error.errno is not None)
+    print("refused", error.errno == errno.EFBIG, error.filename == sys.argv[1])
 """
 
 
@@ -253,7 +256,7 @@ def test_a_full_disk_leaves_the_older_file(tmp_path: Path) -> None:
     target = tmp_path / "model.fmu"
     target.write_text("older")
     done = in_another_process([sys.executable, "-c", FULL, str(target)], tmp_path)
-    assert done.stdout == "refused True\n", done.stderr
+    assert done.stdout == "refused True True\n", done.stderr
     assert target.read_text() == "older"
     assert [path.name for path in tmp_path.iterdir()] == ["model.fmu"]
 
@@ -281,6 +284,62 @@ def test_an_interrupted_build_leaves_nothing(tmp_path: Path) -> None:
     assert "Traceback" not in done.stderr
     assert not out.exists()
     assert list(scratch.iterdir()) == []
+
+
+INTERRUPTING_MODEL = """
+import os, signal, sys
+if "-c" in sys.argv:
+    os.kill(os.getppid(), signal.SIGINT)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("handling", ["SIG_DFL", "SIG_IGN"])  # a script that starts it with '&' has SIGINT ignored
+def test_an_interrupted_hosted_build_leaves_nothing(handling: str, tmp_path: Path) -> None:
+    """The model interrupts the build, once it runs in the process of its own in which it is tried."""
+    model, scratch, out = tmp_path / "model.py", tmp_path / "scratch", tmp_path / "out"
+    own = MODEL.replace("FLOW", "        pass").replace("import numpy as np", INTERRUPTING_MODEL)
+    model.write_text(own)
+    scratch.mkdir()
+    start = (
+        f"import signal; signal.signal(signal.SIGINT, signal.{handling}); import os, sys; os.execv(sys.executable, sys.argv[1:])"
+    )
+    build = [sys.executable, "-m", "fmus.cli", "build", f"{model}:Trolley", "--hosted", "-o", str(out)]
+    done = in_another_process([sys.executable, "-c", start, *build], tmp_path, TMPDIR=str(scratch))
+    assert (done.returncode, done.stdout) == (2, ""), done.stderr
+    assert done.stderr.strip() == "fmus: interrupted."
+    assert not out.exists()
+    assert list(scratch.iterdir()) == []
+
+
+# -- what nobody foresaw ------------------------------------------------------------------------------------------------
+
+
+def test_an_unexpected_key_error_says_what_failed(tmp_path: Path, capsys: Output, own_model: Callable[..., Path]) -> None:
+    """From a user's class, in a place that nothing guards."""
+    path = own_model()
+    path.write_text(
+        path.read_text().replace(
+            "    def output", "    @property\n    def traceable(self):\n        return {}['y']\n\n    def output"
+        )
+    )
+    said = refused(["build", f"{path}:Trolley", "-o", str(tmp_path / "out")], capsys)
+    assert f"fmus: unexpected KeyError: 'y' while building {path}:Trolley into {tmp_path / 'out'} ({path}:" in said
+
+
+def test_words_for_errors_without_a_file_name() -> None:
+    building = Namespace(names=["trolley"], output=Path("out"))
+    full = words(OSError(28, "No space left on device"), building)
+    assert full == "No space left on device, while building trolley into out"
+    assert words(OSError(27, "File too large", "x.fmu"), building) == "x.fmu: File too large"
+    assert words(IndexError("list index out of range"), building).startswith(
+        "unexpected IndexError: list index out of range while"
+    )
+    assert words(UnknownRecipeError("There is no model 'x'."), building) == "There is no model 'x'."
+    assert (
+        words(RuntimeError(), Namespace(file=Path("a.fmu")))
+        == "unexpected RuntimeError while reading a.fmu; please look there, or report it."
+    )
 
 
 # -- info on files that are no good -------------------------------------------------------------------------------------

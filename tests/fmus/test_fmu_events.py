@@ -16,6 +16,7 @@ from fmu_observer.block.events import QUEUE_CAPACITY
 pytestmark = pytest.mark.compiler
 
 H = 0.1
+IDENTITY = ("guid", "unzipDirectory", "modelIdentifier", "instanceName")
 FIXTURES_LIVE_ON = [HealthCheck.function_scoped_fixture]  # every example resets its component
 
 
@@ -220,3 +221,96 @@ def test_fmu_and_block_treat_events_alike(
     assert np.ptp(runs[0], axis=0).max() > 1.0
     np.testing.assert_allclose(runs[0], runs[1], rtol=1e-12, atol=1e-12)
     assert (block.counters.replayed, block.counters.rejected) == (1, 0)
+
+
+# -- what is no event ---------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(params=[(2, False), (2, True), (3, False), (3, True)], ids=["fmi2", "fmi2 block", "fmi3", "fmi3 block"])
+def counting(request: pytest.FixtureRequest, component: Callable[..., Any], reference: Callable[[str], Any]) -> Any:
+    """A tracker told by counts, as FMU and as block."""
+    version, is_block = request.param
+    made = component("tracker", version, counts=True)
+    if is_block:
+        made.slave.freeInstance()
+        made.slave = make_block(reference("tracker").system, version, announcement="counts")
+        made.instantiate()
+    return made
+
+
+def test_count_that_stands_when_time_starts_is_no_event(counting: Any) -> None:
+    """An observer that is reset while the reader counts on gets no phantom balise."""
+    for standing in (3, 2):
+        counting.raise_count("balise", standing)
+        counting.initialize(balise_position=50.0)
+        counting.step(0.0, H)
+        assert counting.get("innovation")[0] == 0.0
+        counting.raise_count("balise")
+        counting.step(H, H)
+        assert counting.get("innovation")[0] != 0.0
+        assert counting.log == []
+        counting.slave.reset()
+
+
+def test_count_that_stands_is_no_event_in_model_exchange(exchange: Callable[..., Any]) -> None:
+    one = exchange("tracker", 2)
+    one.model.setInteger(one.references(["balise_count"]), [3])
+    one.initialize(balise_position=50.0)
+    one.happen()
+    assert one.get("innovation")[0] == 0.0
+
+
+@pytest.mark.parametrize("stamp", [np.inf, np.nan])
+def test_stamp_that_is_no_number_is_lost_with_a_warning(stamp: float, counting: Any, caplog: pytest.LogCaptureFixture) -> None:
+    """It would wait for ever."""
+    counting.initialize()
+    before = counting.serialize(counting.save()) if hasattr(counting.slave, "dll") else b""
+    counting.event("balise", stamp=stamp, balise_position=50.0)
+    counting.step(0.0, H)
+    assert counting.get("innovation")[0] == 0.0
+    texts = [*counting.log, *caplog.messages]
+    assert len(texts) == 1
+    assert "is not a finite number; it is lost" in texts[0]
+    if before:
+        lost = 4  # word of the head
+        assert np.frombuffer(counting.serialize(counting.save()), dtype=np.int64, count=8)[lost] == 1
+    else:
+        assert counting.slave.counters.lost == 1
+    counting.event("balise", balise_position=50.0)
+    counting.step(H, H)
+    assert counting.get("innovation")[0] != 0.0
+
+
+def test_clocked_stamp_that_is_no_number_is_lost(component: Callable[..., Any]) -> None:
+    made = component("tracker", 3)
+    made.initialize()
+    made.event("balise", stamp=np.nan, balise_position=50.0)
+    assert made.get("innovation")[0] == 0.0
+    assert "is not a finite number" in made.log[0]
+
+
+@pytest.mark.parametrize("is_block", [False, True])
+def test_importer_without_event_mode_is_warned(
+    is_block: bool, component: Callable[..., Any], reference: Callable[[str], Any], caplog: pytest.LogCaptureFixture
+) -> None:
+    warned = {}
+    for name, counts, event_mode in [
+        ("tracker", False, False), ("tracker", False, True), ("tracker", True, False), ("oscillator", False, False),
+    ]:  # fmt: skip
+        made = component(name, 3, counts=counts)
+        made.slave.freeInstance()
+        if is_block:
+            made.slave = make_block(reference(name).system, 3, announcement="counts" if counts else "clocks")
+        else:
+            made.slave = type(made.slave)(**{n: getattr(made.slave, n) for n in IDENTITY})
+        made.event_mode = event_mode
+        made.instantiate()
+        caplog.clear()
+        made.initialize()
+        made.step(0.0, H)
+        warned[name, counts, event_mode] = [*made.log, *caplog.messages]
+    texts = warned.pop(("tracker", False, False))
+    assert len(texts) == 1
+    assert "eventModeUsed is" in texts[0]
+    assert "--events counts" in texts[0]
+    assert not any(warned.values())

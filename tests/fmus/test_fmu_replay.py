@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fmu_observer.block import make_block
-from fmu_observer.block.journal import JOURNAL_CAPACITY
+from fmu_observer.event_protocol import JOURNAL_CAPACITY
 
 pytestmark = pytest.mark.compiler
 

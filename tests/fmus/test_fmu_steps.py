@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fmu_observer.block import make_block
-from fmu_observer.block.journal import JOURNAL_CAPACITY
+from fmu_observer.event_protocol import JOURNAL_CAPACITY
 from fmus.build import plan_fmu
 from fmus.toolchain.compile import find_compiler
 
@@ -340,3 +340,32 @@ def test_nothing_is_allocated_after_instantiation(counting: Any) -> None:
     assert count() == 1
     counting.free(counting.save())
     assert count() == 2
+
+
+# -- steps without an end -----------------------------------------------------------------------------------------------
+
+
+def test_a_step_of_too_many_internal_steps_is_discarded(hopper: Any) -> None:
+    """It would never return; 1e9 internal steps of 0.01 s are 1e7 s."""
+    hopper.initialize()
+    hopper.step(0.0, H)
+    before = hopper.values()
+    for size in (1e15, 1.001e7):
+        with pytest.raises(FMICallException) as caught:
+            hopper.step(H, size)
+        assert caught.value.status == DISCARD
+        text = hopper.log[-1] if hopper.log else str(caught.value)
+        assert "more than 1000000000 internal steps" in text
+        assert f"{size:.17g}"[:4] in text or repr(size) in text
+        assert "internal_step = 0.01" in text
+    np.testing.assert_array_equal(hopper.values(), before)
+    hopper.step(H, H)
+    assert hopper.get("time")[0] == pytest.approx(2 * H)
+
+
+def test_a_period_far_below_the_step_is_discarded(hopper: Any) -> None:
+    """The periodic event would happen 5e10 times."""
+    hopper.initialize(period=1e-12)
+    with pytest.raises(FMICallException) as caught:
+        hopper.step(0.0, H)
+    assert caught.value.status == DISCARD

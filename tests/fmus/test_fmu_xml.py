@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
-from xml.etree.ElementTree import fromstring
+from xml.etree.ElementTree import ParseError, fromstring
 
+import numpy as np
 import pytest
 from fmpy import read_model_description
 from fmpy.model_description import ModelDescription, ModelVariable, Unknown, read_build_description
+from hypothesis import given
+from hypothesis import strategies as st
 
 from fmu_observer.description import LOG_CATEGORIES, can_exchange, describe
+from fmus import recipe
 from fmus.build import MAIN_SOURCE
+from fmus.content.characters import TextRefusedError, number_text
 from fmus.content.xml import build_description_xml, model_description_xml
 from plant_models.hybrid import HybridSystem
 
+EPS = float(np.finfo(float).eps)
 VARIABLE = (
     "name",
     "valueReference",
@@ -108,13 +115,68 @@ def test_build_description_lists_the_sources(tmp_path: Path) -> None:
     assert configuration.sourceFileSets[0].sourceFiles == ["model.c", "fmi3.c"]
 
 
+@pytest.mark.parametrize(("value", "text"), [(1.0 / (1.0 / 3.6), "3.6"), (1000.0, "1000.0"), (-273.15, "-273.15"), (0.0, "0.0")])
+def test_a_number_that_is_next_to_a_short_decimal_is_written_as_that(value: float, text: str) -> None:
+    assert number_text(value) == text
+
+
+@pytest.mark.parametrize("value", [180.0 / math.pi, 1.0 / 3.6, 3.6 * (1.0 + 4.0 * EPS)])
+def test_other_numbers_keep_all_digits(value: float) -> None:
+    assert float(number_text(value)) == value
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_a_number_as_text_is_the_number_to_rounding(value: float) -> None:
+    assert abs(float(number_text(value)) - value) <= math.ulp(value)
+
+
+def test_kilometres_per_hour_convert_as_they_should(version: Any) -> None:
+    description = describe(recipe("locomotive"), version)
+    root = fromstring(model_description_xml(description, [MAIN_SOURCE]))
+    (factor,) = {e.get("factor") for e in root.iter("DisplayUnit") if e.get("name") == "km/h"}
+    assert factor == "3.6"
+    assert 25.0 * float(str(factor)) == 90.0  # exactly
+
+
+@pytest.mark.parametrize("character", ["\x01", "\x00", "\x1f", "\ufffe", "\ud800"])
+def test_characters_that_xml_forbids_are_refused(character: str, version: Any) -> None:
+    described = describe(recipe("odometer"), version)
+    variable = next(v for v in described.modelVariables if v.name == "reading")
+    variable.description = f"Reading{character}"
+    with pytest.raises(TextRefusedError, match=rf"description of \w+ 'reading' .* U\+{ord(character):04X} at position 8, which"):
+        model_description_xml(described)
+    variable.description, described.description = "Reading", f"{character}odometer"
+    with pytest.raises(TextRefusedError, match=r"description of fmiModelDescription 'odometer' .* at position 1,"):
+        model_description_xml(described)
+
+
+@given(st.text(st.characters(exclude_categories=("Cs",))))
+def test_what_is_accepted_is_read_back(text: str) -> None:
+    """Against an XML parser: it takes what is accepted, and what is refused has a character that it does not take."""
+    described = describe(recipe("odometer"), 3)
+    described.description = text
+    try:
+        written = model_description_xml(described)
+    except TextRefusedError:
+        escaped = "".join(f"&#{ord(c)};" for c in text)
+        with pytest.raises(ParseError):
+            fromstring(f'<a b="{escaped}"/>')
+    else:
+        assert fromstring(written.encode()).get("description") == text
+
+
 def _reference(clock: ModelVariable | int) -> int:
     return clock if isinstance(clock, int) else int(clock.valueReference)
 
 
 def _unit(unit: Any) -> tuple[Any, ...]:
     base = tuple(float(getattr(unit.baseUnit, n)) for n in ("kg", "m", "s", "A", "K", "mol", "cd", "rad", "factor", "offset"))
-    return unit.name, base, [(d.name, float(d.factor), float(d.offset)) for d in unit.displayUnits]
+    return unit.name, _neat(*base), [(d.name, *_neat(float(d.factor), float(d.offset))) for d in unit.displayUnits]
+
+
+def _neat(*values: float) -> tuple[Any, ...]:
+    """A factor may be written as the decimal that is next to it: one unit in the last place, which `approx` takes with room."""
+    return tuple(pytest.approx(value, rel=4.0 * EPS, abs=0.0) for value in values)
 
 
 def _unknown(unknown: Unknown) -> tuple[Any, ...]:

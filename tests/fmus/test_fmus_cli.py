@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import zipfile
 from pathlib import Path
 
@@ -104,6 +107,37 @@ def test_wrong_usage_ends_with_two(arguments: list[str], capsys: Output) -> None
         main(arguments)
     assert stopped.value.code == 2
     assert "usage: fmus" in capsys.readouterr().err
+
+
+@pytest.mark.compiler
+def test_info_tells_capabilities_of_each_interface_and_items_by_name(capsys: Output) -> None:
+    common = "canHandleVariableCommunicationStepSize, "
+    for version, tail in ((2, "canGetAndSetFMUstate, canSerializeFMUstate, providesDirectionalDerivative"),
+                          (3, "canGetAndSetFMUState, canSerializeFMUState, ")):  # fmt: skip
+        assert main(["info", str(cached_fmu(recipe("takagi_sugeno_cdo"), version))]) == 0
+        shown = capsys.readouterr().out
+        assert f"capabilities in co-simulation: {common}{tail}" in shown
+        assert "  late_policy = replay [replay, reject, late]" in shown
+    lines = [line for line in shown.splitlines() if line.startswith("capabilities")]
+    assert [line.partition(":")[0] for line in lines] == ["capabilities in co-simulation", "capabilities in model exchange"]
+    assert all(line.endswith("providesDirectionalDerivatives") for line in lines)
+    assert main(["info", str(cached_fmu(recipe("odometer"), 3))]) == 0
+    assert "mightReturnEarlyFromDoStep, providesDirectionalDerivatives" in capsys.readouterr().out
+
+
+@pytest.mark.compiler
+@pytest.mark.skipif(sys.platform == "win32", reason="pipes of POSIX")
+@pytest.mark.parametrize("arguments", [["list"], ["info", "FMU"]])
+def test_a_reader_that_goes_away_is_no_failure(arguments: list[str]) -> None:
+    """What is written into a pipe without a reader; ``head`` ends before the output does."""
+    fmu = str(cached_fmu(recipe("odometer")))
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-m", "fmus.cli", *(fmu if word == "FMU" else word for word in arguments)]
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
+    with os.fdopen(writer) as stream:
+        done = subprocess.run(command, stdout=stream, stderr=subprocess.PIPE, text=True, check=False, env=environment)
+    assert (done.returncode, done.stderr) == (141, "")
 
 
 def test_info_on_something_else(tmp_path: Path, capsys: Output) -> None:

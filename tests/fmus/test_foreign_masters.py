@@ -3,31 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
+from dataclasses import asdict
 
 import numpy as np
 import pytest
 from foreign_loops import (
+    MASTERS,
     PLANT_PRESET,
     SPACING,
     STEP,
     STEPS,
     TRAIN,
     Passings,
-    container,
+    accuracy,
     exact_observer,
     fine_crossings,
     in_time,
-    libcosim,
+    run_master,
 )
 
 import cosim
 
 pytestmark = [pytest.mark.compiler, pytest.mark.foreign]
-
-PACKAGES = {"container": "fmu_manipulation_toolbox", "libcosim": "libcosimpy"}
-# master, whether its inputs are a step old: 0 in sequence, 1 in parallel
-MASTERS = {"container-sequential": 0, "container-parallel": 1, "libcosim-parallel": 1}
 
 # The cubic against the plant's own crossing: 3e-10 s at this step and train, see test_c_host.py.
 STAMP = 1e-9
@@ -41,24 +38,20 @@ def ran(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], np.nda
     tables: dict[tuple[str, int], np.ndarray] = {}
 
     def run(master: str, input_instant: int) -> np.ndarray:
-        tool, _, order = master.partition("-")
-        pytest.importorskip(PACKAGES[tool])
+        pytest.importorskip(MASTERS[master].package)
         key = (master, input_instant)
         if key not in tables:
-            folder = tmp_path_factory.mktemp(master)
-            tables[key] = _run(tool, order, folder, input_instant)
+            tables[key] = run_master(master, input_instant, tmp_path_factory.mktemp(master))
         return tables[key]
 
     return run
 
 
-def _run(tool: str, order: str, folder: Path, input_instant: int) -> np.ndarray:
-    return libcosim(folder, input_instant) if tool == "libcosim" else container(folder, order == "sequential", input_instant)
-
-
 @pytest.mark.parametrize("master", MASTERS)
-def test_events_are_exact_in_a_foreign_master(master: str, ran: Callable[[str, int], np.ndarray]) -> None:
-    lag = MASTERS[master]
+def test_events_are_exact_in_a_foreign_master(
+    master: str, ran: Callable[[str, int], np.ndarray], record_property: Callable[[str, object], None]
+) -> None:
+    lag = MASTERS[master].lag
     table = ran(master, 1 - lag)
     passings = Passings.of(table)
     instants, positions = fine_crossings(table)
@@ -67,12 +60,16 @@ def test_events_are_exact_in_a_foreign_master(master: str, ran: Callable[[str, i
     # libcosim sets the plant's clock in nanoseconds, the container adds times up: the plant's own grid is the same.
     np.testing.assert_allclose(table["train.position"], positions, rtol=0.0, atol=1e-10)
     np.testing.assert_array_equal(passings.places, SPACING * (1.0 + np.arange(len(passings.places))))
-    np.testing.assert_allclose(passings.stamps, instants, rtol=0.0, atol=STAMP)
+    assert len(passings.stamps) == len(instants)
+    found = accuracy(table, lag)
+    for name, value in asdict(found).items():
+        record_property(name, value)  # into the report, with --junit-xml; the benchmark native_fmu.py prints them
+    assert found.stamps <= STAMP
+    assert found.position <= POSITION
+    assert found.speed <= SPEED
 
     exact, told = exact_observer(table, instants, lag), in_time(table, instants, lag)
     assert told.mean() > 0.9
-    np.testing.assert_allclose(table["observer.position"][told], exact["position"][told], rtol=0.0, atol=POSITION)
-    np.testing.assert_allclose(table["observer.speed"][told], exact["speed"][told], rtol=0.0, atol=SPEED)
     if lag == 0:
         assert told[1:].all()  # nothing is ever told late
     else:
@@ -82,7 +79,7 @@ def test_events_are_exact_in_a_foreign_master(master: str, ran: Callable[[str, i
 
 @pytest.mark.parametrize("master", MASTERS)
 def test_the_wrong_input_instant_shifts_the_train_by_a_step(master: str, ran: Callable[[str, int], np.ndarray]) -> None:
-    lag = MASTERS[master]
+    lag = MASTERS[master].lag
     table = ran(master, lag)
     passings = Passings.of(table)
     instants, _ = fine_crossings(table)

@@ -81,6 +81,19 @@ def test_extra_files_lie_beside_the_model(tmp_path: Path) -> None:
     assert not (tmp_path / "no").exists()
 
 
+def test_the_licences_of_all_that_is_inside(tmp_path: Path) -> None:
+    own, ours = build_hosted_fmu(Gatekeeper, tmp_path), build_hosted_fmu(TakagiSugenoCdo, tmp_path)
+    for fmu, terms in ((own, "its terms are its author's to state"), (ours, "TakagiSugenoCdo is part of fmu-observer")):
+        with zipfile.ZipFile(fmu) as archive:
+            folder = "documentation/licenses/"
+            texts = {n.removeprefix(folder): archive.read(n).decode() for n in archive.namelist() if n.startswith(folder)}
+        assert sorted(texts) == ["fmi-headers.txt", "fmu-observer.txt", "license.txt", "pythonfmu.txt"]
+        assert texts["fmu-observer.txt"] == (PROJECT / "LICENSE").read_text()
+        assert "MIT License" in texts["pythonfmu.txt"]
+        assert terms in texts["license.txt"]
+        assert all(name in texts["license.txt"] for name in texts if name != "license.txt")
+
+
 def test_options_go_in(tmp_path: Path) -> None:
     assert recipe_of(build_hosted_fmu(f"{MODELS}:Needy", tmp_path, options={"gain": 2.0}))["options"] == {"gain": 2.0}
 

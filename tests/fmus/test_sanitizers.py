@@ -1,4 +1,5 @@
-"""The C runtime under AddressSanitizer, LeakSanitizer and UndefinedBehaviorSanitizer, through a whole life of several models."""
+"""The C runtime under AddressSanitizer, LeakSanitizer and UndefinedBehaviorSanitizer: a whole life of several models,
+in co-simulation and model exchange, and states with damaged bytes."""
 
 from __future__ import annotations
 
@@ -9,6 +10,7 @@ import pytest
 from c_hosts import SANITIZE, Unpacked, compile_host, run
 from life_wirings import MODELS, life_wiring
 
+from fmu_observer.description import can_exchange
 from fmus import cached_fmu, recipe
 from fmus.toolchain.compile import find_compiler, header_folder
 
@@ -19,6 +21,12 @@ pytestmark = pytest.mark.compiler
 def life(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The host program, sanitized."""
     return compile_host("life", tmp_path_factory.mktemp("sanitized"), SANITIZE)
+
+
+@pytest.fixture(scope="module")
+def exchange(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The host program for model exchange, sanitized."""
+    return compile_host("exchange", tmp_path_factory.mktemp("sanitized"), SANITIZE)
 
 
 def sanitized_library(fmu: Unpacked) -> Path:
@@ -34,6 +42,30 @@ def sanitized_library(fmu: Unpacked) -> Path:
 def test_a_whole_life_is_clean(name: str, version: int, life: Path, tmp_path: Path) -> None:
     fmu = Unpacked.of(cached_fmu(recipe(name), version), tmp_path / name)  # type: ignore[arg-type]
     run([str(life), "cover", str(life_wiring(fmu, tmp_path / "wiring.txt", sanitized_library(fmu)))])
+
+
+@pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.parametrize("name", ["takagi_sugeno_cdo", "balise_reader", "odometer"])
+def test_damaged_states_are_refused_or_harmless(name: str, version: int, life: Path, tmp_path: Path) -> None:
+    """A state is accepted where a damaged word only changes a value; then steps come to an end and touch nothing else."""
+    fmu = Unpacked.of(cached_fmu(recipe(name), version), tmp_path / name)  # type: ignore[arg-type]
+    printed = run([str(life), "damage", str(life_wiring(fmu, tmp_path / "wiring.txt", sanitized_library(fmu)))])
+    tried, accepted = map(int, printed.split())
+    assert 0 < accepted < tried
+
+
+@pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.parametrize("name", [name for name in MODELS if can_exchange(recipe(name)) and name != "multirate_cdo"])
+def test_model_exchange_is_clean(name: str, version: int, exchange: Path, tmp_path: Path) -> None:
+    """A run with events and directional derivatives, then damaged states."""
+    fmu = Unpacked.of(cached_fmu(recipe(name), version), tmp_path / name)  # type: ignore[arg-type]
+    wiring = life_wiring(fmu, tmp_path / "wiring.txt", sanitized_library(fmu))
+    states, indicators = (
+        str(n or 0) for n in (fmu.description.numberOfContinuousStates, fmu.description.numberOfEventIndicators)
+    )
+    given, tried, accepted = map(int, run([str(exchange), str(wiring), states, indicators]).split())
+    assert given > 0
+    assert 0 < accepted < tried
 
 
 @pytest.mark.parametrize("version", [2, 3])

@@ -105,6 +105,7 @@ def test_a_start_from_rest_is_exact_where_the_cubic_has_a_double_root() -> None:
     p0=st.floats(-500.0, 500.0), v0=st.floats(-40.0, 40.0), a=st.floats(-3.0, 3.0), b=st.floats(-3.0, 3.0),
     h=st.floats(0.01, 1.0), spacing=st.floats(5.0, 60.0),
 )  # fmt: skip
+@example(p0=-1e-278, v0=0.0, a=0.0, b=1.0, h=1.0, spacing=5.0)  # a saddle on a balise
 @example(p0=0.0, v0=1.0, a=-3.0, b=0.0, h=1.0, spacing=0.12)  # turns after a third of the step; passes some twice
 def test_one_step_finds_what_the_master_finds(p0: float, v0: float, a: float, b: float, h: float, spacing: float) -> None:
     """Against `HermiteStep` and `TrackLayout` of the package's own master, which share no code with the reader."""
@@ -129,8 +130,11 @@ def test_one_step_finds_what_the_master_finds(p0: float, v0: float, a: float, b:
     room = min(len(expected), SPACING.pending_capacity)
     assert [p for _, p in heard[:room]] == [p for _, p in expected[:room]]
     slowest = min((abs(step.speed(t)) for t, _ in expected), default=1.0)
-    # Two roots of one cubic differ by its rounding (4e-13 m here) over its slope, or by the square root where it turns.
-    tolerance = min(4e-13 / max(slowest, 1e-30), np.sqrt(4e-13)) + 1e-12
+    # Two roots of one cubic differ by its rounding (4e-13 m here) over its slope; where it turns or has a saddle, by more, but
+    # the position there is the balise's all the same. A saddle alone gives the cubic root: t^3 / 6 within the rounding.
+    for t, place in heard[:room]:
+        assert abs(step.position(t) - place) < 4e-13
+    tolerance = min(4e-13 / max(slowest, 1e-30), np.cbrt(6.0 * 4e-13)) + 1e-12
     np.testing.assert_allclose([t for t, _ in heard[:room]], [t for t, _ in expected[:room]], rtol=0.0, atol=tolerance)
 
 
@@ -283,6 +287,20 @@ def test_equal_spacing_counts_to_the_last_bit(first: float, spacing: float, i: i
         place = float(layout.next(place, direction, p))
         found.append(place)
     assert found == expected
+
+
+@pytest.mark.parametrize("spacing", [0.0, -0.0, -5.0, -1e-300, float("nan")])
+@pytest.mark.parametrize("kernel", [NumpyKernel, None], ids=["numpy", "traced"])
+def test_without_a_positive_spacing_there_are_no_balises(spacing: float, kernel: Any) -> None:
+    """A tool need not enforce the declared minimum; nothing is announced, nothing becomes NaN, in either direction."""
+    (declared,) = (s for s in SPACING.parameters if s.name == "balise_spacing")
+    assert declared.min is not None
+    assert declared.min > 0.0
+    runtime = Runtime(SPACING, kernel and kernel(SPACING))
+    runtime.p[:] = parameters(SPACING, None, first_balise=3.0, balise_spacing=spacing)
+    assert ride(runtime, accelerated(0.0, 5.0, -1.0), grid(0.7, 20)) == []
+    assert outputs(runtime) == {"balise_count": 0.0, "balise_time": 0.0, "balise_position": 0.0, "lost_count": 0.0}
+    assert np.isfinite(runtime.x).all()
 
 
 def test_positions_that_are_set_later_need_no_order() -> None:

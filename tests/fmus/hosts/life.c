@@ -1,6 +1,7 @@
 /* The life of one FMU, for sanitizers and for counting what it leaves behind.
 
    life cover WIRING            everything once: refusal, run, events, late events, states, a bad step, reset, free
+   life damage WIRING           words of a serialised state damaged one by one: refused, or set and stepped from; prints how many of each
    life many WIRING COUNT       COUNT short lives; prints resident memory [kB] and open files after a tenth of them and at the end
    life save WIRING FILE        run, write the state to FILE, run on, print what follows
    life continue WIRING FILE    another process: read the state, run on, print what follows
@@ -13,6 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "damage.h"
 #include "slave.h"
 #include "wiring.h"
 
@@ -116,6 +118,34 @@ static void cover(const Wiring *w) {
     other->close(other); /* without terminate */
 }
 
+/* With an event that waits for the next step, and late ones in the past. */
+static void damage(const Wiring *w) {
+    Slave *slave = start(w);
+    run(w, slave, 0, 24);
+    if (w->events > 0)
+        tell(w, slave, 5, 24.4 * STEP, 2.0);
+    void *state = slave->save(slave);
+    char *bytes;
+    size_t size = slave->serialize(slave, state, &bytes);
+    slave->forget(slave, state);
+    require(slave, "DoStep", slave->do_step(slave, 24 * STEP, STEP));
+    double expected = checksum(w, slave);
+    int tried = 0, accepted = 0;
+    for (Damage d = damage_first(bytes, size); damage_next(&d); tried++) {
+        if (slave->try_restore(slave, bytes, size) <= SLAVE_WARNING) {
+            accepted++;
+            slave->do_step(slave, 24 * STEP, STEP); /* any status will do, if it comes */
+            slave->do_step(slave, 25 * STEP, STEP);
+        }
+    }
+    require(slave, "restore", slave->try_restore(slave, bytes, size));
+    require(slave, "DoStep", slave->do_step(slave, 24 * STEP, STEP));
+    expect_same("after damaged states", checksum(w, slave), expected);
+    printf("%d %d\n", tried, accepted);
+    free(bytes);
+    slave->close(slave);
+}
+
 static long resident_kilobytes(void) {
     FILE *file = fopen("/proc/self/status", "r");
     char line[256];
@@ -185,11 +215,13 @@ static void continue_from(const Wiring *w, const char *path) {
 
 int main(int argc, char **argv) {
     if (argc < 3)
-        die("usage: life cover|many|save|continue WIRING [COUNT|FILE]");
+        die("usage: life cover|damage|many|save|continue WIRING [COUNT|FILE]");
     Wiring *wiring = malloc(sizeof *wiring);
     read_wiring(wiring, argv[2]);
     if (strcmp(argv[1], "cover") == 0)
         cover(wiring);
+    else if (strcmp(argv[1], "damage") == 0)
+        damage(wiring);
     else if (strcmp(argv[1], "many") == 0)
         many(wiring, atoi(argv[3]));
     else if (strcmp(argv[1], "save") == 0)

@@ -1,7 +1,7 @@
 /* A co-simulation slave behind a table of functions, so that a host program steps FMI 2 and FMI 3 alike.
 
    The host programs of these tests use nothing of an FMU but its library and the functions of FMI: no Python, no XML. Which value
-   reference is what is told to them in text files. A call that fails ends the program, except do_step, whose status is returned. */
+   reference is what is told to them in text files. A call that fails ends the program, except do_step and try_restore, whose status is returned. */
 #ifndef SLAVE_H
 #define SLAVE_H
 
@@ -29,6 +29,7 @@ struct Slave {
     void *(*deserialize)(Slave *slave, const char *bytes, size_t size);
     void (*reset)(Slave *slave);
     void (*terminate)(Slave *slave);
+    int (*try_restore)(Slave *slave, const char *bytes, size_t size); /* deserialise, set, forget; the worst status */
     void (*close)(Slave *slave); /* frees instance and slave; the library stays loaded */
 };
 

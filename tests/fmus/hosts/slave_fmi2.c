@@ -89,6 +89,17 @@ static void *deserialize(Slave *slave, const char *bytes, size_t size) {
     return state;
 }
 
+static int try_restore(Slave *slave, const char *bytes, size_t size) {
+    Slave2 *s = (Slave2 *)slave;
+    fmi2FMUstate state = NULL;
+    int status = (int)s->DeSerializeFMUstate(s->c, bytes, size, &state);
+    if (status > SLAVE_WARNING)
+        return status;
+    status = (int)s->SetFMUstate(s->c, state);
+    require(slave, "fmi2FreeFMUstate", s->FreeFMUstate(s->c, &state));
+    return status;
+}
+
 static void reset(Slave *slave) {
     require(slave, "fmi2Reset", ((Slave2 *)slave)->Reset(((Slave2 *)slave)->c));
 }
@@ -111,7 +122,7 @@ Slave *open_fmi2(const char *name, const char *library, const char *token, const
     Slave2 *s = calloc(1, sizeof *s);
     s->slave = (Slave){name,      enter_initialization, exit_initialization, get_real, set_real, get_integer, set_integer, do_step,
                        no_clocks, save,                 restore,             forget,   serialize, deserialize, reset,      terminate,
-                       close_slave};
+                       try_restore, close_slave};
     void *handle = load_library(library);
 #define FUNCTION(function) find_function(handle, "fmi2" #function, &s->function);
 #include "functions_fmi2.h"

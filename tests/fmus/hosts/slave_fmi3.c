@@ -108,6 +108,17 @@ static void *deserialize(Slave *slave, const char *bytes, size_t size) {
     return state;
 }
 
+static int try_restore(Slave *slave, const char *bytes, size_t size) {
+    Slave3 *s = (Slave3 *)slave;
+    fmi3FMUState state = NULL;
+    int status = (int)s->DeserializeFMUState(s->c, (const fmi3Byte *)bytes, size, &state);
+    if (status > SLAVE_WARNING)
+        return status;
+    status = (int)s->SetFMUState(s->c, state);
+    require(slave, "fmi3FreeFMUState", s->FreeFMUState(s->c, &state));
+    return status;
+}
+
 static void reset(Slave *slave) {
     require(slave, "fmi3Reset", ((Slave3 *)slave)->Reset(((Slave3 *)slave)->c));
 }
@@ -125,7 +136,7 @@ Slave *open_fmi3(const char *name, const char *library, const char *token, const
     Slave3 *s = calloc(1, sizeof *s);
     s->slave = (Slave){name, enter_initialization, exit_initialization, get_real, set_real, get_integer, set_integer, do_step,
                        tell, save,                 restore,             forget,   serialize, deserialize, reset,      terminate,
-                       close_slave};
+                       try_restore, close_slave};
     s->event_mode = event_mode;
     void *handle = load_library(library);
 #define FUNCTION(function) find_function(handle, "fmi3" #function, &s->function);

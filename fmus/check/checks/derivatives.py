@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fmus.check.bench import WARM_UP_STEPS
-from fmus.check.checks_life import real_names
+from fmus.check.checks.life import real_names
 from fmus.check.context import Context
 from fmus.check.derivatives import compare
 from fmus.check.findings import Outcome, skipped

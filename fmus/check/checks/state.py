@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fmus.check.behaviour import again, continuation, difference, exact_state, go_elsewhere
 from fmus.check.bench import WARM_UP_STEPS
-from fmus.check.checks_life import by
+from fmus.check.checks.life import by
 from fmus.check.context import Context
 from fmus.check.findings import Outcome, skipped
 from fmus.check.slave import FmuSlave

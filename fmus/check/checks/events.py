@@ -12,7 +12,7 @@ import numpy as np
 
 from fmus.check.behaviour import RESOLUTION, STEP_TOLERANCE, UNEVEN, divided_steps, worst
 from fmus.check.bench import WARM_UP_STEPS, Bench
-from fmus.check.checks_life import listed, not_finite
+from fmus.check.checks.life import listed, not_finite
 from fmus.check.context import Context
 from fmus.check.findings import Outcome, failed, passed, skipped, warned
 from fmus.check.instance import REAL_TYPES, FmuInstance

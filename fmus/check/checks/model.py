@@ -7,8 +7,8 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from fmus.check.checks_derivatives import nominal_of
-from fmus.check.checks_life import by, exported_symbols, listed, not_finite, real_names
+from fmus.check.checks.derivatives import nominal_of
+from fmus.check.checks.life import by, exported_symbols, listed, not_finite, real_names
 from fmus.check.context import Context
 from fmus.check.derivatives import compare
 from fmus.check.findings import Outcome, failed, passed, skipped

@@ -11,7 +11,7 @@ from time import perf_counter
 
 from fmus.check.behaviour import difference
 from fmus.check.bench import WARM_UP_STEPS, elsewhere
-from fmus.check.checks_life import SHARE_OF_BUDGET, by
+from fmus.check.checks.life import SHARE_OF_BUDGET, by
 from fmus.check.context import Context
 from fmus.check.findings import Outcome, failed, passed, skipped
 

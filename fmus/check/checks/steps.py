@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fmus.check.behaviour import divided_steps, short_step
-from fmus.check.checks_life import by, listed, not_finite
+from fmus.check.checks.life import by, listed, not_finite
 from fmus.check.context import Context
 from fmus.check.findings import Outcome, failed, passed, skipped, warned
 from fmus.check.slave import FmuSlave, RawStep

@@ -1,0 +1,34 @@
+/* Messages: to the importer's logger, from the front itself and from Python. */
+#include "front.h"
+
+static void tell(const Front *front, fmi2Status status, const char *category, const char *text) {
+    if (front->importer == NULL || front->importer->logger == NULL)
+        return;
+    /* Many importers show the format as it is and never look at the arguments after it. */
+    if (strchr(text, '%') == NULL)
+        front->importer->logger(front->environment, front->name, status, category, text);
+    else
+        front->importer->logger(front->environment, front->name, status, category, "%s", text);
+}
+
+static fmi2Status fail(Front *front, const char *format, ...) {
+    char text[TEXT_SIZE];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    front->failed = true;
+    tell(front, fmi2Error, "logStatusError", text);
+    return fmi2Error;
+}
+
+static void hear(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status, fmi2String category, fmi2String message, ...) {
+    (void)name, (void)category;
+    Front *front = environment;
+    if (status >= fmi2Error)
+        fail(front, "%s", message); /* pythonfmu hands over finished text, without arguments */
+    else if (status != fmi2OK)
+        tell(front, status, status == fmi2Discard ? "logStatusDiscard" : "logStatusWarning", message);
+    else if (front->on)
+        tell(front, status, "logEvents", message);
+}
