@@ -58,6 +58,7 @@ class Instance:
         self.events.reset()
         self.mode: Mode = "instantiated"
         self.discarded = False  # whether the last step was
+        self._plain_step = 0.0
         self.variables.touch()
 
     # -- variables --------------------------------------------------------------------------------------------------
@@ -169,6 +170,7 @@ class Instance:
             raise BlockError(str(error)) from error
         except Exception as error:
             raise _model_failure(error) from error
+        self._plain_step = self._timing.plain_step(self.runtime.p)
 
     def step(self, t: float, h: float, early_return: bool = False) -> bool:
         """Advance from `t` by `h` [s], through the events announced and the queued ones whose stamps lie inside.
@@ -193,7 +195,8 @@ class Instance:
             raise BlockError(f"currentCommunicationPoint = {t!r} s, but the block stands at {self.runtime.t!r} s.")
         runtime = self.runtime
         due = runtime.next_instant_before(t + h) if early_return else None
-        self._check_size(h, t + h if due is None else due)
+        if h > self._plain_step:
+            self._check_size(h, t + h if due is None else due)
         before, mark = (runtime.memory.copy(), runtime.t, runtime.t0, tuple(runtime.ticks)), self.events.mark()
         self.variables.touch()
         try:
@@ -267,6 +270,7 @@ class Instance:
         events.protocol[:] = state.protocol
         events.restore_past(state.records)
         self.discarded = False
+        self._plain_step = self._timing.plain_step(self.runtime.p)
         self.variables.touch()
 
     # -- life -------------------------------------------------------------------------------------------------------

@@ -50,6 +50,11 @@ class Timing:
             count = max(count, (last - instant) / float(p[period]))
         return count
 
+    def plain_step(self, p: Sequence[float] | np.ndarray) -> float:
+        """Communication steps up to this [s] are far from the bound, so that nobody needs to count; 0 where that is not sure."""
+        shortest = min(float(p[i]) for i in (self.step_position, *(period for period, _ in self._periodic)))
+        return 0.1 * MOST_INTERNAL_STEPS * shortest if GRID_TOLERANCE * float(p[self.step_position]) <= shortest else 0.0
+
     def can_run(self, snapshot: Snapshot) -> bool:
         """Whether time can run on from a snapshot of a runtime whose time has begun."""
         p = snapshot.memory[self._offset :].tolist()
