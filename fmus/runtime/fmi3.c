@@ -73,6 +73,18 @@ static Status check_token(const Instance *instance, const char *function, fmi3St
                          function, model.token, token != NULL ? token : "none");
 }
 
+/* The instance if it fits the model and its resources can be read; otherwise it is freed, after its reason is logged. */
+static Instance *admit(Instance *instance, Status status, const char *function, fmi3String token, fmi3String resourcePath) {
+    if (status == STATUS_OK)
+        status = check_token(instance, function, token);
+    if (status == STATUS_OK)
+        status = resource_load(instance, resourcePath);
+    if (status == STATUS_OK)
+        return instance;
+    instance_free(instance);
+    return NULL;
+}
+
 /* Log why there will be no instance. */
 static fmi3Instance refuse_type(fmi3String name, fmi3InstanceEnvironment environment, fmi3LogMessageCallback logMessage) {
     Instance *instance = create(name, false, false, environment, logMessage);
@@ -90,15 +102,7 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
     if (instance == NULL)
         return NULL;
     instance->exchange = true;
-    Status status = exchange_check_model(instance, __func__);
-    if (status == STATUS_OK)
-        status = check_token(instance, __func__, instantiationToken);
-    if (status == STATUS_OK)
-        status = resource_load(instance, resourcePath);
-    if (status == STATUS_OK)
-        return instance;
-    instance_free(instance);
-    return NULL;
+    return admit(instance, exchange_check_model(instance, __func__), __func__, instantiationToken, resourcePath);
 }
 
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3String instantiationToken, fmi3String resourcePath,
@@ -124,14 +128,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
     Status status = STATUS_OK;
     if (nRequiredIntermediateVariables > 0)
         status = instance_fail(instance, "fmi3InstantiateCoSimulation: intermediate variables are not provided (providesIntermediateUpdate = false)");
-    else
-        status = check_token(instance, __func__, instantiationToken);
-    if (status == STATUS_OK)
-        status = resource_load(instance, resourcePath);
-    if (status == STATUS_OK)
-        return instance;
-    instance_free(instance);
-    return NULL;
+    return admit(instance, status, __func__, instantiationToken, resourcePath);
 }
 
 void fmi3FreeInstance(fmi3Instance instance) {

@@ -151,25 +151,23 @@ def test_model_exchange_refuses_step_mode(version: int, exchange: Callable[..., 
     one.restore(with_mode(content, EVENT_MODE))
 
 
-def test_co_simulation_refuses_continuous_time_mode(version: int, component: Callable[..., Any]) -> None:
-    made = component("tracker", version)
+@pytest.mark.parametrize(
+    ("system", "mode", "message"),
+    [
+        ("tracker", CONTINUOUS, "Continuous-Time Mode, in which this instance for co-simulation"),
+        ("oscillator", EVENT_MODE, "co-simulation without event mode"),
+    ],
+)
+def test_co_simulation_refuses_modes_it_has_not(
+    system: str, mode: int, message: str, version: int, component: Callable[..., Any]
+) -> None:
+    made = component(system, version)
     made.initialize()
-    saved = made.deserialize(with_mode(made.serialize(made.save()), CONTINUOUS))
+    saved = made.deserialize(with_mode(made.serialize(made.save()), mode))
     with pytest.raises(FMICallException):
         made.restore(saved)
     made.free(saved)
-    assert "Continuous-Time Mode, in which this instance for co-simulation" in made.log[-1]
-    made.step(0.0, H)
-
-
-def test_co_simulation_without_event_mode_refuses_it(version: int, component: Callable[..., Any]) -> None:
-    made = component("oscillator", version)
-    made.initialize()
-    saved = made.deserialize(with_mode(made.serialize(made.save()), EVENT_MODE))
-    with pytest.raises(FMICallException):
-        made.restore(saved)
-    made.free(saved)
-    assert "co-simulation without event mode" in made.log[-1]
+    assert message in made.log[-1]
     made.step(0.0, H)
 
 

@@ -101,6 +101,18 @@ def test_a_start_from_rest_is_exact_where_the_cubic_has_a_double_root() -> None:
     np.testing.assert_allclose(stamps(heard[:2]), [np.sqrt(2e-4), np.sqrt(2.0 * 0.5001)], rtol=0.0, atol=1e-14)
 
 
+ROOT = 4e-13  # [m] rounding of a position of some hundred metres
+
+
+def _spread(step: HermiteStep, t: float) -> float:
+    """How far apart two roots near `t` may lie [s]: where the cubic's position, slope or curvature alone leaves the rounding."""
+    jerk = (step.acceleration(step.h) - step.acceleration(0.0)) / step.h
+    slopes = ((1.0, step.speed(t)), (2.0, step.acceleration(t)), (3.0, jerk))
+    factorials = (1.0, 2.0, 6.0)
+    spreads = ((f * ROOT / max(abs(d), 1e-30)) ** (1.0 / n) for (n, d), f in zip(slopes, factorials, strict=True))
+    return float(min(spreads)) + 1e-12
+
+
 @given(
     p0=st.floats(-500.0, 500.0), v0=st.floats(-40.0, 40.0), a=st.floats(-3.0, 3.0), b=st.floats(-3.0, 3.0),
     h=st.floats(0.01, 1.0), spacing=st.floats(5.0, 60.0),
@@ -129,13 +141,9 @@ def test_one_step_finds_what_the_master_finds(p0: float, v0: float, a: float, b:
         heard.append((y["balise_time"], y["balise_position"]))
     room = min(len(expected), SPACING.pending_capacity)
     assert [p for _, p in heard[:room]] == [p for _, p in expected[:room]]
-    slowest = min((abs(step.speed(t)) for t, _ in expected), default=1.0)
-    # Two roots of one cubic differ by its rounding (4e-13 m here) over its slope; where it turns or has a saddle, by more, but
-    # the position there is the balise's all the same. A saddle alone gives the cubic root: t^3 / 6 within the rounding.
-    for t, place in heard[:room]:
-        assert abs(step.position(t) - place) < 4e-13
-    tolerance = min(4e-13 / max(slowest, 1e-30), np.cbrt(6.0 * 4e-13)) + 1e-12
-    np.testing.assert_allclose([t for t, _ in heard[:room]], [t for t, _ in expected[:room]], rtol=0.0, atol=tolerance)
+    for (t, place), (wanted, _) in zip(heard[:room], expected[:room], strict=True):
+        assert abs(step.position(t) - place) < ROOT
+        assert abs(t - wanted) < _spread(step, wanted)
 
 
 def test_backwards_and_forwards_again() -> None:
