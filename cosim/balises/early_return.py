@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from cosim.balises.layout import InstantLayout, TrackLayout
@@ -37,7 +39,7 @@ class EarlyReturnLocaliser(Localiser):
     def step(self, t: float, until: float) -> list[tuple[Passing, np.ndarray]]:  # noqa: D102 - see Localiser
         plant, watch = self._plant, self.watch
         passings: list[tuple[Passing, np.ndarray]] = []
-        watch.write()
+        watch.send()
         for _ in range(MAX_RETURNS_PER_STEP):
             t, event = plant.step(t, plant.next_stop(t, until))
             if not plant.terminated and plant.is_event(t, event) and plant.report_clock(self._clock):
@@ -47,6 +49,12 @@ class EarlyReturnLocaliser(Localiser):
                 watch.read()
                 return passings
         raise plant.failure(f"returned early {MAX_RETURNS_PER_STEP} times without reaching {until:g} s", t)
+
+    def save(self) -> Any:  # noqa: D102 - see Localiser
+        return self._count
+
+    def restore(self, state: Any) -> None:  # noqa: D102 - see Localiser
+        self._count = state
 
     def _passing(self, stamp: float) -> Passing:
         """The plant says that it passed a balise; which one and how accurately it is placed, the layout knows."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -36,6 +37,12 @@ class InterpolateLocaliser(Localiser):
         if isinstance(self.layout, TrackLayout):
             return self.passings_between(step, t, start, step.time_bound(spread))
         return [self._at(instant, step, t, start) for instant in self.layout.within(t, until)]
+
+    def save(self) -> Any:  # noqa: D102 - see Localiser
+        return self._last_acceleration
+
+    def restore(self, state: Any) -> None:  # noqa: D102 - see Localiser
+        self._last_acceleration = state
 
     def _at(self, instant: float, step: HermiteStep, t: float, start: np.ndarray) -> tuple[Passing, np.ndarray]:
         s = min(max(instant - t, 0.0), step.h)

@@ -6,7 +6,7 @@ It may cut or redo the step; how, is up to the methods in the modules beside thi
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -42,6 +42,14 @@ class Localiser(ABC):
         Returns:
             The passings in ``(t, until]`` in order of time, each with the plant's outputs at that instant, shape (q,).
         """
+
+    def save(self) -> Any:
+        """What it remembers from step to step; the plant's own state is saved elsewhere."""
+        return None
+
+    def restore(self, state: Any) -> None:
+        """Return to what was saved."""
+        return
 
     def passings_between(self, step: HermiteStep, t: float, start: np.ndarray, bound: float) -> list[tuple[Passing, np.ndarray]]:
         """Passings of a step that was taken, by cubic Hermite interpolation.

@@ -63,12 +63,12 @@ class Watch:
         return outputs
 
     def step(self, t: float, until: float) -> None:
-        """Write inputs, advance to `until` [s], read outputs."""
-        self._planned.step(t, until)
+        """Send the inputs, advance to `until` [s], read outputs."""
+        self._planned.drive(t, until)
 
-    def write(self) -> None:
-        """Write the connected inputs."""
-        self._planned.write()
+    def send(self) -> None:
+        """Send the gathered inputs."""
+        self._planned.inputs.send()
 
     def read(self) -> None:
         """Read the outputs."""

@@ -7,15 +7,17 @@ inputs of a component are gathered from it by index. The stepper executes the pl
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from cosim.components.component import NUMERIC_TYPES, Component
 from cosim.coupling.connection import Connection
+from cosim.coupling.inputs import Inputs, connected_inputs
 from cosim.errors import CouplingError, nearest
 from cosim.results.result import SignalInfo
 
+Mover = Callable[[float, float], None]
 FLOATING_TYPES = frozenset({"Real", "Float64", "Float32"})
 
 
@@ -27,23 +29,39 @@ class PlannedComponent:
         component: what is stepped.
         outputs: slice of `values` with its outputs, a view of shape (q,).
         read: reads the outputs into `values`.
-        write: gathers and writes the connected inputs.
+        inputs: its connected inputs.
         columns: where the view lies in `values`.
         continuous: mask of the outputs that may be interpolated between communication points, shape (q,).
+        move: how it gets from one time to another [s] once its inputs are gathered; `drive`, unless a service takes it over (the
+            watched plant is stepped by its localiser, a receiver through the telegrams that reach it).
     """
 
     component: Component
     outputs: np.ndarray
     read: Callable[[], None]
-    write: Callable[[], None]
+    inputs: Inputs
     columns: slice
     continuous: np.ndarray
+    move: Mover = field(init=False)
 
-    def step(self, t: float, until: float) -> None:
-        """Write inputs, advance, read outputs; times in [s]."""
-        self.write()
+    def __post_init__(self) -> None:
+        self.move = self.drive
+
+    def drive(self, t: float, until: float) -> None:
+        """Send the gathered inputs, advance, read outputs; times in [s]."""
+        self.inputs.send()
         self.component.advance(t, until)
         self.read()
+
+    def write(self) -> None:
+        """Gather and send the connected inputs."""
+        self.inputs.gather()
+        self.inputs.send()
+
+    def step(self, t: float, until: float) -> None:
+        """Gather the inputs and move from `t` to `until` [s]."""
+        self.inputs.gather()
+        self.move(t, until)
 
 
 @dataclass
@@ -99,25 +117,23 @@ def make_plan(
         CouplingError: a variable to record does not exist or is not a scalar number.
     """
     read_names = {n: _names_to_read(components[n], (extra or {}).get(n, ())) for n in order}
-    total = sum(len(names) for names in read_names.values())
-    values = np.zeros(total)
     columns: dict[tuple[str, str], int] = {}
-    steps: list[PlannedComponent] = []
+    spans: dict[str, slice] = {}
     signals: list[SignalInfo] = []
-    position = 0
     for name in order:
-        names = read_names[name]
-        columns |= {(name, signal): position + i for i, signal in enumerate(names)}
-        own = [_info(components[name], signal) for signal in names]
-        signals += own
-        span = slice(position, position + len(names))
-        view = values[span]
-        continuous = np.array([s.variability == "continuous" for s in own], dtype=bool)
-        steps.append(PlannedComponent(components[name], view, components[name].reader(names, view), _unset, span, continuous))
-        position += len(names)
-    for step in steps:
-        step.write = _input_writer(step.component, connections, columns, values)
-    return Plan(steps, values, signals, np.concatenate([s.continuous for s in steps]) if steps else np.zeros(0, dtype=bool))
+        first = len(signals)
+        columns |= {(name, signal): first + i for i, signal in enumerate(read_names[name])}
+        signals += [_info(components[name], signal) for signal in read_names[name]]
+        spans[name] = slice(first, len(signals))
+    values = np.zeros(len(signals))
+    continuous = np.array([s.variability == "continuous" for s in signals], dtype=bool)
+    steps = []
+    for name in order:
+        component, span = components[name], spans[name]
+        read = component.reader(read_names[name], values[span])
+        inputs = connected_inputs(component, connections, columns, values)
+        steps.append(PlannedComponent(component, values[span], read, inputs, span, continuous[span]))
+    return Plan(steps, values, signals, continuous)
 
 
 def _names_to_read(component: Component, extra: Sequence[str]) -> list[str]:
@@ -131,27 +147,6 @@ def _names_to_read(component: Component, extra: Sequence[str]) -> list[str]:
     return names
 
 
-def _input_writer(
-    component: Component, connections: Sequence[Connection], columns: Mapping[tuple[str, str], int], values: np.ndarray
-) -> Callable[[], None]:
-    own = [c for c in connections if c.target[0] == component.name]
-    if not own:
-        return _nothing
-    write, buffer = component.writer([c.target[1] for c in own])
-    index = np.array([columns[c.source] for c in own], dtype=np.intp)
-    factors, offsets = np.array([c.factor for c in own]), np.array([c.offset for c in own])
-    converts = bool(np.any(factors != 1.0) or np.any(offsets != 0.0))
-
-    def gather_and_write() -> None:
-        values.take(index, out=buffer, mode="clip")
-        if converts:
-            np.multiply(buffer, factors, out=buffer)
-            np.add(buffer, offsets, out=buffer)
-        write()
-
-    return gather_and_write
-
-
 def _info(component: Component, name: str) -> SignalInfo:
     variable = component.variables[name]
     declared = variable.declaredType
@@ -161,11 +156,3 @@ def _info(component: Component, name: str) -> SignalInfo:
     return SignalInfo(
         f"{component.name}.{name}", unit, display, "continuous" if flows else "discrete", variable.description or ""
     )
-
-
-def _nothing() -> None:
-    """No connected inputs."""
-
-
-def _unset() -> None:
-    raise AssertionError("the plan is complete only when every component has its writer")

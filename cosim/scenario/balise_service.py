@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from cosim.balises.delivery import Receiver
 from cosim.balises.layout import Layout
 from cosim.balises.localise import Method, choose, make_localiser
+from cosim.balises.service import BaliseService
 from cosim.balises.telegram import Channel, FalseTelegram
 from cosim.balises.watch import Watch
 from cosim.components.component import Component
 from cosim.coupling.connection import split_name
 from cosim.coupling.plan import Plan
 from cosim.errors import CouplingError, ScenarioError
-from cosim.master.delivery import Receiver
-from cosim.master.master import BaliseService
 from cosim.scenario.schema import BalisesTable
 from fmus.check.probe import ProbeReport, probe
 from plant_models.hybrid.units import UnitError, conversion, parse_unit

@@ -11,12 +11,14 @@ from time import perf_counter
 from typing import Any
 
 from cosim.balises.layout import Layout
+from cosim.balises.service import BaliseService
 from cosim.components.component import Component
 from cosim.coupling.connection import Connection, connect, unconnected_inputs
 from cosim.coupling.graph import execution_order, undeclared
 from cosim.coupling.plan import Plan, make_plan
 from cosim.errors import CosimError
-from cosim.master.master import BaliseService, Master, TimeAxis, close
+from cosim.master.axis import TimeAxis
+from cosim.master.master import Master, close
 from cosim.report.spec import Phase, ReportSpec
 from cosim.results.result import BaliseRecord, Result
 from cosim.results.si import in_si

@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from cosim.balises.delivery import Receiver
 from cosim.balises.layout import Layout, by_positions
 from cosim.balises.localise import Method, make_localiser
+from cosim.balises.service import BaliseService
 from cosim.balises.telegram import Channel
 from cosim.balises.watch import Watch
 from cosim.components.component import Component
@@ -17,8 +19,8 @@ from cosim.components.loading import load_block
 from cosim.coupling.connection import connect
 from cosim.coupling.graph import execution_order
 from cosim.coupling.plan import Plan, make_plan
-from cosim.master.delivery import Receiver
-from cosim.master.master import BaliseService, Master, TimeAxis, close
+from cosim.master.axis import TimeAxis
+from cosim.master.master import Master, close
 from cosim.results.result import BaliseRecord
 from fmu_observer.observers.high_gain_observer import HighGainTrainObserver
 from plant_models.hybrid import (

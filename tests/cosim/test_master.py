@@ -16,7 +16,8 @@ from mock_slaves import DISCARD, ERROR, FATAL, FMI2, Counter, EventMode, Mock, T
 
 from cosim.balises.telegram import Channel, FalseTelegram
 from cosim.errors import CouplingError, RunError
-from cosim.master.master import Master, TimeAxis, close
+from cosim.master.axis import TimeAxis
+from cosim.master.master import Master, close
 
 # -- time and rows ------------------------------------------------------------------------------------------------------
 

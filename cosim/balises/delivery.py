@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -66,15 +66,24 @@ class Receiver:
         """Whether something told or held back earlier still has to be seen to."""
         return bool(self.backlog or self._announced)
 
+    def save(self) -> Any:
+        """What it remembers from step to step; the component's own state is saved elsewhere."""
+        return dict(self.seen), list(self.backlog), self._announced
+
+    def restore(self, state: Any) -> None:
+        """Return to what was saved."""
+        seen, backlog, self._announced = state
+        self.seen, self.backlog = dict(seen), list(backlog)
+
     def step(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
-        """Step from `t` to `until` [s] through `telegrams`, in order of delivery.
+        """Step from `t` to `until` [s] with the gathered inputs through `telegrams`, in order of delivery.
 
         Afterwards `arrived` holds the outputs on reaching `until`, before anything was told there, shape (q,).
 
         Returns:
             What became of each telegram, in the same order.
         """
-        self.planned.write()
+        self.planned.inputs.send()
         self._open.clear()
         waiting, self.backlog = self.backlog, []
         if self.timing == "stale":

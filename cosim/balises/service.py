@@ -1,0 +1,208 @@
+"""The balise service of a run: the plant is watched, telegrams are sent, receivers are told, events become rows.
+
+It takes over how the watched plant and the receivers are moved; whoever steps the components need not know of it. The trajectory
+of the plant does not depend on whether anybody looks for balises (methods `rollback` and `interpolate`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from math import nan
+from typing import Any
+
+import numpy as np
+
+from cosim.balises.delivery import Delivery, Receiver
+from cosim.balises.localiser import Localiser
+from cosim.balises.telegram import Channel, FalseTelegram, Mailbox, Passing
+from cosim.components.component import TIME_TOLERANCE
+from cosim.coupling.plan import Plan, PlannedComponent
+from cosim.errors import CouplingError
+from cosim.results.result import BaliseRecord
+
+Row = tuple[float, np.ndarray]
+Snapshot = tuple[Passing, np.ndarray]
+NO_ROWS: tuple[Row, ...] = ()
+
+
+class BaliseService:
+    """Everything about balises in a run.
+
+    Args:
+        localiser: steps the watched plant and finds passings.
+        channel: latency, misses, false telegrams.
+        receivers: components that are told.
+        odometer: column of the odometer reading that a telegram carries, or None.
+        position: column of the plant's position.
+
+    After a run `mailbox` holds what was delivered, missed, and still on its way; `passed` counts the balises passed.
+    """
+
+    def __init__(
+        self, localiser: Localiser, channel: Channel, receivers: Sequence[Receiver], odometer: int | None, position: int
+    ) -> None:
+        self.localiser, self.channel, self.receivers = localiser, channel, list(receivers)
+        self.odometer, self.position = odometer, position
+        self.mailbox = Mailbox()
+        self.passed = 0
+        self._by_name = {r.planned.component.name: r for r in receivers}
+        self._false = sorted(channel.false_telegrams, key=lambda f: f.time)
+        self._t = self._until = nan
+        self._previous = np.zeros(0)
+        self._snapshots: list[Snapshot] = []
+        self._telegrams: list[BaliseRecord] | None = None
+        self._told: dict[str, list[Delivery]] = {}
+
+    @property
+    def plant(self) -> str:
+        """Name of the watched plant."""
+        return self.localiser.watch.component.name
+
+    def attach(self, plan: Plan) -> None:
+        """Take over how the plant and the receivers are moved.
+
+        Raises:
+            CouplingError: a receiver is stepped before the watched plant, or is the plant itself.
+        """
+        self._plan = plan
+        self._check_order()
+        self._previous = np.zeros_like(plan.values)
+        self._plant: PlannedComponent = plan.find(self.plant)
+        self._plant.move = self._move_plant
+        for receiver in self.receivers:
+            receiver.planned.move = partial(self._move_receiver, receiver)
+
+    # -- a step -----------------------------------------------------------------------------------------------------
+
+    def begin(self, t: float, until: float) -> None:
+        """A step from `t` to `until` [s] begins; the plan holds the values at `t`."""
+        self._t, self._until = t, until
+        self._previous[:] = self._plan.values
+        self._snapshots, self._telegrams, self._told = [], None, {}
+
+    def _move_plant(self, t: float, until: float) -> None:
+        self._snapshots += self.localiser.step(t, until)
+
+    def _move_receiver(self, receiver: Receiver, t: float, until: float) -> None:
+        """Step a receiver through what is delivered to it; what it needs of plant and odometer has been stepped before."""
+        if self._telegrams is None and self._something_to_tell:
+            self._telegrams = self._collect(t, until)
+        if self._telegrams or receiver.busy:
+            self._told[receiver.planned.component.name] = receiver.step(t, until, self._telegrams or [])
+        else:
+            receiver.planned.drive(t, until)
+
+    @property
+    def _something_to_tell(self) -> bool:
+        return bool(self._snapshots or self.mailbox.waiting or self._false)
+
+    def rows(self) -> Sequence[Row]:
+        """The step is done: log the telegrams delivered in it.
+
+        Returns:
+            Rows before and after each, at the times at which receivers were told.
+        """
+        if self._telegrams is None and self._something_to_tell:
+            self._telegrams = self._collect(self._t, self._until)
+        return self._event_rows(self._t, self._until, self._telegrams) if self._telegrams else NO_ROWS
+
+    @property
+    def idle_until(self) -> float:
+        """Up to here [s] nothing is on its way to a receiver; what the plant passes in between is not known beforehand."""
+        if any(receiver.busy for receiver in self.receivers):
+            return -np.inf
+        known = [e.delivered_at for e in self.mailbox.waiting[:1]] + [f.time for f in self._false[:1]]
+        return min(known, default=np.inf)
+
+    # -- state ------------------------------------------------------------------------------------------------------
+
+    def save(self) -> Any:
+        """What a step changes here."""
+        mailbox = list(self.mailbox.waiting), len(self.mailbox.log)
+        return mailbox, self.passed, list(self._false), self.localiser.save(), [r.save() for r in self.receivers]
+
+    def restore(self, state: Any) -> None:
+        """Return to a saved state."""
+        (waiting, logged), self.passed, false, localiser, receivers = state
+        self.mailbox.waiting = list(waiting)
+        del self.mailbox.log[logged:]
+        self._false = list(false)
+        self.localiser.restore(localiser)
+        for receiver, saved in zip(self.receivers, receivers, strict=True):
+            receiver.restore(saved)
+
+    # -- telegrams --------------------------------------------------------------------------------------------------
+
+    def _collect(self, t: float, until: float) -> list[BaliseRecord]:
+        """Post the passings of this step, and take what is delivered within it."""
+        for passing, _ in self._snapshots:
+            self.mailbox.post(self.channel.transmit(passing, self.passed, self._odometer_at(passing.stamp, t, until)))
+            self.passed += 1
+        while self._false and self._false[0].time <= until + TIME_TOLERANCE:
+            self.mailbox.post(self._false_telegram(self._false.pop(0), t, until))
+        return self.mailbox.due(until + TIME_TOLERANCE)
+
+    def _false_telegram(self, false: FalseTelegram, t: float, until: float) -> BaliseRecord:
+        stamp = max(false.time, t)
+        position = float(self._interpolate(stamp, t, until)[self.position]) * self.localiser.watch.position_scale
+        reading = self._odometer_at(stamp, t, until)
+        return BaliseRecord(stamp, stamp, "false", position + false.offset, position, 0.0, reading, "false")
+
+    def _odometer_at(self, time: float, t: float, until: float) -> float:
+        return nan if self.odometer is None else float(self._interpolate(time, t, until)[self.odometer])
+
+    # -- rows -------------------------------------------------------------------------------------------------------
+
+    def _event_rows(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Row]:
+        at_stamp = {passing.stamp: outputs for passing, outputs in self._snapshots}
+        rows: list[Row] = []
+        for i, telegram in enumerate(telegrams):
+            deliveries = {name: several[i] for name, several in self._told.items()}
+            nominal = min(max(telegram.delivered_at, t), until)
+            times = sorted({d.time for d in deliveries.values()}) or [nominal]
+            late = times[0] - telegram.delivered_at > TIME_TOLERANCE
+            logged = replace(telegram, delivered_at=times[0]) if late else telegram
+            self.mailbox.delivered(logged, {name: d.outcome for name, d in deliveries.items()})
+            for time in times:
+                rows += self._pair(time, t, until, deliveries, at_stamp.get(telegram.delivered_at))
+        return sorted(rows, key=lambda row: row[0])
+
+    def _pair(
+        self, time: float, t: float, until: float, deliveries: dict[str, Delivery], plant_there: np.ndarray | None
+    ) -> list[Row]:
+        """The rows before and after one telegram; the latter only where it is not the row of the communication point."""
+        before = self._interpolate(time, t, until)
+        if plant_there is not None and time < until:
+            before[self._plant.columns] = plant_there
+        after = before.copy()
+        for name, delivery in deliveries.items():
+            columns = self._by_name[name].planned.columns
+            before[columns] = after[columns] = self._mixed(time, t, until, columns, self._by_name[name].arrived)
+            if delivery.time == time and delivery.before is not None:
+                before[columns] = delivery.before
+            if delivery.time == time and delivery.after is not None:
+                after[columns] = delivery.after
+        return [(time, before), (time, after)] if until - time > TIME_TOLERANCE else [(time, before)]
+
+    def _interpolate(self, time: float, t: float, until: float) -> np.ndarray:
+        """Values at an instant within the step: linear between its ends, discrete ones held."""
+        return self._mixed(time, t, until, slice(None), self._plan.values)
+
+    def _mixed(self, time: float, t: float, until: float, columns: slice, end: np.ndarray) -> np.ndarray:
+        if until - time <= TIME_TOLERANCE:
+            return end.copy()
+        start = self._previous[columns]
+        share = (time - t) / (until - t)
+        return np.where(self._plan.continuous[columns], start + share * (end - start), start)
+
+    # -- checks -----------------------------------------------------------------------------------------------------
+
+    def _check_order(self) -> None:
+        order = [s.component.name for s in self._plan.steps]
+        for name in self._by_name:
+            if name == self.plant:
+                raise CouplingError(f"{name}: the watched plant cannot be told of its own balises; take it off the receivers.")
+            if order.index(name) < order.index(self.plant):
+                raise CouplingError(f"{name} is told of balises, so it must be stepped after the plant '{self.plant}'.")

@@ -1,0 +1,1 @@
+"""Algorithms: in which order, and how often, the components are brought over one communication step."""
