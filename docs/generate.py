@@ -155,6 +155,9 @@ def schema_tables() -> dict[str, Any]:
     return {
         "scenario": schema.ScenarioTable,
         "component": schema.ComponentTable,
+        "connection": schema.ConnectionTable,
+        "master": schema.MasterTable,
+        "iteration": schema.IterationTable,
         "balises": schema.BalisesTable,
         "false_telegram": schema.FalseTelegramTable,
         "report": schema.ReportTable,
@@ -170,6 +173,8 @@ def _default(info: FieldInfo) -> str:
         return "-"
     if isinstance(value, str):
         return f'`"{value}"`'
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
     return f"`{value}`" if isinstance(value, int | float) else "empty"
 
 
@@ -195,9 +200,10 @@ def _kind(annotation: Any) -> str:
     elif hasattr(annotation, "__metadata__"):
         text = _type(FieldInfo.from_annotation(annotation))
     elif origin is list:
-        text = f"list of {_kind(arguments[0])}s"
+        entry = _kind(arguments[0])
+        text = f"list of {entry}" if entry.endswith("s") else f"list of {entry}s"
     elif origin is tuple:
-        text = f"list of {len(arguments)} numbers"
+        text = f"groups of {len(arguments)} numbers"
     elif origin is dict:
         text = f"table of {_kind(arguments[1])}"
     elif isinstance(annotation, type):
@@ -213,9 +219,8 @@ PARTS: dict[tuple[str, str], Callable[[], str]] = {
     ("README.md", "printed table"): printed_table,
     ("README.md", "observers"): certificate_table,
     ("docs/certificates.md", "observers"): certificate_table,
-    **{("docs/scenario_files.md", name): schema_page(name)
-       for name in ("scenario", "component", "balises", "false_telegram", "report", "phase")},
-}  # fmt: skip
+    **{("docs/scenario_files.md", name): schema_page(name) for name in schema_tables()},
+}
 
 if __name__ == "__main__":
     main()

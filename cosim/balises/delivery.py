@@ -76,14 +76,14 @@ class Receiver:
         self.seen, self.backlog = dict(seen), list(backlog)
 
     def step(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
-        """Step from `t` to `until` [s] with the gathered inputs through `telegrams`, in order of delivery.
+        """Step from `t` to `until` [s] with the prepared inputs through `telegrams`, in order of delivery.
 
         Afterwards `arrived` holds the outputs on reaching `until`, before anything was told there, shape (q,).
 
         Returns:
             What became of each telegram, in the same order.
         """
-        self.planned.inputs.send()
+        self.planned.send(t, until)
         self._open.clear()
         waiting, self.backlog = self.backlog, []
         if self.timing == "stale":
@@ -92,6 +92,25 @@ class Receiver:
             return self._tell_then_step(t, until, [*waiting, *telegrams])[len(waiting) :]
         return self._step_through(t, until, [*waiting, *telegrams])[len(waiting) :]
 
+    def hold_back(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
+        """Keep telegrams of a part of a step, from `t` to `until` [s], that the component does not take: its next step has them.
+
+        Returns:
+            A delivery for each, in the same order.
+        """
+        self.backlog.extend(telegrams)
+        self.arrived = self.planned.outputs.copy()
+        return [Delivery(snapped(telegram.delivered_at, t, until)) for telegram in telegrams]
+
+    def told(self, delivery: Delivery, arrived: np.ndarray) -> None:
+        """Somebody else has stepped it through one telegram, all as `step` would have done.
+
+        Args:
+            delivery: what became of it. arrived: the outputs on reaching the end of the step, shape (q,).
+        """
+        self._open[:] = [delivery]
+        self.arrived = arrived
+
     # -- a receiver that can be stopped anywhere --------------------------------------------------------------------
 
     def _step_through(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
@@ -99,7 +118,7 @@ class Receiver:
         deliveries: list[Delivery] = []
         arrived = None
         for telegram in telegrams:
-            told_at = _snapped(telegram.delivered_at, now, until)
+            told_at = snapped(telegram.delivered_at, now, until)
             deliveries.append(self._deliver(now, told_at, telegram))
             if told_at == until and arrived is None:
                 arrived = deliveries[-1].before
@@ -149,7 +168,7 @@ class Receiver:
             return None
         state = component.save()
         try:
-            component.advance(now, told_at)
+            self.planned.advance(now, told_at)
             outputs = self._outputs()
             component.restore(state)
             return outputs
@@ -164,7 +183,7 @@ class Receiver:
             return self._step_then_tell(t, until, telegrams)
         at_once = 1 if self.planned.component.event_needs_step else len(telegrams)
         self.backlog.extend(telegrams[at_once:])
-        deliveries = [Delivery(_snapped(telegram.delivered_at, t, until)) for telegram in telegrams]
+        deliveries = [Delivery(snapped(telegram.delivered_at, t, until)) for telegram in telegrams]
         for telegram, delivery in zip(telegrams[:at_once], deliveries, strict=False):
             self._tell(t, telegram, telegram.stamp, delivery)
         self._advance(t, until)
@@ -188,7 +207,7 @@ class Receiver:
         return self.planned.component.events[self.event]
 
     def _advance(self, now: float, until: float) -> None:
-        self.planned.component.advance(now, until)
+        self.planned.advance(now, until)
         self._announced = False
         self._note_outcome()
 
@@ -215,7 +234,7 @@ class Receiver:
             self._open.clear()
 
 
-def _snapped(delivered_at: float, now: float, until: float) -> float:
+def snapped(delivered_at: float, now: float, until: float) -> float:
     """Time of delivery within ``[now, until]`` [s], on an end where it is too near for a step in between."""
     told_at = min(max(delivered_at, now), until)
     if until - told_at <= TIME_TOLERANCE:

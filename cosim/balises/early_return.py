@@ -39,7 +39,7 @@ class EarlyReturnLocaliser(Localiser):
     def step(self, t: float, until: float) -> list[tuple[Passing, np.ndarray]]:  # noqa: D102 - see Localiser
         plant, watch = self._plant, self.watch
         passings: list[tuple[Passing, np.ndarray]] = []
-        watch.send()
+        watch.send(t, until)
         for _ in range(MAX_RETURNS_PER_STEP):
             t, event = plant.step(t, plant.next_stop(t, until))
             if not plant.terminated and plant.is_event(t, event) and plant.report_clock(self._clock):

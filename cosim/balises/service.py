@@ -6,7 +6,7 @@ of the plant does not depend on whether anybody looks for balises (methods `roll
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from math import nan
@@ -52,6 +52,7 @@ class BaliseService:
         self._t = self._until = nan
         self._previous = np.zeros(0)
         self._snapshots: list[Snapshot] = []
+        self._ahead: list[Snapshot] = []
         self._telegrams: list[BaliseRecord] | None = None
         self._told: dict[str, list[Delivery]] = {}
 
@@ -76,11 +77,13 @@ class BaliseService:
 
     # -- a step -----------------------------------------------------------------------------------------------------
 
-    def begin(self, t: float, until: float) -> None:
-        """A step from `t` to `until` [s] begins; the plan holds the values at `t`."""
+    def begin(self, t: float, until: float, values: np.ndarray | None = None) -> None:
+        """A step from `t` to `until` [s] begins; `values`, shape (n,), are those at `t`, by default what the plan holds."""
         self._t, self._until = t, until
-        self._previous[:] = self._plan.values
-        self._snapshots, self._telegrams, self._told = [], None, {}
+        self._previous[:] = self._plan.values if values is None else values
+        self._snapshots = [found for found in self._ahead if found[0].stamp <= until + TIME_TOLERANCE]
+        self._ahead = self._ahead[len(self._snapshots) :]
+        self._telegrams, self._told = None, {}
 
     def _move_plant(self, t: float, until: float) -> None:
         self._snapshots += self.localiser.step(t, until)
@@ -93,6 +96,16 @@ class BaliseService:
             self._told[receiver.planned.component.name] = receiver.step(t, until, self._telegrams or [])
         else:
             receiver.planned.drive(t, until)
+
+    def holder(self, name: str) -> Callable[[float, float], None]:
+        """What to call instead of moving a receiver that waits: telegrams of that time are kept for its next step."""
+
+        def hold(t: float, until: float) -> None:
+            if self._telegrams is None and self._something_to_tell:
+                self._telegrams = self._collect(t, until)
+            self._told[name] = self._by_name[name].hold_back(t, until, self._telegrams or [])
+
+        return hold
 
     @property
     def _something_to_tell(self) -> bool:
@@ -121,17 +134,26 @@ class BaliseService:
     def save(self) -> Any:
         """What a step changes here."""
         mailbox = list(self.mailbox.waiting), len(self.mailbox.log)
-        return mailbox, self.passed, list(self._false), self.localiser.save(), [r.save() for r in self.receivers]
+        receivers = [r.save() for r in self.receivers]
+        return mailbox, self.passed, list(self._false), self.localiser.save(), receivers, list(self._ahead)
 
     def restore(self, state: Any) -> None:
         """Return to a saved state."""
-        (waiting, logged), self.passed, false, localiser, receivers = state
+        (waiting, logged), self.passed, false, localiser, receivers, ahead = state
+        self._ahead = list(ahead)
         self.mailbox.waiting = list(waiting)
         del self.mailbox.log[logged:]
         self._false = list(false)
         self.localiser.restore(localiser)
         for receiver, saved in zip(self.receivers, receivers, strict=True):
             receiver.restore(saved)
+
+    def restore_but_plant(self, state: Any) -> None:
+        """Return to a saved state without the plant, which stays ahead of it: what it has passed is not found a second time."""
+        found, localiser = [*self._snapshots, *self._ahead], self.localiser.save()
+        self.restore(state)
+        self.localiser.restore(localiser)
+        self._ahead = found
 
     # -- telegrams --------------------------------------------------------------------------------------------------
 
@@ -151,7 +173,10 @@ class BaliseService:
         return BaliseRecord(stamp, stamp, "false", position + false.offset, position, 0.0, reading, "false")
 
     def _odometer_at(self, time: float, t: float, until: float) -> float:
-        return nan if self.odometer is None else float(self._interpolate(time, t, until)[self.odometer])
+        if self.odometer is None:
+            return nan
+        column = slice(self.odometer, self.odometer + 1)
+        return float(self._mixed(time, t, until, column, self._plan.values[column])[0])
 
     # -- rows -------------------------------------------------------------------------------------------------------
 
@@ -173,13 +198,15 @@ class BaliseService:
         self, time: float, t: float, until: float, deliveries: dict[str, Delivery], plant_there: np.ndarray | None
     ) -> list[Row]:
         """The rows before and after one telegram; the latter only where it is not the row of the communication point."""
-        before = self._interpolate(time, t, until)
+        end = self._plan.values.copy()
+        for name in deliveries:
+            end[self._by_name[name].planned.columns] = self._by_name[name].arrived
+        before = self._mixed(time, t, until, slice(None), end)
         if plant_there is not None and time < until:
             before[self._plant.columns] = plant_there
         after = before.copy()
         for name, delivery in deliveries.items():
             columns = self._by_name[name].planned.columns
-            before[columns] = after[columns] = self._mixed(time, t, until, columns, self._by_name[name].arrived)
             if delivery.time == time and delivery.before is not None:
                 before[columns] = delivery.before
             if delivery.time == time and delivery.after is not None:
@@ -194,7 +221,7 @@ class BaliseService:
         if until - time <= TIME_TOLERANCE:
             return end.copy()
         start = self._previous[columns]
-        share = (time - t) / (until - t)
+        share = max((time - t) / (until - t), 0.0)
         return np.where(self._plan.continuous[columns], start + share * (end - start), start)
 
     # -- checks -----------------------------------------------------------------------------------------------------

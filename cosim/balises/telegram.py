@@ -71,9 +71,11 @@ class Channel:
 
     def transmit(self, passing: Passing, number: int, odometer_reading: float) -> BaliseRecord:
         """The telegram of passing `number`; `delivered_at` is NaN where the balise is missed."""
-        luck, jitter = uniform_pair(self.seed, 0, number)
+        chance = self.missed_fraction > 0.0 or self.latency_jitter > 0.0
+        luck, jitter = uniform_pair(self.seed, 0, number) if chance else (1.0, 0.0)
         missed = luck < self.missed_fraction or passing.identity in self.missed
-        noise = self.position_noise * passing.location_accuracy * standard_normal(self.seed, 1, number)
+        spread = self.position_noise * passing.location_accuracy
+        noise = spread * standard_normal(self.seed, 1, number) if spread > 0.0 else 0.0
         return BaliseRecord(
             stamp=passing.stamp,
             delivered_at=nan if missed else passing.stamp + self.latency + jitter * self.latency_jitter,
@@ -114,11 +116,9 @@ class Mailbox:
         self.log.append(replace(telegram, outcomes=dict(outcomes)))
 
 
+PAYLOAD = ("position", "location_accuracy", "odometer_reading", "delivered_at")
+
+
 def payload(telegram: BaliseRecord) -> dict[str, float]:
     """The numeric fields of a telegram, by the names a receiver may declare as ``balise_<field>``."""
-    return {
-        "position": telegram.position,
-        "location_accuracy": telegram.location_accuracy,
-        "odometer_reading": telegram.odometer_reading,
-        "delivered_at": telegram.delivered_at,
-    }
+    return {name: getattr(telegram, name) for name in PAYLOAD}

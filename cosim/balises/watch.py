@@ -28,6 +28,21 @@ class Watch:
         self.redo_differences = 0
 
     @property
+    def position_column(self) -> int:
+        """Column of the position within the plant's outputs."""
+        return self._position
+
+    @property
+    def speed_column(self) -> int:
+        """Column of the speed within the plant's outputs."""
+        return self._speed
+
+    @property
+    def speed_scale(self) -> float:
+        """Factor from the plant's own unit of speed to [m/s]."""
+        return self._scales[1]
+
+    @property
     def position_scale(self) -> float:
         """Factor from the plant's own unit of position to [m]."""
         return self._scales[0]
@@ -66,9 +81,9 @@ class Watch:
         """Send the inputs, advance to `until` [s], read outputs."""
         self._planned.drive(t, until)
 
-    def send(self) -> None:
-        """Send the gathered inputs."""
-        self._planned.inputs.send()
+    def send(self, t: float, until: float) -> None:
+        """Send the prepared inputs for a step from `t` to `until` [s]."""
+        self._planned.send(t, until)
 
     def read(self) -> None:
         """Read the outputs."""

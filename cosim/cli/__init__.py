@@ -1,4 +1,4 @@
-"""The command line ``cosim``: run, list, info. Exit codes: 0 done, 1 done but not as asked for, 2 usage or run error."""
+"""The command line ``cosim``: run, show, list, info, export. Exit codes: 0 done, 1 not as asked for, 2 usage or run error."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from cosim.cli import info, listing, run
+from cosim.cli import export, info, listing, run, show
 from cosim.errors import CosimError
 
 __all__ = ["main"]
@@ -20,7 +20,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         prog="cosim", description="Co-simulate train observers with train plant FMUs, balise events exact."
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for command in (run, listing, info):
+    for command in (run, show, listing, info, export):
         command.register(commands)
     options = parser.parse_args(arguments)
     try:

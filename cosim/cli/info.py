@@ -1,4 +1,4 @@
-"""``cosim info FILE.fmu``: what an FMU says about itself, and whether it can run here."""
+"""``cosim info FILE``: what an FMU says about itself and whether it can run here, or what is in a system structure package."""
 
 from __future__ import annotations
 
@@ -7,13 +7,17 @@ import json
 from pathlib import Path
 from typing import Any
 
+from cosim.components.capabilities import read_capabilities
 from cosim.components.loading import read_description
+from cosim.ssp.names import is_package
 
 
 def register(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        "info", help="describe an FMU file", description="Interfaces, platforms and variables of an FMU."
+        "info",
+        help="describe an FMU or SSP file",
+        description="Interfaces, platforms and variables of an FMU, or the systems, components and connections in an SSP.",
     )
     parser.add_argument("file", type=Path)
     parser.add_argument("--json", action="store_true", help="print JSON")
@@ -22,6 +26,8 @@ def register(commands: Any) -> None:
 
 def execute(options: argparse.Namespace) -> int:
     """Print the description."""
+    if is_package(options.file):
+        return _execute_package(options)
     data = describe_file(options.file)
     if options.json:
         print(json.dumps(data, indent=2))
@@ -40,6 +46,14 @@ def execute(options: argparse.Namespace) -> int:
     return 0
 
 
+def _execute_package(options: argparse.Namespace) -> int:
+    from cosim.ssp.describe import describe_package, text_of_package  # noqa: PLC0415 - lxml only for those who read SSP
+
+    data = describe_package(str(options.file))
+    print(json.dumps(data, indent=2) if options.json else text_of_package(data))
+    return 0
+
+
 def describe_file(path: Path) -> dict[str, Any]:
     """The description of an FMU file as plain data.
 
@@ -49,9 +63,7 @@ def describe_file(path: Path) -> dict[str, Any]:
     import fmpy  # noqa: PLC0415 - only here
 
     description = read_description(path, "info")
-    slave = description.coSimulation
     platforms = list(fmpy.supported_platforms(str(path)))
-    capabilities = ["canHandleVariableCommunicationStepSize", "canGetAndSetFMUstate", "canSerializeFMUstate", "hasEventMode"]
     interfaces = {"coSimulation": "co-simulation", "modelExchange": "model exchange", "scheduledExecution": "scheduled execution"}
     return {
         "file": str(path),
@@ -62,7 +74,7 @@ def describe_file(path: Path) -> dict[str, Any]:
         "platforms": platforms,
         "runs here": "yes" if {fmpy.platform, fmpy.platform_tuple} & set(platforms) else f"no (this is {fmpy.platform_tuple})",
         "tool": description.generationTool or "",
-        "declares": [name for name in capabilities if slave is not None and getattr(slave, name)],
+        "declares": list(read_capabilities(description).declared()),
         "variables": [
             {"name": v.name, "causality": v.causality or "local", "variability": v.variability, "type": v.type,
              "unit": v.unit, "start": v.start, "description": v.description}

@@ -1,4 +1,4 @@
-"""``cosim list``: scenarios, plants and observers that ship, with their sources."""
+"""``cosim list``: scenarios, plants and observers that ship, with their sources; or the variants in an SSP file."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from cosim.scenario import Scenario, shipped_scenarios
+from cosim.ssp.names import is_package
+
+KINDS = ("scenarios", "models", "observers", "all")
 
 
 def register(commands: Any) -> None:
@@ -15,13 +18,15 @@ def register(commands: Any) -> None:
     parser = commands.add_parser(
         "list", help="list what ships", description="Scenarios, plants and observers with their sources."
     )
-    parser.add_argument("what", nargs="?", choices=("scenarios", "models", "observers", "all"), default="all")
+    parser.add_argument("what", nargs="?", type=_what, default="all", help=f"{', '.join(KINDS)}, or an .ssp file")
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.set_defaults(execute=execute)
 
 
 def execute(options: argparse.Namespace) -> int:
     """Print the lists."""
+    if is_package(options.what):
+        return _execute_package(options)
     data = {kind: entries for kind, entries in catalogue().items() if options.what in (kind, "all")}
     if options.json:
         print(json.dumps(data, indent=2))
@@ -36,6 +41,26 @@ def execute(options: argparse.Namespace) -> int:
             extras += [f"options: {', '.join(entry['options'])}"] if entry.get("options") else []
             if extras:
                 print(f"  {'':<{width}}  {'; '.join(extras)}")
+    return 0
+
+
+def _what(text: str) -> str:
+    if text not in KINDS and not is_package(text):
+        raise argparse.ArgumentTypeError(f"choose from {', '.join(KINDS)}, or give an .ssp file (got {text!r})")
+    return text
+
+
+def _execute_package(options: argparse.Namespace) -> int:
+    from cosim.ssp.load import list_variants  # noqa: PLC0415 - lxml only for those who read SSP
+
+    variants = list_variants(options.what)
+    if options.json:
+        print(json.dumps({"variants": variants}, indent=2))
+        return 0
+    width = max(map(len, variants))
+    print("variants:")
+    for name, title in variants.items():
+        print(f"  {name:<{width}}  {title}")
     return 0
 
 

@@ -12,6 +12,7 @@ from cosim.errors import ScenarioError
 from cosim.scenario import Outcome, Scenario
 
 DONE, NOT_AS_ASKED, ERROR = 0, 1, 2
+CALL_LOG = "calls.log"
 
 
 def register(commands: Any) -> None:
@@ -27,6 +28,8 @@ def register(commands: Any) -> None:
     parser.add_argument(
         "--strict", action="store_true", help="exit with 1 when the run gave warnings, e.g. an exceeded certificate"
     )
+    parser.add_argument("--log-calls", nargs="?", const="", metavar="FILE",
+                        help="log every call of every component to FILE (default: calls.log among the results)")  # fmt: skip
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
     parser.set_defaults(execute=execute)
 
@@ -42,9 +45,10 @@ def execute(options: argparse.Namespace) -> int:
     scenario.table()
     directory = Path(options.out) if options.out is not None else Path("results") / scenario.name
     check_writable(directory)
+    call_log = _call_log(options, scenario, directory)
     bar = None if options.quiet or options.json else ProgressBar()
     try:
-        outcome = scenario.run(progress=bar, warn=_warn)
+        outcome = scenario.run(progress=bar, warn=_warn, call_log=call_log)
     finally:
         if bar is not None:
             bar.close()
@@ -54,7 +58,7 @@ def execute(options: argparse.Namespace) -> int:
         study = _study(scenario, options)
         outcome = outcome.with_summary(seed_study=study.to_data())
         paths = outcome.write(directory, report=not options.no_report)
-    _tell(outcome, study, paths, options)
+    _tell(outcome, study, paths | ({"calls": call_log} if call_log is not None else {}), options)
     if outcome.failure is not None:
         return ERROR
     return NOT_AS_ASKED if options.strict and outcome.warnings else DONE
@@ -98,6 +102,16 @@ class ProgressBar:
             self._bar.close()
 
 
+def _call_log(options: argparse.Namespace, scenario: Scenario, directory: Path) -> Path | None:
+    """Where calls are logged, if they are; a log that an earlier run left there would not belong to these results."""
+    if options.log_calls:
+        return Path(options.log_calls)
+    if options.log_calls is None and not scenario.table().master.log_calls:
+        (directory / CALL_LOG).unlink(missing_ok=True)
+        return None
+    return directory / CALL_LOG
+
+
 def _warn(text: str) -> None:
     print(f"warning: {text}", file=sys.stderr, flush=True)
 
@@ -109,7 +123,7 @@ def _study(scenario: Scenario, options: argparse.Namespace) -> Any:
         if not (options.quiet or options.json) and sys.stderr.isatty():
             print(f"\rseed {done} of {count}", end="" if done < count else "\n", file=sys.stderr)
 
-    return seed_study(scenario, range(options.seeds), tell)
+    return seed_study(scenario.copy().master(log_calls=False), range(options.seeds), tell)
 
 
 def _tell(outcome: Outcome, study: Any, paths: dict[str, Path], options: argparse.Namespace) -> None:
@@ -120,6 +134,8 @@ def _tell(outcome: Outcome, study: Any, paths: dict[str, Path], options: argpars
         data = dict(summary) | {"failure": outcome.failure, "files": {k: str(p) for k, p in paths.items()}}
         print(json.dumps(jsonable(data), indent=2))
         return
+    from cosim.report.cost import cost_text  # noqa: PLC0415 - only here
+
     print(_headline(summary))
     if outcome.result.table.size:
         from cosim.report.metrics import phase_metrics  # noqa: PLC0415 - only here
@@ -128,6 +144,7 @@ def _tell(outcome: Outcome, study: Any, paths: dict[str, Path], options: argpars
         metrics = phase_metrics(outcome.result, outcome.spec)
         if metrics:
             print(text_table(metrics, outcome.spec))
+    print(cost_text(outcome.result), end="\n\n")
     if study is not None:
         print(study.text())
     for kind, path in paths.items():

@@ -1,26 +1,35 @@
-"""Components: everything the master can step, with one face for FMI 2 slaves, FMI 3 slaves and Python blocks.
+"""Components: everything the master can step, with one face for slaves of FMI 1, 2 and 3 and Python blocks.
 
-A component wraps an object with the call surface of fmpy's `FMU2Slave` or `FMU3Slave`; whether that is a sealed library or a
-block makes no difference here. The dialects are in `fmi2` and `fmi3`.
+A component wraps an object with the call surface of fmpy's `FMU1Slave`, `FMU2Slave` or `FMU3Slave`; whether that is a sealed
+library or a block makes no difference here. The dialects are in `fmi1`, `fmi2` and `fmi3`.
 """
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription, ModelVariable
 
+from cosim.components.capabilities import read_capabilities, tool_warning
+from cosim.components.derivatives import directional_derivative, make_derivative_writer
+from cosim.components.elements import Element, Variables, described, elements_of
+from cosim.components.start_values import StartValue, refusal, typed_value, typed_values
+from cosim.components.units import Units
+from cosim.components.values import element_reader, element_writer, exact_reader, exact_writer, write_start
+from cosim.diagnostics.log_choice import LogSwitch, log_switch, switch_log
+from cosim.diagnostics.messages import LogChoice, MessageLog
+from cosim.diagnostics.native_log import forget
+from cosim.diagnostics.tally import Tally, count_methods, new_tallies
 from cosim.errors import CouplingError, RunError, nearest
-from fmus.ports import make_reader, make_writer
-from plant_models.hybrid.units import BASE_SYMBOLS, Unit, UnitError, parse_unit
+from fmus.exact_ports import Values
+from plant_models.hybrid.units import Unit, UnitError
 
 TIME_TOLERANCE = 1e-9
 """Communication times closer than this are the same [s]; a billionth of a second is above rounding at 1e5 s."""
@@ -29,7 +38,8 @@ NUMERIC_TYPES = frozenset(
     {"Real", "Integer", "Boolean", "Enumeration", "Float64", "Float32"}
     | {f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)}
 )
-MESSAGES_KEPT = 20
+"""Types whose values a table of numbers can hold. Integers beyond 2**53 are rounded in it; see `exact_reader`."""
+
 NEVER = math.inf
 FATAL = 4  # FMI status: the slave must not be called again
 OWN_TOOL = "fmu-observer"
@@ -56,11 +66,13 @@ class EventPort:
 class Component(ABC):
     """One stepped thing, from instantiation to the end.
 
-    The life: `instantiate`, `set_start`, `enter_initialization`, readers and writers in turn, `exit_initialization`, then
-    `advance` and `tell` in turn, `terminate`, `free`. `reader` and `writer` are prepared once and called without arguments.
-    `save`, `restore` and `release` exist where `can_save` says so. Counters: `seconds` spent in steps, `calls` of doStep.
-    `time` is where it stands [s]. `terminated` says that the slave asked for the end of the run. Whatever a call of the slave
-    throws comes out as a `RunError` with component, time and the names of the variables concerned.
+    The life: `configure`, `instantiate`, `set_start`, `enter_initialization`, readers and writers in turn,
+    `exit_initialization`, then `advance` and `tell` in turn, `terminate`, `free`. `reader` and `writer` are prepared once and
+    called without arguments. Variables go by name; elements of arrays are named ``x[1]``, ``m[2,3]``, from 1, row by row.
+    `save`, `restore` and `release` exist where `can_save` says so. Counters: `seconds` spent in doStep, `calls` of it, `tallies`
+    of everything else. `messages` are what the slave logged. `time` is where it stands [s]. `terminated` says that the slave
+    asked for the end of the run. Whatever a call of the slave throws comes out as a `RunError` with component, time and the names
+    of the variables concerned.
 
     Args:
         name: name in the scenario.
@@ -81,29 +93,39 @@ class Component(ABC):
         release_files: Callable[[], None] | None = None,
     ) -> None:  # fmt: skip
         self.name, self.slave, self.description, self.source, self.kind = name, slave, description, source, kind
-        self.variables: dict[str, ModelVariable] = {v.name: v for v in description.modelVariables}
+        self.capabilities = read_capabilities(description)
+        self.variables = Variables({v.name: v for v in description.modelVariables})
+        self.negated: frozenset[str] = frozenset()  # variables whose slave holds the value with the other sign (FMI 1)
         self.events: dict[str, EventPort] = self._find_events()
-        self.starts: dict[str, float] = {}
+        self.starts: dict[str, StartValue] = {}
         self.seconds, self.calls = 0.0, 0
         self.time = math.nan
         self.terminated = False
         self.next_event = NEVER
         self._release_files = release_files
         self._alive = self._running = False
-        self.messages: deque[str] = deque(maxlen=MESSAGES_KEPT)
-        self._units = {u.name: u for u in description.unitDefinitions}
+        self.messages = MessageLog(name)
+        self.clock: Callable[[], float] | None = None  # says where it stands [s] while somebody else than Python steps it
+        self.log: LogSwitch | None = None
+        self.tallies = new_tallies()
+        self._units = Units(description)
 
     # -- what it is -------------------------------------------------------------------------------------------------
 
     @property
+    def running(self) -> bool:
+        """Whether initialisation is over and the end has not come."""
+        return self._running
+
+    @property
     def can_save(self) -> bool:
         """Whether the component says that its state can be saved and restored."""
-        return bool(self.description.coSimulation.canGetAndSetFMUstate)
+        return self.capabilities.canGetAndSetFMUState
 
     @property
     def can_vary_step(self) -> bool:
         """Whether the component says that the communication step may vary."""
-        return bool(self.description.coSimulation.canHandleVariableCommunicationStepSize)
+        return self.capabilities.canHandleVariableCommunicationStepSize
 
     @property
     def restores_exactly(self) -> bool:
@@ -111,24 +133,35 @@ class Component(ABC):
         return self.can_save and (self.kind == "block" or self.description.generationTool == OWN_TOOL)
 
     def names(self, causality: str) -> list[str]:
-        """Names of the scalar numeric variables of one causality, without the triggers, stamps and payloads of events."""
+        """Names of the numeric scalars and elements of one causality, without the triggers, stamps and payloads of events."""
         hidden = self.event_references() if causality == "input" else set()
-        return [
-            v.name
-            for v in self.description.modelVariables
-            if v.causality == causality and v.type in NUMERIC_TYPES and not v.shape and v.valueReference not in hidden
-        ]
+        variables = self.description.modelVariables
+        found = [v for v in variables if v.causality == causality and v.type in NUMERIC_TYPES and v.valueReference not in hidden]
+        return [name for v in found for name in ([e.name for e in elements_of(v)] if v.shape else [v.name])]
+
+    def elements(self, name: str) -> list[Element]:
+        """The elements of a variable, row by row; a scalar or a single element is alone.
+
+        Raises:
+            CouplingError: there is no such variable or element.
+        """
+        self.variable(name)
+        return self.variables.expanded(name)
 
     def variable(self, name: str, *causalities: str) -> ModelVariable:
-        """The variable of this name.
+        """The variable of this name, or the array that holds the element of this name.
 
         Raises:
             CouplingError: there is none, or it has another causality; the nearest names are suggested.
         """
-        found = self.variables.get(name)
-        if found is None:
+        try:
+            found = self.variables[name]
+        except KeyError as error:
+            array = self.variables.get(name.partition("[")[0])
+            if array is not None and array.shape:
+                raise CouplingError(f"{self.name}: no element {name!r} in a {described(array)}; the first is 1.") from error
             candidates = [v.name for v in self.variables.values() if not causalities or v.causality in causalities]
-            raise CouplingError(f"{self.name}: no variable {name!r}; {nearest(name, candidates)}")
+            raise CouplingError(f"{self.name}: no variable {name!r}; {nearest(name, candidates)}") from error
         if causalities and found.causality not in causalities:
             raise CouplingError(
                 f"{self.name}.{name} has causality '{found.causality}', expected {' or '.join(causalities)}; "
@@ -138,10 +171,7 @@ class Component(ABC):
 
     def unit_name(self, name: str) -> str | None:
         """Name of a variable's unit, its own or that of its declared type; None where there is none."""
-        variable = self.variables[name]
-        declared = variable.declaredType
-        found: str | None = variable.unit or (declared.unit if declared is not None else None)
-        return found
+        return self._units.name(self.variables[name])
 
     def unit(self, name: str) -> Unit | None:
         """The unit of a variable from the FMU's own unit definitions, or None where it declares none.
@@ -151,21 +181,40 @@ class Component(ABC):
         Raises:
             UnitError: a unit name without definition that cannot be understood.
         """
-        unit_name = self.unit_name(name)
-        if unit_name is None:
-            return None
         try:
-            unit = self._defined_unit(unit_name) or parse_unit(unit_name)
+            return self._units.of(self.variables[name])
         except UnitError as error:
             raise UnitError(f"{self.name}.{name}: {error}") from error
-        return replace(unit, offset=0.0) if self._is_relative(name) else unit
+
+    @property
+    def seconds_in_all(self) -> float:
+        """Seconds in the slave: steps, and everything in `tallies` [s]."""
+        return self.seconds + sum(tally.seconds for tally in self.tallies.values())
 
     # -- life -------------------------------------------------------------------------------------------------------
 
+    def configure(self, starts: Mapping[str, StartValue]) -> None:  # noqa: B027 - only FMI 3 has structural parameters
+        """Take the structural parameters among start values: the shapes of arrays follow from them. Before `instantiate`.
+
+        Raises:
+            CouplingError: a value is no dimension.
+        """
+
     def instantiate(self) -> None:
-        """Create the instance."""
-        self._guard("instantiate", self._instantiate)
+        """Create the instance.
+
+        Raises:
+            RunError: the slave refuses; where it needs another program, the message says so.
+        """
+        try:
+            self._guard("instantiate", self._instantiate)
+        except RunError as error:
+            warning = tool_warning(self.name, self.description)
+            if warning is None:
+                raise
+            raise RunError(f"{error} Perhaps because: {warning}", self.name, error.time) from error
         self._alive = True
+        self._switch_log()
 
     def reset(self) -> None:
         """Back to the state after `instantiate`."""
@@ -174,22 +223,30 @@ class Component(ABC):
         self.time, self.terminated, self.next_event = math.nan, False, NEVER
         self._running = False
 
-    def set_start(self, name: str, value: float) -> None:
+    def set_start(self, name: str, value: StartValue) -> None:
         """Set a parameter, a start state or an unconnected input before initialisation.
 
+        Args:
+            name: variable, or element of an array.
+            value: of the variable's type; an item's name for an enumeration, a hexadecimal text for bytes, a nested or flat list
+                or one value for all elements of an array.
+
         Raises:
-            CouplingError: the variable does not exist, cannot be set, or is not a scalar number.
+            CouplingError: the variable does not exist or cannot be set, or the value is not of its type.
             RunError: the slave refuses the value.
         """
         variable = self.variable(name)
         if variable.causality in ("output", "independent", "calculatedParameter") or variable.variability == "constant":
             what = "is constant" if variable.variability == "constant" else f"has causality '{variable.causality}'"
             raise CouplingError(f"{self.name}.{name} cannot be set: it {what}.")
-        if variable.type not in NUMERIC_TYPES or variable.shape:
-            raise CouplingError(f"{self.name}.{name} cannot be set: it is a {_kind(variable)}; only scalar numbers can.")
-        write, buffer = self._unguarded_writer([name])
-        buffer[0] = value
-        self._guard(f"setting {name} = {value!r}", write)
+        if variable.type == "Clock":
+            raise CouplingError(f"{self.name}.{name} cannot be set: it is a Clock, which ticks by itself or at events.")
+        try:
+            element = None if name in self.variables else self.variables.element(name)
+            values = typed_values(variable, value) if element is None else [typed_value(variable, value)]
+        except ValueError as error:
+            raise CouplingError(refusal(f"{self.name}.{name} cannot be set", error)) from error
+        self._guard(f"setting {name} = {value!r}", lambda: write_start(self, variable, element, values))
         self.starts[name] = value
 
     @abstractmethod
@@ -201,14 +258,62 @@ class Component(ABC):
         """End initialisation, discrete states settled."""
 
     def reader(self, names: Sequence[str], values: np.ndarray) -> Callable[[], None]:
-        """A call that reads variables into `values`, shape (len(names),), a contiguous view of the caller's array."""
-        read = make_reader(self.slave, self.fmi_version, [self.variables[n] for n in names], values)
-        return self._guarded(f"reading {_shown(names)}", read)
+        """A call that reads scalars and elements into `values`, shape (len(names),), a contiguous view of the caller's array."""
+        return self._counted(self.tallies["get"], f"reading {_shown(names)}", self._unguarded_reader(names, values))
 
     def writer(self, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
-        """A call that writes variables, and the array of shape (len(names),) it writes from."""
+        """A call that writes scalars and elements, and the array of shape (len(names),) it writes from."""
         write, buffer = self._unguarded_writer(names)
-        return self._guarded(f"writing {_shown(names)}", write), buffer
+        return self._counted(self.tallies["set"], f"writing {_shown(names)}", write), buffer
+
+    def exact_reader(self, name: str) -> Callable[[], Values]:
+        """A call that returns the values of a whole variable as they are: texts, bytes, integers of any size; row by row."""
+        read = exact_reader(self, self.variables[name])
+        return lambda: self._guard(f"reading {name}", read)
+
+    def exact_writer(self, name: str) -> Callable[[Sequence[Any]], None]:
+        """A call that writes the values of a whole variable as they are."""
+        write = exact_writer(self, self.variables[name])
+        return lambda values: self._guard(f"writing {name}", lambda: write(values))
+
+    def make_derivative_writer(self, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
+        """A call that tells the first derivatives of inputs (FMI 1 and 2), and the array of shape (len(names),) it tells from.
+
+        They hold for the coming step only.
+
+        Raises:
+            CouplingError: the slave does not take derivatives (canInterpolateInputs), or a name is no continuous real input.
+        """
+        tell, buffer = make_derivative_writer(self, names)
+        return self._guarded(f"derivatives of {_shown(names)}", tell), buffer
+
+    def set_input_derivatives(self, names: Sequence[str], order: int, values: Sequence[float]) -> None:
+        """Tell derivatives of inputs for the coming step (FMI 1 and 2); arguments and errors as for `make_derivative_writer`.
+
+        Args:
+            names: of real inputs. order: of the derivatives, 1 or more.
+            values: shape (len(names),) [unit of the input / s**order].
+        """
+        tell, buffer = make_derivative_writer(self, names, order)
+        buffer[:] = values
+        self._guard(f"derivatives of {_shown(names)}", tell)
+
+    def directional_derivative(self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]) -> np.ndarray:
+        """Derivatives of scalars and elements `unknowns` along a direction in `knowns`, where declared.
+
+        Args:
+            unknowns: outputs and the like. knowns: inputs and the like. seed: the direction, shape (len(knowns),).
+
+        Returns:
+            The derivatives, shape (len(unknowns),).
+
+        Raises:
+            CouplingError: the slave does not declare providesDirectionalDerivatives, or a variable is not real.
+            RunError: the call failed.
+        """
+        call = directional_derivative(self, unknowns, knowns, seed)
+        found: np.ndarray = self._guard("getDirectionalDerivative", call)
+        return found
 
     @abstractmethod
     def advance(self, t: float, until: float) -> None:
@@ -259,21 +364,37 @@ class Component(ABC):
         if self._release_files is not None:
             self._release_files()
             self._release_files = None
+        forget(self)
+
+    def pending(self, t: float) -> RunError:
+        """The error of a slave that returned from doStep at `t` [s] before it was done."""
+        asynchronous = "as canRunAsynchronuously allows" if self.capabilities.canRunAsynchronuously else "against its description"
+        return self.failure(
+            f"doStep returned before it was done (status pending), {asynchronous}; slaves that compute asynchronously are not "
+            "stepped here. Export the FMU without asynchronous computation.", t,
+        )  # fmt: skip
 
     def outcomes(self) -> Mapping[str, int] | None:
         """Counts of what became of the events told, where the component keeps them (blocks do)."""
         counters = getattr(self.slave, "counters", None)
         return None if counters is None else dict(vars(counters))
 
-    def note(self, message: str | bytes | None) -> None:
-        """Keep a message of the slave's own log; the last ones are part of a failure and of the summary."""
-        text = message.decode("utf-8", "replace") if isinstance(message, bytes) else str(message or "")
-        if text.strip():
-            self.messages.append(text.strip())
+    def choose_log(self, choice: LogChoice | None) -> None:
+        """What the slave shall log; before `instantiate`. None leaves that to the slave.
+
+        Raises:
+            CouplingError: a category that the slave does not declare.
+        """
+        self.log = log_switch(self.name, self.description, choice)
+        self.messages.silent = choice == "none"
+
+    def note(self, message: str | bytes | None, status: int | str = 0, category: str | bytes | None = None) -> None:
+        """Keep a message of the slave's own log; what it said of something wrong is part of a failure."""
+        self.messages.add(self.time if self.clock is None else self.clock(), message, status, category)
 
     def failure(self, reason: str, t: float | None = None) -> RunError:
         """A RunError of this component at `t` [s], by default where it stands, with what the slave logged last."""
-        reason += f" The FMU says: {self.messages[-1]}" if self.messages else ""
+        reason += f" The FMU says: {self.messages.reason}" if self.messages else ""
         when = self.time if t is None else t
         place = "" if math.isnan(when) else f" at t = {when:g} s"
         return RunError(f"Component '{self.name}'{place}: {reason}", self.name, when)
@@ -285,6 +406,19 @@ class Component(ABC):
 
     @abstractmethod
     def _find_events(self) -> dict[str, EventPort]: ...
+
+    def __init_subclass__(cls, **named: Any) -> None:
+        super().__init_subclass__(**named)
+        count_methods(cls)
+
+    @property
+    def _logging_on(self) -> bool:
+        return self.log is not None and self.log.on
+
+    def _switch_log(self) -> None:
+        refused = None if self.log is None else switch_log(self.slave, self.fmi_version, self.log)
+        if refused is not None:
+            self.note(refused, "warning")
 
     def _forget(self) -> None:
         """Drop what the dialect remembers of a run; by default there is nothing."""
@@ -306,23 +440,15 @@ class Component(ABC):
             hidden |= {event.trigger, *event.payload.values()} | ({event.stamp} if event.stamp is not None else set())
         return hidden
 
-    def _defined_unit(self, unit_name: str) -> Unit | None:
-        defined = self._units.get(unit_name)
-        if defined is None or defined.baseUnit is None:
-            return None
-        base = defined.baseUnit
-        powers = tuple(int(getattr(base, symbol) or 0) for symbol in BASE_SYMBOLS)
-        return Unit(powers, 1.0 if base.factor is None else float(base.factor), float(base.offset or 0.0))
-
-    def _is_relative(self, name: str) -> bool:
-        variable = self.variables[name]
-        declared = variable.declaredType
-        own = variable.relativeQuantity
-        return bool(declared is not None and declared.relativeQuantity) if own is None else bool(own)
+    def _unguarded_reader(self, names: Sequence[str], values: np.ndarray) -> Callable[[], None]:
+        return element_reader(self, names, values)
 
     def _unguarded_writer(self, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
-        buffer = np.zeros(len(names))
-        return make_writer(self.slave, self.fmi_version, [self.variables[n] for n in names], buffer), buffer
+        return element_writer(self, names)
+
+    def _counted(self, tally: Tally, what: str, call: Callable[[], None]) -> Callable[[], None]:
+        """`_guarded`, counted."""
+        return tally.counting(call, lambda error: self._explained(what, error))
 
     def _guarded(self, what: str, call: Callable[[], None]) -> Callable[[], None]:
         def guarded() -> None:
@@ -348,10 +474,6 @@ class Component(ABC):
 
 def _shown(names: Sequence[str]) -> str:
     return ", ".join(names[:NAMES_SHOWN]) + (f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else "")
-
-
-def _kind(variable: ModelVariable) -> str:
-    return f"{variable.type} array of shape {variable.shape}" if variable.shape else str(variable.type)
 
 
 def _quietly(call: Callable[[], Any]) -> None:

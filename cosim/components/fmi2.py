@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable, Mapping
 from time import perf_counter
 from typing import Any
 
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import (
-    defaultCallbacks,
-    fmi2CallbackFunctions,
-    fmi2CallbackLoggerTYPE,
     fmi2Discard,
     fmi2LastSuccessfulTime,
+    fmi2Pending,
     fmi2Terminated,
 )
 
 from cosim.components.component import TIME_TOLERANCE, Component, EventPort
+from cosim.diagnostics.native_log import fmi2_callbacks
+from fmus.native_calls import prepared_call
 
 
 class FMI2Component(Component):
@@ -28,9 +29,10 @@ class FMI2Component(Component):
 
     def _instantiate(self) -> None:
         if hasattr(self.slave, "dll"):
-            self.slave.instantiate(callbacks=_callbacks(self.note))
+            self.slave.instantiate(callbacks=fmi2_callbacks(self), loggingOn=self._logging_on)
         else:
-            self.slave.instantiate()
+            self.slave.instantiate(callbacks=fmi2_callbacks(self))
+        self._do_step = _make_step(self.slave)
         self._forget()
 
     def _forget(self) -> None:
@@ -60,7 +62,7 @@ class FMI2Component(Component):
     def advance(self, t: float, until: float) -> None:  # noqa: D102 - see Component
         begin = perf_counter()
         try:
-            self.slave.doStep(t, until - t, False)  # the state may be set back: nothing of the past may be forgotten
+            self._do_step(t, until - t)
             self.time = until
         except FMICallException as error:
             self._after_refusal(error, t, until)
@@ -91,6 +93,8 @@ class FMI2Component(Component):
 
     def _after_refusal(self, error: FMICallException, t: float, until: float) -> None:
         """A discarded step is the end: the slave has terminated, or it cannot do this step and its state is lost."""
+        if error.status == fmi2Pending:
+            raise self.pending(t) from error
         if error.status != fmi2Discard:
             raise self._explained("doStep", error, t) from error
         reached = self._asked(self.slave.getRealStatus, fmi2LastSuccessfulTime)
@@ -112,10 +116,15 @@ class FMI2Component(Component):
             return None
 
 
-def _callbacks(note: Callable[[bytes], None]) -> Any:
-    """fmpy's callbacks with our logger in place of the one that prints; it sees the message without its arguments."""
-    callbacks = fmi2CallbackFunctions()
-    callbacks.logger = fmi2CallbackLoggerTYPE(lambda _environment, _name, _status, _category, message: note(message))
-    callbacks.allocateMemory = defaultCallbacks.allocateMemory
-    callbacks.freeMemory = defaultCallbacks.freeMemory
-    return callbacks
+def _make_step(slave: Any) -> Callable[[float, float], None]:
+    """The slave's doStep(t, h) in [s]. Its state may be set back: nothing of the past may be forgotten."""
+    if not hasattr(slave, "dll"):
+        return lambda t, h: slave.doStep(t, h, False)
+    start, length = ctypes.c_double(), ctypes.c_double()
+    call = prepared_call(slave, "fmi2DoStep", slave.component, start, length, ctypes.c_int(False))
+
+    def do_step(t: float, h: float) -> None:
+        start.value, length.value = t, h
+        call()
+
+    return do_step

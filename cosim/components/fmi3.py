@@ -3,36 +3,103 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from time import perf_counter
 from typing import Any
 
-from fmpy.model_description import ModelVariable
+from fmpy.model_description import ModelDescription, ModelVariable
 
+from cosim.components.clocks import ClockSchedule
 from cosim.components.component import NEVER, TIME_TOLERANCE, Component, EventPort
+from cosim.components.intermediate import IntermediateUpdate
+from cosim.components.interruption import EventMet
+from cosim.components.quick_calls import quicken
+from cosim.components.start_values import StartValue
+from cosim.components.structure import STRUCTURAL, resize, structural_value
+from fmus.exact_ports import make_exact_writer
+from fmus.native_calls import prepared_call
 
 MAX_EVENT_ITERATIONS = 100
 MAX_RETURNS_PER_STEP = 10_000
 
 
 class FMI3Component(Component):
-    """An FMI 3.0 co-simulation slave. Arguments as for `Component`."""
+    """An FMI 3.0 co-simulation slave. Arguments as for `Component`.
+
+    It handles its events itself, unless somebody coordinates it: then it stops at an event (`EventMet`), says so
+    (`event_pending`), and is taken through Event Mode from outside. `next_event` is when something known in advance is due,
+    `clocks` are its time-based input clocks.
+    """
 
     fmi_version = 3
     real_type = "Float64"
     event_needs_step = False
 
+    def __init__(self, name: str, slave: Any, description: ModelDescription, **more: Any) -> None:
+        super().__init__(name, slave, description, **more)
+        self._structure: dict[str, int] = {}
+        self._intermediate = IntermediateUpdate()
+        clocks = description.modelVariables if self.has_event_mode else []
+        self.clocks = ClockSchedule(lambda: self.slave, clocks, self.failure)
+        self.coordinated = self.event_pending = False
+        self.interrupts_from = -math.inf  # [s]; early returns before it are handled here even when coordinated
+
     @property
     def has_event_mode(self) -> bool:
         """Whether the slave declares event mode."""
-        return bool(self.description.coSimulation.hasEventMode)
+        return self.capabilities.hasEventMode
+
+    def request_intermediate_updates(self, names: Sequence[str]) -> None:
+        """Ask, before `instantiate`, to be called back within steps to set inputs; see `follow_within_step`."""
+        if self.capabilities.providesIntermediateUpdate and hasattr(self.slave, "dll"):
+            self._intermediate.request([self.variable(name, "input") for name in names])
+
+    def follow_within_step(self, names: Sequence[str], handler: Callable[[float], None]) -> bool:
+        """Call `handler` with the time [s] whenever these inputs may be set within a step; False where that was not arranged."""
+        if not names or not set(names) <= set(self._intermediate.requested):
+            return False
+        self._intermediate.handler = handler
+        return True
+
+    def configure(self, starts: Mapping[str, StartValue]) -> None:  # noqa: D102 - see Component
+        for name, value in starts.items():
+            if name in self.variables and self.variables[name].causality == STRUCTURAL:
+                self._structure[name] = structural_value(self.name, self.variables[name], value)
+        resize(self.description, self._structure)
+
+    def set_start(self, name: str, value: StartValue) -> None:  # noqa: D102 - see Component
+        if self.variable(name).causality != STRUCTURAL:
+            super().set_start(name, value)
+            return
+        given = self._structure.get(name)
+        self.configure({name: value})
+        if given != self._structure[name]:
+            self._guard(f"setting {name} = {value!r} in Configuration Mode", self._configure_slave)
+        self.starts[name] = value
+
+    def reset(self) -> None:  # noqa: D102 - see Component
+        super().reset()
+        self._guard("setting structural parameters", self._configure_slave)
+
+    def _configure_slave(self) -> None:
+        """Structural parameters are set in Configuration Mode, right after the instance was made."""
+        if self._structure:
+            self.slave.enterConfigurationMode()
+            for name, value in self._structure.items():
+                make_exact_writer(self.slave, self.fmi_version, self.variables[name])([value])
+            self.slave.exitConfigurationMode()
 
     def _instantiate(self) -> None:
-        early = bool(self.description.coSimulation.mightReturnEarlyFromDoStep)
+        early = self.capabilities.mightReturnEarlyFromDoStep
         native = hasattr(self.slave, "dll")
-        log = {"logMessage": lambda _environment, _status, _category, message: self.note(message)} if native else {}
-        self.slave.instantiate(eventModeUsed=self.has_event_mode, earlyReturnAllowed=early, **log)
+        log: dict[str, Any] = {"logMessage": lambda _environment, status, category, message: self.note(message, status, category)}
+        log |= {"loggingOn": self._logging_on} if native else {}
+        self.slave.instantiate(eventModeUsed=self.has_event_mode, earlyReturnAllowed=early, **log, **self._intermediate.arguments)
         self._do_step = _native_step(self.slave) if native else self.slave.doStep
+        if native:
+            quicken(self.slave)
+        self._configure_slave()
 
     def _find_events(self) -> dict[str, EventPort]:
         variables = self.description.modelVariables
@@ -53,6 +120,8 @@ class FMI3Component(Component):
         self._guard("enterInitializationMode", lambda: call(startTime=start_time, stopTime=stop_time))
 
     def exit_initialization(self) -> None:  # noqa: D102 - see Component
+        if self.clocks:
+            self._guard("intervals of clocks", lambda: self.clocks.begin(self.time))
         self._guard("exitInitializationMode", self.slave.exitInitializationMode)
         self._running = True
         if self.has_event_mode:
@@ -67,6 +136,8 @@ class FMI3Component(Component):
         begin = perf_counter()
         try:
             event, terminate, early, reached = self._do_step(t, until - t)
+            if self._intermediate.requested:
+                self._intermediate.check()
         except Exception as error:
             raise self._explained("doStep", error, t) from error
         finally:
@@ -75,9 +146,9 @@ class FMI3Component(Component):
         if terminate:
             self.terminated = True
             early = early or abs(reached - until) > TIME_TOLERANCE  # a slave that stops on the way says where
-        if not early:
+        if not early and not t + TIME_TOLERANCE < reached < until - TIME_TOLERANCE:
             self.time = until
-            return until, event
+            return until, event  # otherwise it came less far than asked, whether it says so once or twice
         if not t - TIME_TOLERANCE <= reached <= until + TIME_TOLERANCE:
             raise self.failure(f"doStep to {until:g} s says that it reached {reached!r} s", t)
         self.time = min(max(float(reached), t), until)
@@ -87,12 +158,12 @@ class FMI3Component(Component):
         if self.next_event == NEVER:  # the ordinary step: nothing is due, and mostly nothing happens
             reached, event = self.step(t, until)
             if event and self.has_event_mode and not self.terminated:
-                self.handle_event()
+                self._meet_event(reached, until)
             if self.terminated or until - reached <= TIME_TOLERANCE:
                 return
             t = reached
         for _ in range(MAX_RETURNS_PER_STEP):
-            if self.has_event_mode and self.next_event <= t + TIME_TOLERANCE:
+            if self.has_event_mode and not self.coordinated and self.next_event <= t + TIME_TOLERANCE:
                 self.handle_event()
             t = self.step_towards(t, until)
             if self.terminated or until - t <= TIME_TOLERANCE:
@@ -103,33 +174,80 @@ class FMI3Component(Component):
         """One doStep to `until` or to the next time event before it, with the event handled; returns the time reached [s]."""
         reached, event = self.step(t, self.next_stop(t, until))
         if self.has_event_mode and not self.terminated and self.is_event(reached, event):
-            self.handle_event()
+            self._meet_event(reached, until)
         return reached
 
     def next_stop(self, t: float, until: float) -> float:
-        """Where the next doStep from `t` must end: `until`, or the time event before it [s]."""
-        return self.next_event if t + TIME_TOLERANCE < self.next_event < until - TIME_TOLERANCE else until
+        """Where the next doStep from `t` must end: `until`, or the time event before it where the step may vary [s]."""
+        ahead = t + TIME_TOLERANCE < self.next_event < until - TIME_TOLERANCE
+        return self.next_event if ahead and self.can_vary_step else until
 
     def is_event(self, reached: float, event: bool) -> bool:
         """Whether events must be handled at the time reached [s]: the slave says so, or its time event is due."""
         return event or reached >= self.next_event - TIME_TOLERANCE
 
     def handle_event(self) -> None:
-        """Enter event mode, settle, and return to step mode."""
-        self._guard("enterEventMode", self.slave.enterEventMode)
+        """Enter event mode, let due clocks tick, settle, and return to step mode."""
+        self.enter_event_mode()
+        self.tick_due_clocks()
         self._settle()
+
+    def enter_event_mode(self) -> None:
+        """From Step Mode to Event Mode."""
+        self._guard("enterEventMode", self.slave.enterEventMode)
+
+    def tick_due_clocks(self) -> list[int]:
+        """In Event Mode: set the time-based clocks active that are due here; returns their value references."""
+        due = self.clocks.due(self.time) if self.clocks else []
+        if due:
+            self.set_clocks([clock.variable.valueReference for clock in due])
+            self.clocks.tick(due)
+        return [clock.variable.valueReference for clock in due]
+
+    def set_clocks(self, references: Sequence[int]) -> None:
+        """In Event Mode: set input clocks active."""
+        self._guard("setClock", lambda: self.slave.setClock(list(references), [True] * len(references)))
+
+    def ticking(self, references: Sequence[int]) -> list[bool]:
+        """In Event Mode: which of these output clocks are active."""
+        return [bool(x) for x in self._guard("getClock", lambda: self.slave.getClock(list(references)))]
+
+    def update_discrete_states(self) -> bool:
+        """In Event Mode: end a super-dense instant; True where the slave needs another one."""
+        again, terminate, _, _, defined, next_time = self._guard("updateDiscreteStates", self.slave.updateDiscreteStates)
+        self.terminated |= bool(terminate)
+        if defined and math.isnan(next_time):
+            raise self.failure("updateDiscreteStates says that the next event is at t = nan")
+        if self.clocks:
+            self._guard("intervals of clocks", lambda: self.clocks.ask(self.time))
+        self.next_event = min(float(next_time) if defined else NEVER, self.clocks.next)
+        self.event_pending = False
+        return bool(again)
+
+    def enter_step_mode(self) -> None:
+        """From Event Mode to Step Mode."""
+        self._guard("enterStepMode", self.slave.enterStepMode)
+
+    def _meet_event(self, reached: float, until: float) -> None:
+        """An event at the time reached [s] of a step to `until` [s]: handle it, or leave it to who coordinates."""
+        early = until - reached > TIME_TOLERANCE
+        if not self.coordinated or (early and reached < self.interrupts_from - TIME_TOLERANCE):
+            self.handle_event()
+            return
+        self.event_pending = True
+        if early:
+            raise EventMet(self, reached)
 
     def report_clock(self, clock: int) -> bool:
         """Handle an event; True where the triggered output clock ticked."""
-        self._guard("enterEventMode", self.slave.enterEventMode)
-        ticked = bool(self._guard("getClock", lambda: self.slave.getClock([clock]))[0])
+        self.enter_event_mode()
+        self.tick_due_clocks()
+        ticked = self.ticking([clock])[0]
         self._settle()
         return ticked
 
     def tell(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Component
-        begin = perf_counter()
         self._guard(f"event '{event.name}'", lambda: self._tell(event, stamp, payload))
-        self.seconds += perf_counter() - begin
 
     def _tell(self, event: EventPort, stamp: float, payload: Mapping[str, float]) -> None:
         slave = self.slave
@@ -144,21 +262,20 @@ class FMI3Component(Component):
 
     def _settle(self) -> None:
         for _ in range(MAX_EVENT_ITERATIONS):
-            again, terminate, _, _, defined, next_time = self._guard("updateDiscreteStates", self.slave.updateDiscreteStates)
-            self.terminated |= bool(terminate)
-            if not again:
+            if not self.update_discrete_states():
                 break
         else:
             raise self.failure(f"discrete states do not settle in {MAX_EVENT_ITERATIONS} updates")
-        self.next_event = float(next_time) if defined else NEVER
-        self._guard("enterStepMode", self.slave.enterStepMode)
+        self.enter_step_mode()
 
     def save(self) -> Any:  # noqa: D102 - see Component
-        return self._guard("getFMUState", self.slave.getFMUState), self.next_event, self.time, self.terminated
+        state = self._guard("getFMUState", self.slave.getFMUState)
+        return state, self.next_event, self.time, self.terminated, self.event_pending, self.clocks.save()
 
     def restore(self, state: Any) -> None:  # noqa: D102 - see Component
         self._guard("setFMUState", lambda: self.slave.setFMUState(state[0]))
-        _, self.next_event, self.time, self.terminated = state
+        _, self.next_event, self.time, self.terminated, self.event_pending, clocks = state
+        self.clocks.restore(clocks)
 
     def release(self, state: Any) -> None:  # noqa: D102 - see Component
         self._guard("freeFMUState", lambda: self.slave.freeFMUState(state[0]))
@@ -173,10 +290,12 @@ def _native_step(slave: Any) -> Callable[[float, float], tuple[bool, bool, bool,
     """fmpy's doStep of a native slave with its four results allocated once instead of at every call."""
     event, terminate, early, reached = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool(), ctypes.c_double()
     results = (ctypes.byref(event), ctypes.byref(terminate), ctypes.byref(early), ctypes.byref(reached))
-    call, component, no_set_state = slave.fmi3DoStep, slave.component, ctypes.c_bool(False)
+    start, length = ctypes.c_double(), ctypes.c_double()
+    call = prepared_call(slave, "fmi3DoStep", slave.component, start, length, ctypes.c_bool(False), *results)
 
     def do_step(t: float, h: float) -> tuple[bool, bool, bool, float]:
-        call(component, t, h, no_set_state, *results)
+        start.value, length.value, reached.value = t, h, t + h  # the last for slaves that do not fill it in
+        call()
         return event.value, terminate.value, early.value, reached.value
 
     return do_step

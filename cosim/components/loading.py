@@ -14,12 +14,19 @@ import fmpy.fmi3
 from fmpy.model_description import ModelDescription
 
 from cosim.components.component import Component
+from cosim.components.fmi1 import FMI1Component
+from cosim.components.fmi1_library import FMU1SlaveRepaired
 from cosim.components.fmi2 import FMI2Component
 from cosim.components.fmi3 import FMI3Component
 from cosim.errors import FmuLoadError
 from fmu_observer.block import make_block
 from fmus.check.archive import MAX_UNPACKED_BYTES, Archive, NotAnFmuError, open_archive
+from fmus.check.description import negated_aliases
 from plant_models.hybrid import HybridSystem
+
+VERSIONS = ("1.0", "2.0", "3.0")
+COMPONENTS: dict[int, Any] = {1: FMI1Component, 2: FMI2Component, 3: FMI3Component}
+SLAVES: dict[int, Any] = {1: FMU1SlaveRepaired, 2: fmpy.fmi2.FMU2Slave, 3: fmpy.fmi3.FMU3Slave}
 
 
 def load_fmu(path: str | Path, name: str) -> Component:
@@ -51,9 +58,12 @@ def load_fmu(path: str | Path, name: str) -> Component:
         raise FmuLoadError(f"{name}: cannot load {path}: {error}") from error
     finally:
         os.chdir(here)  # fmpy changes it while it loads, and leaves it so when it fails
-    return _component_type(description)(
-        name, slave, description, source=str(path), kind="FMU", release_files=lambda: shutil.rmtree(folder, ignore_errors=True)
-    )
+    more = {"negated": negated_aliases(folder)} if _version(description) == 1 else {}
+    component: Component = COMPONENTS[_version(description)](
+        name, slave, description, source=str(path), kind="FMU",
+        release_files=lambda: shutil.rmtree(folder, ignore_errors=True), **more,
+    )  # fmt: skip
+    return component
 
 
 def read_description(path: str | Path, name: str = "FMU") -> ModelDescription:
@@ -65,9 +75,21 @@ def read_description(path: str | Path, name: str = "FMU") -> ModelDescription:
     return _open(Path(path), name).description
 
 
+def describe_fmu(path: str | Path, name: str) -> Component:
+    """A component of an FMU file that can be asked for its variables and not stepped: nothing is unpacked or loaded.
+
+    Raises:
+        FmuLoadError: as for `read_description`.
+    """
+    description = read_description(path, name)
+    more = {"negated": negated_aliases(Path(path))} if _version(description) == 1 else {}
+    component: Component = COMPONENTS[_version(description)](name, None, description, source=str(path), **more)
+    return component
+
+
 def _open(path: Path, name: str) -> Archive:
     try:
-        return open_archive(path, MAX_UNPACKED_BYTES)
+        return open_archive(path, MAX_UNPACKED_BYTES, VERSIONS)
     except NotAnFmuError as error:
         raise FmuLoadError(f"{name}: {error}") from error
 
@@ -76,11 +98,13 @@ def load_block(system: HybridSystem, name: str, fmi_version: Literal[2, 3] = 3, 
     """A Python block as a component; further arguments as for `fmu_observer.block.Face`."""
     block = make_block(system, fmi_version, instance_name=name, **arguments)
     source = system.source or type(system).__qualname__
-    return _component_type(block.model_description)(name, block, block.model_description, source=source, kind="block")
+    face = COMPONENTS[_version(block.model_description)]
+    component: Component = face(name, block, block.model_description, source=source, kind="block")
+    return component
 
 
-def _component_type(description: ModelDescription) -> type[Component]:
-    return FMI2Component if description.fmiVersion.startswith("2.") else FMI3Component
+def _version(description: ModelDescription) -> int:
+    return int(str(description.fmiVersion)[0])
 
 
 def _slave(folder: Path, description: ModelDescription, name: str) -> Any:
@@ -90,6 +114,4 @@ def _slave(folder: Path, description: ModelDescription, name: str) -> Any:
         "unzipDirectory": str(folder),
         "instanceName": name,
     }
-    if description.fmiVersion.startswith("2."):
-        return fmpy.fmi2.FMU2Slave(**arguments)
-    return fmpy.fmi3.FMU3Slave(**arguments)
+    return SLAVES[_version(description)](**arguments)

@@ -1,13 +1,28 @@
-"""Connections: one output to one input, units checked and converted. Knows components, not time."""
+"""Connections: one output to one input, types and units checked and converted. Knows components, not time.
+
+A connection joins two scalars or two elements; whole arrays are joined element by element. Numbers travel as doubles; texts,
+bytes and 64-bit integers, which doubles cannot hold, travel as they are.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from fmpy.model_description import ModelVariable
+
 from cosim.components.component import NUMERIC_TYPES, Component
+from cosim.components.elements import Element, described, elements_of
+from cosim.coupling.transformation import Transformation
 from cosim.errors import CouplingError, nearest
+from fmus.ports import FLOATING_TYPES, getter_type
 from plant_models.hybrid.units import UnitError, conversion
+
+Link = tuple[str, str] | tuple[str, str, Transformation]
+"""Names of a source and a target, and what happens to the number on its way besides units."""
+
+LONG_TYPES = frozenset({"Int64", "UInt64"})
+"""Types with values that a double cannot hold."""
 
 
 @dataclass(frozen=True)
@@ -15,13 +30,30 @@ class Connection:
     """``target = factor * source + offset``.
 
     Args:
-        source: (component, output). target: (component, input). factor, offset: unit conversion.
+        source: (component, output). target: (component, input). factor, offset: unit conversion and linear transformation.
+        table: (source, target) values of a discrete signal, where it is mapped; a value without an entry passes unchanged.
+        exact: whether the value travels as it is instead of as a double.
+        source_array, target_array: the array that the source or target is an element of, or an empty name.
     """
 
     source: tuple[str, str]
     target: tuple[str, str]
     factor: float = 1.0
     offset: float = 0.0
+    table: tuple[tuple[float, float], ...] = ()
+    exact: bool = False
+    source_array: str = ""
+    target_array: str = ""
+
+    @property
+    def source_variable(self) -> tuple[str, str]:
+        """(component, variable) of the source; of an element its array, which is what dependencies are declared for."""
+        return self.source[0], self.source_array or self.source[1]
+
+    @property
+    def target_variable(self) -> tuple[str, str]:
+        """(component, variable) of the target; of an element its array."""
+        return self.target[0], self.target_array or self.target[1]
 
     def __str__(self) -> str:
         return f"{'.'.join(self.source)} -> {'.'.join(self.target)}"
@@ -41,48 +73,129 @@ def split_name(name: str, components: Iterable[str], what: str) -> tuple[str, st
     return component, signal
 
 
-def connect(pairs: Sequence[tuple[str, str]], components: Mapping[str, Component]) -> list[Connection]:
-    """Checked connections from ``(source, target)`` names.
+def connect(pairs: Sequence[Link], components: Mapping[str, Component]) -> list[Connection]:
+    """Checked connections from ``(source, target)`` names, with a transformation or without; one for each element of arrays.
 
     Raises:
-        CouplingError: an unknown variable, a wrong causality, a type that is not numeric, units that do not fit, or two
-            sources for one input.
+        CouplingError: an unknown variable, a wrong causality, types, shapes or units that do not fit, or two sources for one
+            input.
     """
     connections: list[Connection] = []
     taken: dict[tuple[str, str], str] = {}
-    for source_name, target_name in pairs:
+    for source_name, target_name, *given in pairs:
+        transformation = given[0] if given else Transformation()
         source = split_name(source_name, components, "Connection source")
         target = split_name(target_name, components, "Connection target")
-        _check_variable(components[source[0]], source[1], "output")
-        _check_variable(components[target[0]], target[1], "input")
-        if target in taken:
-            raise CouplingError(
-                f"Input {target_name} has two sources, {taken[target]} and {source_name}; an input takes one. "
-                "Remove one connection."
-            )
-        taken[target] = source_name
-        factor, offset = _conversion(components, source, target)
-        connections.append(Connection(source, target, factor, offset))
+        exact = _exact(components, source, target, transformation)
+        factor, offset = _conversion(components, source, target) if transformation.convert_units else (1.0, 0.0)
+        for output, name in _elements(components, source, target):
+            made = Connection(
+                (source[0], output.name), (target[0], name.name), *transformation.after(factor, offset), transformation.table,
+                exact, _array(output), _array(name),
+            )  # fmt: skip
+            if made.target in taken:
+                raise CouplingError(
+                    f"Input {'.'.join(made.target)} has two sources, {taken[made.target]} and {source_name}; an input takes one. "
+                    "Remove one connection."
+                )
+            taken[made.target] = source_name
+            connections.append(made)
     return connections
 
 
+def _elements(
+    components: Mapping[str, Component], source: tuple[str, str], target: tuple[str, str]
+) -> Iterable[tuple[Element, Element]]:
+    """Pairs of elements, row by row.
+
+    Raises:
+        CouplingError: the shapes differ.
+    """
+    sides = [(components[name], signal) for name, signal in (source, target)]
+    outputs, inputs = (component.elements(signal) for component, signal in sides)
+    shapes = [tuple(c.variables[s].shape or ()) if s in c.variables else () for c, s in sides]
+    if shapes[0] != shapes[1]:
+        words = [f"{c.name}.{s} is {_article(shape)}" for (c, s), shape in zip(sides, shapes, strict=True)]
+        raise CouplingError(f"{words[0]}, {words[1]}; connect arrays of one shape, or their elements ('a.x[1] -> b.u').")
+    return zip(outputs, inputs, strict=True)
+
+
+def _article(shape: tuple[int, ...]) -> str:
+    return f"an array of shape {shape}" if shape else "a scalar"
+
+
+def _array(element: Element) -> str:
+    return "" if element.index is None else str(element.variable.name)
+
+
+def _exact(
+    components: Mapping[str, Component], source: tuple[str, str], target: tuple[str, str], transformation: Transformation
+) -> bool:
+    """Whether a value travels as it is.
+
+    Raises:
+        CouplingError: the types do not fit.
+    """
+    sides = [(components[source[0]], "output", source[1]), (components[target[0]], "input", target[1])]
+    output, name = (_connectable(*side) for side in sides)
+    reason = _misfit(output, name)
+    if reason:
+        types = f"{'.'.join(source)} is a {output.type}, {'.'.join(target)} is a {name.type}"
+        raise CouplingError(f"Connection {'.'.join(source)} -> {'.'.join(target)}: {types}; {reason}.")
+    if output.type not in NUMERIC_TYPES:
+        if transformation != Transformation():
+            raise CouplingError(f"Connection {'.'.join(source)} -> {'.'.join(target)}: a {output.type} cannot be transformed.")
+        return True
+    versions = [components[end[0]].fmi_version for end in (source, target)]
+    kinds = {getter_type(v.type, version) for v, version in zip((output, name), versions, strict=True)}
+    return kinds <= LONG_TYPES and transformation == Transformation()
+
+
+def _misfit(source: ModelVariable, target: ModelVariable) -> str:
+    """Why a value of one type is no value of another, or an empty text.
+
+    Floating-point numbers fit one another, and so do integers, truth values and enumerations; those also fit floating-point
+    inputs, not the other way round. Texts fit texts, bytes fit bytes.
+    """
+    if source.type not in NUMERIC_TYPES or target.type not in NUMERIC_TYPES:
+        return "" if source.type == target.type else "only equal types fit here"
+    if source.type in FLOATING_TYPES and target.type not in FLOATING_TYPES:
+        return "a floating-point number is not rounded on its way; round it in a component between them"
+    return ""
+
+
 def unconnected_inputs(connections: Sequence[Connection], components: Iterable[Component]) -> list[str]:
-    """Names of inputs without a source; they keep their start values."""
+    """Names of inputs, and of elements of arrays, without a source; they keep their start values."""
     taken = {c.target for c in connections}
-    return [f"{c.name}.{i}" for c in components for i in c.names("input") if (c.name, i) not in taken]
+    return [f"{c.name}.{name}" for c in components for v in _free_to_connect(c) for name in _without_source(c, v, taken)]
 
 
-def _check_variable(component: Component, name: str, causality: str) -> None:
+def _free_to_connect(component: Component) -> list[ModelVariable]:
+    hidden = component.event_references()
+    inputs = [v for v in component.description.modelVariables if v.causality == "input" and v.type != "Clock"]
+    return [v for v in inputs if v.valueReference not in hidden]
+
+
+def _without_source(component: Component, variable: ModelVariable, taken: set[tuple[str, str]]) -> list[str]:
+    """The elements without a source; the array itself where no element has one."""
+    elements = elements_of(variable)
+    free = [element.name for element in elements if (component.name, element.name) not in taken]
+    return [variable.name] if len(free) == len(elements) else free
+
+
+def _connectable(component: Component, causality: str, name: str) -> ModelVariable:
     variable = component.variable(name, causality)
-    if variable.type not in NUMERIC_TYPES or variable.shape:
-        kind = f"an array of shape {variable.shape}" if variable.shape else f"a {variable.type}"
-        raise CouplingError(f"{component.name}.{name} is {kind}; only scalar numeric variables can be connected.")
+    if variable.type == "Clock":
+        raise CouplingError(f"{component.name}.{name} is a {described(variable)}; it has no value that could be connected.")
     if causality == "input" and variable.valueReference in component.event_references():
         raise CouplingError(f"{component.name}.{name} belongs to an event; the master sets it, it cannot be connected.")
+    return variable
 
 
 def _conversion(components: Mapping[str, Component], source: tuple[str, str], target: tuple[str, str]) -> tuple[float, float]:
     sender, receiver = components[source[0]], components[target[0]]
+    if sender.variables[source[1]].type not in FLOATING_TYPES:
+        return 1.0, 0.0  # only floating-point numbers have units
     names = sender.unit_name(source[1]), receiver.unit_name(target[1])
     try:
         units = sender.unit(source[1]), receiver.unit(target[1])

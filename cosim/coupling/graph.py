@@ -1,30 +1,60 @@
-"""Order: in which order the components are stepped, and which direct-feedthrough loops there are.
+"""Order: in which order the components are stepped, and which of them hang together in loops. Pure graph work on names.
 
 The connection graph of a controlled train has cycles; they are harmless where some output in the cycle follows from states
-alone. Only a cycle of declared direct feedthrough is an algebraic loop. Pure graph work on names.
+alone. Only a cycle of direct feedthrough is an algebraic loop (`cosim.coupling.feedthrough`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TypeVar
+from dataclasses import dataclass
 
 from cosim.components.component import Component
 from cosim.coupling.connection import Connection
+from cosim.coupling.feedthrough import (
+    AlgebraicLoop,
+    algebraic_loops,
+    declared_feedthrough,
+    undeclared,
+    undeclared_outputs,
+)
+from cosim.coupling.strong import arranged, strong_groups, topological
 from cosim.errors import CouplingError
 
-Node = tuple[str, str]
-T = TypeVar("T")
+__all__ = ["Group", "check_algebraic_loops", "declared_feedthrough", "execution_groups", "execution_order", "undeclared"]
+
+Pair = tuple[str, str]
 
 
-def execution_order(
-    components: Mapping[str, Component], connections: Sequence[Connection], before: Iterable[tuple[str, str]] = ()
-) -> list[str]:
-    """Component names in Gauss-Seidel order: a source before its targets, where the graph allows it.
+@dataclass(frozen=True)
+class Group:
+    """Components that influence one another, directly or round about; mostly a single one.
 
-    Strongly connected groups are taken in topological order. Inside a group an input that acts directly on an output which
-    is passed on comes after its source; what remains free follows the order in which the components were listed, so list the
-    plant first: the connection into the first component of a loop is the one that is held over a step.
+    Args:
+        names: in execution order.
+        loop: whether there is a loop at all: several components, or one connected to itself.
+        algebraic: loops of declared direct feedthrough in it.
+        possible: loops that exist only if outputs without declared dependencies depend on every input.
+        knots: the parts of `names` that share algebraic loops, each a consecutive run of it.
+    """
+
+    names: tuple[str, ...]
+    loop: bool = False
+    algebraic: tuple[AlgebraicLoop, ...] = ()
+    possible: tuple[AlgebraicLoop, ...] = ()
+    knots: tuple[tuple[str, ...], ...] = ()
+
+
+def execution_groups(
+    components: Mapping[str, Component], connections: Sequence[Connection], before: Iterable[Pair] = ()
+) -> list[Group]:
+    """Strongly connected groups in topological order, the members of each in Gauss-Seidel order.
+
+    Inside a group the components of an algebraic loop stand together, and an input that acts directly on an output which is
+    passed on comes after its source; where an FMU does not say what its outputs depend on, every input is taken to act on all
+    of them as far as that contradicts nothing that is declared. What remains free follows the order in which the components
+    were listed, so list the plant first: the connection into the first component of a loop is the one that is held over a step.
+    The time it takes grows linearly with components and connections.
 
     Args:
         components: by name, in the order listed.
@@ -32,27 +62,47 @@ def execution_order(
         before: further pairs (first, second), e.g. the watched plant before the receivers of its balises; these hold always.
 
     Raises:
+        CouplingError: pairs in `before` that contradict each other.
+    """
+    names = list(components)
+    must = {(a, b) for a, b in before if a != b}
+    _check_consistent(names, must)
+    algebraic = algebraic_loops(components, connections)
+    possible = algebraic_loops(components, connections, possible=True)
+    edges = {(c.source[0], c.target[0]) for c in connections}
+    groups = strong_groups(names, edges | must)
+    group_of = {name: i for i, group in enumerate(groups) for name in group}
+    levels = [_split(level, group_of, len(groups)) for level in _levels(components, connections, must)]
+    loops: list[list[AlgebraicLoop]] = [[] for _ in groups]
+    maybe: list[list[AlgebraicLoop]] = [[] for _ in groups]
+    for loop in algebraic:
+        loops[group_of[loop.components[0]]].append(loop)
+    for loop in possible:
+        maybe[group_of[loop.components[0]]].append(loop)
+    found = []
+    for i, group in enumerate(groups):
+        blocks = _blocks(group, loops[i], [level[i] for level in levels])
+        tied = {name for loop in loops[i] for name in loop.components}
+        ordered = tuple(name for block in blocks for name in block)
+        knots = tuple(block for block in blocks if not tied.isdisjoint(block))
+        is_loop = len(group) > 1 or (group[0], group[0]) in edges
+        found.append(Group(ordered, is_loop, tuple(loops[i]), tuple(maybe[i]), knots))
+    return found
+
+
+def execution_order(
+    components: Mapping[str, Component], connections: Sequence[Connection], before: Iterable[Pair] = ()
+) -> list[str]:
+    """Component names in Gauss-Seidel order, see `execution_groups`, for a master that does not iterate.
+
+    Args:
+        components: by name, in the order listed. connections: checked. before: further pairs (first, second).
+
+    Raises:
         CouplingError: an algebraic loop, with its signals named, or pairs in `before` that contradict each other.
     """
-    must = {(a, b) for a, b in before if a != b}
     check_algebraic_loops(components, connections)
-    names = list(components)
-    edges = {(c.source[0], c.target[0]) for c in connections if c.source[0] != c.target[0]}
-    passed_on = {c.source for c in connections}
-    hard = {(c.source[0], c.target[0]) for c in connections if _feeds_through(components[c.target[0]], c.target[1], passed_on)}
-    order: list[str] = []
-    for group in _groups(names, edges | must):
-        listed = sorted(group, key=names.index)
-        arranged = _topological(listed, _within(group, hard | must)) or _topological(listed, _within(group, must))
-        if arranged is None:
-            pairs = ", ".join(f"{a} before {b}" for a, b in sorted(_within(group, must)))
-            raise CouplingError(f"No order of stepping satisfies all of: {pairs}.")
-        order += arranged
-    return order
-
-
-def _within(group: set[str], edges: set[tuple[str, str]]) -> set[tuple[str, str]]:
-    return {(a, b) for a, b in edges if a in group and b in group and a != b}
+    return [name for group in execution_groups(components, connections, before) for name in group.names]
 
 
 def check_algebraic_loops(components: Mapping[str, Component], connections: Sequence[Connection]) -> None:
@@ -61,98 +111,65 @@ def check_algebraic_loops(components: Mapping[str, Component], connections: Sequ
     Raises:
         CouplingError: there is one; its signals are named in order.
     """
-    successors: dict[Node, list[Node]] = {}
-    for connection in connections:
-        successors.setdefault(connection.source, []).append(connection.target)
-    for component in components.values():
-        for output, inputs in declared_feedthrough(component).items():
-            for name in inputs:
-                successors.setdefault((component.name, name), []).append((component.name, output))
-    loop = _find_cycle(successors)
-    if loop:
-        path = " -> ".join(".".join(node) for node in loop)
+    loops = algebraic_loops(components, connections)
+    if loops:
         raise CouplingError(
-            f"Algebraic loop without a method: {path}. Break it with a component that holds a state or a sample "
-            "(for instance a sampled sensor), or merge the components."
+            f"Algebraic loop without a method: {loops[0]}. Iterate it (master.algorithm = 'auto' or 'iterate'), break it with a "
+            "component that holds a state or a sample (for instance a sampled sensor), or merge the components."
         )
 
 
-def declared_feedthrough(component: Component) -> dict[str, list[str]]:
-    """Outputs and the inputs they declare to depend on directly; undeclared dependencies count as none."""
-    table: dict[str, list[str]] = {}
-    for unknown in component.description.outputs:
-        if unknown.variable is not None and unknown.dependencies is not None:
-            table[unknown.variable.name] = [v.name for v in unknown.dependencies if v.causality == "input"]
-    return table
+# -- order inside a group -----------------------------------------------------------------------------------------------
 
 
-def undeclared(components: Iterable[Component]) -> list[str]:
-    """Components that declare no dependencies although they have inputs and outputs."""
-    return [
-        c.name
-        for c in components
-        if c.names("input") and c.names("output") and all(u.dependencies is None for u in c.description.outputs)
-    ]
+def _levels(components: Mapping[str, Component], connections: Sequence[Connection], must: set[Pair]) -> list[set[Pair]]:
+    """Pairs (first, second): all that one would like, without what is only possible, and those that hold always."""
+    passed_on = {c.source_variable for c in connections}
+    acting: dict[str, set[str]] = {}
+    maybe: dict[str, set[str]] = {}
+    for name, component in components.items():
+        table = declared_feedthrough(component)
+        acting[name] = {used for output, inputs in table.items() if (name, output) in passed_on for used in inputs}
+        silent = any((name, output) in passed_on for output in undeclared_outputs(component))
+        maybe[name] = set(component.variables) if silent else set()
+    ends = [(c.source[0], *c.target_variable) for c in connections if c.source[0] != c.target[0]]
+    hard = {(source, target) for source, target, name in ends if name in acting[target]}
+    soft = {(source, target) for source, target, name in ends if name in maybe[target]}
+    return [hard | soft | must, hard | must, must]
 
 
-def _feeds_through(component: Component, name: str, passed_on: set[Node]) -> bool:
-    """Whether an input acts directly on an output that some other component uses."""
-    table = declared_feedthrough(component)
-    return any(name in inputs for output, inputs in table.items() if (component.name, output) in passed_on)
+def _blocks(group: Sequence[str], loops: Sequence[AlgebraicLoop], levels: Sequence[set[Pair]]) -> list[tuple[str, ...]]:
+    """The members in order; together those that share algebraic loops."""
+    knots = strong_groups(group, [pair for loop in loops for pair in _round(loop.components)])
+    first = {name: knot[0] for knot in knots for name in knot}
+    members = {knot[0]: knot for knot in knots}
+    outer = [{(first[a], first[b]) for a, b in level if first[a] != first[b]} for level in levels]
+    listed = [name for name in group if first[name] == name]
+    blocks = []
+    for run in arranged(listed, outer):
+        inside = [name for name in group if first[name] in run] if len(run) > 1 else members[run[0]]
+        own = set(inside)
+        inner = [{(a, b) for a, b in level if a in own and b in own} for level in levels] if len(inside) > 1 else []
+        blocks.append(tuple(name for part in arranged(inside, inner) for name in part) if inner else tuple(inside))
+    return blocks
 
 
-def _find_cycle(successors: Mapping[Node, Sequence[Node]]) -> list[Node]:
-    """A cycle as a closed list of nodes, or an empty list: peel off what has no successor, then follow what remains."""
-    remaining = {node: set(following) for node, following in successors.items()}
-    while True:
-        leaves = {node for following in remaining.values() for node in following if not remaining.get(node)}
-        leaves |= {node for node, following in remaining.items() if not following}
-        if not leaves:
-            break
-        remaining = {n: f - leaves for n, f in remaining.items() if n not in leaves}
-    path: list[Node] = []
-    node = next(iter(remaining), None)
-    while node is not None and node not in path:
-        path.append(node)
-        node = min(remaining[node])
-    return [] if node is None else [*path[path.index(node) :], node]
+def _round(names: Sequence[str]) -> list[Pair]:
+    return list(zip(names, [*names[1:], names[0]], strict=True))
 
 
-def _groups(names: Sequence[str], edges: set[tuple[str, str]]) -> list[set[str]]:
-    """Strongly connected groups in topological order; ties in listing order."""
-    reach = {name: _reachable(name, edges) for name in names}
-    groups: list[set[str]] = []
-    for name in names:
-        if not any(name in group for group in groups):
-            groups.append({name} | {other for other in reach[name] if name in reach[other]})
-    links = {
-        (i, j) for i, a in enumerate(groups) for j, b in enumerate(groups) if i != j and any(x in a and y in b for x, y in edges)
-    }
-    order = _topological(list(range(len(groups))), links)
-    assert order is not None
-    return [groups[i] for i in order]
+def _split(edges: Iterable[Pair], group_of: Mapping[str, int], count: int) -> list[set[Pair]]:
+    """The edges inside each group."""
+    inside: list[set[Pair]] = [set() for _ in range(count)]
+    for a, b in edges:
+        if group_of[a] == group_of[b] and a != b:
+            inside[group_of[a]].add((a, b))
+    return inside
 
 
-def _reachable(start: str, edges: set[tuple[str, str]]) -> set[str]:
-    seen: set[str] = set()
-    frontier = [start]
-    while frontier:
-        node = frontier.pop()
-        for a, b in edges:
-            if a == node and b not in seen:
-                seen.add(b)
-                frontier.append(b)
-    return seen
-
-
-def _topological(items: Sequence[T], edges: set[tuple[T, T]]) -> list[T] | None:
-    """Kahn's order, the earliest listed item first; None where the edges have a cycle."""
-    remaining = list(items)
-    order: list[T] = []
-    while remaining:
-        free = next((i for i in remaining if not any(b == i and a in remaining for a, b in edges)), None)
-        if free is None:
-            return None
-        remaining.remove(free)
-        order.append(free)
-    return order
+def _check_consistent(names: Sequence[str], must: set[Pair]) -> None:
+    if topological(names, must) is not None:
+        return
+    tied = next(set(group) for group in strong_groups(names, must) if len(group) > 1)
+    pairs = ", ".join(f"{a} before {b}" for a, b in sorted(must) if a in tied and b in tied)
+    raise CouplingError(f"No order of stepping satisfies all of: {pairs}.")

@@ -12,6 +12,7 @@ import numpy as np
 
 from cosim.components.component import Component
 from cosim.coupling.connection import Connection
+from cosim.coupling.untouched import UntouchedInputs
 
 
 class Inputs:
@@ -24,35 +25,56 @@ class Inputs:
         values: all outputs of all components, shape (n,).
         buffer: what `send` writes, shape (m,).
         send: writes `buffer` to the component.
+        tables: for an input whose values are mapped, its place -> {source: target}; a value without an entry passes unchanged.
+        untouched: inputs that are no numbers, or integers beyond doubles, gathered and sent with the others; or None.
     """
 
     def __init__(
         self, names: Sequence[str], sources: np.ndarray, factors: np.ndarray, offsets: np.ndarray, values: np.ndarray,
-        buffer: np.ndarray, send: Callable[[], None],
+        buffer: np.ndarray, send: Callable[[], None], tables: Mapping[int, Mapping[float, float]] | None = None,
+        untouched: UntouchedInputs | None = None,
     ) -> None:  # fmt: skip
         self.names, self.sources, self.factors, self.offsets = tuple(names), sources, factors, offsets
         self.buffer, self.send = buffer, send
-        self.gather = _gatherer(sources, factors, offsets, values, buffer)
+        self.tables = dict(tables or {})
+        self.gather = _mapped(_gatherer(sources, factors, offsets, values, buffer), self.tables, buffer)
+        self.untouched = untouched
+        if untouched is not None:
+            self.gather, self.send = _both(self.gather, untouched.gather), _both(self.send, untouched.send)
 
     def __len__(self) -> int:
         return len(self.names)
 
 
 def connected_inputs(
-    component: Component, connections: Sequence[Connection], columns: Mapping[tuple[str, str], int], values: np.ndarray
-) -> Inputs:
+    component: Component, connections: Sequence[Connection], columns: Mapping[tuple[str, str], int], values: np.ndarray,
+    untouched: UntouchedInputs | None = None,
+) -> Inputs:  # fmt: skip
     """The inputs of a component that have a source.
 
     Args:
         connections: of all components.
         columns: (component, output) -> column of `values`.
         values: all outputs of all components, shape (n,).
+        untouched: the component's connected inputs that do not travel as doubles, if any.
     """
-    own = [c for c in connections if c.target[0] == component.name]
+    own = [c for c in connections if c.target[0] == component.name and not c.exact]
     send, buffer = component.writer([c.target[1] for c in own]) if own else (_nothing, np.zeros(0))
     sources = np.array([columns[c.source] for c in own], dtype=np.intp)
     factors, offsets = np.array([c.factor for c in own], dtype=float), np.array([c.offset for c in own], dtype=float)
-    return Inputs([c.target[1] for c in own], sources, factors, offsets, values, buffer, send)
+    tables = {place: dict(c.table) for place, c in enumerate(own) if c.table}
+    return Inputs([c.target[1] for c in own], sources, factors, offsets, values, buffer, send, tables, untouched)
+
+
+def _both(first: Callable[[], None], second: Callable[[], None]) -> Callable[[], None]:
+    if first is _nothing:
+        return second
+
+    def both() -> None:
+        first()
+        second()
+
+    return both
 
 
 def _gatherer(
@@ -72,6 +94,19 @@ def _gatherer(
 
     converts = bool(np.any(factors != 1.0) or np.any(offsets != 0.0))
     return gather_and_convert if converts else gather
+
+
+def _mapped(gather: Callable[[], None], tables: Mapping[int, Mapping[float, float]], buffer: np.ndarray) -> Callable[[], None]:
+    if not tables:
+        return gather
+
+    def gather_and_map() -> None:
+        gather()
+        for place, table in tables.items():
+            value = float(buffer[place])
+            buffer[place] = table.get(value, value)
+
+    return gather_and_map
 
 
 def _nothing() -> None:

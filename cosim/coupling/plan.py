@@ -8,16 +8,44 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 import numpy as np
 
 from cosim.components.component import NUMERIC_TYPES, Component
+from cosim.coupling.clocks import ClockConnection
 from cosim.coupling.connection import Connection
 from cosim.coupling.inputs import Inputs, connected_inputs
+from cosim.coupling.untouched import untouched_cells, untouched_inputs, with_untouched
 from cosim.errors import CouplingError, nearest
 from cosim.results.result import SignalInfo
 
 Mover = Callable[[float, float], None]
+
+
+class Carrier(Protocol):
+    """Lets inputs follow a line during a step (`cosim.master.lines`)."""
+
+    @property
+    def name(self) -> str:
+        """How the component is told."""
+
+    def prepare(self, until: float, *, ends_known: bool | np.ndarray = False) -> None:
+        """Gather the inputs for a step to `until` [s]."""
+
+    def send(self, t: float, until: float) -> None:
+        """Tell of the line for a step from `t` to `until` [s]."""
+
+    def forget(self) -> None:
+        """Something jumped: no line leads over it."""
+
+    def save(self) -> Any:
+        """What a step changes."""
+
+    def restore(self, state: Any) -> None:
+        """Return to what was saved."""
+
+
 FLOATING_TYPES = frozenset({"Real", "Float64", "Float32"})
 
 
@@ -34,6 +62,8 @@ class PlannedComponent:
         continuous: mask of the outputs that may be interpolated between communication points, shape (q,).
         move: how it gets from one time to another [s] once its inputs are gathered; `drive`, unless a service takes it over (the
             watched plant is stepped by its localiser, a receiver through the telegrams that reach it).
+        carrier: tells the component of lines that its inputs follow; None where they are held.
+        substeps: number of steps that the component takes for one of the master's.
     """
 
     component: Component
@@ -43,14 +73,45 @@ class PlannedComponent:
     columns: slice
     continuous: np.ndarray
     move: Mover = field(init=False)
+    carrier: Carrier | None = field(default=None, init=False)
+    substeps: int = field(default=1, init=False)
 
     def __post_init__(self) -> None:
         self.move = self.drive
 
+    def prepare(self, t: float, until: float, *, ends_known: bool | np.ndarray = False) -> None:
+        """Gather the inputs for a step from `t` to `until` [s].
+
+        Args:
+            ends_known: `values` are those of `until`, wherever the components stand (a step that is iterated); for all inputs or
+                for each, shape (m,).
+        """
+        if self.carrier is None:
+            self.inputs.gather()
+        else:
+            self.carrier.prepare(until, ends_known=ends_known)
+
+    def send(self, t: float, until: float) -> None:
+        """Send the prepared inputs for a step from `t` to `until` [s]."""
+        if self.carrier is None:
+            self.inputs.send()
+        else:
+            self.carrier.send(t, until)
+
+    def advance(self, t: float, until: float) -> None:
+        """Advance with the prepared inputs, in so many steps as the component wants; times in [s]."""
+        if self.substeps == 1:
+            self.send(t, until)
+            self.component.advance(t, until)
+            return
+        for i in range(self.substeps):
+            a, b = t + (until - t) * i / self.substeps, t + (until - t) * (i + 1) / self.substeps
+            self.send(a, b)
+            self.component.advance(a, b)
+
     def drive(self, t: float, until: float) -> None:
-        """Send the gathered inputs, advance, read outputs; times in [s]."""
-        self.inputs.send()
-        self.component.advance(t, until)
+        """Send the prepared inputs, advance, read outputs; times in [s]."""
+        self.advance(t, until)
         self.read()
 
     def write(self) -> None:
@@ -59,8 +120,8 @@ class PlannedComponent:
         self.inputs.send()
 
     def step(self, t: float, until: float) -> None:
-        """Gather the inputs and move from `t` to `until` [s]."""
-        self.inputs.gather()
+        """Prepare the inputs and move from `t` to `until` [s]."""
+        self.prepare(t, until)
         self.move(t, until)
 
 
@@ -73,12 +134,17 @@ class Plan:
         values: all outputs, shape (n,).
         signals: what each value is, in the same order.
         continuous: mask of the values that may be interpolated between communication points, shape (n,).
+        untouched: connected outputs that are no numbers, or integers beyond doubles; shape (m,), of objects. Whoever keeps and
+            restores a copy of `values` does so with them.
+        clocks: connections between clocks.
     """
 
     steps: list[PlannedComponent]
     values: np.ndarray
     signals: list[SignalInfo]
     continuous: np.ndarray
+    untouched: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=object))
+    clocks: Sequence[ClockConnection] = ()
 
     def find(self, component: str) -> PlannedComponent:
         """The planned component of this name.
@@ -105,17 +171,19 @@ class Plan:
 
 def make_plan(
     components: Mapping[str, Component], connections: Sequence[Connection], order: Sequence[str],
-    extra: Mapping[str, Sequence[str]] | None = None,
+    extra: Mapping[str, Sequence[str]] | None = None, clocks: Sequence[ClockConnection] = (),
 ) -> Plan:  # fmt: skip
     """Prepare the plan; the components must be instantiated.
 
     Args:
         components: by name. connections: checked. order: execution order.
         extra: variables besides the outputs to record, by component.
+        clocks: checked connections between clocks.
 
     Raises:
-        CouplingError: a variable to record does not exist or is not a scalar number.
+        CouplingError: a variable to record does not exist or is not a number.
     """
+    cells, places = untouched_cells(connections)
     read_names = {n: _names_to_read(components[n], (extra or {}).get(n, ())) for n in order}
     columns: dict[tuple[str, str], int] = {}
     spans: dict[str, slice] = {}
@@ -130,20 +198,23 @@ def make_plan(
     steps = []
     for name in order:
         component, span = components[name], spans[name]
-        read = component.reader(read_names[name], values[span])
-        inputs = connected_inputs(component, connections, columns, values)
+        read = with_untouched(component.reader(read_names[name], values[span]), component, places, cells)
+        untouched = untouched_inputs(component, connections, places, cells)
+        inputs = connected_inputs(component, connections, columns, values, untouched)
         steps.append(PlannedComponent(component, values[span], read, inputs, span, continuous[span]))
-    return Plan(steps, values, signals, continuous)
+    return Plan(steps, values, signals, continuous, cells, clocks)
 
 
 def _names_to_read(component: Component, extra: Sequence[str]) -> list[str]:
     names = component.names("output")
     for name in extra:
-        variable = component.variable(name)
-        if variable.type not in NUMERIC_TYPES or variable.shape:
-            raise CouplingError(f"{component.name}.{name} cannot be recorded: only scalar numbers can.")
-        if name not in names:
-            names.append(name)
+        kind = component.variable(name).type
+        if kind not in NUMERIC_TYPES:
+            raise CouplingError(
+                f"{component.name}.{name} cannot be recorded: it is a {kind}, and results are a table of numbers. It can be "
+                "connected, and set as a parameter."
+            )
+        names += [element.name for element in component.elements(name) if element.name not in names]
     return names
 
 

@@ -1,4 +1,8 @@
-"""Initialisation: all components exchange inputs and outputs in Initialization Mode until nothing changes."""
+"""Initialisation: all components exchange inputs and outputs in Initialization Mode until nothing changes.
+
+First they exchange plainly, which settles whatever holds a state somewhere. What does not settle so (an algebraic loop) is
+searched for by Newton's method on the values that are fed back; setting inputs needs no saved states here.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +10,22 @@ import numpy as np
 
 from cosim.coupling.plan import Plan
 from cosim.errors import RunError
+from cosim.master.algorithms.acceleration import Newton
+from cosim.master.algorithms.history import shown
+from cosim.master.algorithms.links import interface, plan_links
 
 MAX_ROUNDS = 100
+PLAIN_ROUNDS = (10, 30)
+"""Plain exchanges before Newton's method: as many as a chain of values that are fed back can be long, within these bounds."""
+
+EXPLOSION = 100.0
+"""Growth of the changes from one plain exchange to the next that is not waited out."""
+
 TOLERANCE = 1e-12
 """A value that moves by less than this share of itself has settled: a few roundings of a double."""
+
+JUMP = 1e-6
+"""What changes by more than this share of itself when initialisation ends has jumped."""
 
 
 def initialise(plan: Plan, start_time: float, stop_time: float) -> int:
@@ -30,27 +46,111 @@ def initialise(plan: Plan, start_time: float, stop_time: float) -> int:
     """
     for step in plan.steps:
         step.component.enter_initialization(start_time, stop_time)
-    rounds = _settle(plan, start_time)
+    settling = _Settling(plan)
+    changing = settling.run()
+    if changing:
+        raise _unsettled(plan, changing, settling.residuals, start_time)
     for step in plan.steps:
         step.write()
         step.component.exit_initialization()
         step.read()
-    _exchange(plan)
+    rounds = settling.rounds
+    if settling.exchange_changes_feedback():
+        settling.run()
+    for step in plan.steps:
+        if step.carrier is not None:
+            step.carrier.prepare(start_time)  # where its lines begin
     return rounds
 
 
-def _settle(plan: Plan, start_time: float) -> int:
-    changed = np.ones(len(plan.values), dtype=bool)
-    for round_number in range(1, MAX_ROUNDS + 1):
-        previous = plan.values.copy()
-        _exchange(plan)
-        changed = ~np.isclose(plan.values, previous, rtol=TOLERANCE, atol=0.0, equal_nan=True)
-        if not changed.any() and round_number > 1:
-            return round_number
-    names = [plan.signals[i].name for i in np.flatnonzero(changed)]
-    shown = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
-    reason = f"Initialisation at t = {start_time:g} s does not settle after {MAX_ROUNDS} exchanges; still changing: {shown}."
-    raise RunError(reason, names[0].partition(".")[0], start_time)
+class _Settling:
+    """Exchanges until nothing changes.
+
+    After `run`, `rounds` says how many it took and `residuals` by how much what is fed back changed in each, as a share of its
+    first size.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan, self.rounds = plan, 0
+        self.residuals: list[float] = []
+        self._columns = interface(plan_links(plan))
+        self._jumps = ~plan.continuous[self._columns]
+        self._size = np.ones(len(self._columns))
+        self._best: tuple[np.ndarray, np.ndarray] | None = None
+        self._newton: Newton | None = None
+
+    def run(self) -> list[int]:
+        """Exchange; returns the columns of the values that still change, none where all is well."""
+        values, columns = self.plan.values, self._columns
+        plain = min(max(PLAIN_ROUNDS[0], len(columns) + 2), PLAIN_ROUNDS[1])
+        changed = np.ones(len(values), dtype=bool)
+        if self._newton is not None:
+            self._newton.begin(self._size)
+        for self.rounds in range(1, MAX_ROUNDS + 1):
+            previous = values.copy()
+            _exchange(self.plan)
+            changed = self._changed(previous)
+            if not changed.any() and self.rounds > 1:
+                return []
+            if len(columns):
+                with np.errstate(all="ignore"):
+                    self._note(previous[columns], values[columns])
+                    if self.rounds >= plain or self._newton is not None or self._explodes():
+                        values[columns] = self._guess(previous[columns], values[columns])
+        return [int(column) for column in np.flatnonzero(changed)]
+
+    def exchange_changes_feedback(self) -> bool:
+        """Exchange once; whether anything that is fed back was still changed by it."""
+        previous = self.plan.values.copy()
+        _exchange(self.plan)
+        return bool(self._changed(previous, JUMP)[self._columns].any())
+
+    def _changed(self, previous: np.ndarray, tolerance: float = TOLERANCE) -> np.ndarray:
+        values = self.plan.values
+        size = np.maximum(np.abs(values), np.abs(previous))
+        same = (values == previous) | (np.isnan(values) & np.isnan(previous))
+        with np.errstate(invalid="ignore"):
+            settled = np.abs(values - previous) <= tolerance * size
+        moved: np.ndarray = ~(same | (settled & np.isfinite(size)))
+        return moved
+
+    def _note(self, z: np.ndarray, g: np.ndarray) -> None:
+        if self.rounds == 1:
+            return  # what was there before the first exchange means nothing
+        if self.rounds == 2:
+            size = np.maximum(np.abs(z), np.abs(g))
+            self._size = np.where((size > 0.0) & np.isfinite(size), size, 1.0)
+        change = float(np.nan_to_num(np.max(np.abs(g - z) / self._size), nan=np.inf, posinf=np.inf))
+        if self._best is None or change < min(self.residuals):
+            self._best = z, g
+        self.residuals.append(change)
+
+    def _explodes(self) -> bool:
+        """Twice in a row the changes grew so much that no component should be asked for more of it."""
+        return (
+            len(self.residuals) > 2
+            and self.residuals[-1] > EXPLOSION * self.residuals[-2] > EXPLOSION**2 * self.residuals[-3] > 0.0
+        )
+
+    def _guess(self, z: np.ndarray, g: np.ndarray) -> np.ndarray:
+        """The next values to feed back; the search begins with the best ones of the plain exchange."""
+        if self._newton is None:
+            assert self._best is not None
+            self._newton = Newton(len(z))
+            self._newton.begin(self._size)
+            z, g = self._best
+        return np.where(self._jumps, g, self._newton.next(z, g))
+
+
+def _unsettled(plan: Plan, changing: list[int], residuals: list[float], start_time: float) -> RunError:
+    names = [plan.signals[i].name for i in changing]
+    more = f" and {len(names) - 5} more" if len(names) > 5 else ""
+    reason = (
+        f"Initialisation at t = {start_time:g} s does not settle after {MAX_ROUNDS} exchanges; still changing: "
+        f"{', '.join(names[:5])}{more}. Relative changes of what is fed back: {shown(residuals)}. Check the start values; if it "
+        "is an algebraic loop, whether its equations have a solution."
+    )
+    return RunError(reason, names[0].partition(".")[0], start_time)
 
 
 def _exchange(plan: Plan) -> None:

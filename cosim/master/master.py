@@ -7,21 +7,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from time import perf_counter
 
 import numpy as np
 
 from cosim.balises.service import BaliseService
+from cosim.compiled.choice import Choice, Wanted, choose_stepper
 from cosim.components.component import TIME_TOLERANCE
 from cosim.coupling.plan import Plan
 from cosim.errors import RunError
 from cosim.master.algorithms.algorithm import Algorithm
 from cosim.master.algorithms.gauss_seidel import GaussSeidel
 from cosim.master.axis import TimeAxis
+from cosim.master.control.control import StepControl
 from cosim.master.control.fixed import FixedStep
+from cosim.master.events.choose import Events
+from cosim.master.finite import make_finite_check
 from cosim.master.initialisation import initialise
 from cosim.master.system import Row, System
 from cosim.results.recorder import Recorder
+from cosim.results.result import SignalInfo
 
 PROGRESS_INTERVAL = 64
 
@@ -45,6 +51,9 @@ class Master:
         progress: called now and then with the time reached [s].
         algorithm: makes the algorithm for the plan; Gauss-Seidel by default.
         control: makes the step control for the system; fixed steps by default.
+        recorder: makes the recorder for signals and an expected number of rows.
+        stepper: who executes the plan: ``python``, ``compiled``, or ``auto`` for the compiled one wherever it can.
+        events: of the components: ``propagate`` them to others at the same instant, or leave them ``local``.
 
     After `run`, `recorder`, `timing`, `exchange_rounds` and `balises.mailbox.log` hold what came out, also when it failed.
 
@@ -54,16 +63,20 @@ class Master:
 
     def __init__(
         self, plan: Plan, axis: TimeAxis, balises: BaliseService | None = None, progress: Callable[[float], None] | None = None,
-        algorithm: Callable[[Plan], Algorithm] = GaussSeidel, control: Callable[[System], FixedStep] = FixedStep,
+        algorithm: Callable[[Plan], Algorithm] = GaussSeidel, control: Callable[[System], StepControl] = FixedStep,
+        stepper: Wanted = "python", recorder: Callable[[Sequence[SignalInfo], int], Recorder] = Recorder,
+        events: Events = "propagate",
     ) -> None:  # fmt: skip
         self.plan, self.axis, self.balises = plan, axis, balises
-        self.system = System(plan, algorithm(plan), balises)
+        self.system = System(plan, algorithm(plan), balises, events)
         self.control = control(self.system)
-        self.recorder = Recorder(plan.signals, axis.count + 1)
+        self.recorder = recorder(plan.signals, axis.count + 1)
         self.timing = WallClock()
         self.exchange_rounds = 0
         self.ended_early: str | None = None
         self._progress = progress
+        self._all_finite = make_finite_check(plan.values)
+        self.stepper = Choice(stepper)
 
     def run(self) -> None:
         """Initialise and step to the end.
@@ -74,13 +87,16 @@ class Master:
         begin = perf_counter()
         try:
             self.exchange_rounds = initialise(self.plan, self.axis.start, self.axis.stop)
+            self.system.start(self.axis.start)
             self.recorder.add(self.axis.start, self.plan.values)
             self._check_finite(self.axis.start)
         finally:
             self.timing.initialisation = perf_counter() - begin
         begin = perf_counter()
         try:
-            self._step_all()
+            self.stepper = choose_stepper(self.stepper.wanted, self.control, self.axis)
+            if self._stopped_at(self.axis.start) is None:
+                self._step_all()
         finally:
             self.timing.stepping = perf_counter() - begin - self.timing.recording
             self.system.algorithm.close()
@@ -88,26 +104,42 @@ class Master:
     # -- stepping ---------------------------------------------------------------------------------------------------
 
     def _step_all(self) -> None:
-        axis = self.axis
-        for k in range(axis.count):
-            t, until = axis[k], axis[k + 1]
-            rows = self._step_or_name_the_cause(t, until)
-            stopped = self._stopped_at(until)
-            if stopped is not None and until - stopped > TIME_TOLERANCE:
-                return  # somebody never came to `until`: there are no values of that time to record
-            self._record(rows, until)
-            self._check_finite(until)
-            if stopped is not None:
+        axis, compiled = self.axis, self.stepper.compiled
+        k = 0
+        while k < axis.count:
+            step: Callable[[], Sequence[Row]] | None = partial(self.control.step, axis[k], axis[k + 1])
+            if compiled is not None:
+                stretch = compiled.run(k, self.recorder)
+                k, step = k + stretch.done, stretch.finish
+                if stretch.suspect:
+                    self._check_finite(axis[k])
+                if self._progress is not None and stretch.done:
+                    self._progress(axis[k])
+            if step is None:
+                continue
+            if not self._step_and_record(step, axis[k + 1]):
                 return
             if self._progress is not None and k % PROGRESS_INTERVAL == 0:
-                self._progress(until)
+                self._progress(axis[k + 1])
+            k += 1
         if self._progress is not None:
             self._progress(axis.stop)
 
-    def _step_or_name_the_cause(self, t: float, until: float) -> Sequence[Row]:
+    def _step_and_record(self, step: Callable[[], Sequence[Row]], until: float) -> bool:
+        """One step in Python, or what is left of it; whether the run goes on."""
+        rows = self._step_or_name_the_cause(step, until)
+        stopped = self._stopped_at(until)
+        if stopped is not None and until - stopped > TIME_TOLERANCE:
+            self._record_events([row for row in rows if row[0] <= stopped + TIME_TOLERANCE])
+            return False  # somebody never came to `until`: there are no values of that time to record
+        self._record(rows, until)
+        self._check_finite(until)
+        return stopped is None
+
+    def _step_or_name_the_cause(self, step: Callable[[], Sequence[Row]], until: float) -> Sequence[Row]:
         """One step; where a component fails because another one handed it NaN, the error names that one."""
         try:
-            return self.control.step(t, until)
+            return step()
         except RunError:
             self._check_finite(until)
             raise
@@ -121,24 +153,30 @@ class Master:
 
     def _first_stop(self, until: float) -> float:
         asking = [s.component for s in self.plan.steps if s.component.terminated]
-        first = min(asking, key=lambda c: c.time)
-        self.ended_early = f"Component '{first.name}' asked to terminate at t = {min(first.time, until):g} s."
-        return min(first.time, until)
+        stopped = min(until, *(c.time for c in asking))
+        names = [f"'{c.name}'" for c in asking if c.time - stopped <= TIME_TOLERANCE]
+        who = f"Component {names[0]}" if len(names) == 1 else f"Components {', '.join(names[:-1])} and {names[-1]}"
+        self.ended_early = f"{who} asked to terminate at t = {stopped:g} s."
+        return stopped
 
     def _record(self, rows: Sequence[Row], until: float) -> None:
+        self._record_events(rows)
+        begin = perf_counter()
+        self.recorder.add(until, self.plan.values)
+        self.timing.recording += perf_counter() - begin
+
+    def _record_events(self, rows: Sequence[Row]) -> None:
         begin = perf_counter()
         for time, row in rows:
-            self.recorder.add(time, row)
-        self.recorder.add(until, self.plan.values)
+            self.recorder.add_event(time, row)
         self.timing.recording += perf_counter() - begin
 
     # -- checks -----------------------------------------------------------------------------------------------------
 
     def _check_finite(self, t: float) -> None:
-        finite = np.isfinite(self.plan.values)
-        if finite.all():
+        if self._all_finite():
             return
-        bad = int(np.argmin(finite))
+        bad = int(np.argmin(np.isfinite(self.plan.values)))
         name, value = self.plan.signals[bad].name, self.plan.values[bad]
         component = name.partition(".")[0]
         raise RunError(f"Component '{component}' at t = {t:g} s: output {name} is {value}; the run ends here.", component, t)

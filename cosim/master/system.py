@@ -5,7 +5,7 @@ What controls the step knows only this: `advance` from one time to another, `sav
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +15,7 @@ from cosim.balises.service import NO_ROWS, BaliseService, Row
 from cosim.coupling.plan import Plan
 from cosim.errors import CouplingError
 from cosim.master.algorithms.algorithm import Algorithm
+from cosim.master.events.choose import Events, make_coordinator
 
 __all__ = ["NO_ROWS", "Checkpoint", "Row", "System"]
 
@@ -26,12 +27,20 @@ class Checkpoint:
     Args:
         states: of the components, in the order of the plan.
         values: shape (n,).
+        lines: of the inputs that follow one, in the order of the plan; None for the others.
         balises: of the balise service, or None.
+        untouched: the values that are no doubles, shape (m,).
+        algorithm: what the algorithm remembers, or None.
+        events: what the coordinator remembers, or None.
     """
 
     states: list[Any]
     values: np.ndarray
+    lines: list[Any]
     balises: Any
+    untouched: np.ndarray
+    algorithm: Any = None
+    events: Any = None
 
 
 class System:
@@ -41,22 +50,41 @@ class System:
         plan: prepared, components instantiated.
         algorithm: how they are brought over a step.
         balises: balise service, or None.
+        events: ``propagate`` events of the components to others, or leave them ``local``.
     """
 
-    def __init__(self, plan: Plan, algorithm: Algorithm, balises: BaliseService | None = None) -> None:
+    def __init__(
+        self, plan: Plan, algorithm: Algorithm, balises: BaliseService | None = None, events: Events = "propagate"
+    ) -> None:  # fmt: skip
         self.plan, self.algorithm, self.balises = plan, algorithm, balises
         if balises is not None:
             balises.attach(plan)
+        self.events = make_coordinator(self, events)
+
+    def start(self, t: float) -> None:
+        """All components were initialised at `t` [s]: handle what happens there already.
+
+        Raises:
+            RunError: a component failed, or events do not settle.
+        """
+        if self.events is not None:
+            self.events.start(t)
 
     def advance(self, t: float, until: float) -> Sequence[Row]:
-        """Bring everything from `t` to `until` [s].
+        """Bring everything from `t` to `until` [s], events of the components on the way included.
+
+        Where a component asks for the end of the run, everybody who can stops there.
 
         Returns:
             Event rows in ``(t, until]``: before and after each event; the row of `until` itself is the plan's values.
 
         Raises:
-            RunError: a component failed.
+            RunError: a component failed, or events do not settle.
         """
+        return self.move(t, until) if self.events is None else self.events.advance(t, until)
+
+    def move(self, t: float, until: float) -> Sequence[Row]:
+        """Bring everything from `t` to `until` [s] without a stop; returns and raises as `advance`."""
         if self.balises is None:
             self.algorithm.advance(t, until)
             return NO_ROWS
@@ -77,20 +105,50 @@ class System:
         if stateless:
             raise CouplingError(f"{what} steps back, and these components cannot save their state: {', '.join(stateless)}.")
 
-    def save(self) -> Checkpoint:
-        """Everything, to be restored any number of times and released once."""
-        states = [step.component.save() for step in self.plan.steps]
-        return Checkpoint(states, self.plan.values.copy(), None if self.balises is None else self.balises.save())
+    def save(self, *, anyway: bool = False) -> Checkpoint:
+        """Everything, to be restored any number of times and released once.
 
-    def restore(self, checkpoint: Checkpoint) -> None:
-        """Return to a checkpoint."""
+        Args:
+            anyway: leave out components that cannot save their state.
+        """
+        states = [step.component.save() if step.component.can_save or not anyway else None for step in self.plan.steps]
+        lines = [None if step.carrier is None else step.carrier.save() for step in self.plan.steps]
+        balises = None if self.balises is None else self.balises.save()
+        events = None if self.events is None else self.events.save()
+        return Checkpoint(
+            states, self.plan.values.copy(), lines, balises, self.plan.untouched.copy(), self.algorithm.save(), events
+        )  # fmt: skip
+
+    def restore(self, checkpoint: Checkpoint, keep: Set[str] = frozenset()) -> None:
+        """Return to a checkpoint.
+
+        Args:
+            keep: components that stay as they are; so do those that the checkpoint leaves out.
+        """
+        stay = [
+            step for step, state in zip(self.plan.steps, checkpoint.states, strict=True)
+            if state is None or step.component.name in keep
+        ]  # fmt: skip
         for step, state in zip(self.plan.steps, checkpoint.states, strict=True):
-            step.component.restore(state)
+            if step not in stay:
+                step.component.restore(state)
+        for step, line in zip(self.plan.steps, checkpoint.lines, strict=True):
+            if step.carrier is not None:
+                step.carrier.restore(line)
         self.plan.values[:] = checkpoint.values
-        if self.balises is not None:
+        self.plan.untouched[:] = checkpoint.untouched
+        self.algorithm.restore(checkpoint.algorithm)
+        if self.events is not None:
+            self.events.restore(checkpoint.events)
+        if self.balises is not None and self.balises.plant in [step.component.name for step in stay]:
+            self.balises.restore_but_plant(checkpoint.balises)
+        elif self.balises is not None:
             self.balises.restore(checkpoint.balises)
+        for step in stay:
+            step.read()
 
     def release(self, checkpoint: Checkpoint) -> None:
         """Free a checkpoint."""
         for step, state in zip(self.plan.steps, checkpoint.states, strict=True):
-            step.component.release(state)
+            if state is not None:
+                step.component.release(state)

@@ -8,6 +8,7 @@ from html import escape
 from pathlib import Path
 
 from cosim.errors import OutputError
+from cosim.report.cost import cost_html, messages_html
 from cosim.report.event_counts import OUTCOMES, count_events
 from cosim.report.facts import list_entry, mapping_entry, statement
 from cosim.report.gallery import PANELS, Panel, draw_all
@@ -90,6 +91,8 @@ def report_page(result: Result, spec: ReportSpec, figures: Mapping[Panel, bytes]
             section("Balise telegrams", *_events(result, spec)),
             section("Slip indicators", _indicators(result, spec)),
             section("Components", _components(result)),
+            section("Calls", *cost_html(result)),
+            section("Messages of the components", *messages_html(result)),
             section("Notes", bullets(dict.fromkeys(map(str, [*spec.notes, *list_entry(result, "notes")])))),
             section("Versions", _versions(result)),
         ],

@@ -8,6 +8,7 @@ kept. FMPy splits lines at every comma, so names such as ``a[1,2]`` are read by 
 from __future__ import annotations
 
 import csv
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -53,13 +54,13 @@ def read_csv(path: str | Path) -> np.ndarray:
         names = next(csv.reader(file), [])
         if not names or names[0] != "time":
             raise ValueError(f"{path} is not a result table: its first column must be 'time', got {names[:1]}.")
-        lines = file.readlines()
-    if not lines:
-        return np.empty(0, table_dtype(names))
-    try:
-        values = np.loadtxt(lines, delimiter=",", ndmin=2, comments=None)
-    except ValueError as error:
-        raise ValueError(f"{path} is not a result table: {error}") from error
+        first = file.readline()
+        if not first:
+            return np.empty(0, table_dtype(names))
+        try:
+            values = np.loadtxt(chain([first], file), delimiter=",", ndmin=2, comments=None)
+        except ValueError as error:
+            raise ValueError(f"{path} is not a result table: {error}") from error
     if values.shape[1] != len(names):
         raise ValueError(f"{path} is not a result table: {len(names)} names but {values.shape[1]} numbers in a row.")
     return values.view(table_dtype(names))[:, 0]

@@ -1,4 +1,4 @@
-"""A result as a folder of files: table, events, summary. Touches only the folder it is given.
+"""A result as a folder of files: table, events, messages, summary. Touches only the folder it is given.
 
 All files are written to a hidden folder beside their places first and moved there when they are complete: a full disk or a
 stopped program leaves the former files whole.
@@ -12,15 +12,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from cosim.diagnostics.messages import read_messages, write_messages
 from cosim.errors import OutputError, nearest
 from cosim.results.csv_file import read_csv, write_csv
 from cosim.results.events_file import read_events, write_events
 from cosim.results.mat_file import read_mat, write_mat
+from cosim.results.npy_file import read_npy, write_npy
 from cosim.results.result import Result, SignalInfo
 from cosim.results.summary_file import read_summary, write_summary
 
-TABLES = {"csv": "table.csv", "mat": "table.mat"}
-EVENTS, SUMMARY = "events.csv", "summary.json"
+TABLES = {"csv": "table.csv", "mat": "table.mat", "npy": "table.npy"}
+EVENTS, MESSAGES, SUMMARY = "events.csv", "messages.csv", "summary.json"
 LAYOUT = 1  # version of the layout of summary.json
 
 
@@ -43,7 +45,7 @@ def check_writable(directory: str | Path) -> Path:
             file.write(b"results")
     except OSError as error:
         raise OutputError(f"Results cannot be written to {folder}: {_reason(error)}. Choose another output folder.") from error
-    for name in (*TABLES.values(), EVENTS, SUMMARY):
+    for name in (*TABLES.values(), EVENTS, MESSAGES, SUMMARY):
         if (folder / name).is_dir():
             raise OutputError(f"Results cannot be written to {folder}: {name} is a folder there. Choose another output folder.")
     return folder
@@ -64,10 +66,13 @@ def _write_all(result: Result, folder: Path, formats: Sequence[str]) -> list[str
         write_csv(folder / TABLES["csv"], result.table)
     if "mat" in formats:
         write_mat(folder / TABLES["mat"], result)
+    if "npy" in formats:
+        write_npy(folder / TABLES["npy"], result.table)
     write_events(folder / EVENTS, result.events)
+    write_messages(folder / MESSAGES, result.messages)
     content = {"layout": LAYOUT, "failure": result.failure, "signals": list(result.signals), "summary": result.summary}
     write_summary(folder / SUMMARY, content)
-    return [*(TABLES[name] for name in TABLES if name in formats), EVENTS, SUMMARY]
+    return [*(TABLES[name] for name in TABLES if name in formats), EVENTS, MESSAGES, SUMMARY]
 
 
 def write_results(result: Result, directory: str | Path, formats: Sequence[str] = ("csv", "mat")) -> dict[str, Path]:
@@ -76,11 +81,11 @@ def write_results(result: Result, directory: str | Path, formats: Sequence[str] 
     Args:
         result: what to write.
         directory: the folder; created where it does not exist.
-        formats: formats of the table, any of ``csv`` and ``mat``. A table that an earlier run left in another format is
+        formats: formats of the table, any of ``csv``, ``mat`` and ``npy``. A table that an earlier run left in another format is
             removed, since it would not belong to the other files.
 
     Returns:
-        Paths by what they hold: ``csv``, ``mat``, ``events``, ``summary``.
+        Paths by what they hold: ``csv``, ``mat``, ``npy``, ``events``, ``messages``, ``summary``.
 
     Raises:
         OutputError: a format is unknown, or a file cannot be written; former files are then still whole.
@@ -98,6 +103,7 @@ def write_results(result: Result, directory: str | Path, formats: Sequence[str] 
         raise OutputError(f"Results could not be written to {folder}: {_reason(error)}. {hint}") from error
     return {name: folder / TABLES[name] for name in TABLES if name in formats} | {
         "events": folder / EVENTS,
+        "messages": folder / MESSAGES,
         "summary": folder / SUMMARY,
     }
 
@@ -107,9 +113,10 @@ def _read(folder: Path) -> tuple[Result, Mapping[str, Any]]:
     if content.get("layout") != LAYOUT:
         raise ValueError(f"{SUMMARY} has layout {content.get('layout')!r}, this version reads layout {LAYOUT}.")
     signals = [SignalInfo(**signal) for signal in content["signals"]]
-    csv, mat = folder / TABLES["csv"], folder / TABLES["mat"]
-    table = read_csv(csv) if csv.exists() else read_mat(mat).table
-    return Result(table, signals, read_events(folder / EVENTS)), content
+    csv, mat, npy = (folder / TABLES[name] for name in ("csv", "mat", "npy"))
+    table = read_npy(npy) if npy.exists() else read_csv(csv) if csv.exists() else read_mat(mat).table
+    messages = read_messages(folder / MESSAGES) if (folder / MESSAGES).exists() else []  # older results have none
+    return Result(table, signals, read_events(folder / EVENTS), messages=messages), content
 
 
 def read_results(directory: str | Path) -> Result:

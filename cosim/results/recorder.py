@@ -1,12 +1,26 @@
-"""The recorder: rows of values in one growing array, copied and never looked up."""
+"""The recorder: rows of values in memory and, past a stated size, in a file that nobody else sees. Touches no other file.
+
+Rows are copied once and never looked up. What does not fit into the stated memory goes to a `RowFile` block by block, so that
+a run of any length needs no more memory than that.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from cosim.errors import OutputError
 from cosim.results.result import SignalInfo
+from cosim.results.row_file import RowFile
+from cosim.results.table_layout import table_dtype
+
+MEMORY = 256e6  # rows stay in memory up to this size [bytes]
+BLOCK = 4e6  # rows gathered before each writing to the file [bytes]
+FIRST_ROWS = 16
 
 
 class Recorder:
@@ -15,26 +29,149 @@ class Recorder:
     Args:
         signals: what the values are.
         expected_rows: rows to make room for at first.
+        memory: rows stay in memory up to this size; beyond it they stream to a file [bytes].
+        folder: where that file is; by default the one for large temporary files. It has no name there, and is
+            gone with the recorder and its table whatever happens to the program.
+        every: keep each `every`-th communication point only, counted from the first. The last point, rows of events, and the
+            point that follows an event are always kept.
+
+    `count` is the number of rows that are kept.
     """
 
-    def __init__(self, signals: Sequence[SignalInfo], expected_rows: int) -> None:
-        self._signals = list(signals)
-        self._rows = np.empty((max(expected_rows, 16), len(self._signals) + 1))
-        self.count = 0
+    def __init__(
+        self, signals: Sequence[SignalInfo], expected_rows: int, *, memory: float = MEMORY, folder: str | Path | None = None,
+        every: int = 1,
+    ) -> None:  # fmt: skip
+        self._dtype = table_dtype(["time", *(s.name for s in signals)])
+        self._width = len(signals) + 1
+        self._limit = max(int(memory // self._dtype.itemsize), FIRST_ROWS)
+        self._folder = folder
+        self._file: RowFile | None = None
+        self.every = every
+        self._points, self._after_event, self._skipping = 0, False, False
+        self._skipped = np.empty(self._width)
+        self._source: np.ndarray | None = None
+        self.count = self._first = 0  # `_first`: first row of the block in memory; all before it are in the file
+        self._use(np.empty((min(max(expected_rows // every + 1, FIRST_ROWS), self._limit), self._width)))
 
     def add(self, t: float, values: np.ndarray) -> None:
-        """Copy one row: time [s] and values, shape (n,)."""
-        if self.count == len(self._rows):
-            self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
-        row = self._rows[self.count]
-        row[0] = t
-        row[1:] = values
-        self.count += 1
+        """Copy the row of a communication point: time [s] and values, shape (n,).
+
+        Raises:
+            OutputError: the file cannot take more rows; everything recorded so far is kept.
+        """
+        if self.every == 1 or self._is_due():
+            self._append(t, values)
+            return
+        if self.count - self._first == len(self._rows):
+            self._make_room()  # now, so that there is room for this row in case it is the last one
+        self._skipped[0], self._skipped[1:] = t, values
+        self._skipping = True
+
+    def add_event(self, t: float, values: np.ndarray) -> None:
+        """Copy the row of an event within a step or at its end; it is kept whatever `every` says. Otherwise as `add`."""
+        self._append(t, values)
+        self._after_event, self._skipping = True, False
+
+    def block(self, rows: int) -> np.ndarray:
+        """Free rows to be filled by somebody else, who says with `commit` how many of them are communication points now.
+
+        Args:
+            rows: how many are wanted, at least 1.
+
+        Returns:
+            A C-contiguous view of shape (m, 1 + n), 1 <= m <= rows; valid until the next call of anything here.
+
+        Raises:
+            OutputError: as for `add`.
+        """
+        if self.count - self._first == len(self._rows):
+            self._make_room()
+        start = self.count - self._first
+        return self._rows[start : start + rows]
+
+    def commit(self, rows: int) -> None:
+        """The first `rows` rows of the last `block` hold communication points, in order."""
+        if self.every != 1 and rows:
+            start = self.count - self._first
+            filled = self._rows[start : start + rows]
+            due = (self._points + np.arange(rows)) % self.every == 0
+            due[0] |= self._after_event
+            self._points, self._after_event, self._skipping = self._points + rows, False, not due[-1]
+            self._skipped[:] = filled[-1]
+            kept = filled[due]
+            rows = len(kept)
+            filled[:rows] = kept
+        self.count += rows
 
     def table(self) -> np.ndarray:
-        """The rows as a structured array, ``time`` first."""
-        names = ["time", *(s.name for s in self._signals)]
-        table = np.empty(self.count, dtype=[(name, np.float64) for name in names])
-        for i, name in enumerate(names):
-            table[name] = self._rows[: self.count, i]
-        return table
+        """The rows as a structured array, shape (rows,), ``time`` first.
+
+        It is the recorder's own memory or, past the stated size, a map of its file of which only the pages in use are in memory:
+        what is changed in the table is changed in the recorder.
+        """
+        if self._skipping:
+            self._skipping = False
+            self._append(self._skipped[0], self._skipped[1:])
+        if self._file is None:
+            return self._in_memory()
+        try:
+            self._flush()
+        except OutputError:  # space was reserved, and the disk refuses all the same: the rest must fit into the memory
+            return np.concatenate([np.asarray(self._file.table(self._dtype)), self._in_memory()])
+        with suppress(OutputError):  # the next rows start behind these: it matters only if there are any
+            self._file.reserve(self.count + len(self._rows))
+        return self._file.table(self._dtype)
+
+    # -- rows -------------------------------------------------------------------------------------------------------
+
+    def _append(self, t: float, values: np.ndarray) -> None:
+        place = self.count - self._first
+        if place == len(self._rows):
+            self._make_room()
+            place = self.count - self._first
+        if values is not self._source:  # the master hands over the same array at every step
+            self._source = np.asarray(values, dtype=np.float64)
+            self._view: Any = memoryview(self._source.data)
+        at = place * self._width
+        self._cells[at] = t
+        self._cells[at + 1 : at + self._width] = self._view
+        self.count += 1
+
+    def _is_due(self) -> bool:
+        """Whether the next communication point is to be kept."""
+        due = self._points % self.every == 0 or self._after_event
+        self._points += 1
+        self._after_event = self._skipping = False
+        return due
+
+    def _in_memory(self) -> np.ndarray:
+        return self._rows[: self.count - self._first].view(self._dtype)[:, 0]
+
+    # -- room -------------------------------------------------------------------------------------------------------
+
+    def _use(self, rows: np.ndarray) -> None:
+        self._rows = rows
+        self._cells: Any = memoryview(rows.reshape(-1).data)
+
+    def _make_room(self) -> None:
+        """More memory as long as the limit allows it; the file from then on."""
+        if self._file is None and len(self._rows) < self._limit:
+            more = np.empty((min(2 * len(self._rows), self._limit), self._width))
+            more[: self.count] = self._rows
+            self._use(more)
+            return
+        block = max(int(BLOCK // self._dtype.itemsize), FIRST_ROWS)
+        if self._file is None:
+            self._file = RowFile(self._folder, self._dtype.itemsize, len(self._rows) + block)
+            self._flush()
+            self._use(np.empty((min(block, len(self._rows)), self._width)))
+        else:
+            self._file.reserve(self.count + len(self._rows))
+            self._flush()
+
+    def _flush(self) -> None:
+        """Bring the block in memory into the file; only then it counts as being there."""
+        assert self._file is not None
+        self._file.write(self._first, self._rows[: self.count - self._first])
+        self._first = self.count

@@ -8,6 +8,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from cosim.diagnostics.messages import Message
+
 
 @dataclass(frozen=True, slots=True)
 class SignalInfo:
@@ -71,6 +73,7 @@ class Result:
         events: the balise telegrams in order of delivery.
         summary: versions, parameters, certificates, methods, wall times, warnings; JSON-able.
         failure: why the run ended early, or None.
+        messages: what the components logged, in order of time.
     """
 
     table: np.ndarray
@@ -78,6 +81,7 @@ class Result:
     events: Sequence[BaliseRecord] = ()
     summary: Mapping[str, Any] = field(default_factory=dict)
     failure: str | None = None
+    messages: Sequence[Message] = ()
 
     @property
     def time(self) -> np.ndarray:

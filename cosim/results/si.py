@@ -16,6 +16,8 @@ NAMED = {
                  "Pa", "V", "N/m", "N.s/m", "N.s2/m2", "kg/s")
 }  # fmt: skip
 
+CHUNK = 65536  # rows converted at a time: a table may be larger than the memory
+
 
 def in_si(
     table: np.ndarray, signals: Sequence[SignalInfo], unit_of: Callable[[str], Unit | None]
@@ -29,7 +31,12 @@ def in_si(
     Returns:
         The table and the description of its columns.
     """
-    return table, [_convert(table, signal, unit_of) for signal in signals]
+    units = {signal.name: unit for signal in signals if (unit := _to_convert(signal, unit_of)) is not None}
+    for start in range(0, len(table) if units else 0, CHUNK):
+        rows = table[start : start + CHUNK]
+        for name, unit in units.items():
+            rows[name] = unit.factor * rows[name] + unit.offset
+    return table, [_described(signal, units.get(signal.name)) for signal in signals]
 
 
 def si_name(unit: Unit) -> str:
@@ -39,12 +46,15 @@ def si_name(unit: Unit) -> str:
     return ".".join(f"{s}{'' if e == 1 else e}" for s, e in zip(BASE_SYMBOLS, unit.exponents, strict=True) if e)
 
 
-def _convert(table: np.ndarray, signal: SignalInfo, unit_of: Callable[[str], Unit | None]) -> SignalInfo:
+def _to_convert(signal: SignalInfo, unit_of: Callable[[str], Unit | None]) -> Unit | None:
     try:
         unit = unit_of(signal.name)
     except UnitError:
-        return signal  # a unit nobody understands stays as it is, under its own name
-    if unit is None or (unit.factor == 1.0 and unit.offset == 0.0):
+        return None  # a unit nobody understands stays as it is, under its own name
+    return None if unit is None or (unit.factor == 1.0 and unit.offset == 0.0) else unit
+
+
+def _described(signal: SignalInfo, unit: Unit | None) -> SignalInfo:
+    if unit is None:
         return signal
-    table[signal.name] = unit.factor * table[signal.name] + unit.offset
     return replace(signal, unit=si_name(unit), display_unit=signal.display_unit or signal.unit)

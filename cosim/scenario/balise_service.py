@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from cosim.balises.delivery import Receiver
 from cosim.balises.layout import Layout
@@ -74,7 +75,7 @@ def watched_plant(table: BalisesTable, components: Mapping[str, Component], wher
 
 
 def choose_method(
-    table: BalisesTable, component: Component, make: Callable[[], Component], starts: Mapping[str, float],
+    table: BalisesTable, component: Component, make: Callable[[], Component], starts: Mapping[str, Any],
     start: float, step: float,
 ) -> Choice:  # fmt: skip
     """The localisation method: asked for, or the best that the probed plant allows.

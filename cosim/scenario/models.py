@@ -62,7 +62,7 @@ def component_factory(name: str, table: ComponentTable, folder: Path, where: str
     if realisation.startswith("block"):
         arguments = {"preset": table.preset, "late_policy": table.late_policy, "replay_horizon": table.replay_horizon}
         return lambda: load_block(system, name, version, **arguments)
-    path = _native(system, version, table.preset, where)
+    path = native_fmu(system, version, table.preset, where)
     return lambda: load_fmu(path, name)
 
 
@@ -81,7 +81,12 @@ def protocol_parameters(table: ComponentTable, component: Component, where: str)
     return given
 
 
-def _native(system: HybridSystem, version: Any, preset: str | None, where: str) -> Path:
+def native_fmu(system: HybridSystem, version: Any, preset: str | None, where: str) -> Path:
+    """The FMU of a shipped system, built where it was not yet.
+
+    Raises:
+        FmuLoadError: it cannot be built; `where` is the place for the message.
+    """
     try:
         return fmus.cached_fmu(system, fmi_version=version, preset=preset)
     except (OSError, RuntimeError, ValueError) as error:

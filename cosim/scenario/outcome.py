@@ -19,10 +19,12 @@ class Outcome:
     Args:
         result: table, events, summary.
         spec: roles of the signals for metrics and report.
+        tables: formats in which `write` writes the table, any of ``csv``, ``mat`` and ``npy``.
     """
 
     result: Result
     spec: ReportSpec
+    tables: tuple[str, ...] = ("csv", "mat")
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Values of a recorded signal, shape (rows,)."""
@@ -54,7 +56,7 @@ class Outcome:
         from cosim.report.html import write_report  # noqa: PLC0415 - matplotlib is loaded only for a report
         from cosim.results.folder import write_results  # noqa: PLC0415 - and scipy only for MAT files
 
-        paths = dict(write_results(self.result, directory))
+        paths = dict(write_results(self.result, directory, self.tables))
         if report:
             paths["report"] = write_report(self.result, self.spec, directory)
         else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -12,20 +12,31 @@ from typing import Any
 
 from cosim.balises.layout import Layout
 from cosim.balises.service import BaliseService
+from cosim.components.capabilities import tool_warning
 from cosim.components.component import Component
+from cosim.components.fmi3 import FMI3Component
+from cosim.components.start_values import StartValue
+from cosim.coupling.clocks import connect_clocks
 from cosim.coupling.connection import Connection, connect, unconnected_inputs
-from cosim.coupling.graph import execution_order, undeclared
+from cosim.coupling.graph import execution_groups, undeclared
 from cosim.coupling.plan import Plan, make_plan
+from cosim.diagnostics.call_log import CallLog
+from cosim.diagnostics.logged_slave import log_calls
+from cosim.diagnostics.messages import in_order
 from cosim.errors import CosimError
+from cosim.master.algorithms.choose import AlgorithmChoice, choose_algorithm
 from cosim.master.axis import TimeAxis
-from cosim.master.master import Master, close
+from cosim.master.lines.draw import draw_lines
+from cosim.master.master import close
 from cosim.report.spec import Phase, ReportSpec
 from cosim.results.result import BaliseRecord, Result
 from cosim.results.si import in_si
 from cosim.scenario.balise_service import Choice, choose_method, find_receivers, make_service, watched_plant
 from cosim.scenario.certificates import check_certificates, expected_gap
 from cosim.scenario.connections import parse_connections
+from cosim.scenario.instances import check_instances
 from cosim.scenario.layouts import make_layout
+from cosim.scenario.master import make_master
 from cosim.scenario.models import component_factory, protocol_parameters
 from cosim.scenario.outcome import Outcome
 from cosim.scenario.roles import ROLES, check_roles
@@ -35,24 +46,36 @@ from cosim.scenario.summary import run_summary
 from plant_models.hybrid.units import Unit
 
 LOG = logging.getLogger("cosim")
+CALL_LOG = Path("calls.log")
+LOGGED_FAULTS = frozenset({"discard", "error", "fatal"})
+CARRIED = {
+    "derivatives": "value and slope to",
+    "intermediate": "set within the step of",
+    "mean": "mean over the step to",
+    "held": "held, because discrete, for",
+}
 Progress = Callable[[float, float], None]
 Warn = Callable[[str], None]
 
 
 def run_scenario(
-    table: ScenarioTable, name: str, folder: Path, where: str, progress: Progress | None = None, warn: Warn | None = None
-) -> Outcome:
+    table: ScenarioTable, name: str, folder: Path, where: str, progress: Progress | None = None, warn: Warn | None = None,
+    call_log: Path | None = None,
+) -> Outcome:  # fmt: skip
     """Run a scenario to its end or to its first failure.
 
     Args:
         table: validated scenario. name: its name. folder: start of relative paths. where: place for messages.
         progress: called with the time reached and the end [s].
         warn: told of everything doubtful as soon as it is known, before the run where it can be; by default the log ``cosim``.
+        call_log: where calls are logged, where the scenario asks for that; by default `CALL_LOG` in the working folder.
 
     Raises:
         CosimError: the scenario cannot be set up; failures on the way are in the outcome.
     """
     setup = _Setup(table, folder, where, warn or LOG.warning)
+    if table.master.log_calls:
+        setup.call_log = CallLog(call_log or CALL_LOG)
     try:
         try:
             setup.prepare()
@@ -77,8 +100,11 @@ class _Setup:
         self.components: dict[str, Component] = {}
         self.plan: Plan | None = None
         self.choice: Choice | None = None
+        self.algorithm = AlgorithmChoice()
         self.service: BaliseService | None = None
+        self.lines: Mapping[str, str] = {}
         self.setup_seconds = 0.0
+        self.call_log: CallLog | None = None
 
     def prepare(self) -> None:
         """Everything up to the first step, cheap checks first."""
@@ -88,18 +114,29 @@ class _Setup:
         pairs = parse_connections(table.connections, self.where)
         for name, component in table.components.items():
             self.factories[name] = component_factory(name, component, self.folder, f"{self.where}: components.{name}")
+        files = {name: (self.folder / t.fmu).resolve() for name, t in table.components.items() if t.fmu is not None}
+        check_instances(files, self.where)
         for name, factory in self.factories.items():
             self.components[name] = factory()
+            self.components[name].configure(table.components[name].parameters)
+            self._warn_of_tool(self.components[name])
+        clocks, pairs = connect_clocks(pairs, self.components)
         connections = connect(pairs, self.components)
         receivers, plant = self._balise_roles()
         check_roles(table, self.components, self.where)
-        order = execution_order(self.components, connections, self._before(plant, receivers))
+        groups = execution_groups(self.components, connections, self._before(plant, receivers))
+        self.algorithm = choose_algorithm(table.master.algorithm, groups, self.components)
+        order = [name for group in groups for name in group.names]
         starts = {n: self._start_values(n, c) for n, c in self.components.items()}
         if layout is not None:
             self._check_certificates(layout, receivers)
-        self._instantiate(starts)
-        self.plan = make_plan(self.components, connections, order, {n: t.record for n, t in table.components.items()})
+        self._instantiate(starts, connections)
+        self.plan = make_plan(self.components, connections, order, {n: t.record for n, t in table.components.items()}, clocks)
         self._note_unconnected(connections)
+        self.notes += self.algorithm.notes
+        if table.master.inputs != "hold":
+            self.lines = draw_lines(self.plan, table.master.inputs)
+            self._note_lines()
         if layout is not None:
             self._add_balises(layout, plant, receivers, starts[plant])
         self.setup_seconds = perf_counter() - begin
@@ -108,7 +145,10 @@ class _Setup:
         """Run the master and gather what came out."""
         assert self.plan is not None
         stop = self.axis.stop
-        master = Master(self.plan, self.axis, self.service, None if progress is None else lambda t: progress(t, stop))
+        told = None if progress is None else lambda t: progress(t, stop)
+        master = make_master(self.table, self.plan, self.axis, self.service, told, self.algorithm)
+        if master.system.events is not None:
+            self.notes += master.system.events.notes
         failure = None
         try:
             master.run()
@@ -118,13 +158,18 @@ class _Setup:
             failure = "The run was interrupted; what was computed so far is kept."
         if master.ended_early is not None:
             self._warn(master.ended_early)
+        for warning in master.control.warnings():
+            self._warn(warning)
         summary = run_summary(name, self.table, self.plan, master, self.setup_seconds)
         events = [] if self.service is None else self._all_telegrams(self.service)
         self._warn_of_rejections()
+        self._warn_of_logs()
         summary |= self._balise_summary([e.stamp for e in events if e.kind == "true"])
         summary |= {"certificates": self.certificates, "warnings": self.warnings, "notes": self.notes}
         table, signals = in_si(master.recorder.table(), self.plan.signals, self._unit)
-        return Outcome(Result(table, signals, events, summary, failure), self._report_spec())
+        messages = in_order(component.messages for component in self.components.values())
+        result = Result(table, signals, events, summary, failure, messages)
+        return Outcome(result, self._report_spec(), tuple(self.table.report.tables))
 
     def close(self) -> None:
         """Free everything, also after a set-up that failed half-way."""
@@ -133,6 +178,8 @@ class _Setup:
         for component in self.components.values():
             component.terminate()
             component.free()
+        if self.call_log is not None:
+            self.call_log.close()
 
     def _warn(self, text: str) -> None:
         self.warnings.append(text)
@@ -144,13 +191,23 @@ class _Setup:
 
     # -- set-up -----------------------------------------------------------------------------------------------------
 
-    def _instantiate(self, starts: dict[str, dict[str, float]]) -> None:
+    def _warn_of_tool(self, component: Component) -> None:
+        warning = tool_warning(component.name, component.description)
+        if warning is not None:
+            self._warn(warning)
+
+    def _instantiate(self, starts: dict[str, dict[str, StartValue]], connections: list[Connection]) -> None:
         for name, component in self.components.items():
+            if isinstance(component, FMI3Component) and self.table.master.inputs != "hold":
+                component.request_intermediate_updates([c.target[1] for c in connections if c.target[0] == name])
+            component.choose_log(self.table.components[name].log)
+            if self.call_log is not None:
+                log_calls(component, self.call_log)
             component.instantiate()
             for parameter, value in starts[name].items():
                 component.set_start(parameter, value)
 
-    def _start_values(self, name: str, component: Component) -> dict[str, float]:
+    def _start_values(self, name: str, component: Component) -> dict[str, StartValue]:
         table = self.table.components[name]
         return start_values(component, protocol_parameters(table, component, f"components.{name}") | table.parameters)
 
@@ -175,7 +232,7 @@ class _Setup:
         for warning in warnings:
             self._warn(warning)
 
-    def _add_balises(self, layout: Layout, plant: str, receivers: list[str], starts: dict[str, float]) -> None:
+    def _add_balises(self, layout: Layout, plant: str, receivers: list[str], starts: dict[str, StartValue]) -> None:
         table = self.table.balises
         assert table is not None
         assert self.plan is not None
@@ -198,13 +255,20 @@ class _Setup:
                 "late_policy does not say what it does with late stamps."
             )
 
+    def _note_lines(self) -> None:
+        by_carrier: dict[str, list[str]] = {}
+        for name, carrier in self.lines.items():
+            by_carrier.setdefault(carrier, []).append(name)
+        said = "; ".join(f"{CARRIED[carrier]}: {', '.join(names)}" for carrier, names in by_carrier.items())
+        self.notes.append(f"Inputs between communication points ({self.table.master.inputs}): {said or 'none are connected'}.")
+
     def _note_unconnected(self, connections: list[Connection]) -> None:
         free = unconnected_inputs(connections, self.components.values())
         if free:
             self._warn(f"Unconnected inputs keep their start values: {', '.join(free)}.")
         silent = undeclared(self.components.values())
         if silent:
-            self.notes.append(f"Declare no dependencies, direct feedthrough assumed absent: {', '.join(silent)}.")
+            self.notes.append(f"Declare no dependencies, algebraic loops through them assumed absent: {', '.join(silent)}.")
 
     # -- after the run ----------------------------------------------------------------------------------------------
 
@@ -219,6 +283,16 @@ class _Setup:
             rejected = (component.outcomes() or {}).get("rejected", 0)
             if rejected:
                 self._warn(f"{name}: {rejected} telegrams were rejected: stamped in the past, and beyond what it replays.")
+
+    def _warn_of_logs(self) -> None:
+        """What the components logged of things gone wrong, in numbers; and a call log that could not be finished."""
+        for name, component in self.components.items():
+            wrong = {status: count for status, count in component.messages.counts.items() if status in LOGGED_FAULTS}
+            if wrong:
+                counts = ", ".join(f"{count} of status {status}" for status, count in wrong.items())
+                self._warn(f"{name} logged {counts}; the last says: {component.messages.reason}")
+        if self.call_log is not None and self.call_log.broken is not None:
+            self._warn(self.call_log.broken)
 
     def _balise_summary(self, stamps: list[float]) -> dict[str, Any]:
         """Method, probe, and the gaps that really occurred against what is certified."""

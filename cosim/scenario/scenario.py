@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import tomllib
 from collections.abc import Callable, Mapping
 from copy import deepcopy
@@ -9,12 +10,16 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, Self
 
+from cosim.diagnostics.structure import Structure
 from cosim.errors import ScenarioError, nearest
 from cosim.scenario.outcome import Outcome
 from cosim.scenario.run import run_scenario
 from cosim.scenario.schema import ComponentTable, ScenarioTable, parse_scenario
+from cosim.ssp.names import is_package, stem
 
+LOG = logging.getLogger("cosim")
 SHIPPED = files("cosim") / "scenarios"
+TABLES = ("balises", "master", "report")
 COMPONENT_KEYS = {field.alias or name for name, field in ComponentTable.model_fields.items()}
 
 
@@ -39,14 +44,21 @@ class Scenario:
     def __init__(self, *, folder: str | Path = ".", where: str = "script", **tables: Any) -> None:
         self.folder, self.where = Path(folder), where
         self._data: dict[str, Any] = {"components": {}, "connections": [], **deepcopy(tables)}
+        self._doubts: list[str] = []
+        self._files: object = None  # what keeps unpacked files alive
 
     @classmethod
     def load(cls, name_or_path: str | Path) -> Scenario:
-        """A shipped scenario by name, or one from a TOML file; paths in it are relative to the file.
+        """A shipped scenario by name, or one from a TOML file (paths in it are relative to the file) or from an SSP.
+
+        Args:
+            name_or_path: ``freight_profile_d``, ``my.toml``, ``system.ssp``, or ``system.ssp#Variant`` for a structure in it.
 
         Raises:
-            ScenarioError: there is no such scenario, or it is not TOML.
+            ScenarioError: there is no such scenario, or it is not TOML, or not SSP.
         """
+        if is_package(name_or_path):
+            return cls._from_package(str(name_or_path))
         path = Path(name_or_path)
         if path.suffix != ".toml" and not path.is_file():
             shipped = Path(str(SHIPPED)) / f"{name_or_path}.toml"
@@ -63,10 +75,36 @@ class Scenario:
         scenario._data = {"components": {}, "connections": [], **data}
         return scenario
 
+    @classmethod
+    def _from_package(cls, name: str) -> Scenario:
+        from cosim.ssp.load import load_package  # noqa: PLC0415 - lxml only for those who read such files
+
+        loaded = load_package(name)
+        scenario = cls(where=name, **loaded.tables)
+        scenario._doubts, scenario._files = loaded.doubts, loaded.unpacked
+        return scenario
+
+    def export_ssp(self, path: str | Path, version: str = "2.0") -> Path:
+        """Write the scenario as a system structure package: FMUs, connections and parameters, as other tools read them.
+
+        Args:
+            path: of the file, ending in ``.ssp``. version: of SSP, ``1.0`` or ``2.0``.
+
+        Returns:
+            The path.
+
+        Raises:
+            CosimError: the scenario cannot be set up, or has something that this version cannot say.
+            OutputError: the file cannot be written.
+        """
+        from cosim.ssp.export import export_package  # noqa: PLC0415 - lxml only for those who write such files
+
+        return export_package(self.table(), self.name, self.folder, self.where, Path(path), version)
+
     @property
     def name(self) -> str:
         """Name of the file without its ending, or ``script``."""
-        return Path(self.where).stem
+        return stem(self.where)
 
     def add(self, name: str, **table: Any) -> Self:
         """Add a component; keys as in a file: `fmu`, `model` or `observer`, `parameters`, `preset`, `options`, ..."""
@@ -85,13 +123,20 @@ class Scenario:
         self._data["balises"] = {**self._data.get("balises", {}), **table}
         return self
 
+    def master(self, **table: Any) -> Self:
+        """Set keys of the master table."""
+        self._data["master"] = {**self._data.get("master", {}), **table}
+        return self
+
     def report(self, **table: Any) -> Self:
         """Set keys of the report table."""
         self._data["report"] = {**self._data.get("report", {}), **table}
         return self
 
     def set(self, name: str, value: Any) -> Self:
-        """Override one value: ``component.parameter``, ``balises.key``, ``report.key`` or a top-level key such as ``stop``.
+        """Override one value.
+
+        That is ``component.parameter``, ``balises.key``, ``master.key``, ``report.key`` or a top-level key such as ``stop``.
 
         Raises:
             ScenarioError: there is no such component or table.
@@ -110,16 +155,18 @@ class Scenario:
                 table.setdefault("options", {})[rest.removeprefix("options.")] = value
             else:
                 table.setdefault("parameters", {})[rest] = value
-        elif head in ("balises", "report"):
+        elif head in TABLES:
             self._data.setdefault(head, {})[rest] = value
         else:
-            known = [*components, "balises", "report"]
+            known = [*components, *TABLES]
             raise ScenarioError(f"{self.where}: cannot set {name!r}: no component {head!r}; {nearest(head, known)}")
         return self
 
     def copy(self) -> Scenario:
         """An independent copy."""
-        return Scenario(folder=self.folder, where=self.where, **self._data)
+        scenario = Scenario(folder=self.folder, where=self.where, **self._data)
+        scenario._doubts, scenario._files = list(self._doubts), self._files
+        return scenario
 
     def table(self) -> ScenarioTable:
         """The validated scenario.
@@ -131,7 +178,7 @@ class Scenario:
 
     def run(
         self, progress: Callable[[float, float], None] | None = None, overrides: Mapping[str, Any] | None = None,
-        warn: Callable[[str], None] | None = None,
+        warn: Callable[[str], None] | None = None, call_log: str | Path | None = None,
     ) -> Outcome:  # fmt: skip
         """Run it.
 
@@ -140,6 +187,7 @@ class Scenario:
             overrides: as for `set`, for this run only.
             warn: told of everything doubtful as soon as it is known, before the run where it can be; by default the log
                 ``cosim``, which Python shows on the error stream. All warnings are in the outcome as well.
+            call_log: a file to log every call of every component to, as `master.log_calls` asks for.
 
         Returns:
             The outcome: result, report roles, warnings; also for a run that failed on the way (see `Outcome.failure`).
@@ -150,7 +198,27 @@ class Scenario:
         scenario = self.copy()
         for name, value in (overrides or {}).items():
             scenario.set(name, value)
-        return run_scenario(scenario.table(), scenario.name, self.folder, self.where, progress, warn)
+        if call_log is not None:
+            scenario.master(log_calls=True)
+        table = scenario.table()
+        log = None if call_log is None else Path(call_log)
+        for doubt in self._doubts:
+            (warn or LOG.warning)(doubt)
+        outcome = run_scenario(table, scenario.name, self.folder, self.where, progress, warn, log)
+        return outcome.with_summary(warnings=[*self._doubts, *outcome.warnings]) if self._doubts else outcome
+
+    def structure(self) -> Structure:
+        """How the components hang together: order, groups, loops, what is held over a step. Nothing is run or built.
+
+        Returns:
+            The structure, with `text` and `draw`.
+
+        Raises:
+            CosimError: the scenario cannot be set up.
+        """
+        from cosim.scenario.structure import scenario_structure  # noqa: PLC0415 - scipy's graphs only for those who ask
+
+        return scenario_structure(self.table(), self.name, self.folder, self.where)
 
 
 def shipped_scenarios() -> list[str]:

@@ -6,16 +6,27 @@ Unknown keys, wrong types and values out of range are refused with the place and
 from __future__ import annotations
 
 import json
+import math
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, PlainValidator, Tag, ValidationError, model_validator
 
 from cosim.errors import ScenarioError, nearest
 from fmu_observer.block import LatePolicy
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
-Number = float | list[float] | str
-"""A number, a list of them for a vector, or the name of an item of an enumeration."""
+
+
+def _start(value: Any) -> Any:
+    if isinstance(value, list | tuple):
+        return [_start(entry) for entry in value]
+    if isinstance(value, bool | int | str) or (isinstance(value, float) and math.isfinite(value)):
+        return value
+    raise ValueError(f"expected a finite number, true or false, a text, or a list of them (got {value!r})")
+
+
+Start = Annotated[Any, PlainValidator(_start)]
+"""A number, truth value, text or item of an enumeration, bytes in hexadecimal; a list of them for a vector, nested for arrays."""
 Realisation = Literal["fmu3", "fmu2", "block3", "block2"]
 
 
@@ -34,11 +45,14 @@ class ComponentTable(Table):
     realisation: Realisation | None = Field(default=None, alias="as")
     preset: str | None = None
     options: dict[str, str | int | float | bool] = {}
-    parameters: dict[str, Number] = {}
+    parameters: dict[str, Start] = {}
     late_policy: LatePolicy = "replay"
     replay_horizon: Annotated[float, Field(gt=0.0)] = 10.0
     record: list[str] = []
+    log: Literal["all", "errors", "none"] | list[str] | None = None
     label: str | None = None
+    every: Annotated[int, Field(ge=1)] = 1
+    substeps: Annotated[int, Field(ge=1)] = 1
 
     @model_validator(mode="after")
     def _one_origin(self) -> ComponentTable:
@@ -101,6 +115,65 @@ class BalisesTable(Table):
         return self
 
 
+class IterationTable(Table):
+    """How loops are iterated within a communication step."""
+
+    method: Literal["fixed-point", "aitken", "newton"] = "newton"
+    max_iterations: Annotated[int, Field(ge=1)] = 50
+    relative_tolerance: Annotated[float, Field(gt=0.0)] = 1e-9
+    absolute_tolerance: Annotated[float, Field(gt=0.0)] = 1e-12
+    relaxation: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
+
+
+class MasterTable(Table):
+    """How the components are stepped."""
+
+    algorithm: Literal["auto", "gauss-seidel", "jacobi", "iterate"] = "auto"
+    threads: Annotated[int, Field(ge=1)] = 1
+    iteration: IterationTable = IterationTable()
+    inputs: Literal["hold", "interpolate", "extrapolate"] = "hold"
+    control: Literal["fixed", "doubling"] = "fixed"
+    tolerance: Annotated[float, Field(gt=0.0)] = 1e-6
+    smallest_step: Annotated[float, Field(gt=0.0)] | None = None
+    events: Literal["propagate", "local"] = "propagate"
+    stepper: Literal["auto", "python", "compiled"] = "auto"
+    log_calls: bool = False
+    record_every: Annotated[int, Field(ge=1)] = 1
+    record_memory: Annotated[float, Field(gt=0.0)] = 256.0
+
+
+class ConnectionTable(Table):
+    """A connection that does something to the number on its way."""
+
+    source: str = Field(alias="from")
+    target: str = Field(alias="to")
+    factor: float = 1.0
+    offset: float = 0.0
+    units: Literal["convert", "ignore"] = "convert"
+    values: list[tuple[float, float]] = []
+
+    @model_validator(mode="after")
+    def _one_transformation(self) -> ConnectionTable:
+        if self.values and (self.factor, self.offset) != (1.0, 0.0):
+            raise ValueError("give either 'factor' and 'offset', or 'values', not both")
+        sources = [source for source, _ in self.values]
+        if len(set(sources)) < len(sources):
+            raise ValueError("'values' gives two targets for one source")
+        return self
+
+    def __str__(self) -> str:
+        what = f"{self.factor:g} * {self.source} + {self.offset:g}" if not self.values else f"values of {self.source}"
+        return f"{what} -> {self.target}" + ("" if self.units == "convert" else " (units ignored)")
+
+
+LINE, TABLE = "connection line", "connection table"
+"""Tags of the two forms of a connection; left out of messages."""
+ConnectionItem = Annotated[
+    Annotated[str, Tag(LINE)] | Annotated[ConnectionTable, Tag(TABLE)],
+    Discriminator(lambda given: TABLE if isinstance(given, dict | ConnectionTable) else LINE),
+]
+
+
 class PhaseTable(Table):
     """A part of the run to be judged on its own."""
 
@@ -125,6 +198,7 @@ class ReportTable(Table):
     published: dict[str, dict[str, float]] = {}
     independent: dict[str, dict[str, float]] = {}
     notes: list[str] = []
+    tables: list[Literal["csv", "mat", "npy"]] = ["csv", "mat"]
 
 
 class ScenarioTable(Table):
@@ -138,8 +212,9 @@ class ScenarioTable(Table):
     step: float
     certificates: Literal["warn", "require", "ignore"] = "warn"
     components: dict[Name, ComponentTable]
-    connections: list[str] = []
+    connections: list[ConnectionItem] = []
     balises: BalisesTable | None = None
+    master: MasterTable = MasterTable()
     report: ReportTable = ReportTable()
 
     @model_validator(mode="after")
@@ -186,7 +261,9 @@ def parse_scenario(data: dict[str, Any], where: str) -> ScenarioTable:
 
 
 def _explain(item: dict[str, Any]) -> str:
-    place = ".".join(str(p) for p in item["loc"] if p not in ("float", "list[float]", "constrained-str")) or "scenario"
+    place = (
+        ".".join(str(p) for p in item["loc"] if p not in ("float", "list[float]", "constrained-str", LINE, TABLE)) or "scenario"
+    )
     message = str(item["msg"]).removeprefix("Value error, ")
     if item["type"] == "extra_forbidden":
         key = str(item["loc"][-1])
@@ -201,7 +278,13 @@ def _explain(item: dict[str, Any]) -> str:
 
 def _known_keys(location: tuple[Any, ...]) -> list[str]:
     table: type[Table] = ScenarioTable
-    tables: dict[str, type[Table]] = {"components": ComponentTable, "balises": BalisesTable, "report": ReportTable}
+    tables: dict[str, type[Table]] = {
+        "components": ComponentTable,
+        "connections": ConnectionTable,
+        "balises": BalisesTable,
+        "master": MasterTable,
+        "report": ReportTable,
+    }
     if len(location) > 1:
         table = tables.get(str(location[0]), ScenarioTable)
     return [field.alias or name for name, field in table.model_fields.items()]

@@ -1,49 +1,65 @@
-"""Start values: from the parameters of a component's table to scalar variables."""
+"""Start values: from the parameters of a component's table to variables, elements and arrays."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from typing import Any
 
-from cosim.components.component import Component
-from cosim.errors import CouplingError, nearest
+from fmpy.model_description import ModelVariable
+
+from cosim.components.component import NUMERIC_TYPES, Component
+from cosim.components.start_values import StartValue, refusal, typed_value, typed_values
+from cosim.components.structure import STRUCTURAL
+from cosim.errors import CouplingError
 
 
-def start_values(component: Component, parameters: Mapping[str, float | list[float] | str]) -> dict[str, float]:
-    """Scalar start values by name: a list sets ``name[1]``, ``name[2]``, ..., a number for a vector sets all its elements, a
-    text is the name of an item of an enumeration.
+def start_values(component: Component, parameters: Mapping[str, Any]) -> dict[str, StartValue]:
+    """Start values by name, structural parameters first, each of its variable's type.
+
+    A list for a vector of scalars sets ``name[1]``, ``name[2]``, ..., a number for one sets all its elements; an array of FMI 3
+    takes a list, nested or row by row, or one value for all. A text is a text, the name of an item of an enumeration, or the
+    bytes of a binary in hexadecimal.
 
     Raises:
-        CouplingError: a name is unknown (the nearest are suggested), or a value lies outside what the component declares.
+        CouplingError: a name is unknown (the nearest are suggested), or a value is not of the variable's type or lies outside
+            what the component declares.
     """
-    starts: dict[str, float] = {}
+    starts: dict[str, StartValue] = {}
     for name, value in parameters.items():
-        if isinstance(value, str):
-            starts[name] = _item_number(component, name, value)
-        elif isinstance(value, list):
-            starts |= {f"{name}[{i + 1}]": float(v) for i, v in enumerate(value)}
-        elif name not in component.variables and f"{name}[1]" in component.variables:
-            starts |= dict.fromkeys((n for n in component.variables if n.startswith(f"{name}[")), float(value))
-        else:
-            starts[name] = float(value)
-    for name, number in starts.items():
-        _check_range(component, name, number)
-    return starts
+        starts |= {single: _checked(component, single, given) for single, given in _spread(component, name, value)}
+    structural = {n: v for n, v in starts.items() if component.variable(n).causality == STRUCTURAL}
+    return structural | starts
 
 
-def _item_number(component: Component, name: str, item: str) -> float:
+def _spread(component: Component, name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Vectors of FMI 2 and of blocks are scalars named ``name[1]``, ``name[2]``, ..."""
+    vector = [n for n in component.variables if n.startswith(f"{name}[")] if name not in component.variables else []
+    if f"{name}[1]" not in vector:
+        yield name, value
+    elif isinstance(value, list):
+        yield from ((f"{name}[{i}]", entry) for i, entry in enumerate(value, 1))
+    else:
+        yield from ((n, value) for n in vector)
+
+
+def _checked(component: Component, name: str, value: Any) -> StartValue:
     variable = component.variable(name)
-    items = {i.name: float(i.value) for i in getattr(variable.declaredType, "items", None) or []}
-    if variable.type != "Enumeration":
-        raise CouplingError(f"{component.name}.{name}: expected a number, or a list of numbers for a vector (got {item!r}).")
-    if item not in items:
-        raise CouplingError(f"{component.name}.{name} has no item {item!r}; {nearest(item, items)}")
-    return items[item]
+    is_array = bool(variable.shape) and name in component.variables
+    try:
+        values = typed_values(variable, value) if is_array else [typed_value(variable, value)]
+    except ValueError as error:
+        raise CouplingError(refusal(f"{component.name}.{name}", error)) from error
+    if variable.type == "Binary":
+        return list(value) if isinstance(value, list) else str(value)  # as it was written: bytes go into no summary
+    if variable.type in NUMERIC_TYPES:
+        for number in values:
+            _check_range(component, name, variable, number)
+    return values if is_array else values[0]
 
 
-def _check_range(component: Component, name: str, value: float) -> None:
-    variable = component.variable(name)
+def _check_range(component: Component, name: str, variable: ModelVariable, value: float) -> None:
     declared = variable.declaredType
-    numbers = [float(item.value) for item in getattr(declared, "items", None) or []]
+    numbers = [int(item.value) for item in getattr(declared, "items", None) or []]
     if variable.type == "Enumeration" and numbers and value not in numbers:
         names = ", ".join(f"{item.name} ({item.value})" for item in declared.items)
         raise CouplingError(f"{component.name}.{name} = {value:g} is no item of the enumeration: {names}.")

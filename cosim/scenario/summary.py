@@ -9,8 +9,11 @@ from typing import Any
 
 from cosim.components.component import Component
 from cosim.coupling.plan import Plan
+from cosim.diagnostics.tally import tally_table
 from cosim.master.master import Master
 from cosim.scenario.schema import ComponentTable, ScenarioTable
+
+MESSAGES_SHOWN = 20
 
 
 def run_summary(name: str, table: ScenarioTable, plan: Plan, master: Master, setup_seconds: float) -> dict[str, Any]:
@@ -22,8 +25,8 @@ def run_summary(name: str, table: ScenarioTable, plan: Plan, master: Master, set
     axis, timing = master.axis, master.timing
     reached = float(master.recorder.table()["time"][-1]) if master.recorder.count else axis.start
     wall = timing.initialisation + timing.stepping + timing.recording
-    in_components = {s.component.name: s.component.seconds for s in plan.steps}
-    rest = wall - sum(in_components.values()) - timing.recording
+    in_components = {s.component.name: s.component.seconds_in_all for s in plan.steps}
+    rest = max(wall - sum(in_components.values()) - timing.recording, 0.0)  # reading and writing are estimated
     return {
         "scenario": name,
         "title": table.title,
@@ -40,9 +43,15 @@ def run_summary(name: str, table: ScenarioTable, plan: Plan, master: Master, set
         "real_time_factor": (reached - axis.start) / wall if wall > 0.0 else None,
         "seconds": {**in_components, "master": rest, "recording": timing.recording},
         "exchange_rounds": master.exchange_rounds,
+        "master": {
+            "algorithm": dict(master.system.algorithm.summary()),
+            "control": dict(master.control.summary()),
+            "stepper": master.stepper.summary(),
+            "events": None if master.system.events is None else master.system.events.summary(),
+        },
         "order": [s.component.name for s in plan.steps],
         "components": [_component(s.component, table.components[s.component.name]) for s in plan.steps],
-        "connections": list(table.connections),
+        "connections": [str(item) for item in table.connections],
         "versions": versions(),
     }
 
@@ -74,6 +83,8 @@ def _component(component: Component, table: ComponentTable) -> dict[str, Any]:
         "source": component.source,
         "calls": component.calls,
         "seconds": component.seconds,
-        "messages": list(component.messages),
+        "cost": tally_table(component.calls, component.seconds, component.tallies),
+        "messages": [message.text for message in component.messages.kept()[-MESSAGES_SHOWN:]],
+        "message_counts": dict(component.messages.counts),
         "events": None if outcomes is None else dict(outcomes),
     }

@@ -6,7 +6,7 @@ Drives the runtime through them. Knows numbers and names of events, and nothing 
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from math import isfinite
@@ -36,7 +36,8 @@ class Events:
     """Triggered events of one runtime.
 
     `stamps`, `counts` and `active` (FMI 3: numbers of the active clocks) are set from outside, as are, before time runs, the two
-    parameters in `protocol`: the number of the late policy, from one, and how far back it can go [s]. `seen` are the counts
+    parameters in `protocol`: the number of the late policy, from one, and how far back it can go [s]. `listener` is told what is
+    wrong with an event; where there is none, Python's log is. `seen` are the counts
     already taken notice of, `queue` the events whose stamp lies ahead, `journal` the past for replay, where the policy needs it.
 
     Args:
@@ -51,6 +52,7 @@ class Events:
         self._runtime, self._given = runtime, _given_positions(system, runtime)
         self.protocol = list(self._start)
         self.stamps = [STAMP_NOW] * len(self._names)
+        self.listener: Callable[[str], None] | None = None
         self.reset()
 
     @property
@@ -68,6 +70,13 @@ class Events:
         self.queue: list[Stamped] = []
         self.counters = Counters()
         self.restore_past(())
+
+    def warn(self, text: str, *values: object) -> None:
+        """Say what is wrong with an event; `values` are put into the text as a logger does."""
+        if self.listener is None:
+            _log.warning(text, *values)
+        else:
+            self.listener(text % values)
 
     def restore_past(self, records: Sequence[Record]) -> None:
         """Take over what happened so far, where the policy needs it."""
@@ -121,7 +130,7 @@ class Events:
             if count != seen + 1:
                 what = "only the last payload is known" if count > seen else "no event is taken from that"
                 text = "event %s at t = %s s: the count went from %d to %d; %s"
-                _log.warning(text, self._names[number], self._runtime.t, seen, count, what)
+                self.warn(text, self._names[number], self._runtime.t, seen, count, what)
 
     def _announce(self, number: int) -> None:
         name = self._names[number]
@@ -129,11 +138,11 @@ class Events:
         self.stamps[number] = STAMP_NOW
         if not isfinite(stamp):
             self.counters.lost += 1
-            _log.warning("event %s: its stamp %r s is not a finite number; it is lost", name, stamp)
+            self.warn("event %s: its stamp %r s is not a finite number; it is lost", name, stamp)
             return
         if len(self.queue) >= QUEUE_CAPACITY:
             self.counters.lost += 1
-            _log.warning("event %s at %r s: %d events are waiting already; this one is lost", name, stamp, QUEUE_CAPACITY)
+            self.warn("event %s at %r s: %d events are waiting already; this one is lost", name, stamp, QUEUE_CAPACITY)
             return
         positions = self.payloads[name]
         self.queue.append(Stamped(name, stamp, positions, tuple(float(self._runtime.u[i]) for i in positions)))
@@ -164,7 +173,7 @@ class Events:
     def _reject(self, event: Stamped, reason: str) -> None:
         self.counters.rejected += 1
         text = "event %s: its stamp %r s lies before the current time %r s; it is rejected (%d so far): %s"
-        _log.warning(text, event.name, event.stamp, self._runtime.t, self.counters.rejected, reason)
+        self.warn(text, event.name, event.stamp, self._runtime.t, self.counters.rejected, reason)
 
 
 def _payload_positions(system: HybridSystem) -> dict[str, tuple[int, ...]]:

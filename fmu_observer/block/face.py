@@ -26,7 +26,8 @@ from fmu_observer.description import describe
 from fmu_observer.event_protocol import DEFAULT_REPLAY_HORIZON, Announcement, EventProtocol, LatePolicy
 from plant_models.hybrid import HybridSystem
 
-FMI_DISCARD, FMI_ERROR = 2, 3
+FMI_WARNING, FMI_DISCARD, FMI_ERROR = 1, 2, 3
+WARNINGS = b"logStatusWarning"  # the category in which an exported FMU says the same
 
 P = ParamSpec("P")
 R = TypeVar("R")

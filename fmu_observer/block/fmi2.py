@@ -7,7 +7,7 @@ from typing import Any
 
 from fmpy.fmi2 import FMU2Slave, fmi2LastSuccessfulTime, fmi2Terminated
 
-from fmu_observer.block.face import Face, refused
+from fmu_observer.block.face import FMI_WARNING, WARNINGS, Face, refused
 from fmu_observer.block.variables import BlockError, Role
 
 WHOLE: tuple[Role, ...] = ("count", "integer_output", "policy")
@@ -27,8 +27,16 @@ class FMI2Block(Face, FMU2Slave):
     # -- life -------------------------------------------------------------------------------------------------------
 
     def instantiate(self, visible: bool = False, callbacks: Any = None, loggingOn: bool = False) -> None:
-        """Start values."""
+        """Start values; the logger among the callbacks hears what is wrong with events."""
         self.instance.reset()
+        logger: Any = getattr(callbacks, "logger", None)
+        name = self.instanceName.encode()
+        environment = getattr(callbacks, "componentEnvironment", None)
+
+        def listener(text: str) -> None:
+            logger(environment, name, FMI_WARNING, WARNINGS, text.replace("%", "%%").encode())  # it takes what printf takes
+
+        self.instance.events.listener = listener if logger else None
 
     @refused
     def setupExperiment(self, tolerance: float | None = None, startTime: float = 0.0, stopTime: float | None = None) -> None:

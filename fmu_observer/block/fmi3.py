@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 from fmpy.fmi3 import FMU3Slave
 
-from fmu_observer.block.face import Face, refused
+from fmu_observer.block.face import FMI_WARNING, WARNINGS, Face, refused
 from fmu_observer.block.variables import BlockError, Mode, Role
 
 INT32: tuple[Role, ...] = ("count", "integer_output")
 INT64: tuple[Role, ...] = ("policy",)
-
-_log = logging.getLogger(__name__)
 
 
 class FMI3Block(Face, FMU3Slave):
@@ -40,6 +37,9 @@ class FMI3Block(Face, FMU3Slave):
     ) -> None:  # fmt: skip
         """Start values; `eventModeUsed` and `earlyReturnAllowed` as in FMI 3."""
         self.instance.reset()
+        self.instance.events.listener = (
+            None if logMessage is None else lambda text: logMessage(None, FMI_WARNING, WARNINGS, text.encode())
+        )
         self._event_mode_used = bool(eventModeUsed)
         self._early_return_allowed = bool(earlyReturnAllowed)
 
@@ -169,7 +169,7 @@ class FMI3Block(Face, FMU3Slave):
         super().exitInitializationMode()
         if self._event_mode_used is False and self.system.triggered_events and not self._counts_events:
             names = ", ".join(event.name for event in self.system.triggered_events)
-            _log.warning(
+            self.instance.events.warn(
                 "%s: eventModeUsed is False, but events (%s) are announced by clocks: none can be told; a block with "
                 "announcement='counts' (an FMU built with `--events counts`) is for masters without event mode",
                 self.instanceName, names,

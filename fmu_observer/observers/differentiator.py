@@ -34,7 +34,7 @@ def differentiator_flow(z: Sequence[Array], signal: Array, L: Array) -> list[Arr
     n = len(z) - 1
     gains = _gains(n)
     error = z[0] - signal
-    return [-gains[n - i] * L ** ((i + 1) / (n + 1)) * signed_power(error, n - i, n + 1) + _next(z, i) for i in range(n + 1)]
+    return [-gains[n - i] * power(L, i + 1, n + 1) * signed_power(error, n - i, n + 1) + _next(z, i) for i in range(n + 1)]
 
 
 def filtering_differentiator_flow(
@@ -63,14 +63,28 @@ def filtering_differentiator_flow(
     m = n + nf
     gains = _gains(m)
     chain = [*w, z[0] - signal]
-    dw = [-gains[m - i] * L ** ((i + 1) / (m + 1)) * signed_power(w[0], m - i, m + 1) + chain[i + 1] for i in range(nf)]
-    dz = [-gains[n - j] * L ** ((nf + 1 + j) / (m + 1)) * signed_power(w[0], n - j, m + 1) + _next(z, j) for j in range(n + 1)]
+    dw = [-gains[m - i] * power(L, i + 1, m + 1) * signed_power(w[0], m - i, m + 1) + chain[i + 1] for i in range(nf)]
+    dz = [-gains[n - j] * power(L, nf + 1 + j, m + 1) * signed_power(w[0], n - j, m + 1) + _next(z, j) for j in range(n + 1)]
     return dw, dz
+
+
+def power(value: Array, numerator: int, denominator: int) -> Array:
+    """``value^(numerator/denominator)`` of a number that is not negative, numerator >= 1.
+
+    As a power of the root, because all the powers that a differentiator needs then share one root: roots are most of its cost.
+    """
+    if numerator == denominator:
+        return value
+    root = value ** (1.0 / denominator)
+    result = root
+    for _ in range(numerator - 1):
+        result = result * root
+    return result
 
 
 def signed_power(value: Array, numerator: int, denominator: int) -> Array:
     """``|value|^(numerator/denominator) sgn(value)``."""
-    return np.sign(value) if numerator == 0 else np.abs(value) ** (numerator / denominator) * np.sign(value)
+    return np.sign(value) if numerator == 0 else power(np.abs(value), numerator, denominator) * np.sign(value)
 
 
 def _next(z: Sequence[Array], i: int) -> Array:

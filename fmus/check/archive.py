@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import posixpath
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -79,15 +79,16 @@ class Archive:
 
 def platform_folder(description: ModelDescription) -> str:
     """Name of this platform's folder in ``binaries/``."""
-    return str(fmpy.platform if str(description.fmiVersion).startswith("2") else fmpy.platform_tuple)
+    return str(fmpy.platform_tuple if str(description.fmiVersion).startswith("3") else fmpy.platform)
 
 
-def open_archive(path: Path, max_bytes: int = MAX_UNPACKED_BYTES) -> Archive:
+def open_archive(path: Path, max_bytes: int = MAX_UNPACKED_BYTES, versions: Sequence[str] = ("2.0", "3.0")) -> Archive:
     """Look at an FMU file; nothing is unpacked.
 
     Args:
         path: the file.
         max_bytes: refuse what declares to unpack to more.
+        versions: FMI versions that the caller can run.
 
     Raises:
         NotAnFmuError: it is missing, broken, dangerous, no FMU, or of an FMI version that is not known here.
@@ -100,12 +101,17 @@ def open_archive(path: Path, max_bytes: int = MAX_UNPACKED_BYTES) -> Archive:
             entries = archive.infolist()
     except (zipfile.BadZipFile, OSError, EOFError, ValueError, NotImplementedError) as error:
         raise NotAnFmuError(f"{path} is not a readable FMU: not a zip archive, or a broken one ({error}).") from error
-    _demand_harmless(path, entries, max_bytes)
-    description = _description(path, [entry.filename for entry in entries])
+    demand_harmless(path, entries, max_bytes)
+    description = _description(path, [entry.filename for entry in entries], versions)
     return Archive(path, description, _platforms(description, entries))
 
 
-def _demand_harmless(path: Path, entries: list[zipfile.ZipInfo], max_bytes: int) -> None:
+def demand_harmless(path: Path, entries: list[zipfile.ZipInfo], max_bytes: int = MAX_UNPACKED_BYTES) -> None:
+    """Refuse an archive that would unpack to too much, or to places outside of its own folder; by its entries alone.
+
+    Raises:
+        NotAnFmuError: it is refused.
+    """
     size = sum(entry.file_size for entry in entries)
     if size > max_bytes or len(entries) > MAX_FILES:
         limit = f"{max_bytes / 1e9:.1f} GB and {MAX_FILES} files"
@@ -120,7 +126,7 @@ def _demand_harmless(path: Path, entries: list[zipfile.ZipInfo], max_bytes: int)
             raise NotAnFmuError(f"{path} has a modelDescription.xml of {entry.file_size / 1e9:.1f} GB; refused.")
 
 
-def _description(path: Path, names: list[str]) -> ModelDescription:
+def _description(path: Path, names: list[str], versions: Sequence[str]) -> ModelDescription:
     if FILE not in names:
         raise NotAnFmuError(f"{path} is not a readable FMU: it has no modelDescription.xml.")
     try:
@@ -128,8 +134,9 @@ def _description(path: Path, names: list[str]) -> ModelDescription:
     except Exception as error:  # whatever a broken file makes the parser throw
         raise NotAnFmuError(f"{path} is not a readable FMU: modelDescription.xml cannot be parsed ({error}).") from error
     version = str(description.fmiVersion)
-    if not version.startswith(("2.", "3.")):
-        raise NotAnFmuError(f"{path} is FMI {version}; FMI 2.0 and 3.0 are supported.")
+    if not version.startswith(tuple(known[:2] for known in versions)):
+        supported = f"{', '.join(versions[:-1])} and {versions[-1]}"
+        raise NotAnFmuError(f"{path} is FMI {version}; FMI {supported} are supported.")
     if all(getattr(description, name) is None for name in INTERFACES):
         raise NotAnFmuError(f"{path} offers no interface: neither {', '.join(INTERFACES.values())}.")
     return description

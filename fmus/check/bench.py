@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -27,7 +28,7 @@ class Bench:
     """
 
     def __init__(
-        self, make: Callable[[], Steppable], starts: Mapping[str, float], start_time: float, h: float,
+        self, make: Callable[[], Steppable], starts: Mapping[str, Any], start_time: float, h: float,
         component: Steppable | None = None,
     ) -> None:  # fmt: skip
         self._make, self.starts, self.t0, self.h = make, starts, start_time, h

@@ -43,7 +43,7 @@ class ProbeReport:
         return asdict(self) | {"remarks": list(self.remarks)}
 
 
-def probe(make: Callable[[], Steppable], starts: Mapping[str, float], start_time: float, h: float) -> ProbeReport:
+def probe(make: Callable[[], Steppable], starts: Mapping[str, Any], start_time: float, h: float) -> ProbeReport:
     """Probe a component.
 
     Args:

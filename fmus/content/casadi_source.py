@@ -12,6 +12,12 @@ FUNCTION = re.compile(
 )
 SPARSITY = re.compile(r"^(?:#define (?P<macro>casadi_s\d+) |static const casadi_int (?P<array>casadi_s\d+)\[).*\n", re.MULTILINE)
 
+INLINE = {
+    "return fmax(x, y);": "return y != y ? x : x > y ? x : y;",
+    "return fmin(x, y);": "return y != y ? x : x < y ? x : y;",
+}
+"""The same values as the functions of the C library, NaN included, without a call."""
+
 
 def private_source(source: str, called: Collection[str]) -> str:
     """Generated C with nothing visible outside its file.
@@ -25,6 +31,8 @@ def private_source(source: str, called: Collection[str]) -> str:
     Returns:
         The source with only those functions and what they need, all of them static.
     """
+    for call, inline in INLINE.items():
+        source = source.replace(call, inline)
     kept = FUNCTION.sub(lambda match: _kept(match, called), source)
     return SPARSITY.sub(lambda match: match[0] if _is_used(match["macro"] or match["array"], kept) else "", kept)
 

@@ -115,7 +115,7 @@ def generate_model(system: HybridSystem, equations: Equations, description: Mode
 
 def _dense(function: ca.Function, name: str) -> ca.Function:
     arguments = [ca.SX.sym(function.name_in(i), *function.size_in(i)) for i in range(function.n_in())]
-    return ca.Function(name, arguments, [ca.densify(function(*arguments))])
+    return ca.Function(name, arguments, [ca.cse(ca.densify(function(*arguments)))])
 
 
 def _equations_source(name: str, equations: Equations) -> str:

@@ -20,6 +20,7 @@ from cosim.coupling.connection import connect
 from cosim.coupling.graph import execution_order
 from cosim.coupling.plan import Plan, make_plan
 from cosim.master.axis import TimeAxis
+from cosim.master.lines.draw import draw_lines
 from cosim.master.master import Master, close
 from cosim.results.result import BaliseRecord
 from fmu_observer.observers.high_gain_observer import HighGainTrainObserver
@@ -162,9 +163,9 @@ class Balises:
 def prepare(
     components: Sequence[Component], connections: Sequence[tuple[str, str]], h: float, count: int, balises: Balises | None = None,
     *, start: float = 0.0, starts: Mapping[str, Mapping[str, float]] | None = None,
-    extra: Mapping[str, Sequence[str]] | None = None,
+    extra: Mapping[str, Sequence[str]] | None = None, inputs: Any = "hold", **how: Any,
 ) -> Master:  # fmt: skip
-    """A master ready to run."""
+    """A master ready to run; `how` as for `Master`."""
     by_name = {c.name: c for c in components}
     pairs = connect(connections, by_name)
     before = [] if balises is None else [(balises.plant, name) for name in balises.receivers]
@@ -174,8 +175,10 @@ def prepare(
         for name, value in (starts or {}).get(component.name, {}).items():
             component.set_start(name, value)
     plan = make_plan(by_name, pairs, order, extra)
+    if inputs != "hold":
+        draw_lines(plan, inputs)
     service = None if balises is None else _service(plan, balises)
-    return Master(plan, TimeAxis(start, h, count), service)
+    return Master(plan, TimeAxis(start, h, count), service, **how)
 
 
 def _service(plan: Plan, balises: Balises) -> BaliseService:

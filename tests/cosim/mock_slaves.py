@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from copy import deepcopy
+from math import prod
 from typing import Any, ClassVar
 
 from fmpy.fmi1 import FMICallException
@@ -97,7 +98,7 @@ class Mock:
     # -- FMI life ---------------------------------------------------------------------------------------------------
 
     def _restart(self) -> None:
-        self.v: dict[str, float] = dict(self._starts)
+        self.v: dict[str, Any] = dict(self._starts)
         self.time = 0.0
         self.begin()
 
@@ -126,28 +127,42 @@ class Mock:
 
     # -- values -----------------------------------------------------------------------------------------------------
 
-    def _get(self, references: Iterable[int]) -> list[float]:
+    def _sizes(self, references: Iterable[int]) -> Iterable[tuple[str, int]]:
+        """Names and numbers of values; a scalar is held as a number, an array as a flat list."""
+        by_reference = {v.valueReference: v for v in self.model_description.modelVariables}
+        return [(by_reference[r].name, prod(by_reference[r].shape or ())) for r in references]
+
+    def _get(self, references: Iterable[int], nValues: int | None = None) -> list[Any]:
         self.compute()
-        names = {r: n for n, r in self.references.items()}
-        return [self.v[names[r]] for r in references]
+        values: list[Any] = []
+        for name, size in self._sizes(references):
+            held = self.v[name]
+            values += held if isinstance(held, list) else [held] * size
+        assert nValues is None or nValues == len(values)
+        return values
 
-    def _set(self, references: Iterable[int], values: Iterable[float]) -> None:
-        names = {r: n for n, r in self.references.items()}
-        self.v.update({names[r]: x for r, x in zip(references, values, strict=True)})
+    def _set(self, references: Iterable[int], values: Iterable[Any]) -> None:
+        given = list(values)
+        shaped = {v.name for v in self.model_description.modelVariables if v.shape}
+        for name, size in self._sizes(references):
+            taken, given = given[:size], given[size:]
+            assert len(taken) == size
+            self.v[name] = taken if name in shaped else taken[0]
+        assert not given
 
-    getReal = getFloat64 = getFloat32 = _get
-    setReal = setFloat64 = setFloat32 = _set
+    getReal = getFloat64 = getFloat32 = getString = getBinary = _get
+    setReal = setFloat64 = setFloat32 = setString = setBinary = _set
 
-    def _get_whole(self, references: Iterable[int]) -> list[int]:
-        return [round(value) for value in self._get(references)]
+    def _get_whole(self, references: Iterable[int], nValues: int | None = None) -> list[int]:
+        return [round(value) for value in self._get(references, nValues)]
 
     def _set_whole(self, references: Iterable[int], values: Iterable[int]) -> None:
         values = list(values)
         assert all(isinstance(value, (int, bool)) for value in values)
         self._set(references, values)
 
-    getInteger = getInt64 = getInt32 = getUInt8 = getBoolean = _get_whole
-    setInteger = setInt64 = setInt32 = setUInt8 = setBoolean = _set_whole
+    getInteger = getInt64 = getInt32 = getUInt64 = getUInt8 = getBoolean = _get_whole
+    setInteger = setInt64 = setInt32 = setUInt64 = setUInt8 = setBoolean = _set_whole
 
     # -- steps ------------------------------------------------------------------------------------------------------
 

@@ -226,7 +226,7 @@ def test_a_late_policy_for_an_fmu_that_has_none_is_refused() -> None:
 @pytest.mark.parametrize(
     ("value", "message"),
     [
-        ("forget", r"observer\.late_policy has no item 'forget'; "),
+        ("forget", r"observer\.late_policy: no item 'forget'; "),
         (4, r"observer\.late_policy = 4 is no item of the enumeration: replay \(1\), reject \(2\), late \(3\)"),
     ],
 )

@@ -44,8 +44,8 @@ def test_start_values_reach_the_slave() -> None:
         ("y", "mock.y cannot be set: it has causality 'output'"),
         ("derived", "mock.derived cannot be set: it has causality 'calculatedParameter'"),
         ("g", "mock.g cannot be set: it is constant"),
-        ("label", "mock.label cannot be set: it is a String; only scalar numbers can"),
-        ("table", r"mock.table cannot be set: it is a Float64 array of shape \(2, 2\)"),
+        ("label", r"mock.label cannot be set: expected a text for a String \(got 1.0\)"),
+        ("table[3,1]", r"mock: no element 'table\[3,1\]' in a Float64 array of shape \(2, 2\)"),
         ("mas", "mock: no variable 'mas'; did you mean 'mass'"),
     ],
 )
@@ -175,7 +175,8 @@ def test_what_a_component_says_about_itself() -> None:
     assert made.outcomes() is not None
     assert made.variable("push", "input").name == "push"
     settable = component(Settable())
-    assert settable.names("parameter") == ["mass", "axles"]  # text and arrays are left out
+    elements = ["table[1,1]", "table[1,2]", "table[2,1]", "table[2,2]"]
+    assert settable.names("parameter") == ["mass", "axles", *elements]  # text is left out
 
 
 def test_seconds_and_calls_are_counted() -> None:

@@ -19,8 +19,9 @@ from cosim.errors import FmuLoadError
 
 def xml(version: str = "3.0", interface: str = '<CoSimulation modelIdentifier="toy"/>') -> str:
     token = "instantiationToken" if version.startswith("3") else "guid"
+    old = ' modelIdentifier="toy" numberOfContinuousStates="0"' if version.startswith("1") else ""
     return (
-        f'<?xml version="1.0"?><fmiModelDescription fmiVersion="{version}" modelName="toy" {token}="t">{interface}'
+        f'<?xml version="1.0"?><fmiModelDescription fmiVersion="{version}" modelName="toy" {token}="t"{old}>{interface}'
         "<ModelVariables/><ModelStructure/></fmiModelDescription>"
     )
 
@@ -74,6 +75,10 @@ def test_what_is_no_archive(tmp_path: Path) -> None:
         ({"readme.txt": "no description"}, "is not a readable FMU"),
         ({"modelDescription.xml": "<fmiModelDescription"}, "is not a readable FMU"),
         ({"modelDescription.xml": xml(interface='<ModelExchange modelIdentifier="toy"/>')}, "offers no co-simulation interface"),
+        ({"modelDescription.xml": xml("1.0")}, "offers no co-simulation interface"),
+        ({"modelDescription.xml": xml("1.0", "<Implementation/>")}, f"no library .*{fmpy.platform} is needed"),
+        ({"modelDescription.xml": xml("1.0", "<Implementation/>"), library("1.0"): b"x"}, "cannot load .*Failed to load"),
+        ({"modelDescription.xml": xml("4.0")}, "Unsupported FMI version: 4.0"),
         ({"modelDescription.xml": xml()}, f"no library for this platform .*{fmpy.platform_tuple}.* it offers: none"),
         ({"modelDescription.xml": xml(), "binaries/riscv-vms/toy.so": b""}, "no library for this platform"),
         ({"modelDescription.xml": xml("2.0"), "binaries/vms/toy.so": b""}, "no library for this platform"),

@@ -133,8 +133,10 @@ def test_no_unit_on_one_side_is_taken_as_it_is() -> None:
         ("meter.speed", "reader.heard", r"reader.heard has causality 'output', expected input; such variables: speed, force"),
         ("reader.speed", "meter.speed", r"reader.speed has causality 'input', expected output"),
         ("meter.speed", "reader.gain", r"reader.gain has causality 'parameter', expected input"),
-        ("meter.label", "reader.speed", r"meter.label is a String; only scalar numeric"),
-        ("meter.table", "reader.speed", r"meter.table is an array of shape \(3,\); only scalar numeric"),
+        ("meter.label", "reader.speed", r"meter.label is a String, reader.speed is a Float64; only equal types fit here"),
+        ("meter.table", "reader.speed", r"meter.table is an array of shape \(3,\), reader.speed is a scalar; connect arrays of"),
+        ("meter.table[0]", "reader.speed", r"meter: no element 'table\[0\]' in a Float64 array of shape \(3,\); the first is 1"),
+        ("meter.table[4]", "reader.speed", r"meter: no element 'table\[4\]' in a Float64 array of shape \(3,\)"),
     ],
 )
 def test_what_cannot_be_connected_is_named(source: str, target: str, message: str) -> None:
@@ -153,6 +155,20 @@ def test_the_variables_of_an_event_belong_to_the_master(version: Any) -> None:
     assert parts["listener"].names("input") == ["speed"]
     with pytest.raises(CouplingError, match=r"listener.balise_position belongs to an event"):
         connect([("meter.plain", "listener.balise_position")], parts)
+
+
+def test_an_array_without_any_source_is_named_once() -> None:
+    class Table(Reader):
+        def more_variables(self) -> list[Any]:
+            arrays = [variable(n, "input", 60 + i, "Float64", shape=(3,)) for i, n in enumerate(("one", "some", "whole"))]
+            return [*arrays, variable("text", "input", 70, "String")]
+
+    pairs = [("meter.table[2]", "reader.some[1]"), ("meter.table", "reader.whole"), ("meter.speed", "reader.speed")]
+    parts = pair(target=Table())
+    free = unconnected_inputs(connect(pairs, parts), [parts["reader"]])
+    assert free[-4:] == ["reader.one", "reader.some[2]", "reader.some[3]", "reader.text"]
+    with pytest.raises(CouplingError, match=r"Input reader.some\[1\] has two sources, meter.table\[2\] and meter.table"):
+        connect([*pairs, ("meter.table", "reader.some")], parts)
 
 
 def test_names_with_dots_and_what_is_left_free() -> None:

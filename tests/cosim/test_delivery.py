@@ -15,6 +15,7 @@ from mock_slaves import FMI2, EventMode, Mock, component, variable
 import fmu_observer
 from cosim.balises.layout import InstantLayout
 from cosim.balises.telegram import Channel
+from cosim.components.capabilities import read_capabilities
 from cosim.components.component import Component
 
 H = 0.1
@@ -25,6 +26,7 @@ def without(made: Component, *abilities: str) -> Component:
     """The component with capability flags taken away."""
     for ability in abilities:
         setattr(made.description.coSimulation, ability, False)
+    made.capabilities = read_capabilities(made.description)
     return made
 
 

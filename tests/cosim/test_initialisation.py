@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from coupled_runs import block, prepare, run
 from mock_slaves import Counter, Mock, component
+from scipy.optimize import brentq
 
 from cosim.errors import RunError
 from cosim.master.initialisation import MAX_ROUNDS
@@ -93,33 +94,71 @@ def test_what_is_sampled_at_the_start_time_is_in_the_first_row() -> None:
     assert ran["mass.acceleration"][0] == -STIFFNESS / MASS
 
 
-def test_a_contraction_settles_on_its_fixed_point() -> None:
-    """y = u / 2 + 1 and u = y: y = 2. Undeclared feedthrough is the only way to get here without being refused."""
+class Gain(Mock):
+    """``y = gain u + 1``: with ``u = y`` it settles on ``1 / (1 - gain)``, by plain exchange where the gain is below 1."""
 
-    class Half(Mock):
-        inputs: ClassVar[dict[str, Any]] = {"u": 0.0}
-        outputs: ClassVar[dict[str, Any]] = {"y": 0.0}
+    inputs: ClassVar[dict[str, Any]] = {"u": 0.0}
+    outputs: ClassVar[dict[str, Any]] = {"y": 0.0, "steady": 5.0}
+    parameters: ClassVar[dict[str, Any]] = {"gain": 0.5}
+
+    def compute(self) -> None:
+        self.v["y"] = self.v["gain"] * self.v["u"] + 1.0
+
+
+@pytest.mark.parametrize("gain", [1e-3, 0.5, -1.0, -4.0, 7.0])
+def test_a_loop_with_a_solution_settles_on_it(gain: float) -> None:
+    """Undeclared feedthrough; the plain exchange alone would need 40 rounds for a gain of 1/2 and diverges from 1 on."""
+    ran = run([component(Gain(), "a")], [("a.y", "a.u")], 0.1, 1, starts={"a": {"gain": gain}})
+    assert ran["a.y"][0] == pytest.approx(1.0 / (1.0 - gain), rel=1e-11)  # settled within 1e-12, and once more passed on
+    assert ran.master.exchange_rounds < 20
+
+
+def test_what_settles_plainly_is_the_plain_exchange_bit_for_bit() -> None:
+    """Few rounds, and the numbers of repeated substitution: no search where none is needed."""
+    ran = run([component(Gain(), "a")], [("a.y", "a.u")], 0.1, 1, starts={"a": {"gain": 1e-3}})
+    y = 0.0
+    for _ in range(ran.master.exchange_rounds + 2):
+        y = 1e-3 * y + 1.0
+    assert ran["a.y"][0] == y
+    assert ran.master.exchange_rounds <= 7
+
+
+def test_a_nonlinear_loop_is_found_where_plain_exchange_explodes() -> None:
+    """``y = 3 - u^3`` has one solution, with a slope of -4.4; plain exchange would overflow in its eighth round."""
+
+    class Bent(Gain):
+        def compute(self) -> None:
+            self.v["y"] = 3.0 - self.v["u"] ** 3
+
+    ran = run([component(Bent(), "a")], [("a.y", "a.u")], 0.1, 1)
+    solution = brentq(lambda u: u + u**3 - 3.0, 1.0, 1.5, xtol=1e-15)
+    assert ran["a.y"][0] == pytest.approx(solution, rel=1e-11)  # 1e-12 times the slope
+
+
+def test_a_loop_that_jumps_when_initialisation_ends_settles_again() -> None:
+    """``y = -4 u + x``, and x becomes 1 on leaving Initialization Mode: the first row holds 1/5."""
+
+    class Jumps(Gain):
+        def begin(self) -> None:
+            self.x = {"x": 0.0}
 
         def compute(self) -> None:
-            self.v["y"] = 0.5 * self.v["u"] + 1.0
+            self.v["y"] = -4.0 * self.v["u"] + self.x["x"]
 
-    ran = run([component(Half(), "a")], [("a.y", "a.u")], 0.1, 1)
-    assert ran["a.y"][0] == pytest.approx(2.0, rel=1e-11)
-    assert ran.master.exchange_rounds > 30
+        def exitInitializationMode(self) -> None:
+            self.x["x"] = 1.0
+
+    ran = run([component(Jumps(), "a")], [("a.y", "a.u")], 0.1, 1)
+    assert ran["a.y"][0] == pytest.approx(0.2, rel=1e-11)
 
 
 def test_an_exchange_that_does_not_settle_names_the_signals() -> None:
-    class Flip(Mock):
-        inputs: ClassVar[dict[str, Any]] = {"u": 0.0}
-        outputs: ClassVar[dict[str, Any]] = {"y": 0.0, "steady": 5.0}
-
-        def compute(self) -> None:
-            self.v["y"] = 1.0 - self.v["u"]
-
+    """``y = u + 1`` with ``u = y`` has no solution."""
     calm = component(Counter(), "calm")
-    master = prepare([component(Flip(), "a"), calm], [("a.y", "a.u")], 0.1, 3, start=2.0)
+    master = prepare([component(Gain(), "a"), calm], [("a.y", "a.u")], 0.1, 3, start=2.0, starts={"a": {"gain": 1.0}})
     with pytest.raises(RunError, match=rf"t = 2 s does not settle after {MAX_ROUNDS} exchanges; still changing: a\.y\.") as error:
         master.run()
+    assert "Relative changes of what is fed back: " in str(error.value)
     assert error.value.time == 2.0
     assert master.recorder.count == 0
 

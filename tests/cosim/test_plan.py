@@ -43,7 +43,7 @@ def test_outputs_lie_in_one_array_in_the_order_of_stepping() -> None:
         (lambda: plan().column("listener.integral"), "'listener.integral' is neither an output nor recorded; did you mean"),
         (lambda: plan().find("plent"), "No component 'plent' in this run; did you mean 'plant'"),
         (lambda: plan({"listener": ["integrl"]}), "listener: no variable 'integrl'; did you mean 'integral'"),
-        (lambda: plan({"listener": ["balise"]}), "listener.balise cannot be recorded: only scalar numbers can"),
+        (lambda: plan({"listener": ["balise"]}), "listener.balise cannot be recorded: it is a Clock"),
     ],
 )
 def test_what_is_not_there_is_named(call, match: str) -> None:

@@ -198,11 +198,11 @@ def test_summary_is_strict_json(tmp_path: Path) -> None:
 # --- folder -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("formats", [("csv", "mat"), ("csv",), ("mat",)])
+@pytest.mark.parametrize("formats", [("csv", "mat"), ("csv",), ("mat",), ("npy",)])
 def test_folder_reads_back(formats: tuple[str, ...], result: Result, tmp_path: Path) -> None:
     paths = write_results(result, tmp_path / "new" / "out", formats)
     back = read_results(tmp_path / "new" / "out")
-    assert set(paths) == {*formats, "events", "summary"}
+    assert set(paths) == {*formats, "events", "messages", "summary"}
     assert sorted(p.name for p in (tmp_path / "new" / "out").iterdir()) == sorted(p.name for p in paths.values())
     assert bits(back.table) == bits(result.table)
     assert list(back.signals) == list(result.signals)

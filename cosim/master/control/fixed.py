@@ -2,28 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
-from cosim.master.system import Row, System
+from cosim.master.control.control import StepControl
+from cosim.master.system import Row
 
 
-class FixedStep:
-    """Step control without control.
-
-    Args:
-        system: what is stepped.
-    """
+class FixedStep(StepControl):
+    """Step control without control."""
 
     name = "fixed"
 
-    def __init__(self, system: System) -> None:
-        self.system = system
-
-    def step(self, t: float, until: float) -> Sequence[Row]:
-        """Bring the system from `t` to `until` [s]; returns the event rows within the step."""
+    def step(self, t: float, until: float) -> Sequence[Row]:  # noqa: D102 - see StepControl
         return self.system.advance(t, until)
-
-    def summary(self) -> Mapping[str, Any]:
-        """What to tell of it after the run, plain data."""
-        return {"name": self.name}

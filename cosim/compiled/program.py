@@ -1,0 +1,258 @@
+"""The program of the stepper: the plan as the C structures of ``stepper.h``, over the functions of the loaded FMUs.
+
+Everything a structure points to is kept alive here. Knows no balise service and no master.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Sequence
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+
+from cosim.compiled.answers import Answer
+from cosim.components.component import Component
+from cosim.components.elements import Element
+from cosim.coupling.plan import Plan, PlannedComponent
+from cosim.errors import CosimError
+from cosim.master.axis import TimeAxis
+from fmus.ports import c_type, getter_type, size
+
+KINDS = (
+    "Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean8", "Boolean32",
+)  # fmt: skip
+FMI3 = 3
+SAME_AS = {"Real": "Float64", "Integer": "Int32"}
+
+
+class Stop(IntEnum):
+    """Why a stretch ended, as in ``stepper.h``."""
+
+    DONE = 0
+    TIME = 1
+    NEAR = 2
+    REFUSED = 3
+    WRITE = 4
+    STEP = 5
+    READ = 6
+    CROSSED = 7
+    NOT_FINITE = 8
+    SENT = 9  # in Python only: the inputs were sent, and no more was to be done
+
+
+class NotCompilable(CosimError):  # noqa: N818 - no error unless somebody demanded the compiled stepper
+    """A plan that the compiled stepper cannot execute; the message says why."""
+
+
+class CPort(ctypes.Structure):
+    """`Port`."""
+
+    _fields_ = (
+        *((name, ctypes.c_void_p) for name in ("function", "references", "values", "raw", "places", "elements")),
+        *((name, ctypes.c_int64) for name in ("count", "reference_count", "raw_count", "kind")),
+    )
+
+
+class CSlave(ctypes.Structure):
+    """`Slave`."""
+
+    _fields_ = (
+        *((name, ctypes.c_void_p) for name in ("instance", "do_step", "writes", "reads")),
+        *((name, ctypes.c_int64) for name in ("write_count", "read_count", "fmi_version", "heeds_events", "input_count")),
+        *((name, ctypes.c_void_p) for name in ("sources", "factors", "offsets", "inputs")),
+        ("calls", ctypes.c_int64),
+        ("seconds", ctypes.c_double),
+    )
+
+
+class CWatch(ctypes.Structure):
+    """`Watch`."""
+
+    _fields_ = (
+        *((name, ctypes.c_int64) for name in ("slave", "first_output", "output_count", "position", "speed")),
+        *((name, ctypes.c_double) for name in ("position_scale", "speed_scale", "acceleration_limit")),
+        ("places", ctypes.c_void_p),
+        *((name, ctypes.c_int64) for name in ("place_count", "cursor")),
+    )
+
+
+class CProgram(ctypes.Structure):
+    """`Program`."""
+
+    _fields_ = (
+        *((name, ctypes.c_double) for name in ("start", "step")),
+        *((name, ctypes.c_void_p) for name in ("values", "before")),
+        ("value_count", ctypes.c_int64),
+        ("slaves", ctypes.c_void_p),
+        *((name, ctypes.c_int64) for name in ("slave_count", "gathers_first")),
+        ("watch", CWatch),
+        *((name, ctypes.c_double) for name in ("seconds_at_most", "seconds", "sampled")),
+        *((name, ctypes.c_int64) for name in ("stop", "slave", "port", "status", "event", "terminate", "early")),
+        ("reached", ctypes.c_double),
+    )
+
+
+class Program:
+    """The plan in C.
+
+    Args:
+        plan: prepared; components instantiated, and not to be instantiated anew.
+        axis: communication points.
+        gathers_first: Jacobi, else Gauss-Seidel.
+
+    Attributes `head` and `slaves` are the structures; `writes` and `reads` the names of the functions of each slave's ports.
+
+    Raises:
+        NotCompilable: something in the plan has no place in it; it is named.
+    """
+
+    def __init__(self, plan: Plan, axis: TimeAxis, gathers_first: bool) -> None:
+        self.plan = plan
+        self._kept: list[Any] = []
+        self.writes: list[list[str]] = []
+        self.reads: list[list[str]] = []
+        self.slaves = (CSlave * len(plan.steps))(*(self._slave(step) for step in plan.steps))
+        self.head = CProgram(start=axis.start, step=axis.step, gathers_first=gathers_first)
+        self.head.values, self.head.value_count = plan.values.ctypes.data, len(plan.values)
+        self.head.slaves, self.head.slave_count = ctypes.addressof(self.slaves), len(plan.steps)
+        self.head.watch.slave = -1
+        self.before = np.zeros_like(plan.values)
+
+    def watch(self, slave: int, position: int, speed: int, scales: tuple[float, float], places: np.ndarray, limit: float) -> None:
+        """Have the stepper leave steps in which a balise may be passed.
+
+        Args:
+            slave: place of the plant in the plan. position, speed: columns. scales: of these, to [m] and [m/s].
+            places: of the balises [m], increasing. limit: acceleration [m/s2].
+        """
+        columns = self.plan.steps[slave].columns
+        self.head.watch = CWatch(
+            slave=slave, first_output=columns.start, output_count=columns.stop - columns.start, position=position, speed=speed,
+            position_scale=scales[0], speed_scale=scales[1], acceleration_limit=limit,
+            places=self._address(np.ascontiguousarray(places, dtype=np.float64)), place_count=len(places), cursor=0,
+        )  # fmt: skip
+
+    @property
+    def address(self) -> int:
+        """Where the program is."""
+        return ctypes.addressof(self.head)
+
+    def values_before(self) -> np.ndarray:
+        """The values at the beginning of the step in which the last stretch ended, shape (n,); valid until the next one."""
+        count = self.head.value_count
+        return np.frombuffer((ctypes.c_double * count).from_address(self.head.before), dtype=np.float64).copy()
+
+    def reads_straight(self, which: int) -> bool:
+        """Whether the outputs of an FMI 3 slave are read by one call, as doubles, into their place."""
+        reads = ctypes.cast(self.slaves[which].reads, ctypes.POINTER(CPort))
+        return self.reads[which] == ["fmi3GetFloat64"] and reads[0].places is None
+
+    def said(self, which: int, stop: Stop) -> dict[str, list[Answer]]:
+        """What a slave has said in a move that ended with `stop`, by function; `which`: its place in the plan."""
+        head, writes, reads = self.head, self.writes[which], self.reads[which]
+        if stop is Stop.REFUSED:
+            return {}
+        if stop is Stop.WRITE:
+            return {name: [Answer()] for name in writes[: head.port]} | {writes[head.port]: [Answer(head.status)]}
+        said = {name: [Answer()] for name in writes}
+        if stop is Stop.SENT:
+            return said
+        version = self.plan.steps[which].component.fmi_version
+        results: tuple[Any, ...] = (False, False, False, math.inf)  # arrived, as it did
+        if stop is Stop.STEP:
+            results = bool(head.event), bool(head.terminate), bool(head.early), float(head.reached)
+        said[f"fmi{version}DoStep"] = [Answer(head.status if stop is Stop.STEP else 0, results if version == FMI3 else ())]
+        if stop is Stop.READ:
+            said[reads[head.port]] = [Answer(head.status)]
+        return said
+
+    # -- slaves -----------------------------------------------------------------------------------------------------
+
+    def _slave(self, step: PlannedComponent) -> CSlave:
+        component, inputs = step.component, step.inputs
+        _check(component)
+        outputs = [s.name.removeprefix(f"{component.name}.") for s in self.plan.signals[step.columns]]
+        made = CSlave(instance=_address_of(component.slave.component), fmi_version=component.fmi_version)
+        made.do_step = self._function(component, f"fmi{component.fmi_version}DoStep")
+        made.heeds_events = bool(getattr(component, "has_event_mode", False))
+        writes, names = self._ports(component, "Set", inputs.names, inputs.buffer)
+        self.writes.append(names)
+        made.writes, made.write_count = ctypes.addressof(writes), len(writes)
+        reads, names = self._ports(component, "Get", outputs, step.outputs)
+        self.reads.append(names)
+        made.reads, made.read_count = ctypes.addressof(reads), len(reads)
+        made.input_count, made.sources = len(inputs), self._address(inputs.sources.astype(np.int64))
+        if np.any(inputs.factors != 1.0) or np.any(inputs.offsets != 0.0):
+            made.factors, made.offsets = self._address(inputs.factors), self._address(inputs.offsets)
+        made.inputs = self._address(inputs.buffer)
+        return made
+
+    def _ports(
+        self, component: Component, verb: str, names: Sequence[str], values: np.ndarray
+    ) -> tuple[ctypes.Array[CPort], list[str]]:
+        groups: dict[str, list[tuple[int, Element]]] = {}
+        for place, name in enumerate(names):
+            element = component.variables.element(name)
+            if element.variable.name in component.negated:
+                raise NotCompilable(f"{component.name}.{name} is an alias with the other sign")
+            groups.setdefault(getter_type(element.variable.type, component.fmi_version), []).append((place, element))
+        ports = [self._port(component, verb, kind, members, values) for kind, members in groups.items()]
+        array = (CPort * len(ports))(*ports)
+        self._kept.append(array)
+        return array, [f"fmi{component.fmi_version}{verb}{kind}" for kind in groups]
+
+    def _port(
+        self, component: Component, verb: str, kind: str, members: Sequence[tuple[int, Element]], values: np.ndarray
+    ) -> CPort:
+        version = component.fmi_version
+        word = f"Boolean{32 if version == 2 else 8}" if kind == "Boolean" else SAME_AS.get(kind, kind)
+        first, total = _first_values([element for _, element in members])
+        if verb == "Set" and total != len(members):
+            raise NotCompilable(f"some elements of an array of {component.name} have a source and others have none")
+        places = [place for place, _ in members]
+        elements = [first[element.variable.name] + (element.index or 0) for _, element in members]
+        port = CPort(reference_count=len(first), raw_count=total, count=len(members), kind=KINDS.index(word))
+        port.function, port.values = self._function(component, f"fmi{version}{verb}{kind}"), self._address(values)
+        port.references = self._address(np.array([component.variables[n].valueReference for n in first], dtype=np.uint32))
+        if word == "Float64" and elements == list(range(total)) and places == list(range(places[0], places[0] + total)):
+            port.raw = self._address(values[places[0] :])
+            return port
+        port.places, port.elements = (self._address(np.array(numbers, dtype=np.int64)) for numbers in (places, elements))
+        port.raw = self._address(np.zeros(total, dtype=c_type(kind, version)[2]))
+        return port
+
+    def _function(self, component: Component, name: str) -> int:
+        return _address_of(component.slave._functions[name])
+
+    def _address(self, array: np.ndarray) -> int:
+        self._kept.append(array)
+        return int(array.ctypes.data)
+
+
+def _first_values(elements: Sequence[Element]) -> tuple[dict[str, int], int]:
+    """Where the values of each whole variable begin when they are read in order of first use, and how many there are."""
+    first: dict[str, int] = {}
+    total = 0
+    for element in elements:
+        if element.variable.name not in first:
+            first[element.variable.name] = total
+            total += size(element.variable)
+    return first, total
+
+
+def _check(component: Component) -> None:
+    slave = component.slave
+    if component.kind != "FMU" or not hasattr(slave, "dll") or not hasattr(slave, "_functions"):
+        raise NotCompilable(f"{component.name} runs in Python ({component.kind})")
+    if slave.fmiCallLogger is not None:
+        raise NotCompilable(f"the calls of {component.name} are logged")
+    if getattr(getattr(component, "_intermediate", None), "requested", False):
+        raise NotCompilable(f"{component.name} is given inputs during its steps")
+
+
+def _address_of(pointer: Any) -> int:
+    """The address of a function or an instance, however ctypes holds it."""
+    return int(pointer if isinstance(pointer, int) else ctypes.cast(pointer, ctypes.c_void_p).value or 0)

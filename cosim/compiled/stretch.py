@@ -1,0 +1,296 @@
+"""Stretches: communication steps that the compiled stepper does in one call, and the way back to Python where one is odd.
+
+A stretch ends at a row of events that Python knows beforehand (a telegram, an instant, a time event), and at whatever the stepper
+meets: then the Python stepper finishes the step from where it stands.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from cosim.balises.layout import InstantLayout, TrackLayout
+from cosim.balises.localiser import ACCELERATION_LIMIT
+from cosim.balises.rollback import RollbackLocaliser
+from cosim.balises.service import BaliseService
+from cosim.compiled.answers import Answer, answered
+from cosim.compiled.library import load_stepper
+from cosim.compiled.program import NotCompilable, Program, Stop
+from cosim.compiled.telling import Telling, can_be_told
+from cosim.components.component import NEVER, TIME_TOLERANCE, Component
+from cosim.coupling.plan import Mover, Plan, PlannedComponent
+from cosim.master.axis import TimeAxis
+from cosim.master.control.control import StepControl
+from cosim.master.control.fixed import FixedStep
+from cosim.master.system import NO_ROWS, Row, System
+from cosim.results.recorder import Recorder
+from fmus.toolchain.compile import CompilationError, CompilerMissing
+
+LONGEST = 4096
+SECONDS = 0.03
+"""A stretch is to last so long at most [s]: between two of them Ctrl-C is seen and progress told."""
+
+GROWTH = 8
+"""A stretch is at most so many times as long as the one before it."""
+
+Finish = Callable[[], Sequence[Row]]
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """What a stretch did.
+
+    Args:
+        done: steps done and recorded.
+        finish: does what is left of the next step, or all of it, in Python and returns its event rows; None where the next step
+            may be the stepper's again.
+        suspect: a value of the last row is not finite.
+    """
+
+    done: int
+    finish: Finish | None = None
+    suspect: bool = False
+
+
+class CompiledStepper:
+    """Does ordinary communication steps in C.
+
+    Args:
+        control: the step control of the run, through which Python does the other steps.
+        axis: communication points.
+
+    `steps` counts what it did.
+
+    Raises:
+        NotCompilable: why it cannot.
+    """
+
+    def __init__(self, control: StepControl, axis: TimeAxis) -> None:
+        self.control, self.axis = control, axis
+        self.system: System = control.system
+        self.plan: Plan = self.system.plan
+        self.steps = 0
+        self._longest = 1
+        _check(control, self.system)
+        self._program = Program(self.plan, axis, self.system.algorithm.name == "jacobi")
+        self._program.head.seconds_at_most = SECONDS
+        self._library = _load()
+        self._instants = _watch(self._program, self.system.balises, self.plan)
+        self._answering = False
+        for place, step in enumerate(self.plan.steps):
+            self._quicken(place, step)
+        self._quicken_receivers()
+        self._first: int | None = None
+        for place, step in enumerate(self.plan.steps):
+            step.component.clock = partial(self._time_in_stretch, place, step.component)
+
+    def run(self, k: int, recorder: Recorder) -> Stretch:
+        """Do steps from number `k` on.
+
+        Raises:
+            OutputError: the recorder takes no more rows.
+        """
+        free = self._free_steps(k)
+        if free < 1:
+            return Stretch(0, partial(self._whole_step, k))
+        rows = recorder.block(min(free, self._longest))
+        head, before = self._program.head, self._program.before
+        self._first = k
+        done = int(self._library.stepper_run(self._program.address, k, k + len(rows), rows.ctypes.data, before.ctypes.data))
+        self._first = None
+        recorder.commit(done)
+        self.steps += done
+        self._account(k + done)
+        if done:
+            fitting = int(self._longest * SECONDS / max(head.seconds, 1e-9))
+            self._longest = max(1, min(fitting, GROWTH * self._longest, LONGEST))
+        return self._ended(k, done, Stop(head.stop))
+
+    def _ended(self, k: int, done: int, stop: Stop) -> Stretch:
+        if stop in (Stop.DONE, Stop.TIME):
+            return Stretch(done)
+        if stop is Stop.NOT_FINITE:
+            return Stretch(done, suspect=True)
+        if stop is Stop.NEAR:
+            return Stretch(done, partial(self._whole_step, k + done))
+        return Stretch(done, partial(self._rest_of_step, k + done, self._program.values_before()))
+
+    def _time_in_stretch(self, place: int, component: Component) -> float:
+        """Where a component stands that logs something while C steps it: its calls so far tell the step it is in."""
+        if self._first is None:
+            return component.time
+        return self.axis[self._first + max(self._program.slaves[place].calls - 1, 0)]
+
+    # -- how far ----------------------------------------------------------------------------------------------------
+
+    def _free_steps(self, k: int) -> int:
+        """How many steps from number `k` on hold nothing that is known to be Python's."""
+        free, balises = self.axis.count - k, self.system.balises
+        limit = min((s.component.next_event for s in self.plan.steps), default=NEVER)
+        if any(s.component.terminated for s in self.plan.steps):
+            return 0
+        if balises is not None:
+            limit = min(limit, balises.idle_until)
+            if self._instants is not None:
+                limit = min(limit, self._instants.next_after(self.axis[k]))
+        return free if limit == NEVER else min(free, self._steps_before(k, limit))
+
+    def _steps_before(self, k: int, limit: float) -> int:
+        """How many steps from number `k` on end before `limit` [s], and not nearly there."""
+        if limit == -math.inf:
+            return 0
+        last = math.floor((limit - self.axis.start) / self.axis.step) + 1
+        while last > k and not self.axis[last] + 2.0 * TIME_TOLERANCE < limit:
+            last -= 1
+        return last - k
+
+    # -- Python's part ----------------------------------------------------------------------------------------------
+
+    def _whole_step(self, k: int) -> Sequence[Row]:
+        return self.control.step(self.axis[k], self.axis[k + 1])
+
+    def _rest_of_step(self, k: int, before: np.ndarray) -> Sequence[Row]:
+        """What is left of step `k` once the stepper has left it at one of the slaves."""
+        t, until, balises, first = self.axis[k], self.axis[k + 1], self.system.balises, int(self._program.head.slave)
+        if balises is not None:
+            balises.begin(t, until, before)
+        for place, step in enumerate(self.plan.steps[first:]):
+            if place == 0:
+                self._answered_move(step.move, t, until)
+            elif self._program.head.gathers_first:
+                step.move(t, until)
+            else:
+                step.step(t, until)
+        return NO_ROWS if balises is None else balises.rows()
+
+    def _quicken(self, place: int, step: PlannedComponent) -> None:
+        """In the steps that are Python's a component still moves by one call into the stepper."""
+        component, advance, drive = step.component, step.advance, step.drive
+        call, address = self._library.stepper_move, self._program.address
+
+        def move(slowly: Mover, t: float, until: float, reads: bool) -> None:
+            if self._answering or component.next_event <= until + 2.0 * TIME_TOLERANCE:
+                slowly(t, until)
+                return
+            begin = perf_counter()
+            if call(address, place, t, until - t, reads):
+                component.time = until
+                component.calls += 1
+                for kind in ("get", "set") if reads else ("set",):
+                    component.tallies[kind].add(0.0, 1)
+                component.seconds += perf_counter() - begin
+            else:
+                self._answered_move(slowly, t, until)
+
+        def quick_drive(t: float, until: float) -> None:
+            move(drive, t, until, reads=True)
+
+        if step.move == drive:
+            step.move = quick_drive
+        step.drive = quick_drive  # type: ignore[method-assign]
+        step.advance = lambda t, until: move(advance, t, until, reads=False)  # type: ignore[method-assign]
+
+    def _quicken_receivers(self) -> None:
+        """Receivers that allow it are stepped through a telegram by one call into the stepper."""
+        names = [step.component.name for step in self.plan.steps]
+        for receiver in [] if self.system.balises is None else self.system.balises.receivers:
+            place = names.index(receiver.planned.component.name)
+            if can_be_told(receiver, place, self._program):
+                telling = Telling(receiver, place, self._program, self._library, self._answered)
+                receiver.step = telling.step  # type: ignore[method-assign]
+
+    def _answered_move(self, move: Mover, t: float, until: float) -> None:
+        """Move a component in Python that the stepper has moved in part."""
+        head = self._program.head
+        slave = self.plan.steps[head.slave].component.slave
+        with self._answered(slave, self._program.said(head.slave, Stop(head.stop))):
+            move(t, until)
+
+    @contextmanager
+    def _answered(self, slave: Any, answers: Mapping[str, Sequence[Answer]]) -> Iterator[None]:
+        """Python is at work on a step that the stepper has begun: the slave repeats itself, and nobody calls the stepper."""
+        self._answering = True
+        try:
+            with answered(slave, answers):
+                yield
+        finally:
+            self._answering = False
+
+    def _account(self, k: int) -> None:
+        """Counters and times of the components after a stretch that ended in step number `k`."""
+        head = self._program.head
+        ended_within = head.stop in (Stop.REFUSED, Stop.WRITE, Stop.STEP, Stop.READ, Stop.CROSSED)
+        for place, (step, slave) in enumerate(zip(self.plan.steps, self._program.slaves, strict=True)):
+            component = step.component
+            again = ended_within and place == head.slave and head.stop in (Stop.STEP, Stop.READ, Stop.CROSSED)
+            calls = slave.calls - again  # Python counts that one
+            component.calls += calls
+            for kind in ("get", "set") if len(step.inputs) else ("get",):
+                component.tallies[kind].add(0.0, slave.calls)  # so short in C that only doStep is timed
+            if head.sampled:
+                component.seconds += slave.seconds * calls / head.sampled
+            component.time = self.axis[k + 1 if ended_within and place < head.slave else k]
+            slave.calls, slave.seconds = 0, 0.0
+
+
+def _load() -> Any:
+    try:
+        return load_stepper()
+    except (CompilerMissing, CompilationError, OSError) as error:
+        raise NotCompilable(f"the stepper cannot be compiled here: {error}") from error
+
+
+def _watch(program: Program, balises: BaliseService | None, plan: Plan) -> InstantLayout | None:
+    """Tell the program of the balises by position, or return the layout of those by instant."""
+    if balises is None:
+        return None
+    localiser = balises.localiser
+    if not isinstance(localiser, RollbackLocaliser):
+        raise NotCompilable(f"balises are localised by '{localiser.method}'")
+    layout, watch = localiser.layout, localiser.watch
+    if isinstance(layout, TrackLayout):
+        place = [s.component.name for s in plan.steps].index(balises.plant)
+        first = plan.steps[place].columns.start
+        columns = first + watch.position_column, first + watch.speed_column
+        program.watch(place, *columns, (watch.position_scale, watch.speed_scale), layout.positions, ACCELERATION_LIMIT)
+        return None
+    return layout
+
+
+def _check(control: StepControl, system: System) -> None:
+    if type(control) is not FixedStep:
+        raise NotCompilable(f"the step control '{control.name}' is Python's")
+    if system.events is not None:
+        raise NotCompilable("events of the components are propagated")
+    algorithm = system.algorithm
+    if algorithm.name not in ("gauss-seidel", "jacobi") or getattr(algorithm, "threads", 1) != 1:
+        raise NotCompilable(f"the algorithm '{algorithm.name}' is Python's")
+    if system.events is not None:
+        raise NotCompilable("events of components are passed on to others")
+    for step in system.plan.steps:
+        if _owner(step.inputs.send) is not None:
+            raise NotCompilable(f"inputs of {step.component.name} are sent by something in Python")
+        if _owner(step.move) not in (step, system.balises):
+            raise NotCompilable(f"{step.component.name} is moved by something in Python")
+        if step.inputs.untouched is not None:
+            raise NotCompilable(f"inputs of {step.component.name} are no doubles: {', '.join(step.inputs.untouched.names)}")
+        if step.inputs.untouched is not None or len(system.plan.untouched):
+            raise NotCompilable("values that are no doubles are passed on")
+        if step.inputs.tables:
+            raise NotCompilable(f"inputs of {step.component.name} are mapped by tables of values")
+        if step.carrier is not None:
+            raise NotCompilable(f"inputs of {step.component.name} follow lines between communication points")
+        if step.substeps != 1:
+            raise NotCompilable(f"{step.component.name} takes {step.substeps} steps for one")
+
+
+def _owner(move: Any) -> Any:
+    """Whose method it is, bound or as a part."""
+    return getattr(move.func if isinstance(move, partial) else move, "__self__", None)

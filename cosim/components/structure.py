@@ -1,0 +1,46 @@
+"""Structural parameters of FMI 3: the dimensions of arrays that the user chooses. Knows descriptions only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from fmpy.model_description import ModelDescription, ModelVariable
+
+from cosim.components.start_values import refusal, typed_value
+from cosim.errors import CouplingError
+
+STRUCTURAL = "structuralParameter"
+
+
+def structural_value(component: str, variable: ModelVariable, value: Any) -> int:
+    """The value of a structural parameter.
+
+    Raises:
+        CouplingError: it is no whole number, or outside of what the FMU declares.
+    """
+    try:
+        number = int(typed_value(variable, value))
+    except ValueError as error:
+        raise CouplingError(refusal(f"{component}.{variable.name} cannot be set", error)) from error
+    low = 0 if variable.min is None else int(variable.min)
+    if number < low or (variable.max is not None and number > int(variable.max)):
+        high = "any" if variable.max is None else variable.max
+        raise CouplingError(f"{component}.{variable.name} = {number} is outside of what the component declares: {low} to {high}.")
+    return number
+
+
+def resize(description: ModelDescription, structure: Mapping[str, int]) -> None:
+    """Shapes of all arrays for these values of the structural parameters; the others have their start values."""
+    by_reference = {v.valueReference: structure[v.name] for v in description.modelVariables if v.name in structure}
+    for variable in description.modelVariables:
+        if variable.dimensions:
+            variable.shape = tuple(_extent(dimension, by_reference) for dimension in variable.dimensions)
+
+
+def _extent(dimension: Any, given: Mapping[int, int]) -> int:
+    if dimension.start is not None:
+        return int(dimension.start)
+    if dimension.valueReference in given:
+        return given[dimension.valueReference]
+    return int(dimension.variable.start)

@@ -1,0 +1,110 @@
+"""Untouched values: texts, bytes and 64-bit integers on their way from outputs to inputs, as Python objects beside the doubles.
+
+One array of objects `cells` for the whole plan, one for each connected source, is to these values what `Plan.values` is to the
+numbers: outputs are read into it, inputs are gathered from it, and whoever keeps a copy of the one keeps one of the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from cosim.components.component import Component
+from cosim.coupling.connection import Connection
+
+Cells = np.ndarray
+Node = tuple[str, str]
+Write = tuple[Callable[[Sequence[Any]], None], Callable[[], Sequence[Any]], bool, list[tuple[int, int]]]
+"""Writes a variable, reads it, whether all its elements have a source, and (element, place among the inputs) of those that do."""
+
+
+def untouched_cells(connections: Sequence[Connection]) -> tuple[Cells, dict[Node, int]]:
+    """The array of objects, shape (number of exact sources,), and where each source is in it."""
+    sources = list(dict.fromkeys(c.source for c in connections if c.exact))
+    return np.empty(len(sources), dtype=object), {source: i for i, source in enumerate(sources)}
+
+
+def with_untouched(
+    read_numbers: Callable[[], None], component: Component, places: Mapping[Node, int], cells: Cells
+) -> Callable[[], None]:
+    """A call that reads a component's numbers, and its exact sources into the cells where it has any."""
+    wanted: dict[str, list[tuple[int, int]]] = {}
+    for (owner, name), place in places.items():
+        if owner == component.name:
+            element = component.variables.element(name)
+            wanted.setdefault(element.variable.name, []).append((element.index or 0, place))
+    if not wanted:
+        return read_numbers
+    reads = [(component.exact_reader(name), entries) for name, entries in wanted.items()]
+
+    def read() -> None:
+        read_numbers()
+        for call, entries in reads:
+            values = call()
+            for index, place in entries:
+                cells[place] = values[index]
+
+    return read
+
+
+def untouched_inputs(
+    component: Component, connections: Sequence[Connection], places: Mapping[Node, int], cells: Cells
+) -> UntouchedInputs | None:
+    """The exact inputs of a component that have a source, or None where there are none."""
+    own = [c for c in connections if c.exact and c.target[0] == component.name]
+    return UntouchedInputs(component, own, places, cells) if own else None
+
+
+class UntouchedInputs:
+    """The exact inputs of one component: gathered from the cells, then sent; see `cosim.coupling.inputs`.
+
+    Args:
+        component: whose inputs they are. connections: exact ones to it.
+        places: (component, output) -> place in `cells`. cells: of the whole plan.
+    """
+
+    def __init__(
+        self, component: Component, connections: Sequence[Connection], places: Mapping[Node, int], cells: Cells
+    ) -> None:  # fmt: skip
+        self.names = tuple(c.target[1] for c in connections)
+        self._cells = cells
+        self._writes: list[Write] = []
+        self._held: list[object] = [None] * len(connections)
+        self._sources = [places[c.source] for c in connections]
+        targets: dict[str, list[tuple[int, int]]] = {}
+        for i, connection in enumerate(connections):
+            element = component.variables.element(connection.target[1])
+            targets.setdefault(element.variable.name, []).append((element.index or 0, i))
+        for name, entries in targets.items():
+            whole = len(entries) == len(component.elements(name))
+            self._writes.append((component.exact_writer(name), component.exact_reader(name), whole, sorted(entries)))
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @property
+    def held(self) -> tuple[object, ...]:
+        """What was gathered last."""
+        return tuple(self._held)
+
+    def gather(self) -> None:
+        """Take the values from the cells."""
+        self._held = [self._cells[place] for place in self._sources]
+
+    def send(self) -> None:
+        """Write them to the component, whole variables at a time.
+
+        Elements without a source keep their values, and so does all that no source has been read for: the first exchange of a
+        loop begins with what the components were started with.
+        """
+        for write, read, whole, entries in self._writes:
+            known = [(index, self._held[i]) for index, i in entries if self._held[i] is not None]
+            if whole and len(known) == len(entries):
+                write([value for _, value in known])
+            elif known:
+                values = list(read())
+                for index, value in known:
+                    values[index] = value
+                write(values)

@@ -1,0 +1,55 @@
+"""Links of a plan: which component takes which value of which other one. Reads the plan only."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosim.coupling.plan import Plan, PlannedComponent
+
+
+@dataclass(frozen=True)
+class Link:
+    """One connection as the plan holds it.
+
+    Args:
+        text: ``a.y -> b.u``. column: of the source within the values. source, target: places of the components in the plan.
+        place: of the input among the connected inputs of its component.
+    """
+
+    text: str
+    column: int
+    source: int
+    target: int
+    place: int
+
+
+def plan_links(plan: Plan) -> list[Link]:
+    """All connections of a plan, in its order."""
+    owner = [place for place, step in enumerate(plan.steps) for _ in range(step.columns.start, step.columns.stop)]
+    return [
+        Link(f"{plan.signals[column].name} -> {step.component.name}.{name}", int(column), owner[column], target, place)
+        for target, step in enumerate(plan.steps)
+        for place, (name, column) in enumerate(zip(step.inputs.names, step.inputs.sources, strict=True))
+    ]
+
+
+def fed_back(links: Sequence[Link], members: range | None = None) -> list[Link]:
+    """Links whose target is stepped no later than their source, among consecutive members of the plan or among all."""
+    return [
+        link
+        for link in links
+        if link.target <= link.source and (members is None or (link.source in members and link.target in members))
+    ]
+
+
+def interface(links: Sequence[Link], members: range | None = None) -> np.ndarray:
+    """Columns of the values that are fed back, each once, ascending, shape (n,)."""
+    return np.unique(np.array([link.column for link in fed_back(links, members)], dtype=np.intp))
+
+
+def span(steps: Sequence[PlannedComponent]) -> slice:
+    """Where the values of consecutive components of the plan lie."""
+    return slice(steps[0].columns.start, steps[-1].columns.stop)

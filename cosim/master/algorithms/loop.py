@@ -1,0 +1,182 @@
+"""One loop, iterated within a communication step: save, sweep, compare, guess again, restore, sweep.
+
+What is iterated are the values that are fed back: outputs of components that are stepped no earlier than those who use them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from cosim.coupling.plan import Plan
+from cosim.errors import RunError
+from cosim.master.algorithms.acceleration import make_acceleration, scaled_norm
+from cosim.master.algorithms.history import History, Search, shown
+from cosim.master.algorithms.links import Link, interface, span
+from cosim.master.algorithms.sensitivity import Sensitivity
+from cosim.master.algorithms.settings import IterationSettings
+
+SIGNALS_SHOWN = 5
+
+
+@dataclass(frozen=True)
+class Start:
+    """Everything at the start of a step, and where in the values the members' part lies.
+
+    Args:
+        states: of the members. values: of the members, shape (q,). untouched: of all components, shape (k,).
+    """
+
+    states: list[Any]
+    values: np.ndarray
+    untouched: np.ndarray
+
+
+class IteratedLoop:
+    """Consecutive components of a plan, stepped again and again from the same state until what is fed back agrees.
+
+    The last sweep is kept: the inputs of that sweep and the outputs it left agree within the tolerances. Where somebody took
+    over how a member is moved (balises are delivered within the loop), trial sweeps take the plain steps, and the last guess is
+    stepped once more, for good.
+
+    Args:
+        plan: prepared, components initialised. members: places of the loop's components in it. links: of the plan.
+        settings: method and tolerances.
+    """
+
+    def __init__(self, plan: Plan, members: range, links: Sequence[Link], settings: IterationSettings) -> None:
+        self.steps = [plan.steps[place] for place in members]
+        self.settings = settings
+        self.history = History()
+        self._plan, self._columns, self._span = plan, interface(links, members), span(self.steps)
+        self._known = [_ends_known(links, place, members) for place in members]
+        self._jumps = ~plan.continuous[self._columns]
+        self._sensitivity = Sensitivity(plan, members, links, self._columns)
+        size = len(self._columns)
+        self._acceleration = make_acceleration(settings.method, size, settings.relaxation, self._sensitivity)
+
+    @property
+    def names(self) -> list[str]:
+        """Of the members, in execution order."""
+        return [step.component.name for step in self.steps]
+
+    @property
+    def signals(self) -> list[str]:
+        """What is fed back."""
+        return [self._plan.signals[column].name for column in self._columns]
+
+    def advance(self, t: float, until: float) -> None:
+        """Bring the members from `t` to `until` [s].
+
+        Raises:
+            RunError: a component failed, or the iteration does not converge; the residuals are told.
+        """
+        states = [step.component.save() for step in self.steps]
+        start = Start(states, self._plan.values[self._span].copy(), self._plan.untouched.copy())
+        try:
+            self._iterate(t, until, start)
+        except BaseException:
+            with suppress(RunError):  # what went wrong before says more
+                self._release(start)
+            raise
+        self._release(start)
+
+    def save(self) -> Any:
+        """What a step changes here; the components are saved elsewhere."""
+        return self._acceleration.save(), replace(self.history)
+
+    def restore(self, state: Any) -> None:
+        """Return to what was saved."""
+        learnt, history = state
+        self._acceleration.restore(learnt)
+        self.history = replace(history)
+
+    def summary(self) -> dict[str, Any]:
+        """Plain data."""
+        found = {"components": self.names, "iterated": self.signals, "method": self.settings.method}
+        if self.settings.method == "newton":
+            found["jacobian"] = "directional derivatives and Broyden updates" if self._sensitivity.usable else "Broyden updates"
+        return found | self.history.summary()
+
+    # -- iteration --------------------------------------------------------------------------------------------------
+
+    def _iterate(self, t: float, until: float, start: Start) -> None:
+        settings, z = self.settings, self._plan.values[self._columns]
+        residuals: list[float] = []
+        while True:
+            g = self._try(t, until, start, z, residuals)
+            residuals.append(scaled_norm(z, g, settings.relative_tolerance, settings.absolute_tolerance))
+            if residuals[-1] <= 1.0 or any(step.component.terminated for step in self.steps):
+                break
+            if len(residuals) >= settings.max_iterations or not np.isfinite(residuals[-1]):
+                raise self._failure(until, start, z, g, residuals)
+            if len(residuals) == 1:
+                self._acceleration.begin(np.maximum(np.maximum(np.abs(z), np.abs(g)), settings.absolute_tolerance))
+            z = np.where(self._jumps, g, self._acceleration.next(z, g))  # there is nothing between two discrete values
+            self._restore(start)
+        self.history.add(Search(until, tuple(residuals)))
+        if any(step.move != step.drive for step in self.steps):
+            self._restore(start)
+            self._sweep(t, until, start, z, for_good=True)
+
+    def _try(self, t: float, until: float, start: Start, z: np.ndarray, residuals: Sequence[float]) -> np.ndarray:
+        """Step all members once; returns what comes back for the guess `z`, shape (n,)."""
+        try:
+            self._sweep(t, until, start, z)
+        except RunError as error:
+            if not residuals:
+                raise
+            self._plan.values[self._span] = start.values
+            told = f"sweep {len(residuals) + 1} of the iteration of {', '.join(self.names)}; residuals so far: {shown(residuals)}"
+            raise RunError(f"{error} (In {told}.)", error.component, error.time) from error
+        back: np.ndarray = self._plan.values[self._columns]
+        return back
+
+    def _sweep(self, t: float, until: float, start: Start, z: np.ndarray, *, for_good: bool = False) -> None:
+        """One step of all members; for good, each is moved by whoever took it over, and finds its outputs as they were at `t`."""
+        values, first = self._plan.values, self._span.start
+        values[self._span] = start.values
+        values[self._columns] = z
+        self._plan.untouched[:] = start.untouched
+        for step, known in zip(self.steps, self._known, strict=True):
+            step.prepare(t, until, ends_known=known)
+            if for_good:
+                step.outputs[:] = start.values[step.columns.start - first : step.columns.stop - first]
+                step.move(t, until)
+            else:
+                step.drive(t, until)
+
+    def _restore(self, start: Start) -> None:
+        for step, state in zip(self.steps, start.states, strict=True):
+            step.component.restore(state)
+
+    def _release(self, start: Start) -> None:
+        for step, state in zip(self.steps, start.states, strict=True):
+            step.component.release(state)
+
+    def _failure(self, until: float, start: Start, z: np.ndarray, g: np.ndarray, residuals: Sequence[float]) -> RunError:
+        method, signals = self.settings.method, self.signals
+        if len(residuals) > 1:
+            self._plan.values[self._span] = start.values  # a guess gone astray is no result, and hides no cause
+        with np.errstate(all="ignore"):
+            errors = np.abs(g - z) / np.maximum(np.maximum(np.abs(z), np.abs(g)), self.settings.absolute_tolerance)
+        worst = np.argsort(-np.where(np.isnan(errors), np.inf, errors), kind="stable")[:SIGNALS_SHOWN]
+        moving = ", ".join(f"{signals[i]} from {z[i]:.6g} to {g[i]:.6g}" for i in worst)
+        other = "" if method == "newton" else "master.iteration.method = 'newton', "
+        return RunError(
+            f"Loop of {', '.join(self.names)} at t = {until:g} s: {len(residuals)} sweeps by '{method}' do not converge. Scaled "
+            f"residuals (1 is converged): {shown(residuals)}. Moving most in the last sweep: {moving}. Try {other}a smaller "
+            "communication step, a smaller master.iteration.relaxation, larger tolerances or more max_iterations; if the "
+            "equations of the loop have no solution, nothing helps.",
+            self.steps[0].component.name,
+            until,
+        )
+
+
+def _ends_known(links: Sequence[Link], place: int, members: range) -> np.ndarray:
+    """Of each input of a member, whether its value is that of the end of the step: the source is a member, or stepped before."""
+    return np.array([link.source < members.stop for link in links if link.target == place], dtype=bool)

@@ -1,0 +1,218 @@
+"""The coordinator: divides a communication step at events, so that all components meet at each of them. Knows the system.
+
+What is known in advance (time events, ticks of time-based clocks) is where everybody is stepped to. Where a component returns
+early, at an event that nobody knew of, the others are taken back and stepped to it as well.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cosim.balises.service import Row
+from cosim.components.component import TIME_TOLERANCE, Component
+from cosim.components.interruption import EventMet
+from cosim.coupling.plan import Mover, PlannedComponent
+from cosim.errors import RunError
+from cosim.master.events.iteration import EventIteration
+from cosim.master.events.participant import Participant
+from cosim.master.events.stride import Span, Stride
+
+if TYPE_CHECKING:
+    from cosim.master.system import Checkpoint, System
+
+MAX_EVENTS_WITHOUT_PROGRESS = 100
+
+
+class EventCoordinator:
+    """Takes a system over a communication step with events on the way.
+
+    Args:
+        system: what is stepped. participants: components that take part in events, in plan order.
+
+    `notes` says who cannot take part as it should; `redone` counts parts of steps taken again because of an early return.
+    """
+
+    def __init__(self, system: System, participants: Sequence[Participant]) -> None:
+        self._system, self._participants = system, list(participants)
+        self.iteration = EventIteration(system.plan, participants)
+        self.redone = 0
+        self._span = Span()
+        self._interrupters = [p.component for p in participants if p.interrupts]
+        for participant in participants:
+            participant.component.coordinated = True
+            participant.component.interrupts_from = math.inf
+        for step in system.plan.steps:
+            if self._interrupters or not step.component.can_vary_step:
+                Stride(step, self._span, self._holder(step))
+        self.notes = self._remarks()
+
+    # -- steps ------------------------------------------------------------------------------------------------------
+
+    def start(self, t: float) -> None:
+        """The system was initialised at `t` [s]: what happens there already is handled.
+
+        Raises:
+            RunError: as for `advance`.
+        """
+        for participant in self._participants:
+            participant.gate.open()
+        if self.iteration.concerns_anybody(t):
+            self.iteration.run(t)
+
+    def advance(self, t: float, until: float) -> Sequence[Row]:
+        """Bring the system from `t` to `until` [s]; returns the rows before and after events.
+
+        Raises:
+            RunError: a component failed, events do not settle, or time stands still.
+        """
+        rows: list[Row] = []
+        now, standing = t, 0
+        self._span.end = until
+        while True:
+            reached, found = self._part(now, self._next_stop(now, until))
+            rows += found
+            if any(step.component.terminated for step in self._system.plan.steps):
+                return rows if until - reached <= TIME_TOLERANCE else [*rows, (reached, self._system.plan.values.copy())]
+            rows += self._handle(reached, until, bool(rows) and reached - rows[-1][0] <= TIME_TOLERANCE)
+            ended = any(step.component.terminated for step in self._system.plan.steps)
+            if ended or until - reached <= TIME_TOLERANCE:
+                return rows
+            standing = standing + 1 if reached - now <= TIME_TOLERANCE else 0
+            if standing > MAX_EVENTS_WITHOUT_PROGRESS:
+                raise self._stuck(reached)
+            now = reached
+
+    def summary(self) -> dict[str, Any]:
+        """What to tell of it after the run, plain data."""
+        names = [p.name for p in self._participants]
+        iteration = self.iteration
+        return {"participants": names, "instants": iteration.count, "longest": iteration.longest, "redone": self.redone}
+
+    # -- state ------------------------------------------------------------------------------------------------------
+
+    def save(self) -> Any:
+        """What events change here; the states of the components are saved elsewhere."""
+        return [participant.save() for participant in self._participants]
+
+    def restore(self, state: Any) -> None:
+        """Return to what was saved."""
+        for participant, saved in zip(self._participants, state, strict=True):
+            participant.restore(saved)
+
+    # -- parts of a step --------------------------------------------------------------------------------------------
+
+    def _next_stop(self, now: float, until: float) -> float:
+        """The first instant after `now` at which something is known to happen, or `until` [s]."""
+        stop = until
+        for participant in self._participants:
+            component = participant.component
+            if component.time < now - TIME_TOLERANCE or not component.can_vary_step:
+                continue  # it has not come here, or does not stop for it
+            if now + TIME_TOLERANCE < component.next_event < stop:
+                stop = component.next_event
+        return stop if until - stop > TIME_TOLERANCE else until
+
+    def _part(self, t: float, stop: float) -> tuple[float, Sequence[Row]]:
+        """Everybody from `t` to `stop` or to an event met before it [s]; returns where that is, and rows on the way."""
+        for component in self._interrupters:
+            component.interrupts_from = t
+        saved = self._system.save(anyway=True) if self._interrupters else None
+        try:
+            reached, rows, met = self._move(t, stop, saved)
+        finally:
+            if saved is not None:
+                self._system.release(saved)
+        for participant in self._participants:
+            participant.component.event_pending |= participant.component is met
+        return reached, rows
+
+    def _move(self, t: float, stop: float, saved: Checkpoint | None) -> tuple[float, Sequence[Row], Component | None]:
+        """The same, and who met an event; `saved` is the system at `t`, or None where nobody can be taken back."""
+        met: Component | None = None
+        while True:
+            try:
+                rows = self._system.move(t, stop)
+            except EventMet as event:
+                met = event.component
+                if event.time - t <= TIME_TOLERANCE:  # it stands there already, the others come back to it
+                    self._back(saved, met, {met.name})
+                    return t, (), met
+                self._back(saved, met, set())
+                stop = event.time
+                continue
+            ended = self._first_end(stop)
+            if ended is None or saved is None or ended.time - t <= TIME_TOLERANCE:
+                return stop, rows, met
+            met, stop = None, ended.time
+            self._back(saved, ended, {ended.name})
+
+    def _back(self, saved: Checkpoint | None, component: Component, keep: set[str]) -> None:
+        """All who can, but for `keep`, are taken back to where the part began."""
+        self.redone += 1
+        if saved is None:
+            self._system.plan.find(component.name).read()
+        else:
+            self._system.restore(saved, keep)
+
+    def _first_end(self, stop: float) -> Component | None:
+        """The component that asked for the end of the run before `stop` [s], the first one of several."""
+        ended = [
+            s.component for s in self._system.plan.steps if s.component.terminated and stop - s.component.time > TIME_TOLERANCE
+        ]
+        return min(ended, key=lambda c: c.time, default=None)
+
+    # -- at an event ------------------------------------------------------------------------------------------------
+
+    def _handle(self, t: float, until: float, row_before: bool) -> Sequence[Row]:
+        """Handle what happens at `t` [s], and give the rows before and after it; the row of `until` itself is the master's."""
+        if not self.iteration.concerns_anybody(t):
+            return ()
+        plan = self._system.plan
+        before = plan.values.copy()
+        self.iteration.run(t)
+        changed = ~((before == plan.values) | (np.isnan(before) & np.isnan(plan.values)))
+        if changed[plan.continuous].any():
+            for step in plan.steps:
+                if step.carrier is not None:
+                    step.carrier.forget()
+        first = [] if row_before else [(t, before)]
+        if until - t > TIME_TOLERANCE:
+            return [*first, (t, plan.values.copy())]
+        return first if changed.any() else ()
+
+    def _stuck(self, t: float) -> RunError:
+        names = [p.name for p in self._participants if abs(p.component.time - t) <= TIME_TOLERANCE]
+        return RunError(
+            f"Time stands still at t = {t:g} s: {MAX_EVENTS_WITHOUT_PROGRESS} events one after the other without any progress; "
+            f"components with events: {', '.join(names)}.", names[0] if names else "", t,
+        )  # fmt: skip
+
+    def _holder(self, step: PlannedComponent) -> Mover | None:
+        balises = self._system.balises
+        if balises is None or not any(receiver.planned is step for receiver in balises.receivers):
+            return None
+        return balises.holder(step.component.name)
+
+    # -- what cannot be done ----------------------------------------------------------------------------------------
+
+    def _remarks(self) -> list[str]:
+        components = [step.component for step in self._system.plan.steps]
+        whole = [c.name for c in components if not c.can_vary_step]
+        fixed = [c.name for c in components if not c.can_save]
+        notes = []
+        if whole:
+            notes.append(
+                f"Cannot vary the communication step, so events between two communication points reach them at the later one: "
+                f"{', '.join(whole)}."
+            )
+        if self._interrupters and fixed:
+            names = ", ".join(c.name for c in self._interrupters)
+            notes.append(
+                f"{names} may return early from a step; components that cannot save their state are not taken back to the "
+                f"event: {', '.join(fixed)}."
+            )
+        return notes

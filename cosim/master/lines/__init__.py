@@ -1,0 +1,1 @@
+"""Lines: what an input does between communication points."""

@@ -1,0 +1,104 @@
+"""A file of rows without a name: it vanishes with its last user, however that one ends. Touches only the folder it is given."""
+
+from __future__ import annotations
+
+import errno
+import os
+import tempfile
+import weakref
+from pathlib import Path
+
+import numpy as np
+
+from cosim.errors import OutputError
+
+UNSUPPORTED = (errno.EINVAL, errno.EOPNOTSUPP, errno.ENOSYS)
+DISK = "/var/tmp"  # where Unix keeps large temporary files
+ZEROS = bytes(1 << 20)
+
+
+class RowFile:
+    """Rows of a fixed size on disk. Space is reserved before rows are accepted, so that what was accepted can be written.
+
+    Args:
+        folder: where the file is; None for the one for large temporary files.
+        row_bytes: size of a row [bytes].
+        rows: rows to reserve space for.
+
+    `count` is the number of rows in the file.
+
+    Raises:
+        OutputError: there is no space, or the folder cannot be written.
+    """
+
+    def __init__(self, folder: str | Path | None, row_bytes: int, rows: int) -> None:
+        self._row_bytes, self._folder = row_bytes, Path(folder or _folder_for_large_files())
+        self.count = self._reserved = 0
+        try:
+            self._file = tempfile.TemporaryFile(dir=self._folder, buffering=0)  # noqa: SIM115 - open as long as its rows are wanted
+        except OSError as error:
+            raise self._explained(error) from error
+        weakref.finalize(self, self._file.close)  # the maps of the file live on
+        self.reserve(rows)
+
+    def reserve(self, rows: int) -> None:
+        """Make sure that the file can hold so many rows.
+
+        Raises:
+            OutputError: there is no space for them.
+        """
+        size = rows * self._row_bytes
+        try:
+            _allocate(self._file.fileno(), self._reserved, size - self._reserved)
+        except OSError as error:
+            raise self._explained(error) from error
+        self._reserved = max(size, self._reserved)
+
+    def write(self, first: int, rows: np.ndarray) -> None:
+        """Write rows from number `first` on; a C-contiguous array.
+
+        Raises:
+            OutputError: the disk refuses.
+        """
+        data, at = rows.data.cast("B") if rows.size else memoryview(b""), first * self._row_bytes
+        try:
+            self._file.seek(at)
+            while data:
+                data = data[self._file.write(data) or 0 :]
+        except OSError as error:
+            raise self._explained(error) from error
+        self.count = first + len(rows)
+
+    def table(self, dtype: np.dtype[np.void]) -> np.ndarray:
+        """All rows as a structured array that is a map of the file, shape (count,)."""
+        if not self.count:
+            return np.empty(0, dtype)
+        return np.memmap(self._file, dtype=dtype, mode="r+", shape=(self.count,))
+
+    def _explained(self, error: OSError) -> OutputError:
+        reason = error.strerror or str(error)
+        return OutputError(
+            f"The recording outgrew its memory and cannot continue on disk, in {self._folder}: {reason}. What was recorded so "
+            "far is kept. Free the disk, choose another folder (the environment variable TMPDIR), or record less (record_every)."
+        )
+
+
+def _folder_for_large_files() -> str:
+    """The folder for temporary files that the user chose, else one that is not in memory, as ``/tmp`` often is."""
+    chosen = any(os.environ.get(name) for name in ("TMPDIR", "TEMP", "TMP"))
+    return DISK if not chosen and os.access(DISK, os.W_OK | os.X_OK) else tempfile.gettempdir()
+
+
+def _allocate(descriptor: int, start: int, size: int) -> None:
+    """Have the file system set space aside; where it cannot, zeros are written."""
+    if size <= 0:
+        return
+    if hasattr(os, "posix_fallocate"):
+        try:
+            return os.posix_fallocate(descriptor, start, size)
+        except OSError as error:
+            if error.errno not in UNSUPPORTED:
+                raise
+    os.lseek(descriptor, start, os.SEEK_SET)
+    while size > 0:
+        size -= os.write(descriptor, ZEROS[:size])

@@ -1,0 +1,96 @@
+"""The master of a scenario: from the table `[master]` to algorithm, step control and master."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from cosim.balises.service import BaliseService
+from cosim.coupling.plan import Plan
+from cosim.errors import CouplingError
+from cosim.master.algorithms.algorithm import Algorithm
+from cosim.master.algorithms.choose import AlgorithmChoice
+from cosim.master.algorithms.gauss_seidel import GaussSeidel
+from cosim.master.algorithms.iterate import Iterate
+from cosim.master.algorithms.jacobi import Jacobi
+from cosim.master.algorithms.settings import IterationSettings
+from cosim.master.axis import TimeAxis
+from cosim.master.control.control import StepControl
+from cosim.master.control.doubling import DoublingStep
+from cosim.master.control.fixed import FixedStep
+from cosim.master.control.multirate import set_rates
+from cosim.master.master import Master
+from cosim.master.system import System
+from cosim.results.recorder import Recorder
+from cosim.scenario.schema import MasterTable, ScenarioTable
+
+
+def make_master(
+    table: ScenarioTable, plan: Plan, axis: TimeAxis, balises: BaliseService | None, progress: Callable[[float], None] | None,
+    choice: AlgorithmChoice,
+) -> Master:  # fmt: skip
+    """The master that a scenario asks for.
+
+    Args:
+        table: the scenario. plan: prepared, components instantiated. axis: communication points.
+        balises: balise service, or None. progress: called now and then with the time reached [s].
+        choice: the algorithm, and what it iterates.
+
+    Raises:
+        CouplingError: the components cannot do what is asked for; they are named.
+    """
+    master = Master(
+        plan, axis, balises, progress, algorithm=lambda plan: make_algorithm(table.master, plan, choice),
+        control=_control(table.master), stepper=table.master.stepper,
+        recorder=partial(Recorder, every=table.master.record_every, memory=1e6 * table.master.record_memory),
+        events=table.master.events,
+    )  # fmt: skip
+    _check_rates(table, choice)
+    _set_rates(table, plan, axis, balises)
+    return master
+
+
+def make_algorithm(table: MasterTable, plan: Plan, choice: AlgorithmChoice) -> Algorithm:
+    """The algorithm that was chosen.
+
+    Args:
+        table: threads and iteration. plan: prepared. choice: what it is to be.
+    """
+    algorithm: Algorithm
+    if choice.algorithm == "iterate":
+        algorithm = Iterate(plan, choice.iterated, IterationSettings(**table.iteration.model_dump()))
+    elif choice.algorithm == "jacobi":
+        algorithm = Jacobi(plan, table.threads)
+    else:
+        algorithm = GaussSeidel(plan)
+    algorithm.choice = choice
+    return algorithm
+
+
+def _check_rates(table: ScenarioTable, choice: AlgorithmChoice) -> None:
+    for name in (name for loop in choice.iterated for name in loop):
+        if table.components[name].every != 1:
+            raise CouplingError(
+                f"{name}: every = {table.components[name].every} is not possible: it is part of a loop that is iterated, whose "
+                "components take the same steps."
+            )
+
+
+def _set_rates(table: ScenarioTable, plan: Plan, axis: TimeAxis, balises: BaliseService | None) -> None:
+    every = {name: component.every for name, component in table.components.items() if component.every != 1}
+    substeps = {name: component.substeps for name, component in table.components.items() if component.substeps != 1}
+    if every and table.master.control != "fixed":
+        raise CouplingError(
+            f"every = {max(every.values())} needs communication steps that are fixed; set master.control = 'fixed'."
+        )
+    taken = {} if balises is None else {r.planned.component.name: "it is told of balises" for r in balises.receivers}
+    if balises is not None:
+        taken[balises.plant] = "it is watched for balises"
+    set_rates(plan, axis, every, substeps, taken)
+
+
+def _control(table: MasterTable) -> Callable[[System], StepControl]:
+    if table.control == "fixed":
+        return FixedStep
+    second_order = table.inputs == "extrapolate" or (table.inputs == "interpolate" and table.algorithm == "iterate")
+    return lambda system: DoublingStep(system, table.tolerance, 3 if second_order else 2, table.smallest_step)

@@ -1,0 +1,123 @@
+"""The structure of a scenario before its run: descriptions only, no FMU is built, loaded or instantiated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from cosim.components.component import Component
+from cosim.components.loading import describe_fmu, load_block
+from cosim.coupling.clocks import connect_clocks
+from cosim.coupling.connection import Connection, connect, unconnected_inputs
+from cosim.coupling.graph import Group, execution_groups, undeclared
+from cosim.diagnostics.inspect import group_index, make_links, make_part, rate_text
+from cosim.diagnostics.structure import Balises, Link, Structure
+from cosim.errors import CosimError, CouplingError
+from cosim.master.algorithms.choose import AlgorithmChoice, choose_algorithm
+from cosim.scenario.balise_service import find_receivers, watched_plant
+from cosim.scenario.connections import parse_connections
+from cosim.scenario.models import make_system
+from cosim.scenario.schema import ComponentTable, ScenarioTable
+
+
+def scenario_structure(table: ScenarioTable, name: str, folder: Path, where: str) -> Structure:
+    """The structure of a validated scenario.
+
+    Args:
+        table: the scenario. name: its name. folder: start of relative paths. where: place for messages.
+
+    Raises:
+        CosimError: a component, connection or balise role that cannot be. A loop that nothing here solves is told, not refused.
+    """
+    try:
+        return _structure(table, name, folder, where)
+    except CosimError as error:
+        raise error if str(error).startswith(where) else type(error)(f"{where}: {error}") from error
+
+
+def _structure(table: ScenarioTable, name: str, folder: Path, where: str) -> Structure:
+    components = {n: describe_component(n, t, folder, f"{where}: components.{n}") for n, t in table.components.items()}
+    clocks, pairs = connect_clocks(parse_connections(table.connections, where), components)
+    connections = connect(pairs, components)
+    balises = _balises(table, components, where)
+    groups = execution_groups(components, connections, _before(balises))
+    choice, refusal = _choice(table, groups, components)
+    order = [n for group in groups for n in group.names]
+    loops = [loop for group in groups for loop in group.algebraic]
+    number = group_index(group.names for group in groups)
+    rates = {n: rate_text(t.every, t.substeps) for n, t in table.components.items()}
+    return Structure(
+        name=name,
+        title=table.title,
+        start=table.start,
+        stop=table.stop,
+        step=table.step,
+        parts=tuple(make_part(components[n], connections, number[n], rates[n], clocks) for n in order),
+        links=make_links(connections, choice, order, loops),
+        clocks=tuple(Link(c.source, c.target) for c in clocks),
+        groups=tuple(group.names for group in groups),
+        loops=tuple(loop.path for loop in loops),
+        algorithm=choice.algorithm,
+        reason=choice.reason,
+        balises=balises,
+        warnings=(*_warnings(components, connections), *choice.notes, *refusal),
+    )
+
+
+def describe_component(name: str, table: ComponentTable, folder: Path, where: str) -> Component:
+    """A component that can be asked and not stepped.
+
+    Args:
+        name: of the component. table: its table. folder: start of relative paths. where: place for messages.
+
+    Raises:
+        ScenarioError, FmuLoadError: the component cannot be made.
+    """
+    system = make_system(table, where)
+    if system is None:
+        component = describe_fmu((folder / str(table.fmu)).resolve(), name)
+    else:
+        realisation = table.realisation or ("fmu3" if table.model is not None else "block3")
+        version: Any = int(realisation[-1])
+        component = load_block(system, name, version, preset=table.preset)  # the exported FMU carries the same description
+        component.kind = "block" if realisation.startswith("block") else "FMU"
+    component.configure(table.parameters)
+    return component
+
+
+def _choice(
+    table: ScenarioTable, groups: Sequence[Group], components: Mapping[str, Component]
+) -> tuple[AlgorithmChoice, tuple[str, ...]]:
+    """What steps the components, and why the run would be refused, if it would."""
+    try:
+        return choose_algorithm(table.master.algorithm, groups, components), ()
+    except CouplingError as error:
+        names = tuple(group.names for group in groups)
+        refused = AlgorithmChoice(table.master.algorithm, "This run would be refused, see the warnings.", (), names)
+        return replace(refused, algorithm="none" if refused.algorithm == "auto" else refused.algorithm), (str(error),)
+
+
+def _balises(table: ScenarioTable, components: Mapping[str, Component], where: str) -> Balises | None:
+    balises = table.balises
+    if balises is None:
+        return None
+    plant = watched_plant(balises, components, where)
+    told = find_receivers(balises, components, plant, where)
+    return Balises(plant, balises.position, balises.speed, tuple(told), balises.method, balises.timing, balises.odometer)
+
+
+def _before(balises: Balises | None) -> list[tuple[str, str]]:
+    """What must be stepped before the receivers: the plant, and the odometer whose reading the telegrams carry."""
+    if balises is None:
+        return []
+    sources = {balises.plant} | ({balises.odometer.partition(".")[0]} if balises.odometer else set())
+    return [(source, name) for source in sorted(sources) for name in balises.receivers if source != name]
+
+
+def _warnings(components: Mapping[str, Component], connections: list[Connection]) -> list[str]:
+    free = unconnected_inputs(connections, components.values())
+    silent = undeclared(components.values())
+    texts = [f"Unconnected inputs keep their start values: {', '.join(free)}."] if free else []
+    return texts + ([f"Declare no dependencies, direct feedthrough assumed absent: {', '.join(silent)}."] if silent else [])

@@ -1,0 +1,185 @@
+"""Parameter bindings: from parameter sets at any level of nested systems to start values of FMU variables.
+
+Names are resolved and precedence is decided as SSP 2.0, section 5.3.3 says: later bindings before earlier ones, outer systems
+before inner ones. Values are converted to the units of the variables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from cosim.errors import nearest
+from cosim.ssp.common import FAMILIES, INTEGER, REAL, NamedUnit
+from cosim.ssp.document import Node, fail, place
+from cosim.ssp.model import Binding, ComponentElement, Element, Entry, Parameter, SystemElement
+from cosim.ssp.nets import Nets, Path, Point
+from cosim.ssp.pipe import BOOLEANS, Pipe
+
+Scalar = float | str
+Value = Scalar | list[float]
+"""A start value as a scenario writes it."""
+ACCEPTED: dict[str, set[str]] = {
+    REAL: {REAL, INTEGER},
+    INTEGER: {INTEGER},
+    "Boolean": {"Boolean"},
+    "String": {"String"},
+    "Enumeration": {"Enumeration", INTEGER},
+}
+"""Types of parameters by the type of the variable that they may set; nothing may be lost."""
+
+
+@dataclass
+class Starts:
+    """Start values by path of the component and name of the variable, and what was doubtful."""
+
+    values: dict[Path, dict[str, Value]] = field(default_factory=dict)
+    doubts: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Given:
+    """One value on its way to a variable.
+
+    Args:
+        parameter: as written. entry: of the mapping it goes through, where there is one.
+    """
+
+    parameter: Parameter
+    entry: Entry | None = None
+
+    @property
+    def node(self) -> Node:
+        """Where it is written, for messages."""
+        return self.parameter.node if self.entry is None else self.entry.node
+
+    def arrives(self, unit: NamedUnit | None) -> Pipe:
+        """What becomes of its numbers up to a target with this unit."""
+        suppress, step = (False, None) if self.entry is None else (self.entry.suppress, self.entry.step)
+        return Pipe(self.parameter.type.unit).through(unit, suppress, step, self.node)
+
+
+def start_values(nets: Nets) -> Starts:
+    """Start values that the bindings of all elements give.
+
+    Raises:
+        ScenarioError: a value that does not fit its variable, or a mapping to what does not exist.
+    """
+    applying = _Applying(nets)
+    for path in sorted(nets.elements, key=len, reverse=True):  # what is applied later counts, and outer systems count most
+        for binding in nets.elements[path].bindings:
+            applying.apply(binding, path)
+    return applying.starts
+
+
+class _Applying:
+    """Applies bindings one after the other."""
+
+    def __init__(self, nets: Nets) -> None:
+        self.nets, self.starts = nets, Starts()
+
+    def apply(self, binding: Binding, path: Path) -> None:
+        """All parameters of a binding of the element at `path`, or those that its mapping names."""
+        parameters = {p.name: p for p in binding.parameters}
+        if binding.mapping is None:
+            for name, parameter in parameters.items():
+                if not self.assign(Given(parameter), name, path):
+                    self.doubt(parameter.node, f"parameter {name!r} is {self.nothing(name, path)}, so it is ignored")
+            return
+        for entry in binding.mapping:
+            if entry.source not in parameters:
+                known = nearest(entry.source, parameters)
+                self.doubt(entry.node, f"{entry.source!r} is mapped and not in the parameter set; {known}")
+            elif not self.assign(Given(parameters[entry.source], entry), entry.target, path):
+                fail(entry.node, f"{entry.source!r} is mapped to {entry.target!r}, {self.nothing(entry.target, path)}.")
+
+    def assign(self, given: Given, name: str, path: Path) -> bool:
+        """Set everything that `name` can mean within the element at `path`; whether there was anything."""
+        points = [p for p in _targets(self.nets.elements[path], path, name) if self.exists(p)]
+        for point in points:
+            arrived = given.arrives(self.unit(point))
+            if point.path in self.nets.faces:
+                self.set(given, arrived, point)
+            else:
+                self.spread(given, arrived, point)
+        return bool(points)
+
+    def spread(self, given: Given, pipe: Pipe, point: Point) -> None:
+        """A value for a connector of a system goes to all inputs behind it."""
+        for chain in self.nets.chains:
+            hops = chain.after(point)
+            if hops is None:
+                continue
+            final = pipe
+            for hop in hops:
+                final = final.through(self.nets.unit(hop.target), hop.suppress, hop.step, hop.node)
+            self.set(given, final.through(self.unit(chain.sink), False, None, given.node), chain.sink)
+
+    def set(self, given: Given, pipe: Pipe, point: Point) -> None:
+        """Set one variable of one component."""
+        parameter, node = given.parameter, given.node
+        face, name = self.nets.faces[point.path], self.variable(point)
+        kind, family = face.variables[name].type, FAMILIES[face.variables[name].type]
+        if parameter.type.family not in ACCEPTED.get(family, set()):
+            fail(node, f"parameter {parameter.name!r} is a {parameter.type.name}, {point} is a {kind}.")
+        values = [_value(text, parameter, pipe, node) for text in parameter.values]
+        if family == "Enumeration":
+            _check_items(values, face.items(name), point, node)
+        numbers = [value for value in values if not isinstance(value, str)]
+        if parameter.array and len(numbers) < len(values):
+            fail(node, f"parameter {parameter.name!r}: arrays of {parameter.type.name} cannot be set.")
+        self.starts.values.setdefault(point.path, {})[point.name + point.suffix] = numbers if parameter.array else values[0]
+
+    def exists(self, point: Point) -> bool:
+        """Whether the component has this variable, or an array of this name as variables of their own."""
+        return point.path not in self.nets.faces or self.variable(point) in self.nets.faces[point.path].variables
+
+    def variable(self, point: Point) -> str:
+        """Name of a variable that says what the point is."""
+        return point.name if point.name in self.nets.faces[point.path].variables else f"{point.name}[1]"
+
+    def unit(self, point: Point) -> NamedUnit | None:
+        """The unit in which a value is set: the FMU's own, whatever the connector shows."""
+        if point.path in self.nets.faces:
+            return self.nets.faces[point.path].unit(self.variable(point))
+        return self.nets.unit(point)
+
+    def doubt(self, node: Node, text: str) -> None:
+        """Something that is not as it should be, and no fault by the standard."""
+        self.starts.doubts.append(f"{place(node)}: {text}.")
+
+    def nothing(self, name: str, path: Path) -> str:
+        """That there is nothing of this name, and what there is."""
+        return f"nothing of {'.'.join(path) or 'the root system'} ({nearest(name, self.names(path)).rstrip('.')})"
+
+    def names(self, path: Path) -> list[str]:
+        """Everything a parameter of this element can be called."""
+        element = self.nets.elements[path]
+        names = list(self.nets.faces[path].variables if path in self.nets.faces else element.connectors)
+        if isinstance(element, SystemElement):
+            names += [f"{child}.{inner}" for child in element.elements for inner in self.names((*path, child))]
+        return names
+
+
+def _targets(element: Element, path: Path, name: str) -> Iterator[Point]:
+    """What a hierarchical name can mean: a variable of a component, or connectors of systems and all that lies below."""
+    if isinstance(element, ComponentElement) or name in element.connectors:
+        yield Point(path, name)
+    if isinstance(element, SystemElement):
+        for child_name, child in element.elements.items():
+            if name.startswith(f"{child_name}."):
+                yield from _targets(child, (*path, child_name), name.removeprefix(f"{child_name}."))
+
+
+def _value(text: str, parameter: Parameter, pipe: Pipe, node: Node) -> Scalar:
+    family = parameter.type.family
+    if family in ("String", "Enumeration"):
+        return pipe.item(text, node)
+    number = BOOLEANS[text] if family == "Boolean" else int(text) if family == INTEGER else float(text)
+    return pipe.number(number, node)
+
+
+def _check_items(values: list[Scalar], items: dict[str, int], point: Point, node: Node) -> None:
+    for value in values:
+        if isinstance(value, str) and value not in items:
+            fail(node, f"{point} has no item {value!r}; {nearest(value, items)}")

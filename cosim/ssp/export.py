@@ -1,0 +1,244 @@
+"""Export: a scenario becomes a system structure package that other tools can read, and this one reads back to the same run."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cosim.components.loading import read_description
+from cosim.errors import OutputError, ScenarioError, nearest
+from cosim.scenario.connections import parse_connections
+from cosim.scenario.models import LATE_PARAMETERS, make_system, native_fmu
+from cosim.scenario.schema import ComponentTable, ScenarioTable
+from cosim.ssp.annotation import DIGEST, digest, write_extras
+from cosim.ssp.common import FAMILIES, INTEGER, REAL
+from cosim.ssp.document import VERSIONS, Node
+from cosim.ssp.faces import Face
+from cosim.ssp.package import DEFAULT_VARIANT
+from cosim.ssp.write import TOOL, Definitions, add_connector, add_parameter, child, root_of, text_of
+from fmus.pack import check_target, pack_fmu
+
+ELEMENT_OF_ARRAY = re.compile(r"(.+)\[(\d+(?:,\d+)*)\]")
+BALISES_FILE = "resources/balises.csv"
+
+
+@dataclass(frozen=True)
+class Part:
+    """A component on its way into a package.
+
+    Args:
+        table: of the scenario. fmu: its FMU. member: name of that in the package. face: what it says of its variables.
+    """
+
+    table: ComponentTable
+    fmu: Path
+    member: str
+    face: Face
+
+
+def export_package(table: ScenarioTable, name: str, folder: Path, where: str, path: Path, version: str) -> Path:
+    """Write a scenario as an SSP.
+
+    Args:
+        table: validated scenario. name: its name. folder: start of relative paths. where: place for messages.
+        path: of the package. version: of SSP.
+
+    Raises:
+        CosimError: an FMU cannot be read or built, or the scenario says what SSP has no words for.
+        OutputError: the file cannot be written.
+    """
+    if version not in VERSIONS:
+        raise ScenarioError(f"{where}: SSP {version!r} cannot be written; {' and '.join(VERSIONS)} can.")
+    if path.suffix.lower() != ".ssp":
+        raise OutputError(f"{path}: the name of a system structure package ends in .ssp.")
+    try:
+        check_target(path)
+        exporter = _Exporter(table, name, folder, where, version)
+        exporter.build()
+        return pack_fmu(exporter.files, path)
+    except OSError as error:
+        raise error if isinstance(error, OutputError) else OutputError(f"{path} cannot be written: {error}") from error
+
+
+class _Exporter:
+    """Collects the files of one package."""
+
+    def __init__(self, table: ScenarioTable, name: str, folder: Path, where: str, version: str) -> None:
+        self.table, self.name, self.folder, self.where, self.version = table, name, folder, where, version
+        self.files: dict[str, bytes] = {}
+        self.definitions = Definitions()
+        self.parts: dict[str, Part] = {}
+
+    def build(self) -> None:
+        """All files."""
+        for name, component in self.table.components.items():
+            self.parts[name] = self.part(name, component)
+        root = root_of(
+            "ssd", "SystemStructureDescription", self.version,
+            name=self.table.title, description=self.table.description.strip(), generationTool=TOOL,
+        )  # fmt: skip
+        system = child(root, "ssd", "System", name=self.name)
+        elements = child(system, "ssd", "Elements")
+        for name, part in self.parts.items():
+            self.add_component(elements, name, part)
+        self.add_connections(system)
+        self.definitions.write(root, "ssd")
+        child(root, "ssd", "DefaultExperiment", startTime=repr(self.table.start), stopTime=repr(self.table.stop))
+        root.append(write_extras(self.extras()))
+        self.files[DEFAULT_VARIANT] = text_of(root)
+
+    def part(self, name: str, component: ComponentTable) -> Part:
+        """A component with its FMU, which is built where it is a model of this package."""
+        place = f"{self.where}: components.{name}"
+        system = make_system(component, place)
+        if system is None:
+            fmu = (self.folder / str(component.fmu)).resolve()
+        else:
+            realisation = component.realisation or ("fmu3" if component.model is not None else "block3")
+            fmu = native_fmu(system, 2 if self.version == "1.0" else int(realisation[-1]), component.preset, place)
+        face = Face(read_description(fmu, name), f"component {name!r}")
+        if self.version == "1.0" and face.description.fmiVersion.startswith("3"):
+            raise ScenarioError(
+                f"{place}: {fmu.name} is an FMU of FMI 3.0, which SSP 1.0 does not know; export with version 2.0."
+            )
+        content = fmu.read_bytes()
+        member = next((m for m, known in self.files.items() if known == content), f"resources/{name}.fmu")
+        self.files[member] = content
+        return Part(component, fmu, member, face)
+
+    def add_component(self, parent: Node, name: str, part: Part) -> None:
+        """A component with its connectors, parameters and origin."""
+        node = child(parent, "ssd", "Component", name=name, type="application/x-fmu-sharedlibrary", source=part.member)
+        variables = [v for v in part.face.variables.values() if v.causality in ("input", "output")]
+        if variables:
+            connectors = child(node, "ssd", "Connectors")
+            for variable in variables:
+                unit, items = part.face.unit(variable.name), part.face.items(variable.name)
+                add_connector(connectors, variable, self.definitions, unit, items)
+        values = self.parameter_file(name, part)
+        if values is not None:
+            self.files[f"resources/{name}.ssv"] = values
+            child(child(node, "ssd", "ParameterBindings"), "ssd", "ParameterBinding", source=f"resources/{name}.ssv")
+        own = part.table.model_dump(mode="json", by_alias=True, exclude_unset=True, exclude={"fmu", "parameters"})
+        node.append(write_extras(own | {DIGEST: digest(part.fmu)}))
+
+    def parameter_file(self, name: str, part: Part) -> bytes | None:
+        """The parameter set of a component, or None where it has none."""
+        late = {k: getattr(part.table, k) for k in sorted(part.table.model_fields_set & LATE_PARAMETERS)}
+        given = {k: v for k, v in late.items() if k in part.face.variables} | part.table.parameters
+        if not given:
+            return None
+        root, definitions = root_of("ssv", "ParameterSet", self.version, name=name, generationTool=TOOL), Definitions()
+        parameters = child(root, "ssv", "Parameters")
+        for key, value in given.items():
+            for variable, values, shape in self.assignments(name, part.face, key, value):
+                self.add_parameter(parameters, part.face, variable, values, shape, definitions)
+        definitions.write(root, "ssv")
+        return text_of(root)
+
+    def assignments(self, name: str, face: Face, key: str, value: Any) -> list[tuple[str, list[Any], list[int]]]:
+        """Variables with values and shape that one key of `parameters` stands for."""
+        shape: list[int] = []
+        values = [value]
+        while values and isinstance(values[0], list):
+            shape.append(len(values[0]))
+            values = [v for row in values for v in row]
+        split = [v for v in face.variables if v.startswith(f"{key}[")]
+        if key in face.variables:
+            return [(key, values, shape)]
+        if not split:
+            hint = nearest(key, face.variables)
+            raise ScenarioError(f"{self.where}: components.{name}.parameters: {name} has no variable {key!r}; {hint}")
+        if not shape:
+            return [(v, values, []) for v in split]
+        return [(f"{key}[{i}]", [v], []) for i, v in enumerate(values, start=1)]
+
+    def add_parameter(
+        self, parent: Node, face: Face, name: str, values: list[Any], shape: Sequence[int], definitions: Definitions
+    ) -> None:
+        """One parameter in the words of SSP: a number with its unit, an item by its name."""
+        if name not in face.variables:
+            raise ScenarioError(f"{self.where}: {face.what} has no variable {name!r}; {nearest(name, face.variables)}")
+        kind, unit = str(face.variables[name].type), face.unit(name)
+        if kind == "Enumeration":
+            names = {number: item for item, number in face.items(name).items()}
+            values = [v if isinstance(v, str) else names.get(int(v), v) for v in values]
+        if shape and self.version == "1.0":
+            raise ScenarioError(f"{self.where}: {face.what}: {name} is an array, which SSP 1.0 does not know; use version 2.0.")
+        attributes = {"unit": definitions.unit(unit)} if FAMILIES[kind] == REAL and unit is not None else {}
+        add_parameter(parent, name, kind, values, shape, **attributes)
+
+    def add_connections(self, system: Node) -> None:
+        """The connections of the root system."""
+        links = parse_connections(self.table.connections, self.where)
+        holder = child(system, "ssd", "Connections") if links else None
+        for source, target, *given in links:
+            ends = [self.end(name, causality) for name, causality in ((source, "output"), (target, "input"))]
+            attributes = {f"{side}{key}": text for side, end in zip(("start", "end"), ends, strict=True) for key, text in end}
+            transformation = given[0] if given else None
+            if transformation is not None and not transformation.convert_units:
+                attributes["suppressUnitConversion"] = "true"
+            node = child(holder, "ssd", "Connection", **attributes)
+            if transformation is not None:
+                self.add_transformation(node, source, target, transformation)
+
+    def end(self, name: str, causality: str) -> list[tuple[str, str]]:
+        """The attributes of one end of a connection."""
+        component, _, signal = name.partition(".")
+        if component not in self.parts:
+            raise ScenarioError(f"{self.where}: connections: no component {component!r}; {nearest(component, self.parts)}")
+        variables = self.parts[component].face.variables
+        known = [v for v, variable in variables.items() if variable.causality == causality]
+        found = ELEMENT_OF_ARRAY.fullmatch(signal)
+        if signal in known:
+            return [("Element", component), ("Connector", signal)]
+        if found is None or found[1] not in known:
+            hint = nearest(signal, known)
+            raise ScenarioError(f"{self.where}: connections: {component} has no {causality} {signal!r}; {hint}")
+        if self.version == "1.0":
+            raise ScenarioError(f"{self.where}: connections: {name} is an element of an array, which SSP 1.0 does not know.")
+        return [("Element", component), ("Connector", found[1]), ("Indices", found[2].replace(",", " "))]
+
+    def add_transformation(self, node: Node, source: str, target: str, given: Any) -> None:
+        """What a connection does to its values: linear on real numbers, tables on the others."""
+        component, _, signal = target.partition(".")
+        face = self.parts[component].face
+        name = signal if signal in face.variables else signal.rpartition("[")[0]
+        family, values = FAMILIES[face.variables[name].type], dict(given.table)
+        if family == REAL:
+            if (given.factor, given.offset) != (1.0, 0.0):
+                child(node, "ssc", "LinearTransformation", factor=repr(given.factor), offset=repr(given.offset))
+            return
+        if (given.factor, given.offset) != (1.0, 0.0):
+            domain = {"Boolean": [0.0, 1.0], "Enumeration": self.item_numbers(source)}.get(family)
+            if domain is None:
+                raise ScenarioError(f"{self.where}: connection to {target}: SSP knows no factor for type {family}; use 'values'.")
+            values = {value: given.factor * value + given.offset for value in domain}
+        if values:
+            kind = "Boolean" if family == "Boolean" else INTEGER
+            holder = child(node, "ssc", f"{kind}MappingTransformation")
+            for first, second in values.items():
+                texts = [str(bool(v)).lower() if kind == "Boolean" else str(int(v)) for v in (first, second)]
+                child(holder, "ssc", "MapEntry", source=texts[0], target=texts[1])
+
+    def item_numbers(self, name: str) -> list[float]:
+        """Numbers of the items that an enumeration can have."""
+        component, _, signal = name.partition(".")
+        return [float(number) for number in self.parts[component].face.items(signal).values()]
+
+    def extras(self) -> Mapping[str, Any]:
+        """What SSP has no words for, and a file that goes with it."""
+        own: dict[str, Any] = self.table.model_dump(
+            mode="json", by_alias=True, exclude_unset=True, exclude={"components", "connections", "start", "stop"}
+        )
+        balises = self.table.balises
+        if balises is not None and balises.file is not None:
+            try:
+                self.files[BALISES_FILE] = (self.folder / balises.file).read_bytes()
+            except OSError as error:
+                raise ScenarioError(f"{self.where}: balises.file: {balises.file} cannot be read: {error.strerror}.") from error
+            own["balises"] = own["balises"] | {"file": BALISES_FILE}
+        return own

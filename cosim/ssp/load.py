@@ -1,0 +1,190 @@
+"""Loading: an SSP becomes the tables of a scenario, nested systems flattened, FMUs unpacked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path as FilePath
+from typing import Any
+
+from cosim.errors import ScenarioError, nearest
+from cosim.scenario.models import LATE_PARAMETERS
+from cosim.ssp.annotation import DIGEST, digest
+from cosim.ssp.bindings import start_values
+from cosim.ssp.document import fail, place
+from cosim.ssp.model import ComponentElement, Structure
+from cosim.ssp.names import split_variant
+from cosim.ssp.nets import Chain, Nets, Path, flat_names
+from cosim.ssp.package import DEFAULT_VARIANT, Package, Unpacked
+from cosim.ssp.pipe import Pipe, by_items, numeric, simplest
+from cosim.ssp.structure import read_structure
+
+ORIGIN = ("model", "observer", "as", "preset", "options", "late_policy", "replay_horizon")
+"""Keys of a component that say where its FMU came from and how it treats late events."""
+DEFAULT_STEPS = 1000
+"""Communication steps of a run where nothing says how long one should be."""
+
+
+@dataclass
+class Loaded:
+    """A scenario out of an SSP.
+
+    Args:
+        tables: as in a scenario file; paths are absolute.
+        doubts: what was not as it should be, and could be read all the same.
+        unpacked: the folder of the FMUs, to be kept as long as they are needed.
+    """
+
+    tables: dict[str, Any]
+    unpacked: Unpacked
+    doubts: list[str] = field(default_factory=list)
+
+
+def load_package(name: str) -> Loaded:
+    """The scenario in an SSP.
+
+    Args:
+        name: path of the file, with ``#VARIANT`` for another structure than ``SystemStructure.ssd``.
+
+    Raises:
+        CosimError: something in it is missing, broken or cannot be carried out; with file and line.
+    """
+    path, variant = split_variant(name)
+    unpacked = Unpacked()
+    package = Package(FilePath(path), path, unpacked)
+    return load_structure(read_structure(package, find_variant(package, variant)), package)
+
+
+def list_variants(name: str) -> dict[str, str]:
+    """The structures in an SSP: their names as ``#NAME`` takes them, the default one first, and the titles within them.
+
+    Raises:
+        CosimError: one of them cannot be read.
+    """
+    path, _ = split_variant(name)
+    package = Package(FilePath(path), path, Unpacked())
+    return {member.removesuffix(".ssd"): read_structure(package, member).name for member in package.variants}
+
+
+def find_variant(package: Package, variant: str) -> str:
+    """The member that a variant's name means: its file name, with its ending or without, or the name written within it.
+
+    Raises:
+        ScenarioError: there is none.
+    """
+    if not variant:
+        return DEFAULT_VARIANT
+    for member in package.variants:
+        if variant in (member, member.removesuffix(".ssd")):
+            return member
+    for member in package.variants:
+        if read_structure(package, member).name == variant:
+            return member
+    known = [member.removesuffix(".ssd") for member in package.variants]
+    raise ScenarioError(f"{package.title} has no variant {variant!r}; {nearest(variant, known)}")
+
+
+def load_structure(structure: Structure, package: Package) -> Loaded:
+    """The scenario of one system structure.
+
+    Raises:
+        CosimError: something in it cannot be carried out.
+    """
+    nets = Nets(structure.system)
+    if not nets.faces:
+        fail(structure.system.node, "the system holds no component; there is nothing to run.")
+    starts = start_values(nets)
+    loaded = Loaded({}, package.unpacked, list(starts.doubts))
+    names = flat_names(nets.faces)
+    tables = loaded.tables
+    tables |= {"title": structure.name, "description": structure.description}
+    if not structure.extras:
+        tables["source"] = f"SSP {structure.version}: {package.title}"
+    tables |= {key: value for key, value in structure.extras.items() if key not in ("components", "connections")}
+    _localise_files(tables, package)
+    tables |= _experiment(structure, nets, tables)
+    tables["components"] = {
+        names[path]: _component(nets, path, starts.values.get(path, {}), loaded.doubts) for path in nets.faces
+    }
+    tables["connections"] = [line for chain in nets.chains if (line := _connection(chain, nets, names)) is not None]
+    return loaded
+
+
+def _component(nets: Nets, path: Path, parameters: Mapping[str, Any], doubts: list[str]) -> dict[str, Any]:
+    element = nets.elements[path]
+    assert isinstance(element, ComponentElement)
+    extras = dict(element.extras)
+    made = extras.pop(DIGEST, None)
+    if made is not None and made != digest(element.fmu):
+        speaks = f"{element.member} is not the FMU that the annotation speaks of; it is used as it is."
+        doubts.append(f"{place(element.node)}: {speaks}")
+        extras = {key: value for key, value in extras.items() if key not in ORIGIN}
+    if "model" not in extras and "observer" not in extras:
+        extras["fmu"] = str(element.fmu)
+    own = {name: value for name, value in parameters.items() if name not in LATE_PARAMETERS & extras.keys()}
+    return extras | ({"parameters": own} if own else {})
+
+
+def _experiment(structure: Structure, nets: Nets, tables: Mapping[str, Any]) -> dict[str, float]:
+    """Start, stop and step, as far as they are known: from the structure, from our annotation, or else from the FMUs."""
+    experiments = [face.description.defaultExperiment for face in nets.faces.values()]
+    times = {k: [float(v) for e in experiments if (v := getattr(e, k, None)) is not None] for k in ("stopTime", "stepSize")}
+    start = 0.0 if structure.start is None else structure.start
+    stop = structure.stop if structure.stop is not None else max(times["stopTime"], default=None)
+    if stop is None or not stop > start:
+        return {"start": start} | ({} if stop is None else {"stop": stop})
+    if "step" in tables:
+        return {"start": start, "stop": stop}
+    wanted = min((s for s in times["stepSize"] if s > 0.0), default=(stop - start) / DEFAULT_STEPS)
+    return {"start": start, "stop": stop, "step": (stop - start) / max(1, math.ceil((stop - start) / wanted - 1e-9))}
+
+
+def _connection(chain: Chain, nets: Nets, names: Mapping[Path, str]) -> str | dict[str, Any] | None:
+    """A connection of the scenario, or None where no component drives the input."""
+    root, sink, last = chain.root, chain.sink, chain.hops[-1].node
+    if root.path not in nets.faces:
+        return None
+    if nets.kind(root) not in ("output", "inout"):
+        fail(chain.hops[0].node, f"{root} is of kind {nets.kind(root)!r}; only outputs can drive inputs here.")
+    source = f"{names[root.path]}.{root.name}{root.suffix}"
+    target = f"{names[sink.path]}.{sink.name}{sink.suffix}"
+    if not any(hop.suppress or hop.step is not None for hop in chain.hops) and _shows_own_units(chain, nets):
+        return f"{source} -> {target}"
+    own = nets.faces[root.path].unit(root.name)
+    pipe = Pipe(own).through(nets.unit(root), False, None, chain.hops[0].node)
+    for hop in chain.hops:
+        pipe = pipe.through(nets.unit(hop.target), hop.suppress, hop.step, hop.node)
+    pipe = pipe.through(nets.faces[sink.path].unit(sink.name), False, None, last)
+    return {"from": source, "to": target, "units": "ignore"} | _effect(pipe, chain, nets)
+
+
+def _shows_own_units(chain: Chain, nets: Nets) -> bool:
+    """Whether both ends are in the units of their FMUs, so that the connection converts as any other does."""
+    ends = ((point, nets.faces[point.path].unit(point.name), nets.unit(point)) for point in (chain.root, chain.sink))
+    return all((own is None and shown is None) or (own and shown and own.unit == shown.unit) for _, own, shown in ends)
+
+
+def _effect(pipe: Pipe, chain: Chain, nets: Nets) -> dict[str, Any]:
+    """What a pipe does, in the words of a connection's table."""
+    if not pipe.maps:
+        return {"factor": pipe.factor, "offset": pipe.offset}
+    node, kinds = chain.hops[-1].node, {step.kind for step in pipe.maps}
+    source, target = (nets.faces[point.path].items(point.name) for point in (chain.root, chain.sink))
+    if kinds == {"Enumeration"}:
+        table = by_items(pipe.maps, source, target, node)
+        domain = frozenset(map(float, source.values()))
+    else:
+        table = numeric(pipe.maps, node)
+        domain = frozenset((0.0, 1.0)) if kinds == {"Boolean"} else frozenset(map(float, source.values()))
+    simple = simplest(table, domain)
+    if len(simple) == 2 and not isinstance(simple[0], tuple):
+        return {"factor": simple[0], "offset": simple[1]}
+    return {"values": [list(entry) for entry in simple]}
+
+
+def _localise_files(tables: dict[str, Any], package: Package) -> None:
+    """Files that our annotation names become paths of unpacked ones."""
+    balises = tables.get("balises")
+    if isinstance(balises, dict) and balises.get("file") in package.sizes:
+        tables["balises"] = balises | {"file": str(package.file(balises["file"]))}

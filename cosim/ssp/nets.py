@@ -1,0 +1,267 @@
+"""Nets: the connections of nested systems followed from each input back to what drives it, through every system on the way.
+
+Flattens; changes nothing. The directions follow the table "Allowed Connections" of SSP 2.0, section 5.4.2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from cosim.errors import nearest
+from cosim.ssp.common import NamedUnit, Step
+from cosim.ssp.document import Node, fail
+from cosim.ssp.faces import Face, face_of
+from cosim.ssp.model import ComponentElement, Connector, DictionaryReference, Element, End, SystemElement, Wire
+
+Path = tuple[str, ...]
+"""Names of the elements from the root system downwards; the root itself is the empty path."""
+
+TO_ELEMENT: dict[str, set[str]] = {
+    "constant": {"structuralParameter", "parameter", "input", "inout"},
+    "structuralParameter": {"structuralParameter", "parameter", "input", "inout"},
+    "calculatedParameter": {"parameter", "input", "inout"},
+    "parameter": {"parameter", "input", "inout"},
+    "input": {"input", "inout"},
+    "output": {"input", "inout"},
+    "local": {"input", "inout"},
+    "inout": {"input"},
+}
+TO_SYSTEM: dict[str, set[str]] = {
+    "constant": {"constant", "calculatedParameter", "output", "local"},
+    "structuralParameter": {"calculatedParameter", "output", "local"},
+    "calculatedParameter": {"calculatedParameter", "output", "local"},
+    "parameter": {"calculatedParameter", "output", "local"},
+    "input": {"output", "local"},
+    "output": {"output", "local"},
+    "local": {"output", "local"},
+    "inout": {"output", "local"},
+}
+SOURCES = {
+    "system": {"structuralParameter", "parameter", "input"},
+    "element": {"constant", "calculatedParameter", "output", "local", "inout"},
+}
+"""Kinds of connectors that can drive others, of the enclosing system and of its elements."""
+SINKS = ("input", "inout", "parameter", "structuralParameter")
+
+
+@dataclass(frozen=True)
+class Point:
+    """A connector of one element, or one element of the array it is.
+
+    Args:
+        path: of the element. name: of the connector. indices: empty for the whole.
+    """
+
+    path: Path
+    name: str
+    indices: tuple[int, ...] = ()
+
+    def __str__(self) -> str:
+        return ".".join((*self.path, self.name)) + self.suffix
+
+    @property
+    def suffix(self) -> str:
+        """The indices as a variable name has them."""
+        return f"[{','.join(map(str, self.indices))}]" if self.indices else ""
+
+    @property
+    def whole(self) -> Point:
+        """The whole array."""
+        return Point(self.path, self.name)
+
+
+@dataclass(frozen=True)
+class Hop:
+    """A connection in the direction of its data."""
+
+    source: Point
+    target: Point
+    suppress: bool
+    step: Step | None
+    node: Node
+
+
+@dataclass(frozen=True)
+class Chain:
+    """The way into one input of a component.
+
+    Args:
+        root: what drives it, or the outermost connector that nothing drives. hops: from there to the input.
+    """
+
+    root: Point
+    hops: tuple[Hop, ...]
+
+    @property
+    def sink(self) -> Point:
+        """The input at its end."""
+        return self.hops[-1].target
+
+    def after(self, point: Point) -> tuple[Hop, ...] | None:
+        """The hops behind a point on the way, or None where the way does not lead through it."""
+        for number, hop in enumerate(self.hops):
+            if hop.source.whole == point:
+                return self.hops[number:]
+        return None
+
+
+class Nets:
+    """All elements of a nested system by path, and the connections between their connectors.
+
+    Args:
+        root: the root system.
+
+    Raises:
+        ScenarioError: a connector that does not exist or does not fit its FMU, a connection without direction, two drivers of
+            one connector, or connections in a circle.
+    """
+
+    def __init__(self, root: SystemElement) -> None:
+        self.root = root
+        self.elements: dict[Path, Element] = dict(_walk(root, ()))
+        self.faces: dict[Path, Face] = {p: face_of(e) for p, e in self.elements.items() if isinstance(e, ComponentElement)}
+        for path, face in self.faces.items():
+            for connector in self.elements[path].connectors.values():
+                face.check(connector)
+        self.dictionaries = self._dictionaries()
+        self.incoming: dict[Point, Hop] = {}
+        for path, element in self.elements.items():
+            if isinstance(element, SystemElement):
+                for wire in element.wires:
+                    self._add(self._directed(path, element, wire))
+        self.chains = [self._chain(point) for point in self.incoming if self._is_sink(point)]
+
+    def connector(self, point: Point) -> Connector:
+        """The connector at a point."""
+        return self.elements[point.path].connectors[point.name]
+
+    def kind(self, point: Point) -> str:
+        """Kind of a connector; what an FMU's unspecified connector is, its variable says."""
+        kind = self.connector(point).kind
+        if kind == "unspecified" and point.path in self.faces:
+            return str(self.faces[point.path].variables[point.name].causality)
+        return kind
+
+    def unit(self, point: Point) -> NamedUnit | None:
+        """Unit of a connector, its own or that of the FMU's variable."""
+        own = self.connector(point).type
+        if own is not None and own.unit is not None:
+            return own.unit
+        return self.faces[point.path].unit(point.name) if point.path in self.faces else None
+
+    def _dictionaries(self) -> dict[tuple[Path, str, str], list[Point]]:
+        """Connectors that stand for each entry of each dictionary."""
+        members: dict[tuple[Path, str, str], list[Point]] = {}
+        for path, element in self.elements.items():
+            if isinstance(element, DictionaryReference):
+                owner = self._owner(path, element)
+                entries = self._system(owner).dictionaries[element.dictionary]
+                for name, connector in element.connectors.items():
+                    if name not in entries:
+                        fail(connector.node, f"dictionary {element.dictionary!r} has no entry {name!r}; {nearest(name, entries)}")
+                    members.setdefault((owner, element.dictionary, name), []).append(Point(path, name))
+        return members
+
+    def _owner(self, path: Path, reference: DictionaryReference) -> Path:
+        """The system whose dictionary is meant: the nearest one outwards that has it."""
+        for depth in range(len(path) - 1, -1, -1):
+            if reference.dictionary in self._system(path[:depth]).dictionaries:
+                return path[:depth]
+        fail(reference.node, f"no system around {reference.name!r} has a signal dictionary {reference.dictionary!r}.")
+
+    def _system(self, path: Path) -> SystemElement:
+        element = self.elements[path]
+        assert isinstance(element, SystemElement), "only systems hold elements"
+        return element
+
+    def _directed(self, path: Path, system: SystemElement, wire: Wire) -> Hop:
+        start, end = (self._point(path, system, side, wire.node) for side in (wire.start, wire.end))
+        forward, backward = self._allowed(path, start, end), self._allowed(path, end, start)
+        if forward == backward:
+            problem = "could lead either way" if forward else "is not one that SSP allows"
+            kinds = f"kinds {self.kind(start)!r} and {self.kind(end)!r}"
+            fail(wire.node, f"the connection between {start} and {end} {problem} ({kinds}): one must drive the other.")
+        source, target = (start, end) if forward else (end, start)
+        return Hop(source, target, wire.suppress, wire.step, wire.node)
+
+    def _point(self, path: Path, system: SystemElement, end: End, node: Node) -> Point:
+        owner: Element = system
+        if end.element is not None:
+            if end.element not in system.elements:
+                what = f"system {system.name!r} has no element {end.element!r}"
+                fail(node, f"connection: {what}; {nearest(end.element, system.elements)}")
+            owner, path = system.elements[end.element], (*path, end.element)
+        if end.connector not in owner.connectors:
+            what = f"{owner.name!r} has no connector {end.connector!r}"
+            fail(node, f"connection: {what}; {nearest(end.connector, owner.connectors)}")
+        return Point(path, end.connector, end.indices)
+
+    def _allowed(self, path: Path, source: Point, target: Point) -> bool:
+        sides = ["system" if point.path == path else "element" for point in (source, target)]
+        kinds = [self.kind(point) for point in (source, target)]
+        table = TO_SYSTEM if sides[1] == "system" else TO_ELEMENT
+        possible = SOURCES[sides[0]] if kinds[0] == "unspecified" else SOURCES[sides[0]] & {kinds[0]}
+        return any(kinds[1] in table[kind] or kinds[1] == "unspecified" for kind in possible)
+
+    def _add(self, hop: Hop) -> None:
+        other = self.incoming.setdefault(hop.target, hop)
+        if other is not hop:
+            fail(hop.node, f"{hop.target} has two sources, {other.source} and {hop.source}; remove one connection.")
+
+    def _is_sink(self, point: Point) -> bool:
+        return point.path in self.faces and self.kind(point) in SINKS
+
+    def _chain(self, sink: Point) -> Chain:
+        hops: list[Hop] = []
+        point, seen = sink, {sink}
+        while (hop := self._driver(point)) is not None:
+            hops.insert(0, hop)
+            point = hop.source
+            if point in seen:
+                fail(hop.node, f"the connections to {sink} lead in a circle through {point}; no component drives it.")
+            seen.add(point)
+            if point.path in self.faces:
+                break
+        return Chain(point, tuple(hops))
+
+    def _driver(self, point: Point) -> Hop | None:
+        """The connection into a point: its own, that of the whole array, or that of the dictionary entry it stands for."""
+        if point in self.incoming:
+            return self.incoming[point]
+        if point.indices and point.whole in self.incoming:
+            hop = self.incoming[point.whole]
+            if hop.source.indices:
+                fail(hop.node, f"{point.whole} is driven by one element of an array only; {point} is none of it.")
+            return Hop(Point(hop.source.path, hop.source.name, point.indices), point, hop.suppress, hop.step, hop.node)
+        for (_, dictionary, _), members in self.dictionaries.items():
+            if point.whole in members:
+                drivers = [m for m in members if m in self.incoming]
+                if len(drivers) > 1:
+                    names = " and ".join(map(str, drivers))
+                    fail(self.connector(point).node, f"the signal {point.name!r} of {dictionary!r} has two sources, at {names}.")
+                return Hop(drivers[0], point, False, None, self.connector(point).node) if drivers else None
+        return None
+
+
+def _walk(element: Element, path: Path) -> Iterator[tuple[Path, Element]]:
+    yield path, element
+    if isinstance(element, SystemElement):
+        for name, child in element.elements.items():
+            yield from _walk(child, (*path, name))
+
+
+def flat_names(paths: Mapping[Path, object]) -> dict[Path, str]:
+    """A legal, unique component name for each path: its parts joined by ``__``, other characters than letters, digits and ``_``
+    replaced.
+    """
+    names: dict[Path, str] = {}
+    for path in paths:
+        parts = ["".join(c if c.isascii() and (c.isalnum() or c == "_") else "_" for c in part) for part in path]
+        name = "__".join(parts)
+        name = f"_{name}" if name[:1].isdigit() else name
+        base, number = name, 2
+        while name in names.values():
+            name, number = f"{base}_{number}", number + 1
+        names[path] = name
+    return names

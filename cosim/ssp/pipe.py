@@ -1,0 +1,142 @@
+"""Pipes: what becomes of a number on its way from one variable to another: units, linear transformations, tables of values.
+
+Pure functions on numbers and units; knows neither systems nor FMUs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from cosim.coupling.transformation import as_affine
+from cosim.errors import nearest
+from cosim.ssp.common import Linear, NamedUnit, Step, ValueMap
+from cosim.ssp.document import Node, fail
+from plant_models.hybrid.units import UnitError, conversion
+
+BOOLEANS = {"true": 1.0, "1": 1.0, "false": 0.0, "0": 0.0}
+
+
+@dataclass(frozen=True)
+class Pipe:
+    """``target = factor * source + offset``, then the tables in turn.
+
+    Args:
+        unit: what the number is in at the end, where that is known.
+        factor, offset: units and linear transformations so far. maps: tables of values so far.
+    """
+
+    unit: NamedUnit | None = None
+    factor: float = 1.0
+    offset: float = 0.0
+    maps: tuple[ValueMap, ...] = ()
+
+    @property
+    def is_identity(self) -> bool:
+        """Whether every number passes unchanged."""
+        return (self.factor, self.offset) == (1.0, 0.0) and not self.maps
+
+    def through(self, unit: NamedUnit | None, suppress: bool, step: Step | None, node: Node) -> Pipe:
+        """This pipe with one connection or mapping more.
+
+        Args:
+            unit: of the far end, None where it has none of its own. suppress: whether units are left alone.
+            step: the transformation, in the unit of the far end. node: for messages.
+
+        Raises:
+            ScenarioError: units that do not fit, or transformations that cannot follow one another.
+        """
+        pipe = self if suppress else self._converted(unit, node)
+        pipe = replace(pipe, unit=unit or (None if suppress else pipe.unit))
+        if isinstance(step, Linear):
+            if pipe.maps:
+                fail(node, "a linear transformation behind a table of values cannot be carried out.")
+            return pipe._affine(step.factor, step.offset)
+        if isinstance(step, ValueMap):
+            if (pipe.factor, pipe.offset) != (1.0, 0.0):
+                fail(node, "a table of values behind a unit conversion or a linear transformation cannot be carried out.")
+            return replace(pipe, maps=(*pipe.maps, step))
+        return pipe
+
+    def number(self, value: float, node: Node) -> float:
+        """What becomes of a number; a whole number stays one where nothing is done to it."""
+        if self.maps:
+            return numeric(self.maps, node).get(float(value), value)
+        return value if self.is_identity else self.factor * value + self.offset
+
+    def item(self, name: str, node: Node) -> str:
+        """What becomes of the name of an item.
+
+        Raises:
+            ScenarioError: there is a transformation for numbers in the pipe.
+        """
+        if (self.factor, self.offset) != (1.0, 0.0) or any(m.kind != "Enumeration" for m in self.maps):
+            fail(node, f"{name!r} is a name; a transformation of numbers cannot be applied to it.")
+        for entry in self.maps:
+            name = entry.entries.get(name, name)
+        return name
+
+    def _converted(self, unit: NamedUnit | None, node: Node) -> Pipe:
+        if self.unit is None or unit is None or self.unit.unit == unit.unit:
+            return self
+        try:
+            return self._affine(*conversion(self.unit.unit, unit.unit))
+        except UnitError as error:
+            fail(node, f"units {self.unit.name!r} and {unit.name!r} do not fit: {error}.")
+
+    def _affine(self, factor: float, offset: float) -> Pipe:
+        return replace(self, factor=factor * self.factor, offset=factor * self.offset + offset)
+
+
+def numeric(maps: tuple[ValueMap, ...], node: Node) -> dict[float, float]:
+    """Tables of booleans or integers in a row as one table; a value without an entry passes unchanged.
+
+    Raises:
+        ScenarioError: one of them is not numeric, or maps one value twice.
+    """
+    table: dict[float, float] = {}
+    for step in maps:
+        entries = _numbers(step, node)
+        keys = {**table, **entries}
+        table = {key: entries.get(table.get(key, key), table.get(key, key)) for key in keys}
+    return table
+
+
+def by_items(maps: tuple[ValueMap, ...], source: Mapping[str, int], target: Mapping[str, int], node: Node) -> dict[float, float]:
+    """Tables of item names in a row as a table of numbers; an item without an entry keeps its name, or else its number.
+
+    Args:
+        source, target: items of the two enumerations.
+
+    Raises:
+        ScenarioError: an entry leads to an item that the target does not have.
+    """
+    table: dict[float, float] = {}
+    for first, value in source.items():
+        name = first
+        for step in maps:
+            name = step.entries.get(name, name)
+        if name != first and name not in target:
+            fail(node, f"item {first!r} is mapped to {name!r}, which is no item of the target; {nearest(name, target)}")
+        table[float(value)] = float(target.get(name, value))
+    return table
+
+
+def simplest(table: Mapping[float, float], domain: frozenset[float]) -> tuple[float, float] | tuple[tuple[float, float], ...]:
+    """A table as ``(factor, offset)`` where that does the same on its domain, else as its entries that change something."""
+    affine = as_affine(table, domain)
+    if affine is not None:
+        return affine
+    return tuple((source, target) for source, target in sorted(table.items()) if source != target)
+
+
+def _numbers(step: ValueMap, node: Node) -> dict[float, float]:
+    if step.kind == "Enumeration":
+        fail(node, "a table of item names can only connect enumerations.")
+    numbers: dict[float, float] = {}
+    for source, target in step.entries.items():
+        first, second = (BOOLEANS[t.strip()] if step.kind == "Boolean" else float(int(t)) for t in (source, target))
+        if first in numbers:
+            fail(node, f"two entries map the value {source!r}; a mapping must be unambiguous.")
+        numbers[first] = second
+    return numbers
