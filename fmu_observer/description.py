@@ -28,7 +28,7 @@ from fmpy.model_description import (
     Unknown,
 )
 
-from fmu_observer.event_protocol import JOURNAL_CAPACITY, LATE_POLICIES, EventProtocol
+from fmu_observer.event_protocol import JOURNAL_CAPACITY, LATE_POLICIES, OUTCOME_TEXTS, OUTCOME_VARIABLES, EventProtocol
 from plant_models.hybrid import HybridSystem, Signal, TracedSystem, TriggeredEvent, width
 from plant_models.hybrid.units import BASE_SYMBOLS, conversion, parse_unit
 
@@ -63,6 +63,7 @@ class VariableTable:
         outputs: first of the outputs. states: first of the states. parameters: first of the parameters.
         events: first of the event variables, two for each triggered event (clock or count, then stamp).
         protocol: first of `late_policy` and `replay_horizon`; both are missing where there is no triggered event.
+        outcomes: first of the counts of what became of events, see `OUTCOME_VARIABLES`; missing there too.
         derivatives: first of the derivatives of the continuous states.
         indicators: first of the event indicators, one for each state with dry friction.
         end: first value reference that is not used.
@@ -74,6 +75,7 @@ class VariableTable:
     parameters: int
     events: int
     protocol: int
+    outcomes: int
     derivatives: int
     indicators: int
     end: int
@@ -83,7 +85,8 @@ class VariableTable:
         """The table of a system, the same for FMI 2 and FMI 3."""
         triggered = len(system.triggered_events)
         counts = [width(exposed_inputs(system)), width(system.outputs), system.state_count, width(system.parameter_signals)]
-        counts += [2 * triggered, 2 if triggered else 0, system.continuous_count, len(system.frictions)]
+        counts += [2 * triggered, *((2, len(OUTCOME_VARIABLES)) if triggered else (0, 0))]
+        counts += [system.continuous_count, len(system.frictions)]
         return cls(*(1 + sum(counts[:i]) for i in range(len(counts) + 1)))
 
 
@@ -199,6 +202,7 @@ def _variables(system: HybridSystem, fmi_version: FmiVersion, preset: str | None
         variables += _event_variables(event, table.events + 2 * i, fmi_version, protocol.counts(fmi_version))
     if system.triggered_events:
         variables += _protocol_variables(protocol, table.protocol, real)
+        variables += _outcome_variables(table.outcomes, "Integer" if fmi_version == 2 else "Int32")
     if not protocol.counts(fmi_version):
         _assign_clocks(system, variables)
     return variables + _rate_variables(system, variables, real)
@@ -240,6 +244,12 @@ def _protocol_variables(protocol: EventProtocol, reference: int, real: str) -> l
     horizon = _variable("replay_horizon", reference + 1, real, "parameter", "fixed", "exact", "s", protocol.replay_horizon, text)
     horizon.min = "0.0"
     return [policy, horizon]
+
+
+def _outcome_variables(reference: int, integer: str) -> list[ModelVariable]:
+    named = enumerate(OUTCOME_VARIABLES.items())
+    kind = ("local", "discrete", "calculated", None, None)
+    return [_variable(name, reference + i, integer, *kind, OUTCOME_TEXTS[outcome]) for i, (name, outcome) in named]
 
 
 def _rate_variables(system: HybridSystem, variables: list[ModelVariable], real: str) -> list[ModelVariable]:

@@ -20,6 +20,19 @@ JOURNAL_CAPACITY = 4096
 """Records of the past remembered at most, in the block and in the exported FMU; an event before them is out of reach."""
 
 
+OUTCOME_TEXTS = {
+    "accepted": "Events that took effect so far, on time or not",
+    "replayed": "Of the accepted events, the late ones applied at their stamps",
+    "late": "Of the accepted events, the late ones applied when they were told",
+    "rejected": "Late events without effect so far",
+    "lost": "Events announced so far of which nothing else is known",
+}
+"""What became of events, and what its count says; in the order of `Outcome` in an FMU."""
+
+OUTCOME_VARIABLES = {f"events.{outcome}": outcome for outcome in OUTCOME_TEXTS}
+"""Local variables that count outcomes. No signal of a model can be called so: its name has no dot."""
+
+
 @dataclass(frozen=True)
 class EventProtocol:
     """How events are announced, and what becomes of late ones.

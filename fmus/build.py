@@ -19,7 +19,7 @@ from fmus.content.xml import build_description_xml, model_description_xml
 from fmus.documentation import documentation_files
 from fmus.pack import check_target, pack_fmu
 from fmus.toolchain.compile import header_folder
-from fmus.toolchain.platforms import HOST, binary_files
+from fmus.toolchain.platforms import HOST, Platform, binary_files
 from fmus.toolchain.targets import Progress, Target, choose_targets, compile_targets
 from plant_models.hybrid import HybridSystem
 
@@ -122,6 +122,57 @@ def fmu_path(system: HybridSystem, target: Path | str) -> Path:
     return path if path.suffix.lower() == ".fmu" else path / f"{system.name}.fmu"
 
 
+@dataclass(frozen=True)
+class Draft:
+    """An FMU of which all but the libraries is written.
+
+    Only `compile` may be called in another thread: CasADi is at work everywhere else.
+
+    Args:
+        plan: what it will be made of. targets: who compiles. description: modelDescription.xml.
+        sources: C files and headers by name.
+    """
+
+    plan: Plan
+    targets: Sequence[Target]
+    description: bytes
+    sources: dict[str, bytes]
+
+    @classmethod
+    def of(cls, plan: Plan, targets: Sequence[Target]) -> Draft:
+        """Generate the text of an FMU.
+
+        Raises:
+            TextRefusedError: a name or a description holds a character that XML forbids.
+        """
+        description = plan.description_xml().encode()  # first: a text that XML cannot hold is refused before anything is compiled
+        return cls(plan, targets, description, plan.source_files() | plan.header_files())
+
+    def compile(self, progress: Progress | None = None) -> dict[Platform, bytes]:
+        """The libraries.
+
+        Raises:
+            CompilationError: a compiler refused the sources.
+        """
+        return compile_targets(self.targets, self.sources, self.plan.sources, self.plan.system.name, progress)
+
+    def pack(self, libraries: dict[Platform, bytes], path: Path) -> Path:
+        """Write the file.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        plan = self.plan
+        content = {f"sources/{name}": text for name, text in self.sources.items()}
+        content["modelDescription.xml"] = self.description
+        if plan.fmi_version == 3:
+            content["sources/buildDescription.xml"] = build_description_xml(plan.system.name, plan.sources).encode()
+        content |= resource_files(plan.system, plan.preset)
+        content |= binary_files(plan.fmi_version, plan.system.name, libraries)
+        content |= documentation_files(plan.system, plan.description, plan.preset, self.targets)
+        return pack_fmu(content, path)
+
+
 def write_fmu(plan: Plan, targets: Sequence[Target], path: Path, progress: Progress | None = None) -> Path:
     """Carry out a plan: generate, compile, pack.
 
@@ -129,17 +180,8 @@ def write_fmu(plan: Plan, targets: Sequence[Target], path: Path, progress: Progr
         TextRefusedError: a name or a description holds a character that XML forbids.
         CompilationError: a compiler refused the sources.
     """
-    description = plan.description_xml().encode()  # first: a text that XML cannot hold is refused before anything is compiled
-    sources = plan.source_files() | plan.header_files()
-    libraries = compile_targets(targets, sources, plan.sources, plan.system.name, progress)
-    content = {f"sources/{name}": text for name, text in sources.items()}
-    content["modelDescription.xml"] = description
-    if plan.fmi_version == 3:
-        content["sources/buildDescription.xml"] = build_description_xml(plan.system.name, plan.sources).encode()
-    content |= resource_files(plan.system, plan.preset)
-    content |= binary_files(plan.fmi_version, plan.system.name, libraries)
-    content |= documentation_files(plan.system, plan.description, plan.preset, targets)
-    return pack_fmu(content, path)
+    draft = Draft.of(plan, targets)
+    return draft.pack(draft.compile(progress), path)
 
 
 @cache

@@ -12,6 +12,7 @@ import inspect
 import os
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -22,7 +23,7 @@ import casadi as ca
 
 from fmu_observer.description import FmiVersion
 from fmu_observer.event_protocol import EventProtocol
-from fmus.build import Plan, plan_fmu, runtime_sources, standard_headers, write_fmu
+from fmus.build import Draft, Plan, plan_fmu, runtime_sources, standard_headers
 from fmus.folders import cache_folder
 from fmus.toolchain.targets import Target, choose_targets
 from plant_models.hybrid import HybridSystem
@@ -49,18 +50,41 @@ def cached_fmu(
         CompilerMissing: no C compiler was found.
         CompilationError: the compiler refused the sources.
     """
+    entry = cache_entry(system, fmi_version, preset, protocol)
+    if entry.draft is not None:
+        entry.draft.pack(entry.draft.compile(), entry.path)
+    return entry.path
+
+
+@dataclass(frozen=True)
+class CacheEntry:
+    """Where an FMU is kept, and what is to be compiled and packed there: nothing where it was built before.
+
+    Args:
+        path: of the file. draft: of an FMU that is still to be built.
+    """
+
+    path: Path
+    draft: Draft | None = None
+
+
+def cache_entry(
+    system: HybridSystem, fmi_version: FmiVersion = 3, preset: str | None = None, protocol: EventProtocol | None = None
+) -> CacheEntry:
+    """`cached_fmu` up to the compiler, for those who build several FMUs at a time.
+
+    Raises:
+        ValueError, CompilerMissing: as `cached_fmu`.
+    """
     folder = cache_folder()
     by_request = _known.setdefault(system, {})
     request = (fmi_version, preset, protocol, folder, os.environ.get("CC"))
     known = by_request.get(request)  # a system does not change once it is built, so within one process this is enough
     if known is not None and known.exists():
-        return known
+        return CacheEntry(known)
     plan, targets = plan_fmu(system, fmi_version, preset, protocol), choose_targets()
-    target = folder / content_key(plan, targets) / f"{system.name}.fmu"
-    if not target.exists():
-        write_fmu(plan, targets, target)
-    by_request[request] = target
-    return target
+    path = by_request[request] = folder / content_key(plan, targets) / f"{system.name}.fmu"
+    return CacheEntry(path, None if path.exists() else Draft.of(plan, targets))
 
 
 def content_key(plan: Plan, targets: Sequence[Target]) -> str:

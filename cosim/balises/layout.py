@@ -117,11 +117,6 @@ class InstantLayout:
         first = bisect_right(self._sorted, t)
         return self._sorted[first : bisect_right(self._sorted, until, first)]
 
-    def next_after(self, t: float) -> float:
-        """The first instant after `t` [s], infinite where there is none."""
-        following = bisect_right(self._sorted, t)
-        return self._sorted[following] if following < len(self._sorted) else inf
-
     def identity(self, instant: float) -> str:
         """Name of the balise at one of the instants [s]: ``I1`` for the first."""
         return f"I{bisect_left(self._sorted, instant) + 1}"

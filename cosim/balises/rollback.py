@@ -50,7 +50,7 @@ class RollbackLocaliser(Localiser):
             passings = []
             for stamp, balise in found:
                 trial.go(stamp)
-                passings.append((self._passing(stamp, balise), self.watch.outputs.copy()))
+                passings.append((self.passing(stamp, balise, *self._ends()), self.watch.outputs.copy()))
             trial.finish()
             return passings
         finally:
@@ -64,11 +64,16 @@ class RollbackLocaliser(Localiser):
             for balise in self.layout.crossed(stretch.before, stretch.after)
         ]
 
-    def _passing(self, stamp: float, balise: Balise | None) -> Passing:
-        watch = self.watch
+    def passing(self, stamp: float, balise: Balise | None, position: float, speed: float) -> Passing:
+        """What there is to say of a passing.
+
+        Args:
+            stamp: when [s]. balise: which one; None where they are placed by instant.
+            position, speed: of the plant at the stamp [m], [m/s].
+        """
         if balise is None:
-            return self.instant_passing(stamp, watch.position)
-        rounding = 4.0 * ulp(watch.position) / max(abs(watch.speed), 1e-12) + 2.0 * ulp(stamp)
+            return self.instant_passing(stamp, position)
+        rounding = 4.0 * ulp(position) / max(abs(speed), 1e-12) + 2.0 * ulp(stamp)
         bound = max(ROOT_TOLERANCE, rounding)
         return Passing(stamp, balise.position, balise.identity, balise.location_accuracy, self.method, bound)
 

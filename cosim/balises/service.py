@@ -6,7 +6,7 @@ of the plant does not depend on whether anybody looks for balises (methods `roll
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from math import nan
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from cosim.balises.delivery import Delivery, Receiver
+from cosim.balises.layout import InstantLayout
 from cosim.balises.localiser import Localiser
 from cosim.balises.telegram import Channel, FalseTelegram, Mailbox, Passing
 from cosim.components.component import TIME_TOLERANCE
@@ -74,6 +75,7 @@ class BaliseService:
         self._plant.move = self._move_plant
         for receiver in self.receivers:
             receiver.planned.move = partial(self._move_receiver, receiver)
+        plan.services.append(self)
 
     # -- a step -----------------------------------------------------------------------------------------------------
 
@@ -122,12 +124,38 @@ class BaliseService:
         return self._event_rows(self._t, self._until, self._telegrams) if self._telegrams else NO_ROWS
 
     @property
+    def touched(self) -> Collection[str]:
+        """Names of the receivers on which a telegram may have acted in the last step."""
+        return self._told.keys()
+
+    @property
     def idle_until(self) -> float:
         """Up to here [s] nothing is on its way to a receiver; what the plant passes in between is not known beforehand."""
         if any(receiver.busy for receiver in self.receivers):
             return -np.inf
         known = [e.delivered_at for e in self.mailbox.waiting[:1]] + [f.time for f in self._false[:1]]
         return min(known, default=np.inf)
+
+    # -- steps done by somebody else ---------------------------------------------------------------------------------
+
+    def expected_rows(self, start: float, stop: float) -> int:
+        """Rows of events in a run from `start` to `stop` [s], where the layout tells how many; else none."""
+        layout = self.localiser.layout
+        return 2 * len(layout.within(start, stop)) if isinstance(layout, InstantLayout) else 0
+
+    @property
+    def has_nothing_found(self) -> bool:
+        """Whether no passing is known that lies ahead of the receivers."""
+        return not self._ahead
+
+    def told_elsewhere(self, passing: Passing, odometer_reading: float, outcomes: Mapping[str, str]) -> None:
+        """Somebody else did a step in which a balise was passed and all receivers were told at once.
+
+        Args:
+            passing: of the balise. odometer_reading: there. outcomes: what became of the telegram, by receiver.
+        """
+        self.mailbox.log.append(self.channel.transmit(passing, self.passed, odometer_reading, outcomes))
+        self.passed += 1
 
     # -- state ------------------------------------------------------------------------------------------------------
 
@@ -154,6 +182,18 @@ class BaliseService:
         self.restore(state)
         self.localiser.restore(localiser)
         self._ahead = found
+
+    def save_within(self) -> Any:
+        """The same in the middle of a step, with what the step has brought so far."""
+        telegrams = None if self._telegrams is None else list(self._telegrams)
+        return self.save(), list(self._snapshots), telegrams, dict(self._told)
+
+    def restore_within(self, state: Any) -> None:
+        """Return to the middle of the step."""
+        saved, snapshots, telegrams, told = state
+        self.restore(saved)
+        self._snapshots, self._told = list(snapshots), dict(told)
+        self._telegrams = None if telegrams is None else list(telegrams)
 
     # -- telegrams --------------------------------------------------------------------------------------------------
 

@@ -9,10 +9,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import inf, nan
+from types import MappingProxyType
 
 from cosim.errors import ScenarioError
 from cosim.results.result import BaliseRecord
 from plant_models.hybrid.noise import standard_normal, uniform_pair
+
+NO_OUTCOMES: Mapping[str, str] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +72,15 @@ class Channel:
         if self.missed_fraction > 1.0:
             raise ScenarioError(f"balises.missed_fraction is a probability, got {self.missed_fraction!r}.")
 
-    def transmit(self, passing: Passing, number: int, odometer_reading: float) -> BaliseRecord:
-        """The telegram of passing `number`; `delivered_at` is NaN where the balise is missed."""
+    def transmit(
+        self, passing: Passing, number: int, odometer_reading: float, outcomes: Mapping[str, str] = NO_OUTCOMES
+    ) -> BaliseRecord:  # fmt: skip
+        """The telegram of passing `number`; `delivered_at` is NaN where the balise is missed.
+
+        Args:
+            passing: of the balise. number: of the passing. odometer_reading: there [m/s].
+            outcomes: what became of it, where that is known already.
+        """
         chance = self.missed_fraction > 0.0 or self.latency_jitter > 0.0
         luck, jitter = uniform_pair(self.seed, 0, number) if chance else (1.0, 0.0)
         missed = luck < self.missed_fraction or passing.identity in self.missed
@@ -87,6 +97,7 @@ class Channel:
             kind="missed" if missed else "true",
             method=passing.method,
             time_bound=passing.time_bound,
+            outcomes=outcomes,
         )
 
 

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from cosim.errors import ScenarioError
+from cosim.cli.scenarios import add_scenario, load_scenario
 from cosim.scenario import Outcome, Scenario
 
 DONE, NOT_AS_ASKED, ERROR = 0, 1, 2
@@ -17,10 +17,9 @@ CALL_LOG = "calls.log"
 
 def register(commands: Any) -> None:
     """Add the command to the parser."""
-    parser = commands.add_parser("run", help="run a scenario", description="Run a shipped scenario by name, or a TOML file.")
-    parser.add_argument("scenario", nargs="?", default="freight_profile_d", help="name or file (default: freight_profile_d)")
-    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="settings",
-                        help="override component.parameter, balises.key or a top-level key; may be repeated")  # fmt: skip
+    description = "Run a scenario: shipped, from a TOML file, or from a system structure package (SSP)."
+    parser = commands.add_parser("run", help="run a scenario", description=description)
+    add_scenario(parser)
     parser.add_argument("--out", metavar="DIR", default=None, help="folder for results and report (default: results/NAME)")
     parser.add_argument("--seeds", type=_positive, metavar="N", help="also run N balise seeds and report medians and quartiles")
     parser.add_argument("--json", action="store_true", help="print the summary as JSON instead of the table")
@@ -38,17 +37,15 @@ def execute(options: argparse.Namespace) -> int:
     """Run and write; everything computed is written also when the run fails."""
     from cosim.results.folder import check_writable  # noqa: PLC0415 - scipy is loaded only by those who run
 
-    scenario = Scenario.load(options.scenario)
-    for setting in options.settings:
-        name, value = parse_setting(setting)
-        scenario.set(name, value)
+    scenario = load_scenario(options)
     scenario.table()
     directory = Path(options.out) if options.out is not None else Path("results") / scenario.name
     check_writable(directory)
     call_log = _call_log(options, scenario, directory)
     bar = None if options.quiet or options.json else ProgressBar()
     try:
-        outcome = scenario.run(progress=bar, warn=_warn, call_log=call_log)
+        building = _ignore if options.quiet else _say
+        outcome = scenario.run(progress=bar, warn=_warn, call_log=call_log, building=building)
     finally:
         if bar is not None:
             bar.close()
@@ -62,23 +59,6 @@ def execute(options: argparse.Namespace) -> int:
     if outcome.failure is not None:
         return ERROR
     return NOT_AS_ASKED if options.strict and outcome.warnings else DONE
-
-
-def parse_setting(text: str) -> tuple[str, Any]:
-    """``name=value`` with the value read as a TOML value where it is one, else as text.
-
-    Raises:
-        ScenarioError: there is no ``=``.
-    """
-    import tomllib  # noqa: PLC0415 - a small thing, only here
-
-    name, sign, value = text.partition("=")
-    if not sign or not name.strip():
-        raise ScenarioError(f"--set {text!r}: expected NAME=VALUE, for instance --set locomotive.mass=80e3.")
-    try:
-        return name.strip(), tomllib.loads(f"value = {value.strip()}")["value"]
-    except tomllib.TOMLDecodeError:
-        return name.strip(), value.strip()
 
 
 class ProgressBar:
@@ -110,6 +90,13 @@ def _call_log(options: argparse.Namespace, scenario: Scenario, directory: Path) 
         (directory / CALL_LOG).unlink(missing_ok=True)
         return None
     return directory / CALL_LOG
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def _ignore(_: str) -> None: ...
 
 
 def _warn(text: str) -> None:
@@ -164,7 +151,10 @@ def _headline(summary: Any) -> str:
 
 
 def _positive(text: str) -> int:
-    value = int(text)
+    try:
+        value = int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected a whole number (got {text!r})") from None
     if value < 1:
-        raise argparse.ArgumentTypeError("must be at least 1")
+        raise argparse.ArgumentTypeError(f"must be at least 1 (got {value})")
     return value

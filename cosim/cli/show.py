@@ -9,8 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from cosim.cli.run import parse_setting
-from cosim.scenario import Scenario
+from cosim.cli.scenarios import add_scenario, load_scenario
 
 
 def register(commands: Any) -> None:
@@ -18,9 +17,7 @@ def register(commands: Any) -> None:
     parser = commands.add_parser(
         "show", help="show how components hang together", description="Components, connections, order and loops, without a run."
     )
-    parser.add_argument("scenario", nargs="?", default="freight_profile_d", help="name or file (default: freight_profile_d)")
-    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="settings",
-                        help="override as for 'cosim run'; may be repeated")  # fmt: skip
+    add_scenario(parser)
     parser.add_argument("--picture", metavar="FILE", type=Path, help="also draw it, to a .png, .svg or .pdf file")
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.set_defaults(execute=execute)
@@ -28,11 +25,7 @@ def register(commands: Any) -> None:
 
 def execute(options: argparse.Namespace) -> int:
     """Print, and draw where asked."""
-    scenario = Scenario.load(options.scenario)
-    for setting in options.settings:
-        name, value = parse_setting(setting)
-        scenario.set(name, value)
-    structure = scenario.structure()
+    structure = load_scenario(options).structure()
     if options.json:
         print(json.dumps(structure.to_dict(), indent=2))
     else:

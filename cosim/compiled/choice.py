@@ -27,6 +27,17 @@ class Choice:
     compiled: CompiledStepper | None = None
     reason: str | None = None
 
+    @property
+    def is_made(self) -> bool:
+        """Whether anything has been decided."""
+        return self.compiled is not None or self.reason is not None
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the user should know of a choice that was left to the program."""
+        fallback = self.wanted == "auto" and self.reason is not None
+        return (f"Python does all steps, not the compiled stepper: {self.reason}.",) if fallback else ()
+
     def summary(self) -> dict[str, Any]:
         """What to tell of it after the run, plain data: the name, steps it did, and why not."""
         if self.compiled is None:
@@ -35,7 +46,7 @@ class Choice:
 
 
 def choose_stepper(wanted: Wanted, control: StepControl, axis: TimeAxis) -> Choice:
-    """The stepper for a system that is initialised.
+    """The stepper for a system; its components are instantiated, and stay the same.
 
     Args:
         wanted: ``auto``, ``python`` or ``compiled``. control: step control of the run. axis: communication points.

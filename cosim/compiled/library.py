@@ -12,7 +12,7 @@ from pathlib import Path
 from fmus.folders import cache_folder
 from fmus.toolchain.compile import Compiler, compile_library, find_compiler, library_name
 
-SOURCES = ("stepper.c", "stepper.h")
+SOURCES = ("stepper.c", "balises.c", "telling.c", "slave.c", "stepper.h")  # the first one includes the others
 
 
 def load_stepper() -> ctypes.CDLL:
@@ -44,9 +44,11 @@ def cached_library(compiler: Compiler, folder: Path) -> Path:
 def _loaded(path: Path) -> ctypes.CDLL:
     library = ctypes.CDLL(str(path))
     library.stepper_run.restype = ctypes.c_int64
-    library.stepper_run.argtypes = [ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p]
+    library.stepper_run.argtypes = [
+        ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p,
+    ]  # fmt: skip
     library.stepper_move.restype = ctypes.c_int64
     library.stepper_move.argtypes = [ctypes.c_void_p, ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_int64]
     library.stepper_tell.restype = ctypes.c_int64
-    library.stepper_tell.argtypes = [ctypes.c_void_p, ctypes.c_int64, *[ctypes.c_void_p] * 4]
+    library.stepper_tell.argtypes = [ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p]
     return library

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from cosim.compiled.answers import Answer
+from cosim.compiled.journal import Call, CJournal, Journal
 from cosim.components.component import Component
 from cosim.components.elements import Element
 from cosim.coupling.plan import Plan, PlannedComponent
@@ -41,6 +42,7 @@ class Stop(IntEnum):
     CROSSED = 7
     NOT_FINITE = 8
     SENT = 9  # in Python only: the inputs were sent, and no more was to be done
+    HANDED = 10
 
 
 class NotCompilable(CosimError):  # noqa: N818 - no error unless somebody demanded the compiled stepper
@@ -52,7 +54,7 @@ class CPort(ctypes.Structure):
 
     _fields_ = (
         *((name, ctypes.c_void_p) for name in ("function", "references", "values", "raw", "places", "elements")),
-        *((name, ctypes.c_int64) for name in ("count", "reference_count", "raw_count", "kind")),
+        *((name, ctypes.c_int64) for name in ("count", "reference_count", "raw_count", "raw_bytes", "kind")),
     )
 
 
@@ -64,7 +66,12 @@ class CSlave(ctypes.Structure):
         *((name, ctypes.c_int64) for name in ("write_count", "read_count", "fmi_version", "heeds_events", "input_count")),
         *((name, ctypes.c_void_p) for name in ("sources", "factors", "offsets", "inputs")),
         ("calls", ctypes.c_int64),
+        ("all_calls", ctypes.c_int64),
         ("seconds", ctypes.c_double),
+        ("now", ctypes.c_double),
+        ("calls_here", ctypes.c_int64),
+        ("more_calls", ctypes.c_int64),
+        ("seconds_over", ctypes.c_double),
     )
 
 
@@ -79,6 +86,28 @@ class CWatch(ctypes.Structure):
     )
 
 
+class CPassed(ctypes.Structure):
+    """`Passed`."""
+
+    _fields_ = (("which", ctypes.c_int64), *((name, ctypes.c_double) for name in ("stamp", "position", "speed", "reading")))
+
+
+class CBalises(ctypes.Structure):
+    """`Balises`."""
+
+    _fields_ = (
+        *((name, ctypes.c_int64) for name in ("on", "by_instant")),
+        ("instants", ctypes.c_void_p),
+        *((name, ctypes.c_int64) for name in ("instant_count", "next_instant")),
+        *((name, ctypes.c_void_p) for name in ("accuracies", "save_state", "restore_state", "release_state")),
+        ("odometer", ctypes.c_int64),
+        *((name, ctypes.c_void_p) for name in ("continuous", "telegrams", "start", "final", "there", "arrived")),
+        ("passed", ctypes.POINTER(CPassed)),
+        ("outcomes", ctypes.POINTER(ctypes.c_int64)),
+        *((name, ctypes.c_int64) for name in ("passed_count", "passed_limit", "steps")),
+    )
+
+
 class CProgram(ctypes.Structure):
     """`Program`."""
 
@@ -89,7 +118,11 @@ class CProgram(ctypes.Structure):
         ("slaves", ctypes.c_void_p),
         *((name, ctypes.c_int64) for name in ("slave_count", "gathers_first")),
         ("watch", CWatch),
-        *((name, ctypes.c_double) for name in ("seconds_at_most", "seconds", "sampled")),
+        ("balises", CBalises),
+        ("journal", CJournal),
+        ("seconds_at_most", ctypes.c_double),
+        ("rows_done", ctypes.c_int64),
+        *((name, ctypes.c_double) for name in ("seconds", "sampled")),
         *((name, ctypes.c_int64) for name in ("stop", "slave", "port", "status", "event", "terminate", "early")),
         ("reached", ctypes.c_double),
     )
@@ -120,6 +153,9 @@ class Program:
         self.head.slaves, self.head.slave_count = ctypes.addressof(self.slaves), len(plan.steps)
         self.head.watch.slave = -1
         self.before = np.zeros_like(plan.values)
+        self._versions = [step.component.fmi_version for step in plan.steps]
+        calls = [len(writes) + len(reads) + 1 for writes, reads in zip(self.writes, self.reads, strict=True)]
+        self.journal = Journal(self.head.journal, sum(calls), sum(int(r.raw_bytes) for s in self.slaves for r in _ports_read(s)))
 
     def watch(self, slave: int, position: int, speed: int, scales: tuple[float, float], places: np.ndarray, limit: float) -> None:
         """Have the stepper leave steps in which a balise may be passed.
@@ -132,7 +168,7 @@ class Program:
         self.head.watch = CWatch(
             slave=slave, first_output=columns.start, output_count=columns.stop - columns.start, position=position, speed=speed,
             position_scale=scales[0], speed_scale=scales[1], acceleration_limit=limit,
-            places=self._address(np.ascontiguousarray(places, dtype=np.float64)), place_count=len(places), cursor=0,
+            places=self.keep(np.ascontiguousarray(places, dtype=np.float64)), place_count=len(places), cursor=0,
         )  # fmt: skip
 
     @property
@@ -169,6 +205,15 @@ class Program:
             said[reads[head.port]] = [Answer(head.status)]
         return said
 
+    def journalled(self) -> dict[int, dict[str, list[Answer]]]:
+        """What slaves have said since the journal was begun: by place in the plan, then by function, in order."""
+        said: dict[int, dict[str, list[Answer]]] = {}
+        for place, call, port, answer in self.journal.read(self._versions):
+            name = call.function(self._versions[place])
+            name = {Call.SET: self.writes, Call.GET: self.reads}[call][place][port] if name is None else name
+            said.setdefault(place, {}).setdefault(name, []).append(answer)
+        return said
+
     # -- slaves -----------------------------------------------------------------------------------------------------
 
     def _slave(self, step: PlannedComponent) -> CSlave:
@@ -176,7 +221,7 @@ class Program:
         _check(component)
         outputs = [s.name.removeprefix(f"{component.name}.") for s in self.plan.signals[step.columns]]
         made = CSlave(instance=_address_of(component.slave.component), fmi_version=component.fmi_version)
-        made.do_step = self._function(component, f"fmi{component.fmi_version}DoStep")
+        made.do_step = self.function(component, f"fmi{component.fmi_version}DoStep")
         made.heeds_events = bool(getattr(component, "has_event_mode", False))
         writes, names = self._ports(component, "Set", inputs.names, inputs.buffer)
         self.writes.append(names)
@@ -184,10 +229,10 @@ class Program:
         reads, names = self._ports(component, "Get", outputs, step.outputs)
         self.reads.append(names)
         made.reads, made.read_count = ctypes.addressof(reads), len(reads)
-        made.input_count, made.sources = len(inputs), self._address(inputs.sources.astype(np.int64))
+        made.input_count, made.sources = len(inputs), self.keep(inputs.sources.astype(np.int64))
         if np.any(inputs.factors != 1.0) or np.any(inputs.offsets != 0.0):
-            made.factors, made.offsets = self._address(inputs.factors), self._address(inputs.offsets)
-        made.inputs = self._address(inputs.buffer)
+            made.factors, made.offsets = self.keep(inputs.factors), self.keep(inputs.offsets)
+        made.inputs = self.keep(inputs.buffer)
         return made
 
     def _ports(
@@ -215,21 +260,28 @@ class Program:
         places = [place for place, _ in members]
         elements = [first[element.variable.name] + (element.index or 0) for _, element in members]
         port = CPort(reference_count=len(first), raw_count=total, count=len(members), kind=KINDS.index(word))
-        port.function, port.values = self._function(component, f"fmi{version}{verb}{kind}"), self._address(values)
-        port.references = self._address(np.array([component.variables[n].valueReference for n in first], dtype=np.uint32))
+        port.raw_bytes = total * np.dtype(c_type(kind, version)[2]).itemsize
+        port.function, port.values = self.function(component, f"fmi{version}{verb}{kind}"), self.keep(values)
+        port.references = self.keep(np.array([component.variables[n].valueReference for n in first], dtype=np.uint32))
         if word == "Float64" and elements == list(range(total)) and places == list(range(places[0], places[0] + total)):
-            port.raw = self._address(values[places[0] :])
+            port.raw = self.keep(values[places[0] :])
             return port
-        port.places, port.elements = (self._address(np.array(numbers, dtype=np.int64)) for numbers in (places, elements))
-        port.raw = self._address(np.zeros(total, dtype=c_type(kind, version)[2]))
+        port.places, port.elements = (self.keep(np.array(numbers, dtype=np.int64)) for numbers in (places, elements))
+        port.raw = self.keep(np.zeros(total, dtype=c_type(kind, version)[2]))
         return port
 
-    def _function(self, component: Component, name: str) -> int:
+    def function(self, component: Component, name: str) -> int:
+        """Address of a function of the component's library."""
         return _address_of(component.slave._functions[name])
 
-    def _address(self, array: np.ndarray) -> int:
+    def keep(self, array: np.ndarray) -> int:
+        """Address of an array, which is kept alive."""
         self._kept.append(array)
         return int(array.ctypes.data)
+
+
+def _ports_read(slave: CSlave) -> list[CPort]:
+    return list(ctypes.cast(slave.reads, ctypes.POINTER(CPort))[: slave.read_count])
 
 
 def _first_values(elements: Sequence[Element]) -> tuple[dict[str, int], int]:

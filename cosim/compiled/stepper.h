@@ -22,7 +22,7 @@ typedef struct {
     const int64_t *places;  /* of the values that matter within `values`; NULL: `raw` lies there itself, and nothing is to be moved */
     const int64_t *elements; /* of the same values within `raw` */
     int64_t count;          /* of these */
-    int64_t reference_count, raw_count;
+    int64_t reference_count, raw_count, raw_bytes;
     int64_t kind;
 } Port;
 
@@ -37,8 +37,13 @@ typedef struct {
     const int64_t *sources;            /* their columns in the values of the plan */
     const double *factors, *offsets;   /* NULL: nothing is converted */
     double *inputs;                    /* gathered */
-    int64_t calls;                     /* of doStep, counted up */
+    int64_t calls;                     /* of doStep in the present stretch */
+    int64_t all_calls;                 /* in all stretches before */
     double seconds;                    /* in the sampled ones, added up */
+    /* in steps over balises, which are all timed */
+    double now;                        /* where it stands [s] */
+    int64_t calls_here, more_calls;    /* of doStep in the present step; in all of them, beyond one for each step */
+    double seconds_over;
 } Slave;
 
 /* A plant that is watched: steps in which it may pass a balise are not for the stepper. */
@@ -53,23 +58,82 @@ typedef struct {
     int64_t cursor;                     /* places[cursor - 1] < position <= places[cursor], kept from step to step */
 } Watch;
 
+enum { OUTCOMES_AT_MOST = 8 };
+
+/* Fields of a telegram that a receiver may be told. */
+enum { FIELD_POSITION, FIELD_LOCATION_ACCURACY, FIELD_ODOMETER_READING, FIELD_DELIVERED_AT, FIELD_STAMP, FIELDS };
+
 /* A telegram for a receiver with event mode (FMI 3). */
 typedef struct {
     void *enter_event, *set_clock, *set_reals, *update, *enter_step; /* functions */
+    void *get_counts;                                                /* NULL: the receiver does not count outcomes */
     const uint32_t *references;                                      /* of the payload */
-    const double *payload;
+    double *payload;
+    const int64_t *fields;                                           /* what goes where in the payload */
     int64_t payload_count;
     int64_t clock;
-    int64_t stage;                   /* the one that was not ordinary */
-    int64_t flags[5];                /* what the update said */
-    double next_event;
+    double *before, *after;          /* outputs */
+    const uint32_t *count_references; /* of the counts */
+    int64_t count_count;
+    int64_t count_ranks[OUTCOMES_AT_MOST]; /* the lowest says most; -1: says nothing */
+    int64_t seen[OUTCOMES_AT_MOST];  /* what they were when they were read last */
+    int64_t outcome;                 /* rank of the one that has grown; -1: none so far */
 } Telegram;
 
 /* Stages of telling: which calls have been made. */
 enum {
-    STAGE_SEND, STAGE_ARRIVE, STAGE_BEFORE, STAGE_ENTER, STAGE_CLOCK, STAGE_PAYLOAD, STAGE_UPDATE, STAGE_LEAVE, STAGE_AFTER,
-    STAGE_GO_ON, STAGE_END, STAGE_DONE,
+    STAGE_SEND, STAGE_ARRIVE, STAGE_COUNT, STAGE_BEFORE, STAGE_ENTER, STAGE_CLOCK, STAGE_PAYLOAD, STAGE_UPDATE, STAGE_LEAVE,
+    STAGE_COUNT_TOLD, STAGE_AFTER, STAGE_GO_ON, STAGE_COUNT_LATE, STAGE_END, STAGE_DONE,
 };
+
+/* A balise that was passed. */
+typedef struct {
+    int64_t which;          /* number of the place or the instant */
+    double stamp, position, speed, reading; /* of plant and odometer at the stamp */
+} Passed;
+
+/* Steps over balises, which are found by rollback and told at once. */
+typedef struct {
+    int64_t on;             /* 0: they are not for the stepper in this stretch */
+    int64_t by_instant;     /* else by the places of the watch */
+    const double *instants; /* [s], increasing */
+    int64_t instant_count, next_instant;
+    const double *accuracies; /* of the places [m] */
+    void *save_state, *restore_state, *release_state; /* functions of the plant */
+    int64_t odometer;       /* column, or -1 */
+    const uint8_t *continuous; /* of each value */
+    Telegram **telegrams;   /* of each slave; NULL: no receiver */
+    double *start, *final, *there; /* outputs of the plant: at both ends, and at the stamp */
+    double *arrived;        /* values at the end, before anything was told there */
+    Passed *passed;
+    int64_t *outcomes;      /* of each passing at each slave */
+    int64_t passed_count, passed_limit;
+    int64_t steps;          /* done in all, also those that passed none */
+} Balises;
+
+/* Functions in a journal. */
+enum {
+    CALL_SET, CALL_STEP, CALL_GET, CALL_ENTER_EVENT, CALL_SET_CLOCK, CALL_SET_REALS, CALL_UPDATE, CALL_ENTER_STEP, CALL_COUNT, CALL_SAVE,
+    CALL_RESTORE, CALL_RELEASE,
+};
+
+/* A call and what was said. */
+typedef struct {
+    int64_t slave, call, port, status;
+    int64_t flags[5];
+    double number;          /* time reached, or of the next event */
+    void *state;
+    int64_t first, bytes;   /* of the values read */
+} Note;
+
+/* All calls of a step over a balise: if it is not ordinary, Python does the whole step again with these answers. */
+typedef struct {
+    int64_t on;
+    Note *notes;
+    int64_t count;
+    uint8_t *bytes;
+    int64_t used;
+} Journal;
 
 /* Why a stretch ended. */
 enum {
@@ -82,6 +146,8 @@ enum {
     STOP_READ,       /* a function that gets variables failed */
     STOP_CROSSED,    /* the plant passed a balise unforeseen; the slave is stepped, its outputs are those before the step */
     STOP_NOT_FINITE, /* a value is not finite; the step is done and recorded */
+    STOP_SENT,       /* in Python only */
+    STOP_HANDED,     /* a step over a balise is not ordinary: the values are those before it, the calls are in the journal */
 };
 
 typedef struct {
@@ -93,8 +159,11 @@ typedef struct {
     int64_t slave_count;
     int64_t gathers_first;      /* Jacobi: all inputs are gathered before anything is stepped */
     Watch watch;
+    Balises balises;
+    Journal journal;
     double seconds_at_most;     /* a stretch is to last [s] */
-    double seconds, sampled;    /* it lasted; steps of it whose doStep calls were timed */
+    int64_t rows_done;          /* in the stretch: one for each step, and those of events */
+    double seconds, sampled;    /* it lasted; steps of all stretches whose doStep calls were timed */
     /* where and why it ended */
     int64_t stop, slave, port, status;
     int64_t event, terminate, early; /* results of doStep */

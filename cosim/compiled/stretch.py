@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from time import perf_counter
@@ -16,12 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from cosim.balises.layout import InstantLayout, TrackLayout
-from cosim.balises.localiser import ACCELERATION_LIMIT
 from cosim.balises.rollback import RollbackLocaliser
-from cosim.balises.service import BaliseService
 from cosim.compiled.answers import Answer, answered
 from cosim.compiled.library import load_stepper
+from cosim.compiled.passings import Passings
 from cosim.compiled.program import NotCompilable, Program, Stop
 from cosim.compiled.telling import Telling, can_be_told
 from cosim.components.component import NEVER, TIME_TOLERANCE, Component
@@ -39,6 +37,15 @@ SECONDS = 0.03
 
 GROWTH = 8
 """A stretch is at most so many times as long as the one before it."""
+
+ROWS_OF_EVENTS = 64
+"""Room for those in a stretch that may hold some; where it is not enough, the stretch is shorter."""
+
+WITHIN = frozenset({Stop.REFUSED, Stop.WRITE, Stop.STEP, Stop.READ, Stop.CROSSED})
+"""The stretch ended within a step, at one of the slaves."""
+
+STEPPED = frozenset({Stop.STEP, Stop.READ, Stop.CROSSED})
+"""That one has been called to do the step."""
 
 Finish = Callable[[], Sequence[Row]]
 
@@ -82,11 +89,10 @@ class CompiledStepper:
         self._program = Program(self.plan, axis, self.system.algorithm.name == "jacobi")
         self._program.head.seconds_at_most = SECONDS
         self._library = _load()
-        self._instants = _watch(self._program, self.system.balises, self.plan)
         self._answering = False
         for place, step in enumerate(self.plan.steps):
             self._quicken(place, step)
-        self._quicken_receivers()
+        self._passings = self._watch_balises()
         self._first: int | None = None
         for place, step in enumerate(self.plan.steps):
             step.component.clock = partial(self._time_in_stretch, place, step.component)
@@ -97,17 +103,22 @@ class CompiledStepper:
         Raises:
             OutputError: the recorder takes no more rows.
         """
+        own_passings = self._passings is not None and self._passings.allow(recorder.every == 1)
         free = self._free_steps(k)
         if free < 1:
             return Stretch(0, partial(self._whole_step, k))
-        rows = recorder.block(min(free, self._longest))
+        wanted = min(free, self._longest)
+        rows = recorder.block(wanted + ROWS_OF_EVENTS if own_passings else wanted)
         head, before = self._program.head, self._program.before
         self._first = k
-        done = int(self._library.stepper_run(self._program.address, k, k + len(rows), rows.ctypes.data, before.ctypes.data))
+        run = self._library.stepper_run
+        done = int(run(self._program.address, k, k + wanted, rows.ctypes.data, len(rows), before.ctypes.data))
         self._first = None
-        recorder.commit(done)
+        recorder.commit(int(head.rows_done))
         self.steps += done
-        self._account(k + done)
+        if self._passings is not None:
+            self._passings.collect()
+        self._set_times(k + done)
         if done:
             fitting = int(self._longest * SECONDS / max(head.seconds, 1e-9))
             self._longest = max(1, min(fitting, GROWTH * self._longest, LONGEST))
@@ -120,26 +131,28 @@ class CompiledStepper:
             return Stretch(done, suspect=True)
         if stop is Stop.NEAR:
             return Stretch(done, partial(self._whole_step, k + done))
+        if stop is Stop.HANDED:
+            return Stretch(done, partial(self._step_again, k + done, self._program.journalled()))
         return Stretch(done, partial(self._rest_of_step, k + done, self._program.values_before()))
 
     def _time_in_stretch(self, place: int, component: Component) -> float:
         """Where a component stands that logs something while C steps it: its calls so far tell the step it is in."""
         if self._first is None:
             return component.time
+        if self._program.head.journal.on:
+            return float(self._program.slaves[place].now)
         return self.axis[self._first + max(self._program.slaves[place].calls - 1, 0)]
 
     # -- how far ----------------------------------------------------------------------------------------------------
 
     def _free_steps(self, k: int) -> int:
-        """How many steps from number `k` on hold nothing that is known to be Python's."""
+        """How many steps from number `k` on hold nothing that is known to be Python's; passings the stepper leaves to it."""
         free, balises = self.axis.count - k, self.system.balises
         limit = min((s.component.next_event for s in self.plan.steps), default=NEVER)
         if any(s.component.terminated for s in self.plan.steps):
             return 0
         if balises is not None:
             limit = min(limit, balises.idle_until)
-            if self._instants is not None:
-                limit = min(limit, self._instants.next_after(self.axis[k]))
         return free if limit == NEVER else min(free, self._steps_before(k, limit))
 
     def _steps_before(self, k: int, limit: float) -> int:
@@ -155,6 +168,11 @@ class CompiledStepper:
 
     def _whole_step(self, k: int) -> Sequence[Row]:
         return self.control.step(self.axis[k], self.axis[k + 1])
+
+    def _step_again(self, k: int, said: Mapping[int, Mapping[str, Sequence[Answer]]]) -> Sequence[Row]:
+        """The whole of step `k`, of which the stepper has done a part: the slaves repeat what they said."""
+        with self._answered(said):
+            return self._whole_step(k)
 
     def _rest_of_step(self, k: int, before: np.ndarray) -> Sequence[Row]:
         """What is left of step `k` once the stepper has left it at one of the slaves."""
@@ -197,47 +215,63 @@ class CompiledStepper:
         step.drive = quick_drive  # type: ignore[method-assign]
         step.advance = lambda t, until: move(advance, t, until, reads=False)  # type: ignore[method-assign]
 
-    def _quicken_receivers(self) -> None:
-        """Receivers that allow it are stepped through a telegram by one call into the stepper."""
-        names = [step.component.name for step in self.plan.steps]
-        for receiver in [] if self.system.balises is None else self.system.balises.receivers:
+    def _watch_balises(self) -> Passings | None:
+        """The stepper knows of the balises; receivers that allow it are stepped through a telegram by one call into it."""
+        service = self.system.balises
+        if service is None:
+            return None
+        if not isinstance(service.localiser, RollbackLocaliser):
+            raise NotCompilable(f"balises are localised by '{service.localiser.method}'")
+        names, tellings = [step.component.name for step in self.plan.steps], {}
+        for receiver in service.receivers:
             place = names.index(receiver.planned.component.name)
             if can_be_told(receiver, place, self._program):
-                telling = Telling(receiver, place, self._program, self._library, self._answered)
-                receiver.step = telling.step  # type: ignore[method-assign]
+                idle = lambda: not self._answering  # noqa: E731 - one word of state
+                tellings[place] = Telling(receiver, place, self._program, self._library, self._answered, idle)
+                receiver.step = tellings[place].step  # type: ignore[method-assign]
+        return Passings(self._program, self.plan, service, tellings)
 
     def _answered_move(self, move: Mover, t: float, until: float) -> None:
         """Move a component in Python that the stepper has moved in part."""
         head = self._program.head
-        slave = self.plan.steps[head.slave].component.slave
-        with self._answered(slave, self._program.said(head.slave, Stop(head.stop))):
+        with self._answered({int(head.slave): self._program.said(head.slave, Stop(head.stop))}):
             move(t, until)
 
     @contextmanager
-    def _answered(self, slave: Any, answers: Mapping[str, Sequence[Answer]]) -> Iterator[None]:
-        """Python is at work on a step that the stepper has begun: the slave repeats itself, and nobody calls the stepper."""
+    def _answered(self, answers: Mapping[int, Mapping[str, Sequence[Answer]]]) -> Iterator[None]:
+        """Python is at work on a step that the stepper has begun: slaves repeat themselves, and nobody calls the stepper."""
         self._answering = True
         try:
-            with answered(slave, answers):
+            with ExitStack() as stack:
+                for place, said in answers.items():
+                    stack.enter_context(answered(self.plan.steps[place].component.slave, said))
                 yield
         finally:
             self._answering = False
 
-    def _account(self, k: int) -> None:
-        """Counters and times of the components after a stretch that ended in step number `k`."""
-        head = self._program.head
-        ended_within = head.stop in (Stop.REFUSED, Stop.WRITE, Stop.STEP, Stop.READ, Stop.CROSSED)
-        for place, (step, slave) in enumerate(zip(self.plan.steps, self._program.slaves, strict=True)):
-            component = step.component
-            again = ended_within and place == head.slave and head.stop in (Stop.STEP, Stop.READ, Stop.CROSSED)
-            calls = slave.calls - again  # Python counts that one
-            component.calls += calls
+    def _set_times(self, k: int) -> None:
+        """Where the components stand after a stretch that ended in step number `k`; one call there is Python's to count."""
+        head, t = self._program.head, self.axis[k]
+        for step in self.plan.steps:
+            step.component.time = t
+        if head.stop in WITHIN:
+            for step in self.plan.steps[: head.slave]:
+                step.component.time = self.axis[k + 1]
+            self._program.slaves[head.slave].calls -= head.stop in STEPPED
+
+    def close(self) -> None:
+        """Add what was done here to the counters of the components."""
+        for step, slave in zip(self.plan.steps, self._program.slaves, strict=True):
+            component, calls, over = step.component, slave.calls + slave.all_calls, self._program.head.balises.steps
+            component.calls += calls + slave.more_calls
             for kind in ("get", "set") if len(step.inputs) else ("get",):
-                component.tallies[kind].add(0.0, slave.calls)  # so short in C that only doStep is timed
-            if head.sampled:
-                component.seconds += slave.seconds * calls / head.sampled
-            component.time = self.axis[k + 1 if ended_within and place < head.slave else k]
-            slave.calls, slave.seconds = 0, 0.0
+                component.tallies[kind].add(0.0, calls + slave.more_calls)  # so short in C that only doStep is timed
+            component.seconds += slave.seconds_over
+            if self._program.head.sampled:
+                component.seconds += slave.seconds * max(calls - over, 0) / self._program.head.sampled
+            slave.calls = slave.all_calls = slave.more_calls = 0
+        if self._passings is not None:
+            self._passings.close()
 
 
 def _load() -> Any:
@@ -245,23 +279,6 @@ def _load() -> Any:
         return load_stepper()
     except (CompilerMissing, CompilationError, OSError) as error:
         raise NotCompilable(f"the stepper cannot be compiled here: {error}") from error
-
-
-def _watch(program: Program, balises: BaliseService | None, plan: Plan) -> InstantLayout | None:
-    """Tell the program of the balises by position, or return the layout of those by instant."""
-    if balises is None:
-        return None
-    localiser = balises.localiser
-    if not isinstance(localiser, RollbackLocaliser):
-        raise NotCompilable(f"balises are localised by '{localiser.method}'")
-    layout, watch = localiser.layout, localiser.watch
-    if isinstance(layout, TrackLayout):
-        place = [s.component.name for s in plan.steps].index(balises.plant)
-        first = plan.steps[place].columns.start
-        columns = first + watch.position_column, first + watch.speed_column
-        program.watch(place, *columns, (watch.position_scale, watch.speed_scale), layout.positions, ACCELERATION_LIMIT)
-        return None
-    return layout
 
 
 def _check(control: StepControl, system: System) -> None:

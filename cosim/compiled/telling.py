@@ -6,58 +6,40 @@ What is not ordinary is finished by the receiver's own Python, which is handed w
 from __future__ import annotations
 
 import ctypes
-from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from enum import IntEnum
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
-from cosim.balises.delivery import Delivery, Receiver, snapped
-from cosim.balises.telegram import PAYLOAD, payload
+from cosim.balises.delivery import OUTCOMES, Delivery, Receiver, snapped
+from cosim.balises.telegram import PAYLOAD
 from cosim.compiled.answers import Answer
-from cosim.compiled.program import Program, Stop
-from cosim.components.component import NEVER
+from cosim.compiled.program import Program
+from cosim.components.component import NEVER, Component
 from cosim.results.result import BaliseRecord
+from fmu_observer.event_protocol import OUTCOME_VARIABLES
 
 FUNCTIONS = ("fmi3EnterEventMode", "fmi3SetClock", "fmi3SetFloat64", "fmi3UpdateDiscreteStates", "fmi3EnterStepMode")
+FIELDS = ("position", "location_accuracy", "odometer_reading", "delivered_at", "stamp")  # in the order of `stepper.h`
+OUTCOMES_AT_MOST = 8
 FMI3 = 3
-Answering = Callable[[Any, Mapping[str, Sequence[Answer]]], AbstractContextManager[None]]
-
-
-class Stage(IntEnum):
-    """Stages of telling, as in ``stepper.h``."""
-
-    SEND = 0
-    ARRIVE = 1
-    BEFORE = 2
-    ENTER = 3
-    CLOCK = 4
-    PAYLOAD = 5
-    UPDATE = 6
-    LEAVE = 7
-    AFTER = 8
-    GO_ON = 9
-    END = 10
-
-
-CALLED = {
-    Stage.ENTER: "fmi3EnterEventMode", Stage.CLOCK: "fmi3SetClock", Stage.PAYLOAD: "fmi3SetFloat64",
-    Stage.LEAVE: "fmi3EnterStepMode",
-}  # fmt: skip
+Answering = Callable[[Mapping[int, Mapping[str, Sequence[Answer]]]], AbstractContextManager[None]]
 
 
 class CTelegram(ctypes.Structure):
     """`Telegram`."""
 
     _fields_ = (
-        *((name, ctypes.c_void_p) for name in ("enter_event", "set_clock", "set_reals", "update", "enter_step")),
-        *((name, ctypes.c_void_p) for name in ("references", "payload")),
-        *((name, ctypes.c_int64) for name in ("payload_count", "clock", "stage")),
-        ("flags", ctypes.c_int64 * 5),
-        ("next_event", ctypes.c_double),
+        *((name, ctypes.c_void_p) for name in ("enter_event", "set_clock", "set_reals", "update", "enter_step", "get_counts")),
+        *((name, ctypes.c_void_p) for name in ("references", "payload", "fields")),
+        *((name, ctypes.c_int64) for name in ("payload_count", "clock")),
+        *((name, ctypes.c_void_p) for name in ("before", "after", "count_references")),
+        ("count_count", ctypes.c_int64),
+        ("count_ranks", ctypes.c_int64 * OUTCOMES_AT_MOST),
+        ("seen", ctypes.c_int64 * OUTCOMES_AT_MOST),
+        ("outcome", ctypes.c_int64),
     )
 
 
@@ -66,72 +48,72 @@ class Telling:
 
     Args:
         receiver: see `can_be_told`. place: of its component in the plan. program: the plan in C. library: the stepper.
-        answering: context in which the slave gives answers and nothing calls the stepper.
+        answering: context in which slaves give answers and nothing calls the stepper. idle: whether it may be called now.
     """
 
-    def __init__(self, receiver: Receiver, place: int, program: Program, library: Any, answering: Answering) -> None:
-        self.receiver, self.place, self.program, self._answering = receiver, place, program, answering
+    def __init__(
+        self, receiver: Receiver, place: int, program: Program, library: Any, answering: Answering, idle: Callable[[], bool]
+    ) -> None:  # fmt: skip
+        self.receiver, self.place, self.program = receiver, place, program
+        self._answering, self._idle = answering, idle
         self.component = receiver.planned.component
-        self._port = self.component.events[receiver.event]
-        self._fields = [name for name in self._port.payload if name in PAYLOAD]
-        references = [self._port.payload[name] for name in self._fields]
-        references += [] if self._port.stamp is None else [self._port.stamp]
-        self._references = np.array(references, dtype=np.uint32)
-        self._payload, self._times = np.zeros(len(references)), np.zeros(3)
-        functions = [ctypes.cast(self.component.slave._functions[name], ctypes.c_void_p).value for name in FUNCTIONS]
-        pointers = [*functions, self._references.ctypes.data, self._payload.ctypes.data]
-        self._telegram = CTelegram(*pointers, len(references), self._port.trigger)
+        self._port = port = self.component.events[receiver.event]
+        self._names = [name for name in port.payload if name in PAYLOAD] + ["stamp"] * (port.stamp is not None)
+        references = [port.stamp if name == "stamp" else port.payload[name] for name in self._names]
+        self._payload, self._is_prepared = np.zeros(len(references)), False
+        self._before, self._after = (np.zeros(len(receiver.planned.outputs)) for _ in range(2))
+        counted = list(OUTCOME_VARIABLES) if _counts(self.component) else []
+        self._counts = [OUTCOME_VARIABLES[name] for name in counted]
+        keep, slave = program.keep, self.component.slave
+        self.telegram = CTelegram(
+            *(ctypes.cast(slave._functions[name], ctypes.c_void_p).value for name in FUNCTIONS),
+            program.function(self.component, "fmi3GetInt32") if self._counts else None,
+            keep(np.array(references, dtype=np.uint32)), keep(self._payload),
+            keep(np.array([FIELDS.index(name) for name in self._names], dtype=np.int64)), len(references), port.trigger,
+            keep(self._before), keep(self._after),
+            keep(np.array([self.component.variables[f].valueReference for f in counted], dtype=np.uint32)), len(counted),
+        )  # fmt: skip
+        for i, name in enumerate(self._counts):
+            self.telegram.count_ranks[i] = OUTCOMES.index(name) if name in OUTCOMES else -1
+        self._times = (ctypes.c_double * 3)()
         self._call, self._slowly = library.stepper_tell, receiver.step
+        self._arguments = program.address, place, ctypes.addressof(self.telegram), ctypes.addressof(self._times)
 
     def step(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
         """As `Receiver.step`."""
         receiver, component = self.receiver, self.component
-        if len(telegrams) != 1 or receiver.busy or component.next_event != NEVER:
+        if len(telegrams) != 1 or receiver.busy or component.next_event != NEVER or not self._idle():
             return self._slowly(t, until, telegrams)
         told_at = snapped(telegrams[0].delivered_at, t, until)
-        self._times[:] = t, told_at, until
-        fields = payload(telegrams[0])
-        self._payload[:] = [*(fields[name] for name in self._fields), *([] if self._port.stamp is None else [telegrams[0].stamp])]
-        before = np.empty(len(receiver.planned.outputs))
-        after = np.empty_like(before)
+        self._times[0], self._times[1], self._times[2] = t, told_at, until
+        self._payload[:] = [getattr(telegrams[0], name) for name in self._names]
+        self.begin()
         begin = perf_counter()
-        done = self._call(
-            self.program.address, self.place, ctypes.addressof(self._telegram), self._times.ctypes.data, before.ctypes.data,
-            after.ctypes.data,
-        )  # fmt: skip
-        if not done:
-            with self._answering(component.slave, self._said(before, after)):
+        if not self._call(*self._arguments):
+            with self._answering(self.program.journalled()):
                 return self._slowly(t, until, telegrams)
+        before, after = self._before.copy(), self._after.copy()
         component.time, component.calls = until, component.calls + (told_at > t) + (until > told_at)
         component.seconds += perf_counter() - begin
         delivery = Delivery(told_at, before, after)
+        self.end()
+        if self.telegram.outcome >= 0:
+            delivery.outcome = OUTCOMES[self.telegram.outcome]
         receiver.told(delivery, before if told_at == until else receiver.planned.outputs.copy())
         return [delivery]
 
-    def _said(self, before: np.ndarray, after: np.ndarray) -> Mapping[str, Sequence[Answer]]:
-        """All that the slave has said up to the stage that was not ordinary, in order."""
-        head, stage = self.program.head, self._telegram.stage
-        said: defaultdict[str, list[Answer]] = defaultdict(list)
-        moves = {Stage.ARRIVE: self._times[1] > self._times[0], Stage.GO_ON: self._times[2] > self._times[1]}
-        reads = {Stage.BEFORE: before, Stage.AFTER: after}
-        for past in list(Stage)[: stage + 1]:
-            odd = past == stage
-            if past == Stage.SEND:
-                for name, answers in self.program.said(self.place, Stop(head.stop) if odd else Stop.SENT).items():
-                    said[name] += answers
-            elif moves.get(past):
-                for name, answers in self.program.said(self.place, Stop(head.stop) if odd else Stop.DONE).items():
-                    said[name] += answers
-            elif past == Stage.UPDATE:
-                flags = tuple(bool(flag) for flag in self._telegram.flags)
-                said["fmi3UpdateDiscreteStates"].append(Answer(head.status if odd else 0, (*flags, self._telegram.next_event)))
-            elif past in CALLED and (past != Stage.PAYLOAD or len(self._payload)):
-                said[CALLED[past]].append(Answer(head.status if odd else 0))
-            elif past in reads:
-                said["fmi3GetFloat64"].append(Answer(head.status) if odd else Answer(values=reads[past].tobytes()))
-            elif past == Stage.END:
-                said["fmi3GetFloat64"].append(Answer(head.status))
-        return said
+    def begin(self) -> None:
+        """The stepper knows the outcomes that the receiver knows."""
+        if self._counts and not self._is_prepared:
+            self.component.outcomes()  # prepares its call while the library is there to be called
+            self._is_prepared = True
+        for i, name in enumerate(self._counts):
+            self.telegram.seen[i] = self.receiver.seen.get(name, 0)
+
+    def end(self) -> None:
+        """The receiver knows the outcomes that the stepper knows."""
+        if self._counts:
+            self.receiver.seen = dict(zip(self._counts, self.telegram.seen, strict=False))
 
 
 def can_be_told(receiver: Receiver, place: int, program: Program) -> bool:
@@ -141,7 +123,11 @@ def can_be_told(receiver: Receiver, place: int, program: Program) -> bool:
         receiver: of the run. place: of its component in the plan. program: the plan in C.
     """
     component = receiver.planned.component
-    plain = not component.event_needs_step and component.can_vary_step and component.outcomes() is None
-    clocks = bool(getattr(component, "clocks", False))
-    exact = receiver.timing == "exact" and program.reads_straight(place)
-    return component.fmi_version == FMI3 and plain and exact and not clocks
+    plain = not component.event_needs_step and component.can_vary_step and not getattr(component, "clocks", False)
+    countable = _counts(component) or not any(name in component.variables for name in OUTCOME_VARIABLES)
+    return component.fmi_version == FMI3 and plain and countable and receiver.timing == "exact" and program.reads_straight(place)
+
+
+def _counts(component: Component) -> bool:
+    """Whether the slave says what became of events, in the way of the FMUs this package exports."""
+    return all(name in component.variables and component.variables[name].type == "Int32" for name in OUTCOME_VARIABLES)

@@ -28,6 +28,7 @@ from cosim.diagnostics.messages import LogChoice, MessageLog
 from cosim.diagnostics.native_log import forget
 from cosim.diagnostics.tally import Tally, count_methods, new_tallies
 from cosim.errors import CouplingError, RunError, nearest
+from fmu_observer.event_protocol import OUTCOME_VARIABLES
 from fmus.exact_ports import Values
 from plant_models.hybrid.units import Unit, UnitError
 
@@ -41,8 +42,10 @@ NUMERIC_TYPES = frozenset(
 """Types whose values a table of numbers can hold. Integers beyond 2**53 are rounded in it; see `exact_reader`."""
 
 NEVER = math.inf
+NOT_PREPARED: Callable[[], None] | None = None
 FATAL = 4  # FMI status: the slave must not be called again
 OWN_TOOL = "fmu-observer"
+WITHOUT_STATES = "without it: algorithm gauss-seidel or jacobi, control fixed, no balise method rollback"
 NAMES_SHOWN = 6
 
 
@@ -109,6 +112,7 @@ class Component(ABC):
         self.log: LogSwitch | None = None
         self.tallies = new_tallies()
         self._units = Units(description)
+        self._outcomes, self._read_outcomes = np.zeros(len(OUTCOME_VARIABLES)), NOT_PREPARED
 
     # -- what it is -------------------------------------------------------------------------------------------------
 
@@ -187,6 +191,11 @@ class Component(ABC):
             raise UnitError(f"{self.name}.{name}: {error}") from error
 
     @property
+    def usable(self) -> bool:
+        """Whether the slave may still be called: instantiated, and no fatal error so far."""
+        return self._alive
+
+    @property
     def seconds_in_all(self) -> float:
         """Seconds in the slave: steps, and everything in `tallies` [s]."""
         return self.seconds + sum(tally.seconds for tally in self.tallies.values())
@@ -213,7 +222,7 @@ class Component(ABC):
             if warning is None:
                 raise
             raise RunError(f"{error} Perhaps because: {warning}", self.name, error.time) from error
-        self._alive = True
+        self._alive, self._read_outcomes = True, NOT_PREPARED
         self._switch_log()
 
     def reset(self) -> None:
@@ -235,12 +244,7 @@ class Component(ABC):
             CouplingError: the variable does not exist or cannot be set, or the value is not of its type.
             RunError: the slave refuses the value.
         """
-        variable = self.variable(name)
-        if variable.causality in ("output", "independent", "calculatedParameter") or variable.variability == "constant":
-            what = "is constant" if variable.variability == "constant" else f"has causality '{variable.causality}'"
-            raise CouplingError(f"{self.name}.{name} cannot be set: it {what}.")
-        if variable.type == "Clock":
-            raise CouplingError(f"{self.name}.{name} cannot be set: it is a Clock, which ticks by itself or at events.")
+        variable = self.settable(name)
         try:
             element = None if name in self.variables else self.variables.element(name)
             values = typed_values(variable, value) if element is None else [typed_value(variable, value)]
@@ -248,6 +252,20 @@ class Component(ABC):
             raise CouplingError(refusal(f"{self.name}.{name} cannot be set", error)) from error
         self._guard(f"setting {name} = {value!r}", lambda: write_start(self, variable, element, values))
         self.starts[name] = value
+
+    def settable(self, name: str) -> ModelVariable:
+        """The variable of this name, or the array that holds the element of this name, if a start value can be set.
+
+        Raises:
+            CouplingError: there is none, or it cannot be set.
+        """
+        variable = self.variable(name)
+        if variable.causality in ("output", "independent", "calculatedParameter") or variable.variability == "constant":
+            what = "is constant" if variable.variability == "constant" else f"has causality '{variable.causality}'"
+            raise CouplingError(f"{self.name}.{name} cannot be set: it {what}.")
+        if variable.type == "Clock":
+            raise CouplingError(f"{self.name}.{name} cannot be set: it is a Clock, which ticks by itself or at events.")
+        return variable
 
     @abstractmethod
     def enter_initialization(self, start_time: float, stop_time: float) -> None:
@@ -375,9 +393,22 @@ class Component(ABC):
         )  # fmt: skip
 
     def outcomes(self) -> Mapping[str, int] | None:
-        """Counts of what became of the events told, where the component keeps them (blocks do)."""
+        """Counts of what became of the events told, where the slave keeps them: blocks, and FMUs with `OUTCOME_VARIABLES`.
+
+        Of an FMU that cannot say any more those that were read last.
+        """
         counters = getattr(self.slave, "counters", None)
-        return None if counters is None else dict(vars(counters))
+        if counters is not None:
+            return dict(vars(counters))
+        if not all(name in self.variables for name in OUTCOME_VARIABLES):
+            return None
+        if self._alive and self._read_outcomes is None:
+            read = element_reader(self, list(OUTCOME_VARIABLES), self._outcomes)
+            self._read_outcomes = self._guarded("counts of events", read)
+        if self._alive and self._read_outcomes is not None:
+            with suppress(RunError):
+                self._read_outcomes()
+        return dict(zip(OUTCOME_VARIABLES.values(), map(int, self._outcomes), strict=True))
 
     def choose_log(self, choice: LogChoice | None) -> None:
         """What the slave shall log; before `instantiate`. None leaves that to the slave.
@@ -394,7 +425,8 @@ class Component(ABC):
 
     def failure(self, reason: str, t: float | None = None) -> RunError:
         """A RunError of this component at `t` [s], by default where it stands, with what the slave logged last."""
-        reason += f" The FMU says: {self.messages.reason}" if self.messages else ""
+        if self.messages:
+            reason = f"{reason.rstrip('.')}. The FMU says: {self.messages.reason}"
         when = self.time if t is None else t
         place = "" if math.isnan(when) else f" at t = {when:g} s"
         return RunError(f"Component '{self.name}'{place}: {reason}", self.name, when)
@@ -465,6 +497,16 @@ class Component(ABC):
             return call()
         except Exception as error:
             raise self._explained(what, error) from error
+
+    def _saved_state(self, name: str, get: Callable[[], Any]) -> Any:
+        """A state from the slave; a null pointer is none, and to restore it would end the process."""
+        try:
+            state = get()
+            if getattr(state, "value", state) is None:
+                raise RuntimeError("the slave gave no state")
+        except Exception as error:
+            raise self._explained(f"{name} (which its description promises; {WITHOUT_STATES})", error) from error
+        return state
 
     def _explained(self, what: str, error: Exception, t: float | None = None) -> RunError:
         if isinstance(error, FMICallException) and getattr(error, "status", None) == FATAL:

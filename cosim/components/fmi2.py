@@ -82,14 +82,15 @@ class FMI2Component(Component):
         self._guard(f"count of event '{event.name}'", lambda: self.slave.setInteger([event.trigger], [count]))
 
     def save(self) -> Any:  # noqa: D102 - see Component
-        return self._guard("getFMUstate", self.slave.getFMUstate), dict(self._counts), self.time, self.terminated
+        return self._saved_state("getFMUstate", self.slave.getFMUstate), dict(self._counts), self.time, self.terminated
 
     def restore(self, state: Any) -> None:  # noqa: D102 - see Component
         self._guard("setFMUstate", lambda: self.slave.setFMUstate(state[0]))
         self._counts, self.time, self.terminated = dict(state[1]), state[2], state[3]
 
     def release(self, state: Any) -> None:  # noqa: D102 - see Component
-        self._guard("freeFMUstate", lambda: self.slave.freeFMUstate(state[0]))
+        if self._alive:
+            self._guard("freeFMUstate", lambda: self.slave.freeFMUstate(state[0]))
 
     def _after_refusal(self, error: FMICallException, t: float, until: float) -> None:
         """A discarded step is the end: the slave has terminated, or it cannot do this step and its state is lost."""

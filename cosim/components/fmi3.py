@@ -17,9 +17,11 @@ from cosim.components.interruption import EventMet
 from cosim.components.quick_calls import quicken
 from cosim.components.start_values import StartValue
 from cosim.components.structure import STRUCTURAL, resize, structural_value
+from cosim.errors import RunError
 from fmus.exact_ports import make_exact_writer
 from fmus.native_calls import prepared_call
 
+DISCARD = 2  # FMI status
 MAX_EVENT_ITERATIONS = 100
 MAX_RETURNS_PER_STEP = 10_000
 
@@ -75,20 +77,24 @@ class FMI3Component(Component):
         given = self._structure.get(name)
         self.configure({name: value})
         if given != self._structure[name]:
-            self._guard(f"setting {name} = {value!r} in Configuration Mode", self._configure_slave)
+            self._configure_slave()
         self.starts[name] = value
 
     def reset(self) -> None:  # noqa: D102 - see Component
         super().reset()
-        self._guard("setting structural parameters", self._configure_slave)
+        self._configure_slave()
 
     def _configure_slave(self) -> None:
         """Structural parameters are set in Configuration Mode, right after the instance was made."""
         if self._structure:
-            self.slave.enterConfigurationMode()
-            for name, value in self._structure.items():
-                make_exact_writer(self.slave, self.fmi_version, self.variables[name])([value])
-            self.slave.exitConfigurationMode()
+            given = ", ".join(f"{name} = {value}" for name, value in self._structure.items())
+            self._guard(f"setting {given} in Configuration Mode", self._set_structure)
+
+    def _set_structure(self) -> None:
+        self.slave.enterConfigurationMode()
+        for name, value in self._structure.items():
+            make_exact_writer(self.slave, self.fmi_version, self.variables[name])([value])
+        self.slave.exitConfigurationMode()
 
     def _instantiate(self) -> None:
         early = self.capabilities.mightReturnEarlyFromDoStep
@@ -139,7 +145,7 @@ class FMI3Component(Component):
             if self._intermediate.requested:
                 self._intermediate.check()
         except Exception as error:
-            raise self._explained("doStep", error, t) from error
+            raise self._step_failed(error, t, until) from error
         finally:
             self.seconds += perf_counter() - begin
             self.calls += 1
@@ -153,6 +159,11 @@ class FMI3Component(Component):
             raise self.failure(f"doStep to {until:g} s says that it reached {reached!r} s", t)
         self.time = min(max(float(reached), t), until)
         return self.time, event
+
+    def _step_failed(self, error: Exception, t: float, until: float) -> RunError:
+        if getattr(error, "status", None) != DISCARD:
+            return self._explained("doStep", error, t)
+        return self.failure(f"doStep was discarded: asked for {until:g} s; try a smaller communication step", t)
 
     def advance(self, t: float, until: float) -> None:  # noqa: D102 - see Component
         if self.next_event == NEVER:  # the ordinary step: nothing is due, and mostly nothing happens
@@ -269,7 +280,7 @@ class FMI3Component(Component):
         self.enter_step_mode()
 
     def save(self) -> Any:  # noqa: D102 - see Component
-        state = self._guard("getFMUState", self.slave.getFMUState)
+        state = self._saved_state("getFMUState", self.slave.getFMUState)
         return state, self.next_event, self.time, self.terminated, self.event_pending, self.clocks.save()
 
     def restore(self, state: Any) -> None:  # noqa: D102 - see Component
@@ -278,7 +289,8 @@ class FMI3Component(Component):
         self.clocks.restore(clocks)
 
     def release(self, state: Any) -> None:  # noqa: D102 - see Component
-        self._guard("freeFMUState", lambda: self.slave.freeFMUState(state[0]))
+        if self._alive:
+            self._guard("freeFMUState", lambda: self.slave.freeFMUState(state[0]))
 
 
 def _is_clocked_by(variable: ModelVariable, clock: ModelVariable) -> bool:

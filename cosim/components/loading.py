@@ -55,7 +55,8 @@ def load_fmu(path: str | Path, name: str) -> Component:
         slave = _slave(folder, description, name)
     except Exception as error:
         shutil.rmtree(folder, ignore_errors=True)
-        raise FmuLoadError(f"{name}: cannot load {path}: {error}") from error
+        lacks = "its library lacks a function that FMI demands of every FMU: " if isinstance(error, AttributeError) else ""
+        raise FmuLoadError(f"{name}: cannot load {path}: {lacks}{error}") from error
     finally:
         os.chdir(here)  # fmpy changes it while it loads, and leaves it so when it fails
     more = {"negated": negated_aliases(folder)} if _version(description) == 1 else {}

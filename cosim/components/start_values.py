@@ -10,7 +10,7 @@ from fmpy.model_description import ModelVariable
 
 from cosim.components.elements import described
 from cosim.errors import nearest
-from fmus.ports import FLOATING_TYPES, size
+from fmus.ports import CTYPES, FLOATING_TYPES, size
 
 StartValue = float | int | bool | str | bytes | Sequence[Any]
 
@@ -84,6 +84,10 @@ def _floating(value: Any) -> float:
 
 def _whole(kind: str, value: Any) -> int:
     if isinstance(value, (bool, int)) or (isinstance(value, float) and value.is_integer()):
+        _, _, dtype = CTYPES.get(kind, CTYPES["Int64"])
+        low, high = np.iinfo(dtype).min, np.iinfo(dtype).max
+        if not low <= value <= high:
+            raise ValueError(f"expected {low} to {high} for a {kind} (got {int(value)})")
         return int(value)
     raise ValueError(f"expected a whole number for a {kind} (got {value!r})")
 

@@ -9,6 +9,7 @@ from fmpy.model_description import ModelDescription, ModelVariable
 
 from cosim.components.start_values import refusal, typed_value
 from cosim.errors import CouplingError
+from fmus.check.sense import shape_fault
 
 STRUCTURAL = "structuralParameter"
 
@@ -31,11 +32,19 @@ def structural_value(component: str, variable: ModelVariable, value: Any) -> int
 
 
 def resize(description: ModelDescription, structure: Mapping[str, int]) -> None:
-    """Shapes of all arrays for these values of the structural parameters; the others have their start values."""
+    """Shapes of all arrays for these values of the structural parameters; the others have their start values.
+
+    Raises:
+        CouplingError: an array would become too large.
+    """
     by_reference = {v.valueReference: structure[v.name] for v in description.modelVariables if v.name in structure}
     for variable in description.modelVariables:
         if variable.dimensions:
             variable.shape = tuple(_extent(dimension, by_reference) for dimension in variable.dimensions)
+            fault = shape_fault(variable)
+            if fault is not None:
+                given = ", ".join(f"{name} = {value}" for name, value in structure.items())
+                raise CouplingError(f"With {given or 'its start values'}: {fault}")
 
 
 def _extent(dimension: Any, given: Mapping[int, int]) -> int:

@@ -67,9 +67,11 @@ def split_name(name: str, components: Iterable[str], what: str) -> tuple[str, st
     """
     component, dot, signal = name.partition(".")
     known = list(components)
-    if not dot or component not in known:
+    if component not in known:
         expected = "expected 'component.signal' with a component of this run"
         raise CouplingError(f"{what} {name!r}: {expected}; {nearest(component, known)}")
+    if not dot:
+        raise CouplingError(f"{what} {name!r}: expected 'component.signal'; which signal of {name}?")
     return component, signal
 
 

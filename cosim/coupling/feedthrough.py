@@ -75,12 +75,11 @@ def algebraic_loops(
     declared = _knots(components, edges, hubs, frozenset())
     if not possible:
         return declared
-    edges += [
-        ((c.name, name), (c.name, output))
-        for c in components.values()
-        for output in undeclared_outputs(c)
-        for name in _input_variables(c)
-    ]
+    linked = {node for edge in joints for node in edge}  # what is not connected is in no loop
+    for c in components.values():
+        inputs = [name for name in _input_variables(c) if (c.name, name) in linked]
+        outputs = [output for output in undeclared_outputs(c) if (c.name, output) in linked]
+        edges += [((c.name, name), (c.name, output)) for output in outputs for name in inputs]
     return _knots(components, edges, hubs, {node for loop in declared for node in loop.path})
 
 

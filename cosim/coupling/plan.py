@@ -36,14 +36,24 @@ class Carrier(Protocol):
     def send(self, t: float, until: float) -> None:
         """Tell of the line for a step from `t` to `until` [s]."""
 
-    def forget(self) -> None:
-        """Something jumped: no line leads over it."""
+    def forget(self, jumped: np.ndarray) -> None:
+        """Values of the plan that jumped, as a mask of shape (n,): no line of an input leads over it."""
 
     def save(self) -> Any:
         """What a step changes."""
 
     def restore(self, state: Any) -> None:
         """Return to what was saved."""
+
+
+class Service(Protocol):
+    """Somebody who took over how components move, and remembers something within a step (`cosim.balises.service`)."""
+
+    def save_within(self) -> Any:
+        """What moving components changes."""
+
+    def restore_within(self, state: Any) -> None:
+        """Return to what was saved, as often as wanted: components are moved over the same way again."""
 
 
 FLOATING_TYPES = frozenset({"Real", "Float64", "Float32"})
@@ -104,10 +114,14 @@ class PlannedComponent:
             self.send(t, until)
             self.component.advance(t, until)
             return
-        for i in range(self.substeps):
-            a, b = t + (until - t) * i / self.substeps, t + (until - t) * (i + 1) / self.substeps
-            self.send(a, b)
-            self.component.advance(a, b)
+        begin = t
+        for i in range(1, self.substeps + 1):
+            end = until if i == self.substeps else t + (until - t) * i / self.substeps
+            self.send(begin, end)
+            self.component.advance(begin, end)
+            if self.component.terminated:
+                return
+            begin = end
 
     def drive(self, t: float, until: float) -> None:
         """Send the prepared inputs, advance, read outputs; times in [s]."""
@@ -137,6 +151,7 @@ class Plan:
         untouched: connected outputs that are no numbers, or integers beyond doubles; shape (m,), of objects. Whoever keeps and
             restores a copy of `values` does so with them.
         clocks: connections between clocks.
+        services: who took over how components move.
     """
 
     steps: list[PlannedComponent]
@@ -145,6 +160,7 @@ class Plan:
     continuous: np.ndarray
     untouched: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=object))
     clocks: Sequence[ClockConnection] = ()
+    services: list[Service] = field(default_factory=list)
 
     def find(self, component: str) -> PlannedComponent:
         """The planned component of this name.

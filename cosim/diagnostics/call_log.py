@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from math import isnan
 from pathlib import Path
 from threading import RLock
 from time import perf_counter
@@ -49,10 +50,11 @@ class CallLog:
         """Make a call and log it.
 
         Args:
-            time: where the component stands [s]. component: its name. described: the call in words. function: makes it.
+            time: where the component stands [s], NaN before it is initialised. component: its name.
+            described: the call in words. function: makes it.
         """
         with self._lock:
-            number = self._begin(f"{time:.9g} {component} {described.text}")
+            number = self._begin(f"{_instant(time)} {component} {described.text}")
             begin = perf_counter()
             try:
                 result = function()
@@ -88,6 +90,10 @@ class CallLog:
                 os.write(self._file, text.encode("utf-8", "backslashreplace"))
             except OSError as error:  # a full disk ends the log, not the run
                 self.broken = f"The call log {self.path} ends after {self.count} calls: {error.strerror or error}."
+
+
+def _instant(time: float) -> str:
+    return "-" if isnan(time) else f"{time:.9g}"
 
 
 def _status(status: Any, otherwise: str) -> str:

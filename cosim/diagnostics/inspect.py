@@ -104,4 +104,5 @@ def group_index(groups: Iterable[Sequence[str]]) -> Mapping[str, int]:
 def _port(component: Component, variable: ModelVariable, connected: set[str], depends: tuple[str, ...] | None = None) -> Port:
     shape = "x".join(map(str, variable.shape)) if variable.shape else ""
     kind = f"{variable.type}[{shape}]" if shape else str(variable.type)
-    return Port(variable.name, component.unit_name(variable.name), kind, variable.name in connected, depends)
+    ticks = str(variable.intervalVariability) if variable.type == "Clock" and variable.causality == "input" else None
+    return Port(variable.name, component.unit_name(variable.name), kind, variable.name in connected, depends, ticks)

@@ -23,6 +23,7 @@ class Port:
         kind: type of the variable in FMI's words (``Float64``, ``Boolean``, ...), with its shape where it is an array.
         connected: whether a connection begins or ends here.
         depends_on: for an output, the inputs that act on it directly; None where the FMU does not say.
+        ticks: for an input clock its ``intervalVariability``, else None.
     """
 
     name: str
@@ -30,6 +31,7 @@ class Port:
     kind: str
     connected: bool
     depends_on: tuple[str, ...] | None = None
+    ticks: str | None = None
 
     @property
     def text(self) -> str:

@@ -82,7 +82,7 @@ def _ports(structure: Structure) -> list[str]:
     for part in structure.parts:
         for port in part.inputs:
             sources = [".".join(link.source) for target, link in into.items() if _is_end(target, part, port)]
-            rows.append([f"{part.name}.{port.name}", "input", port.unit or DASH, port.kind, _from(sources)])
+            rows.append([f"{part.name}.{port.name}", "input", port.unit or DASH, port.kind, _from(sources, port)])
         for port in part.outputs:
             targets = [".".join(k.target) for source, links in out_of.items() if _is_end(source, part, port) for k in links]
             rows.append([f"{part.name}.{port.name}", "output", port.unit or DASH, port.kind, _to(targets) + _direct(port)])
@@ -93,8 +93,10 @@ def _is_end(end: tuple[str, str], part: Part, port: Port) -> bool:
     return end[0] == part.name and (end[1] == port.name or end[1].startswith(f"{port.name}["))
 
 
-def _from(sources: Sequence[str]) -> str:
-    return f"<- {', '.join(sources)}" if sources else "keeps its start value"
+def _from(sources: Sequence[str], port: Port) -> str:
+    if sources:
+        return f"<- {', '.join(sources)}"
+    return "keeps its start value" if port.ticks is None else f"ticks by the time ({port.ticks})"
 
 
 def _to(targets: Sequence[str]) -> str:

@@ -70,7 +70,8 @@ class Master:
         self.plan, self.axis, self.balises = plan, axis, balises
         self.system = System(plan, algorithm(plan), balises, events)
         self.control = control(self.system)
-        self.recorder = recorder(plan.signals, axis.count + 1)
+        event_rows = 0 if balises is None else balises.expected_rows(axis.start, axis.stop)
+        self.recorder = recorder(plan.signals, axis.count + 1 + event_rows)
         self.timing = WallClock()
         self.exchange_rounds = 0
         self.ended_early: str | None = None
@@ -78,12 +79,23 @@ class Master:
         self._all_finite = make_finite_check(plan.values)
         self.stepper = Choice(stepper)
 
+    def choose_stepper(self) -> None:
+        """Choose who executes the plan; `run` does so where nobody did before. After it no component may be instantiated anew.
+
+        Raises:
+            CouplingError: the compiled stepper is demanded and cannot be had; why.
+        """
+        if not self.stepper.is_made:
+            self.stepper = choose_stepper(self.stepper.wanted, self.control, self.axis)
+
     def run(self) -> None:
         """Initialise and step to the end.
 
         Raises:
+            CouplingError: as for `choose_stepper`.
             RunError: a component failed; what was recorded so far is kept.
         """
+        self.choose_stepper()
         begin = perf_counter()
         try:
             self.exchange_rounds = initialise(self.plan, self.axis.start, self.axis.stop)
@@ -94,11 +106,12 @@ class Master:
             self.timing.initialisation = perf_counter() - begin
         begin = perf_counter()
         try:
-            self.stepper = choose_stepper(self.stepper.wanted, self.control, self.axis)
             if self._stopped_at(self.axis.start) is None:
                 self._step_all()
         finally:
             self.timing.stepping = perf_counter() - begin - self.timing.recording
+            if self.stepper.compiled is not None:
+                self.stepper.compiled.close()
             self.system.algorithm.close()
 
     # -- stepping ---------------------------------------------------------------------------------------------------
@@ -160,7 +173,8 @@ class Master:
         return stopped
 
     def _record(self, rows: Sequence[Row], until: float) -> None:
-        self._record_events(rows)
+        if rows:
+            self._record_events(rows)
         begin = perf_counter()
         self.recorder.add(until, self.plan.values)
         self.timing.recording += perf_counter() - begin

@@ -5,7 +5,7 @@ What controls the step knows only this: `advance` from one time to another, `sav
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Collection, Sequence, Set
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +15,7 @@ from cosim.balises.service import NO_ROWS, BaliseService, Row
 from cosim.coupling.plan import Plan
 from cosim.errors import CouplingError
 from cosim.master.algorithms.algorithm import Algorithm
+from cosim.master.algorithms.links import downstream
 from cosim.master.events.choose import Events, make_coordinator
 
 __all__ = ["NO_ROWS", "Checkpoint", "Row", "System"]
@@ -90,7 +91,34 @@ class System:
             return NO_ROWS
         self.balises.begin(t, until)
         self.algorithm.advance(t, until)
-        return self.balises.rows()
+        rows = self.balises.rows()
+        if self.balises.touched:
+            self._begin_lines_of(self.balises.touched, until)
+        return rows
+
+    def begin_lines(self, t: float, jumped: np.ndarray, stale: np.ndarray) -> None:
+        """Lines of inputs do not lead over a jump at `t` [s].
+
+        Args:
+            jumped: values that jumped, shape (n,): the lines from them begin with what the plan holds now.
+            stale: values that may follow suit only in the next step, shape (n,): their lines begin with that.
+        """
+        for step in self.plan.steps:
+            if step.carrier is None:
+                continue
+            step.carrier.forget(jumped | stale)
+            if jumped[step.inputs.sources].any():
+                step.carrier.prepare(t)
+                step.carrier.forget(stale & ~jumped)
+
+    def _begin_lines_of(self, names: Collection[str], t: float) -> None:
+        """The outputs of these components may have jumped on the way to `t` [s]."""
+        if all(step.carrier is None for step in self.plan.steps):
+            return
+        jumped = np.zeros(len(self.plan.values), dtype=bool)
+        for name in names:
+            jumped[self.plan.find(name).columns] = True
+        self.begin_lines(t, jumped, downstream(self.plan, names))
 
     def demand_states(self, what: str) -> None:
         """All components must be able to save their state.

@@ -18,13 +18,15 @@ KINDS = {
     "states": ("save", "restore", "release"),
 }
 """Columns, and the kinds of calls in each."""
+NOT_TIMED_IN_C = ("get", "set")
+"""Columns that the compiled stepper counts and does not time."""
 MESSAGES_SHOWN = 100
 
 
 def cost_rows(result: Result) -> list[list[str]]:
     """One row for each component: name, then calls and milliseconds of each column of `KINDS`, then messages logged."""
     entries = [entry for entry in list_entry(result, "components") if isinstance(entry, Mapping) and "cost" in entry]
-    return [_row(entry) for entry in entries]
+    return [_row(entry, _compiled(result)) for entry in entries]
 
 
 def cost_text(result: Result) -> str:
@@ -46,7 +48,8 @@ def cost_html(result: Result) -> list[str]:
     rows = cost_rows(result)
     if not rows:
         return []
-    text = "Calls and the milliseconds they took. Of reading (get) and writing (set) one call in 64 was timed."
+    timed = "in C none" if _compiled(result) else "one call in 64"
+    text = f"Calls and the milliseconds they took. Of reading (get) and writing (set) {timed} was timed."
     return [paragraph(text), simple_table(["Component", *KINDS, "Messages"], rows, range(1, len(KINDS) + 2))]
 
 
@@ -63,15 +66,22 @@ def messages_html(result: Result) -> list[str]:
     return [paragraph(note), simple_table(["Component", "Time [s]", "Status", "Category", "Text"], rows, (1,))]
 
 
-def _row(entry: Mapping[str, Any]) -> list[str]:
+def _compiled(result: Result) -> bool:
+    master = result.summary.get("master")
+    stepper = master.get("stepper") if isinstance(master, Mapping) else None
+    return isinstance(stepper, Mapping) and bool(stepper.get("steps_compiled"))
+
+
+def _row(entry: Mapping[str, Any], compiled: bool) -> list[str]:
     cost = entry["cost"] if isinstance(entry["cost"], Mapping) else {}
     counts = entry.get("message_counts")
     messages = sum(counts.values()) if isinstance(counts, Mapping) else 0
-    return [str(entry.get("name")), *(_cell(cost, kinds) for kinds in KINDS.values()), str(messages)]
+    cells = [_cell(cost, kinds, not (compiled and column in NOT_TIMED_IN_C)) for column, kinds in KINDS.items()]
+    return [str(entry.get("name")), *cells, str(messages)]
 
 
-def _cell(cost: Mapping[str, Any], kinds: Sequence[str]) -> str:
+def _cell(cost: Mapping[str, Any], kinds: Sequence[str], timed: bool) -> str:
     found = [cost[kind] for kind in kinds if isinstance(cost.get(kind), Mapping)]
     calls = sum(int(number_entry(entry, "calls") or 0) for entry in found)
     seconds = sum(number_entry(entry, "seconds") or 0.0 for entry in found)
-    return f"{calls} / {1000 * seconds:.3g}" if calls else DASH
+    return f"{calls} / {f'{1000 * seconds:.3g}' if timed else DASH}" if calls else DASH

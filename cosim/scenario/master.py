@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 
 from cosim.balises.service import BaliseService
+from cosim.components.component import Component
 from cosim.coupling.plan import Plan
 from cosim.errors import CouplingError
 from cosim.master.algorithms.algorithm import Algorithm
@@ -47,6 +48,7 @@ def make_master(
     )  # fmt: skip
     _check_rates(table, choice)
     _set_rates(table, plan, axis, balises)
+    master.choose_stepper()
     return master
 
 
@@ -67,6 +69,25 @@ def make_algorithm(table: MasterTable, plan: Plan, choice: AlgorithmChoice) -> A
     return algorithm
 
 
+def slow_last(components: Mapping[str, Component], table: ScenarioTable) -> dict[str, Component]:
+    """The components in the order listed, but those with `every` after the others, so that they find the newest inputs."""
+    return dict(sorted(components.items(), key=lambda item: table.components[item[0]].every > 1))
+
+
+def idle_settings(table: MasterTable) -> list[str]:
+    """What the user set that has no effect beside the other settings, in words."""
+    needs = {
+        "threads": ("algorithm", "jacobi", table.algorithm == "jacobi" or table.threads == 1),
+        "tolerance": ("control", "doubling", table.control == "doubling"),
+        "smallest_step": ("control", "doubling", table.control == "doubling"),
+    }
+    return [
+        f"master.{key} has no effect without master.{other} = '{value}'."
+        for key, (other, value, works) in needs.items()
+        if key in table.model_fields_set and not works
+    ]
+
+
 def _check_rates(table: ScenarioTable, choice: AlgorithmChoice) -> None:
     for name in (name for loop in choice.iterated for name in loop):
         if table.components[name].every != 1:
@@ -83,7 +104,8 @@ def _set_rates(table: ScenarioTable, plan: Plan, axis: TimeAxis, balises: Balise
         raise CouplingError(
             f"every = {max(every.values())} needs communication steps that are fixed; set master.control = 'fixed'."
         )
-    taken = {} if balises is None else {r.planned.component.name: "it is told of balises" for r in balises.receivers}
+    taken = {name: "its clocks are connected" for wire in plan.clocks for name in (wire.source[0], wire.target[0])}
+    taken |= {} if balises is None else {r.planned.component.name: "it is told of balises" for r in balises.receivers}
     if balises is not None:
         taken[balises.plant] = "it is watched for balises"
     set_rates(plan, axis, every, substeps, taken)

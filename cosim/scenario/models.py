@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import fmu_observer
 import fmus
 import plant_models
 from cosim.components.component import Component
 from cosim.components.loading import load_block, load_fmu
-from cosim.errors import FmuLoadError, ScenarioError, nearest
-from cosim.scenario.schema import ComponentTable
+from cosim.errors import ScenarioError, nearest
+from cosim.scenario.realisations import FAULTS, Request, Tell, cannot_build, realise
+from cosim.scenario.schema import ComponentTable, Realisation
 from plant_models.hybrid import HybridSystem
 
 LATE_PARAMETERS = frozenset({"late_policy", "replay_horizon"})
+
+_systems: dict[tuple[type[HybridSystem], str], HybridSystem] = {}
 
 
 def shipped() -> Mapping[str, type[HybridSystem]]:
@@ -44,41 +48,57 @@ def make_system(table: ComponentTable, where: str) -> HybridSystem | None:
     return system
 
 
-def component_factory(name: str, table: ComponentTable, folder: Path, where: str) -> Callable[[], Component]:
-    """A function that makes a fresh component; called once for the run and once for the probe.
+def component_factories(
+    tables: Mapping[str, ComponentTable], folder: Path, where: str, tell: Tell
+) -> tuple[dict[str, Callable[[], Component]], list[str]]:
+    """For each component a function that makes a fresh one, called once for the run and perhaps once for the probe; and notes.
 
     Args:
-        name: component name. table: its table. folder: paths are relative to it. where: place for messages.
+        tables: of the components. folder: paths are relative to it. where: place for messages.
+        tell: told of FMUs that are built.
 
     Raises:
-        ScenarioError, FmuLoadError: the component cannot be made.
+        ScenarioError, FmuLoadError: a component cannot be made.
     """
-    system = make_system(table, where)
-    if system is None:
-        path = (folder / str(table.fmu)).resolve()
-        return lambda: load_fmu(path, name)
-    realisation = table.realisation or ("fmu3" if table.model is not None else "block3")
-    version: Any = int(realisation[-1])
-    if realisation.startswith("block"):
-        arguments = {"preset": table.preset, "late_policy": table.late_policy, "replay_horizon": table.replay_horizon}
-        return lambda: load_block(system, name, version, **arguments)
-    path = native_fmu(system, version, table.preset, where)
-    return lambda: load_fmu(path, name)
+    places = {name: f"{where}: components.{name}" for name in tables}
+    systems = {name: system for name in tables if (system := make_system(tables[name], places[name])) is not None}
+    requests = {name: Request(tables[name], _lasting(tables[name], system), places[name]) for name, system in systems.items()}
+    made = realise(requests, tell)
+    factories: dict[str, Callable[[], Component]] = {}
+    for name, table in tables.items():
+        if name in systems and name not in made.files:
+            factories[name] = partial(load_block, systems[name], name, _version(made.kinds[name]), **_block_arguments(table))
+        else:
+            path = made.files[name] if name in systems else (folder / str(table.fmu)).resolve()
+            factories[name] = partial(load_fmu, path, name)
+    return factories, made.notes
+
+
+def _version(kind: Realisation) -> Literal[2, 3]:
+    return 2 if kind.endswith("2") else 3
+
+
+def _block_arguments(table: ComponentTable) -> dict[str, Any]:
+    return {"preset": table.preset, "late_policy": table.late_policy, "replay_horizon": table.replay_horizon}
+
+
+def _lasting(table: ComponentTable, system: HybridSystem) -> HybridSystem:
+    """The first system of the same class and options in this process: what has been traced need not be traced for each run."""
+    return _systems.setdefault((type(system), repr(sorted(table.options.items()))), system)
 
 
 def protocol_parameters(table: ComponentTable, component: Component, where: str) -> dict[str, float | str]:
     """What the table says about late events, as parameters of an FMU; a block was made with them.
 
     Raises:
-        ScenarioError: the FMU has no such parameter.
+        ScenarioError: the component has no such parameter.
     """
-    if component.kind != "FMU":
-        return {}
     given: dict[str, float | str] = {name: getattr(table, name) for name in sorted(table.model_fields_set & LATE_PARAMETERS)}
     for name in given:
         if name not in component.variables:
-            raise ScenarioError(f"{where}: this FMU has no parameter {name}; what it does with late events is its own choice.")
-    return given
+            why = "what it does with late events is its own choice" if component.events else "it is told of no events"
+            raise ScenarioError(f"{where}: this {component.kind} has no parameter {name}; {why}.")
+    return given if component.kind == "FMU" else {}
 
 
 def native_fmu(system: HybridSystem, version: Any, preset: str | None, where: str) -> Path:
@@ -89,8 +109,8 @@ def native_fmu(system: HybridSystem, version: Any, preset: str | None, where: st
     """
     try:
         return fmus.cached_fmu(system, fmi_version=version, preset=preset)
-    except (OSError, RuntimeError, ValueError) as error:
-        raise FmuLoadError(f"{where}: cannot build the FMU of {system.name}: {error}") from error
+    except FAULTS as error:
+        raise cannot_build(where, system, error) from error
 
 
 def _check_options(factory: type[HybridSystem], options: Mapping[str, Any], where: str) -> None:

@@ -27,7 +27,7 @@ from cosim.errors import CosimError
 from cosim.master.algorithms.choose import AlgorithmChoice, choose_algorithm
 from cosim.master.axis import TimeAxis
 from cosim.master.lines.draw import draw_lines
-from cosim.master.master import close
+from cosim.master.master import Master, close
 from cosim.report.spec import Phase, ReportSpec
 from cosim.results.result import BaliseRecord, Result
 from cosim.results.si import in_si
@@ -36,8 +36,8 @@ from cosim.scenario.certificates import check_certificates, expected_gap
 from cosim.scenario.connections import parse_connections
 from cosim.scenario.instances import check_instances
 from cosim.scenario.layouts import make_layout
-from cosim.scenario.master import make_master
-from cosim.scenario.models import component_factory, protocol_parameters
+from cosim.scenario.master import idle_settings, make_master, slow_last
+from cosim.scenario.models import component_factories, protocol_parameters
 from cosim.scenario.outcome import Outcome
 from cosim.scenario.roles import ROLES, check_roles
 from cosim.scenario.schema import ScenarioTable, step_count
@@ -60,7 +60,7 @@ Warn = Callable[[str], None]
 
 def run_scenario(
     table: ScenarioTable, name: str, folder: Path, where: str, progress: Progress | None = None, warn: Warn | None = None,
-    call_log: Path | None = None,
+    call_log: Path | None = None, building: Warn | None = None,
 ) -> Outcome:  # fmt: skip
     """Run a scenario to its end or to its first failure.
 
@@ -69,19 +69,20 @@ def run_scenario(
         progress: called with the time reached and the end [s].
         warn: told of everything doubtful as soon as it is known, before the run where it can be; by default the log ``cosim``.
         call_log: where calls are logged, where the scenario asks for that; by default `CALL_LOG` in the working folder.
+        building: told of FMUs that are built before the run, as they are done; by default the log, as information.
 
     Raises:
         CosimError: the scenario cannot be set up; failures on the way are in the outcome.
     """
-    setup = _Setup(table, folder, where, warn or LOG.warning)
+    setup = _Setup(table, folder, where, warn or LOG.warning, building or LOG.info)
     if table.master.log_calls:
         setup.call_log = CallLog(call_log or CALL_LOG)
     try:
         try:
-            setup.prepare()
+            setup.prepare(progress)
         except CosimError as error:
             raise error if str(error).startswith(where) else type(error)(f"{where}: {error}") from error
-        return setup.execute(name, progress)
+        return setup.execute(name)
     finally:
         setup.close()
 
@@ -89,11 +90,11 @@ def run_scenario(
 class _Setup:
     """The parts of one run while it is put together; thrown away at its end."""
 
-    def __init__(self, table: ScenarioTable, folder: Path, where: str, tell: Warn) -> None:
+    def __init__(self, table: ScenarioTable, folder: Path, where: str, tell: Warn, building: Warn) -> None:
         self.table, self.folder, self.where = table, folder, where
         self.axis = TimeAxis(table.start, table.step, step_count(table.start, table.stop, table.step))
         self.warnings: list[str] = []
-        self._tell = tell
+        self._tell, self._tell_of_builds = tell, building
         self.notes: list[str] = []
         self.certificates: dict[str, dict[str, Any]] = {}
         self.factories: dict[str, Callable[[], Component]] = {}
@@ -102,18 +103,21 @@ class _Setup:
         self.choice: Choice | None = None
         self.algorithm = AlgorithmChoice()
         self.service: BaliseService | None = None
+        self.master: Master | None = None
         self.lines: Mapping[str, str] = {}
         self.setup_seconds = 0.0
         self.call_log: CallLog | None = None
 
-    def prepare(self) -> None:
+    def prepare(self, progress: Progress | None) -> None:
         """Everything up to the first step, cheap checks first."""
         begin = perf_counter()
         table = self.table
+        for text in idle_settings(table.master):
+            self._warn(text)
         layout = None if table.balises is None else make_layout(table.balises, table.start, table.stop, self.folder, self.where)
         pairs = parse_connections(table.connections, self.where)
-        for name, component in table.components.items():
-            self.factories[name] = component_factory(name, component, self.folder, f"{self.where}: components.{name}")
+        self.factories, notes = component_factories(table.components, self.folder, self.where, self._tell_of_builds)
+        self.notes += notes
         files = {name: (self.folder / t.fmu).resolve() for name, t in table.components.items() if t.fmu is not None}
         check_instances(files, self.where)
         for name, factory in self.factories.items():
@@ -124,7 +128,7 @@ class _Setup:
         connections = connect(pairs, self.components)
         receivers, plant = self._balise_roles()
         check_roles(table, self.components, self.where)
-        groups = execution_groups(self.components, connections, self._before(plant, receivers))
+        groups = execution_groups(slow_last(self.components, table), connections, self._before(plant, receivers))
         self.algorithm = choose_algorithm(table.master.algorithm, groups, self.components)
         order = [name for group in groups for name in group.names]
         starts = {n: self._start_values(n, c) for n, c in self.components.items()}
@@ -139,17 +143,19 @@ class _Setup:
             self._note_lines()
         if layout is not None:
             self._add_balises(layout, plant, receivers, starts[plant])
+        told = None if progress is None else lambda t: progress(t, self.axis.stop)
+        self.master = make_master(self.table, self.plan, self.axis, self.service, told, self.algorithm)
+        if self.master.system.events is not None:
+            self.notes += self.master.system.events.notes
+        self.notes += self.master.stepper.notes
         self.setup_seconds = perf_counter() - begin
 
-    def execute(self, name: str, progress: Progress | None) -> Outcome:
+    def execute(self, name: str) -> Outcome:
         """Run the master and gather what came out."""
         assert self.plan is not None
-        stop = self.axis.stop
-        told = None if progress is None else lambda t: progress(t, stop)
-        master = make_master(self.table, self.plan, self.axis, self.service, told, self.algorithm)
-        if master.system.events is not None:
-            self.notes += master.system.events.notes
-        failure = None
+        assert self.master is not None
+        master = self.master
+        failure: str | None = None
         try:
             master.run()
         except CosimError as error:

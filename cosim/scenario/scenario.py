@@ -179,6 +179,7 @@ class Scenario:
     def run(
         self, progress: Callable[[float, float], None] | None = None, overrides: Mapping[str, Any] | None = None,
         warn: Callable[[str], None] | None = None, call_log: str | Path | None = None,
+        building: Callable[[str], None] | None = None,
     ) -> Outcome:  # fmt: skip
         """Run it.
 
@@ -188,6 +189,8 @@ class Scenario:
             warn: told of everything doubtful as soon as it is known, before the run where it can be; by default the log
                 ``cosim``, which Python shows on the error stream. All warnings are in the outcome as well.
             call_log: a file to log every call of every component to, as `master.log_calls` asks for.
+            building: told of the FMUs of shipped models that are built for the first time, some seconds each; by default the
+                log ``cosim``, as information.
 
         Returns:
             The outcome: result, report roles, warnings; also for a run that failed on the way (see `Outcome.failure`).
@@ -204,7 +207,7 @@ class Scenario:
         log = None if call_log is None else Path(call_log)
         for doubt in self._doubts:
             (warn or LOG.warning)(doubt)
-        outcome = run_scenario(table, scenario.name, self.folder, self.where, progress, warn, log)
+        outcome = run_scenario(table, scenario.name, self.folder, self.where, progress, warn, log, building)
         return outcome.with_summary(warnings=[*self._doubts, *outcome.warnings]) if self._doubts else outcome
 
     def structure(self) -> Structure:

@@ -225,6 +225,10 @@ class ScenarioTable(Table):
         return self
 
 
+MAX_STEPS = 1e12
+"""Communication steps of a run at most: days with the fastest stepper, and times are still told apart."""
+
+
 def step_count(start: float, stop: float, step: float) -> int:
     """Number of communication steps.
 
@@ -235,6 +239,8 @@ def step_count(start: float, stop: float, step: float) -> int:
         raise ValueError(f"step must be positive, got {step!r} s")
     if not stop > start:
         raise ValueError(f"stop ({stop!r} s) must lie behind start ({start!r} s)")
+    if (stop - start) / step > MAX_STEPS:
+        raise ValueError(f"step {step!r} s from {start!r} s to {stop!r} s: more than {MAX_STEPS:g} steps; use a larger step")
     count = round((stop - start) / step)
     if count < 1 or abs(start + count * step - stop) > 1e-9 * max(1.0, abs(stop)):
         below = int((stop - start) / step)
@@ -256,14 +262,12 @@ def parse_scenario(data: dict[str, Any], where: str) -> ScenarioTable:
     try:
         return ScenarioTable.model_validate(data)
     except ValidationError as error:
-        lines = [_explain(dict(item)) for item in error.errors() if item["loc"][-1:] != ("list[float]",)]
+        lines = [_explain(dict(item)) for item in error.errors() if item["loc"][-1:] not in (("list[float]",), ("list[str]",))]
         raise ScenarioError(f"{where}: " + f"\n{where}: ".join(lines)) from error
 
 
 def _explain(item: dict[str, Any]) -> str:
-    place = (
-        ".".join(str(p) for p in item["loc"] if p not in ("float", "list[float]", "constrained-str", LINE, TABLE)) or "scenario"
-    )
+    place = ".".join(str(p) for p in item["loc"] if not _is_form(str(p))) or "scenario"
     message = str(item["msg"]).removeprefix("Value error, ")
     if item["type"] == "extra_forbidden":
         key = str(item["loc"][-1])
@@ -273,7 +277,14 @@ def _explain(item: dict[str, Any]) -> str:
         return f"{place}: {message}"
     if item["loc"][-1:] == ("float",):
         message = "expected a number, or a list of numbers for a vector"
+    if item["loc"][-2:-1] == ("log",) and str(item["loc"][-1]).startswith("literal["):
+        message = "expected 'all', 'errors', 'none', or a list of log categories"
     return f"{place}: {message} (got {json.dumps(given, default=str)})"
+
+
+def _is_form(place: str) -> bool:
+    """Whether part of a place names one of several forms a value may have, which says nothing to the user."""
+    return place in ("float", "constrained-str", LINE, TABLE) or place.startswith(("list[", "literal["))
 
 
 def _known_keys(location: tuple[Any, ...]) -> list[str]:
@@ -287,4 +298,6 @@ def _known_keys(location: tuple[Any, ...]) -> list[str]:
     }
     if len(location) > 1:
         table = tables.get(str(location[0]), ScenarioTable)
+    if location[:2] == ("master", "iteration"):
+        table = IterationTable
     return [field.alias or name for name, field in table.model_fields.items()]

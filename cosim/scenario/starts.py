@@ -43,7 +43,7 @@ def _spread(component: Component, name: str, value: Any) -> Iterator[tuple[str, 
 
 
 def _checked(component: Component, name: str, value: Any) -> StartValue:
-    variable = component.variable(name)
+    variable = component.settable(name)
     is_array = bool(variable.shape) and name in component.variables
     try:
         values = typed_values(variable, value) if is_array else [typed_value(variable, value)]

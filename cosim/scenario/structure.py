@@ -18,7 +18,9 @@ from cosim.errors import CosimError, CouplingError
 from cosim.master.algorithms.choose import AlgorithmChoice, choose_algorithm
 from cosim.scenario.balise_service import find_receivers, watched_plant
 from cosim.scenario.connections import parse_connections
+from cosim.scenario.master import slow_last
 from cosim.scenario.models import make_system
+from cosim.scenario.realisations import intended
 from cosim.scenario.schema import ComponentTable, ScenarioTable
 
 
@@ -42,7 +44,7 @@ def _structure(table: ScenarioTable, name: str, folder: Path, where: str) -> Str
     clocks, pairs = connect_clocks(parse_connections(table.connections, where), components)
     connections = connect(pairs, components)
     balises = _balises(table, components, where)
-    groups = execution_groups(components, connections, _before(balises))
+    groups = execution_groups(slow_last(components, table), connections, _before(balises))
     choice, refusal = _choice(table, groups, components)
     order = [n for group in groups for n in group.names]
     loops = [loop for group in groups for loop in group.algebraic]
@@ -79,7 +81,7 @@ def describe_component(name: str, table: ComponentTable, folder: Path, where: st
     if system is None:
         component = describe_fmu((folder / str(table.fmu)).resolve(), name)
     else:
-        realisation = table.realisation or ("fmu3" if table.model is not None else "block3")
+        realisation = intended(table, system)
         version: Any = int(realisation[-1])
         component = load_block(system, name, version, preset=table.preset)  # the exported FMU carries the same description
         component.kind = "block" if realisation.startswith("block") else "FMU"

@@ -15,9 +15,10 @@ from cosim.ssp.document import Node, fail, place
 from cosim.ssp.model import Binding, ComponentElement, Element, Entry, Parameter, SystemElement
 from cosim.ssp.nets import Nets, Path, Point
 from cosim.ssp.pipe import BOOLEANS, Pipe
+from cosim.ssp.values import LISTS
 
 Scalar = float | str
-Value = Scalar | list[float]
+Value = Scalar | list[Scalar]
 """A start value as a scenario writes it."""
 ACCEPTED: dict[str, set[str]] = {
     REAL: {REAL, INTEGER},
@@ -25,6 +26,7 @@ ACCEPTED: dict[str, set[str]] = {
     "Boolean": {"Boolean"},
     "String": {"String"},
     "Enumeration": {"Enumeration", INTEGER},
+    "Binary": {"Binary"},
 }
 """Types of parameters by the type of the variable that they may set; nothing may be lost."""
 
@@ -125,10 +127,7 @@ class _Applying:
         values = [_value(text, parameter, pipe, node) for text in parameter.values]
         if family == "Enumeration":
             _check_items(values, face.items(name), point, node)
-        numbers = [value for value in values if not isinstance(value, str)]
-        if parameter.array and len(numbers) < len(values):
-            fail(node, f"parameter {parameter.name!r}: arrays of {parameter.type.name} cannot be set.")
-        self.starts.values.setdefault(point.path, {})[point.name + point.suffix] = numbers if parameter.array else values[0]
+        self.starts.values.setdefault(point.path, {})[point.name + point.suffix] = values if parameter.array else values[0]
 
     def exists(self, point: Point) -> bool:
         """Whether the component has this variable, or an array of this name as variables of their own."""
@@ -173,7 +172,7 @@ def _targets(element: Element, path: Path, name: str) -> Iterator[Point]:
 
 def _value(text: str, parameter: Parameter, pipe: Pipe, node: Node) -> Scalar:
     family = parameter.type.family
-    if family in ("String", "Enumeration"):
+    if family in LISTS:
         return pipe.item(text, node)
     number = BOOLEANS[text] if family == "Boolean" else int(text) if family == INTEGER else float(text)
     return pipe.number(number, node)

@@ -8,11 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cosim.components.loading import read_description
-from cosim.errors import OutputError, ScenarioError, nearest
+from fmpy.model_description import ModelDescription
+
+from cosim.components.loading import describe_fmu
+from cosim.errors import CosimError, CouplingError, OutputError, ScenarioError, nearest
 from cosim.scenario.connections import parse_connections
 from cosim.scenario.models import LATE_PARAMETERS, make_system, native_fmu
+from cosim.scenario.realisations import NATIVE
 from cosim.scenario.schema import ComponentTable, ScenarioTable
+from cosim.scenario.starts import start_values
 from cosim.ssp.annotation import DIGEST, digest, write_extras
 from cosim.ssp.common import FAMILIES, INTEGER, REAL
 from cosim.ssp.document import VERSIONS, Node
@@ -59,8 +63,12 @@ def export_package(table: ScenarioTable, name: str, folder: Path, where: str, pa
         exporter = _Exporter(table, name, folder, where, version)
         exporter.build()
         return pack_fmu(exporter.files, path)
+    except CosimError:
+        raise
     except OSError as error:
-        raise error if isinstance(error, OutputError) else OutputError(f"{path} cannot be written: {error}") from error
+        raise OutputError(f"{path} cannot be written: {error}") from error
+    except ValueError as error:  # of the XML library, for texts that XML cannot hold
+        raise ScenarioError(f"{where}: cannot be written as XML: {error}") from error
 
 
 class _Exporter:
@@ -97,9 +105,9 @@ class _Exporter:
         if system is None:
             fmu = (self.folder / str(component.fmu)).resolve()
         else:
-            realisation = component.realisation or ("fmu3" if component.model is not None else "block3")
-            fmu = native_fmu(system, 2 if self.version == "1.0" else int(realisation[-1]), component.preset, place)
-        face = Face(read_description(fmu, name), f"component {name!r}")
+            version = 2 if self.version == "1.0" else int((component.realisation or NATIVE)[-1])
+            fmu = native_fmu(system, version, component.preset, place)
+        face = Face(self.checked(fmu, name, component), f"component {name!r}")
         if self.version == "1.0" and face.description.fmiVersion.startswith("3"):
             raise ScenarioError(
                 f"{place}: {fmu.name} is an FMU of FMI 3.0, which SSP 1.0 does not know; export with version 2.0."
@@ -108,6 +116,16 @@ class _Exporter:
         member = next((m for m, known in self.files.items() if known == content), f"resources/{name}.fmu")
         self.files[member] = content
         return Part(component, fmu, member, face)
+
+    def checked(self, fmu: Path, name: str, table: ComponentTable) -> ModelDescription:
+        """The description of an FMU, arrays as its structural parameters make them, once its parameters fit."""
+        try:
+            component = describe_fmu(fmu, name)
+            component.configure(table.parameters)
+            start_values(component, table.parameters)
+        except CouplingError as error:
+            raise ScenarioError(f"{self.where}: {error}") from error
+        return component.description
 
     def add_component(self, parent: Node, name: str, part: Part) -> None:
         """A component with its connectors, parameters and origin."""
@@ -149,6 +167,9 @@ class _Exporter:
         split = [v for v in face.variables if v.startswith(f"{key}[")]
         if key in face.variables:
             return [(key, values, shape)]
+        if key.rpartition("[")[0] in face.variables:
+            what = "an element of an array; SSP sets whole arrays only, so give all values"
+            raise ScenarioError(f"{self.where}: components.{name}.parameters: {key!r} is {what}.")
         if not split:
             hint = nearest(key, face.variables)
             raise ScenarioError(f"{self.where}: components.{name}.parameters: {name} has no variable {key!r}; {hint}")
@@ -163,7 +184,9 @@ class _Exporter:
         if name not in face.variables:
             raise ScenarioError(f"{self.where}: {face.what} has no variable {name!r}; {nearest(name, face.variables)}")
         kind, unit = str(face.variables[name].type), face.unit(name)
-        if kind == "Enumeration":
+        if kind == "Enumeration" and not face.items(name):
+            kind = "Integer"
+        elif kind == "Enumeration":
             names = {number: item for item, number in face.items(name).items()}
             values = [v if isinstance(v, str) else names.get(int(v), v) for v in values]
         if shape and self.version == "1.0":

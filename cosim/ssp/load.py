@@ -129,15 +129,24 @@ def _component(nets: Nets, path: Path, parameters: Mapping[str, Any], doubts: li
 def _experiment(structure: Structure, nets: Nets, tables: Mapping[str, Any]) -> dict[str, float]:
     """Start, stop and step, as far as they are known: from the structure, from our annotation, or else from the FMUs."""
     experiments = [face.description.defaultExperiment for face in nets.faces.values()]
-    times = {k: [float(v) for e in experiments if (v := getattr(e, k, None)) is not None] for k in ("stopTime", "stepSize")}
+    times = {k: [t for e in experiments if (t := _finite(getattr(e, k, None))) is not None] for k in ("stopTime", "stepSize")}
     start = 0.0 if structure.start is None else structure.start
     stop = structure.stop if structure.stop is not None else max(times["stopTime"], default=None)
-    if stop is None or not stop > start:
+    if stop is None or not stop > start or not math.isfinite(stop):
         return {"start": start} | ({} if stop is None else {"stop": stop})
     if "step" in tables:
         return {"start": start, "stop": stop}
     wanted = min((s for s in times["stepSize"] if s > 0.0), default=(stop - start) / DEFAULT_STEPS)
     return {"start": start, "stop": stop, "step": (stop - start) / max(1, math.ceil((stop - start) / wanted - 1e-9))}
+
+
+def _finite(text: str | None) -> float | None:
+    """A time of an FMU's default experiment [s]; None where it says nothing that could be used."""
+    try:
+        time = math.nan if text is None else float(text)
+    except ValueError:
+        return None
+    return time if math.isfinite(time) else None
 
 
 def _connection(chain: Chain, nets: Nets, names: Mapping[Path, str]) -> str | dict[str, Any] | None:

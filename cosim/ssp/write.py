@@ -11,6 +11,7 @@ from lxml import etree
 
 from cosim.ssp.common import FAMILIES, INTEGER, REAL, NamedUnit
 from cosim.ssp.document import NAMESPACES, Node
+from cosim.ssp.values import LISTS
 from plant_models.hybrid.units import BASE_SYMBOLS, Unit
 
 TOOL = "fmu-observer"
@@ -84,11 +85,12 @@ def add_connector(
     attributes = {}
     if FAMILIES[kind] == REAL and unit is not None:
         attributes["unit"] = definitions.unit(unit)
-    if kind == "Enumeration":
+    if kind == "Enumeration" and items:
         attributes["name"] = definitions.enumeration(getattr(variable.declaredType, "name", None) or variable.name, items)
     if kind == "Clock" and variable.intervalVariability:
         attributes["intervalVariability"] = str(variable.intervalVariability)
-    child(node, "ssc", kind, **attributes)
+    if kind != "Enumeration" or items:  # the schema knows no enumeration without items; a type may be left out
+        child(node, "ssc", kind, **attributes)
     for size in variable.shape or ():
         child(node, "ssc", "Dimension", size=str(size))
 
@@ -102,7 +104,7 @@ def add_parameter(parent: Node, name: str, kind: str, values: Sequence[Any], sha
     """
     node = child(parent, "ssv", "Parameter", name=name)
     texts = [_text(value, FAMILIES[kind]) for value in values]
-    if FAMILIES[kind] in ("String", "Enumeration") and shape:
+    if FAMILIES[kind] in LISTS and shape:
         holder = child(node, "ssv", kind, **attributes)
         for text in texts:
             child(holder, "ssv", "Value", value=text)

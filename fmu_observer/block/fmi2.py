@@ -10,7 +10,7 @@ from fmpy.fmi2 import FMU2Slave, fmi2LastSuccessfulTime, fmi2Terminated
 from fmu_observer.block.face import FMI_WARNING, WARNINGS, Face, refused
 from fmu_observer.block.variables import BlockError, Role
 
-WHOLE: tuple[Role, ...] = ("count", "integer_output", "policy")
+WHOLE: tuple[Role, ...] = ("count", "integer_output", "outcome", "policy")
 
 
 class FMI2Block(Face, FMU2Slave):
@@ -91,7 +91,7 @@ class FMI2Block(Face, FMU2Slave):
 
     @refused
     def getInteger(self, vr: Sequence[int]) -> list[int]:
-        """Values of event counts, integer outputs and the late policy."""
+        """Values of event counts, integer outputs, counts of outcomes and the late policy."""
         return self.instance.get_whole(vr, WHOLE)
 
     @refused

@@ -10,7 +10,7 @@ from fmpy.fmi3 import FMU3Slave
 from fmu_observer.block.face import FMI_WARNING, WARNINGS, Face, refused
 from fmu_observer.block.variables import BlockError, Mode, Role
 
-INT32: tuple[Role, ...] = ("count", "integer_output")
+INT32: tuple[Role, ...] = ("count", "integer_output", "outcome")
 INT64: tuple[Role, ...] = ("policy",)
 
 
@@ -134,7 +134,7 @@ class FMI3Block(Face, FMU3Slave):
 
     @refused
     def getInt32(self, vr: Sequence[int], nValues: int | None = None) -> list[int]:
-        """Values of event counts and integer outputs."""
+        """Values of event counts, integer outputs and counts of outcomes."""
         return self.instance.get_whole(vr, INT32)
 
     @refused

@@ -16,7 +16,7 @@ from fmu_observer.block.events import TIME_TOLERANCE, Events
 from fmu_observer.block.state import BlockState, Shape, check_owner
 from fmu_observer.block.timing import MOST_INTERNAL_STEPS, Timing
 from fmu_observer.block.variables import BEFORE_TIME, COMPUTED, BlockError, Mode, Place, Role, StepDiscarded, Variables
-from fmu_observer.event_protocol import LATE_POLICIES, EventProtocol
+from fmu_observer.event_protocol import LATE_POLICIES, OUTCOME_VARIABLES, EventProtocol
 from plant_models.hybrid import HybridSystem, Runtime, Snapshot, scalar_names
 
 STEP_TOLERANCE = 1e-6
@@ -329,7 +329,10 @@ class Instance:
             raise _model_failure(error) from error
 
     def _whole_value(self, place: Place) -> int:
-        value = self.events.counts[place.index] if place.role == "count" else float(place.values[place.index])
+        if place.role == "outcome":
+            value: float = getattr(self.events.counters, OUTCOME_VARIABLES[place.name])
+        else:
+            value = self.events.counts[place.index] if place.role == "count" else float(place.values[place.index])
         if not -(2.0**31) <= value < 2.0**31:
             raise BlockError(f"{place.name} = {value!r} is not a whole number of 32 bits.")
         return round(value)

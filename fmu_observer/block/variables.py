@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from fmu_observer.description import VariableTable, exposed_inputs
+from fmu_observer.event_protocol import OUTCOME_VARIABLES
 from plant_models.hybrid import HybridSystem, Runtime, Signal, scalar_names
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 Mode = Literal["instantiated", "initialization", "event", "step", "terminated", "freed"]
 Role = Literal[
     "time", "input", "payload", "output", "integer_output", "state", "fixed", "tunable", "clock", "count", "stamp", "policy",
-    "horizon", "derivative", "indicator",
+    "horizon", "outcome", "derivative", "indicator",
 ]  # fmt: skip
 
 COMPUTED: frozenset[Role] = frozenset({"output", "integer_output", "derivative", "indicator"})
@@ -32,6 +33,7 @@ NOT_REAL: dict[Role, str] = {
     "count": "announces an event",
     "policy": "is an enumeration",
     "integer_output": "is a whole number",
+    "outcome": "counts events",
 }
 
 
@@ -82,6 +84,7 @@ class Variables:
         if system.triggered_events:
             self._places.append(Place("late_policy", "policy", events.protocol, 0))
             self._places.append(Place("replay_horizon", "horizon", events.protocol, 1))
+            self._places += [Place(name, "outcome", events, i) for i, name in enumerate(OUTCOME_VARIABLES)]
         self._places += _rate_places(system, self.derivatives, self.indicators)
         self._settable = _settable_modes(counts_events)
         self._stale: set[Role] = set(COMPUTED)

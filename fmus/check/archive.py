@@ -13,7 +13,8 @@ from tempfile import TemporaryDirectory
 import fmpy
 from fmpy.model_description import ModelDescription
 
-from fmus.check.description import FILE, read_description
+from fmus.check.description import FILE, read_description, why_unreadable
+from fmus.check.sense import nonsense
 
 MAX_UNPACKED_BYTES = 2 * 1024**3
 MAX_FILES = 100_000
@@ -132,13 +133,17 @@ def _description(path: Path, names: list[str], versions: Sequence[str]) -> Model
     try:
         description = read_description(path)
     except Exception as error:  # whatever a broken file makes the parser throw
-        raise NotAnFmuError(f"{path} is not a readable FMU: modelDescription.xml cannot be parsed ({error}).") from error
+        reason = why_unreadable(path, error)
+        raise NotAnFmuError(f"{path} is not a readable FMU: modelDescription.xml cannot be parsed ({reason}).") from error
     version = str(description.fmiVersion)
     if not version.startswith(tuple(known[:2] for known in versions)):
         supported = f"{', '.join(versions[:-1])} and {versions[-1]}"
         raise NotAnFmuError(f"{path} is FMI {version}; FMI {supported} are supported.")
     if all(getattr(description, name) is None for name in INTERFACES):
         raise NotAnFmuError(f"{path} offers no interface: neither {', '.join(INTERFACES.values())}.")
+    fault = nonsense(description)
+    if fault is not None:
+        raise NotAnFmuError(f"{path} cannot be used: modelDescription.xml: {fault}")
     return description
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from fmpy import read_model_description
-from fmpy.model_description import ModelDescription, ModelVariable, Unknown
+from fmpy.model_description import ModelDescription, ModelVariable, Unknown, ValidationError
 
 FILE = "modelDescription.xml"
 LEFT_OUT = {
@@ -53,6 +53,20 @@ def read_description(source: Path) -> ModelDescription:
         for entry in root.iterfind("ModelVariables/Clock"):
             _complete_clock(variables[entry.get("name")], entry)
     return description
+
+
+def why_unreadable(source: Path, error: Exception) -> str:
+    """Why a model description could not be read: what the schema of the standard says first, else what the parser threw."""
+    try:
+        read_model_description(str(source), validate=True)
+    except ValidationError as found:
+        lines = [line.removeprefix("- ") for line in str(found).splitlines() if line.startswith("- ")]
+        return lines[0].rstrip(".") if lines else str(error)
+    except Exception:  # as before, with nothing learnt from the schema
+        pass
+    if isinstance(error, (KeyError, TypeError, AttributeError)):  # of the parser, on its way through the entries
+        return f"an attribute is missing, or a reference leads nowhere: {type(error).__name__} {error}"
+    return str(error)
 
 
 def _complete_clock(clock: ModelVariable, entry: ElementTree.Element) -> None:

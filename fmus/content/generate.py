@@ -184,12 +184,13 @@ def _role(system: HybridSystem, table: VariableTable, variable: ModelVariable) -
     if table.events <= reference < table.protocol:
         number, is_stamp = divmod(reference - table.events, 2)
         return f"{'ROLE_STAMP' if is_stamp else 'ROLE_CLOCK' if variable.type == 'Clock' else 'ROLE_COUNT'}, {number}"
-    if table.protocol <= reference < table.derivatives:
+    if table.protocol <= reference < table.outcomes:
         return f"{'ROLE_POLICY' if reference == table.protocol else 'ROLE_HORIZON'}, 0"
     payload = table.inputs + width(system.inputs)
     blocks = (
         (table.indicators, "ROLE_INDICATOR"),
         (table.derivatives, "ROLE_DERIVATIVE"),
+        (table.outcomes, "ROLE_OUTCOME"),
         (table.parameters, "ROLE_TUNABLE" if variable.variability == "tunable" else "ROLE_FIXED"),
         (table.states, "ROLE_STATE"),
         (table.outputs, "ROLE_OUTPUT" if variable.type in ("Real", "Float64") else "ROLE_INTEGER_OUTPUT"),

@@ -6,7 +6,7 @@ from html import escape
 
 from fmpy.model_description import ModelDescription, ModelVariable
 
-from fmu_observer.event_protocol import LATE_POLICIES
+from fmu_observer.event_protocol import LATE_POLICIES, OUTCOME_VARIABLES
 from plant_models.hybrid import HybridSystem, TriggeredEvent
 
 LATE = {
@@ -50,7 +50,8 @@ def _exactness(by_name: dict[str, ModelVariable]) -> str:
     if policy is not None:
         name = LATE_POLICIES[int(policy.start) - 1]
         text += f" A stamp before the current time goes by <code>late_policy</code>, here <code>{name}</code>: {LATE[name]}."
-    return text + "</p>"
+    counts = ", ".join(f"<code>{count}</code>" for count in OUTCOME_VARIABLES if count in by_name)
+    return text + (f" What became of the events is counted in {counts}." if counts else "") + "</p>"
 
 
 def _periodic(system: HybridSystem) -> str:

@@ -41,10 +41,14 @@ static void remove_first(Runtime *runtime) {
 
 /* -- announcing -------------------------------------------------------------------------------------------------- */
 
+static void count_outcome(Runtime *runtime, Outcome outcome) {
+    runtime->outcomes[outcome] += 1.0;
+}
+
 static Status reject(Instance *instance, int event, double stamp, const char *reason) {
-    instance->rejected += 1;
-    return instance_warn(instance, "event %s: its stamp %.17g s lies before the current time %.17g s; it is rejected (%lld so far): %s",
-                         model.triggered[event].name, stamp, instance->runtime.clock.t, (long long)instance->rejected, reason);
+    count_outcome(&instance->runtime, OUTCOME_REJECTED);
+    return instance_warn(instance, "event %s: its stamp %.17g s lies before the current time %.17g s; it is rejected (%.0f so far): %s",
+                         model.triggered[event].name, stamp, instance->runtime.clock.t, instance->runtime.outcomes[OUTCOME_REJECTED], reason);
 }
 
 /* In model exchange an event is late when it is told late; one that waits is not, wherever the solver stops. */
@@ -65,18 +69,21 @@ PRIVATE Status events_announce(Instance *instance, int event) {
     double stamp = runtime->stamps[event] <= STAMP_NOW ? runtime->clock.t : runtime->stamps[event];
     runtime->stamps[event] = STAMP_NOW;
     if (!isfinite(stamp)) {
-        instance->lost += 1;
+        count_outcome(runtime, OUTCOME_LOST);
         return instance_warn(instance, "event %s: its stamp %g s is not a finite number; it is lost", model.triggered[event].name, stamp);
     }
+    double told = stamp;
     Status late = check_exchange(instance, event, &stamp);
     if (late != STATUS_OK)
         return late;
     if (*runtime->queue_length >= QUEUE_CAPACITY) {
-        instance->lost += 1;
+        count_outcome(runtime, OUTCOME_LOST);
         return instance_warn(instance, "event %s at %.17g s: %d events are waiting already; this one is lost",
                              model.triggered[event].name, stamp, QUEUE_CAPACITY);
     }
     insert(runtime, event, stamp);
+    if (stamp != told)
+        count_outcome(runtime, OUTCOME_LATE);
     return STATUS_OK;
 }
 
@@ -89,7 +96,7 @@ static Status poll_count(Instance *instance, int event) {
     if (now > before)
         status = events_announce(instance, event);
     if (now > before + 1.0) {
-        instance->lost += (int64_t)(now - before) - 1;
+        runtime->outcomes[OUTCOME_LOST] += now - before - 1.0;
         status = instance_warn(instance, "event %s: the count rose from %.0f to %.0f at once; only the last payload is known", name, before, now);
     }
     if (now < before)
@@ -114,6 +121,8 @@ static Status take_late(Instance *instance, int event, double stamp, double *pay
         return reject(instance, event, stamp, "late_policy is reject");
     if (*runtime->late_policy == (double)LATE_LATE) {
         move_jump(runtime, &instance->journal, event, payload);
+        count_outcome(runtime, OUTCOME_LATE);
+        count_outcome(runtime, OUTCOME_ACCEPTED);
         instance_note(instance, "event %s of %.17g s applied late at %.17g s", name, stamp, runtime->clock.t);
         return STATUS_OK;
     }
@@ -122,6 +131,8 @@ static Status take_late(Instance *instance, int event, double stamp, double *pay
         return reject(instance, event, stamp, "it lies further back than replay_horizon");
     if (reach == BEYOND_RECORDS)
         return reject(instance, event, stamp, "it lies before the first of the steps that are remembered");
+    count_outcome(runtime, OUTCOME_REPLAYED);
+    count_outcome(runtime, OUTCOME_ACCEPTED);
     instance_note(instance, "event %s applied at %.17g s, from %.17g s", name, stamp, runtime->clock.t);
     return STATUS_OK;
 }
@@ -138,6 +149,7 @@ static Status apply_first(Instance *instance) {
     } else {
         move_advance(runtime, &instance->journal, stamp);
         move_jump(runtime, &instance->journal, event, first + 2);
+        count_outcome(runtime, OUTCOME_ACCEPTED);
         instance_note(instance, "event %s applied at %.17g s", model.triggered[event].name, runtime->clock.t);
     }
     remove_first(runtime);
@@ -173,6 +185,7 @@ PRIVATE void events_apply_here(Instance *instance) {
     double *first = entry(runtime, 0);
     int event = (int)first[0];
     move_jump(runtime, &instance->journal, event, first + 2);
+    count_outcome(runtime, OUTCOME_ACCEPTED);
     remove_first(runtime);
     instance->outdated = OUTDATED_ALL;
     instance_note(instance, "event %s applied at %.17g s", model.triggered[event].name, runtime->clock.t);

@@ -133,7 +133,7 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nv
     return (fmi2Status)instance_set_reals(c, __func__, vr, nvr, value);
 }
 
-#define INTEGERS (ROLES(ROLE_COUNT) | ROLES(ROLE_INTEGER_OUTPUT) | ROLES(ROLE_POLICY))
+#define INTEGERS (ROLES(ROLE_COUNT) | ROLES(ROLE_INTEGER_OUTPUT) | ROLES(ROLE_OUTCOME) | ROLES(ROLE_POLICY))
 
 fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Integer value[]) {
     REQUIRE(c, READABLE);

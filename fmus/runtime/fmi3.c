@@ -328,7 +328,7 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
         return fmi3OK;                                                                                                      \
     }
 
-WHOLE_NUMBERS(Int32, ROLES(ROLE_COUNT) | ROLES(ROLE_INTEGER_OUTPUT))
+WHOLE_NUMBERS(Int32, ROLES(ROLE_COUNT) | ROLES(ROLE_INTEGER_OUTPUT) | ROLES(ROLE_OUTCOME))
 WHOLE_NUMBERS(Int64, ROLES(ROLE_POLICY))
 
 /* The other types: no variable of this model has them. */

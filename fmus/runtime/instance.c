@@ -47,7 +47,6 @@ PRIVATE Status instance_reset(Instance *instance) {
     resource_apply(instance);
     journal_clear(&instance->journal);
     instance->mode = MODE_INSTANTIATED;
-    instance->rejected = instance->lost = 0;
     instance->start_time = 0.0;
     instance->discarded = false;
     instance->outdated = OUTDATED_ALL;

@@ -35,7 +35,6 @@ typedef struct {
 /* The runtime as it was before the present step, so that a step that cannot be done is undone. */
 typedef struct {
     Clock clock;
-    int64_t rejected, lost;
     double *memory;
 } Undo;
 
@@ -45,8 +44,6 @@ struct Instance {
     Journal journal; /* the recent past, for events that are told late */
     const Face *face;
     int64_t mode;
-    int64_t rejected; /* events that came too late */
-    int64_t lost;     /* events announced but never seen */
     double start_time;
     bool exchange; /* model exchange, else co-simulation */
     int outdated; /* bits of `Outdated` */

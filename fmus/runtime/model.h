@@ -52,6 +52,7 @@ typedef enum {
     ROLE_STAMP,      /* instant of an event */
     ROLE_POLICY,     /* enumeration: what to do with late events */
     ROLE_HORIZON,    /* how far back late events can be replayed [s] */
+    ROLE_OUTCOME,    /* integer: how many events have come to an `Outcome` so far */
     ROLE_DERIVATIVE, /* of a continuous state */
     ROLE_INDICATOR   /* event indicator of a state with dry friction */
 } Role;
@@ -59,11 +60,15 @@ typedef enum {
 typedef struct {
     const char *name;
     Role role;
-    int index; /* position in u, y, x, p, derivatives or indicators, or number of the triggered event */
+    int index; /* position in u, y, x, p, derivatives, indicators or outcomes, or number of the triggered event */
 } Variable;
 
 /* What to do with an event stamped before the current time; the numbers of the enumeration in the model description. */
 typedef enum { LATE_REPLAY = 1, LATE_REJECT = 2, LATE_LATE = 3 } LatePolicy;
+
+/* What became of an event, in the order of the variables that count them: it took effect; of these, late at its stamp, and late
+   when it was told; it was too late; it was announced and never seen. */
+typedef enum { OUTCOME_ACCEPTED, OUTCOME_REPLAYED, OUTCOME_LATE, OUTCOME_REJECTED, OUTCOME_LOST, OUTCOMES } Outcome;
 
 typedef struct {
     const char *name;

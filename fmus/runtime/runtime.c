@@ -26,7 +26,7 @@ static size_t queue_size(void) {
 PRIVATE size_t runtime_memory_length(void) {
     size_t length = (size_t)model.states + (size_t)model.inputs + (size_t)model.parameters;
     length += 3 * (size_t)model.periodic_count + 1 + (size_t)model.friction_count;
-    return length + 4 * (size_t)model.triggered_count + 3 + queue_size();
+    return length + 4 * (size_t)model.triggered_count + 3 + OUTCOMES + queue_size();
 }
 
 PRIVATE size_t runtime_used_length(const Runtime *runtime) {
@@ -68,6 +68,7 @@ static double *place_memory(Runtime *runtime, double *numbers) {
     runtime->stamps = take(&place, (size_t)model.triggered_count);
     runtime->late_policy = take(&place, 1);
     runtime->horizon = take(&place, 1);
+    runtime->outcomes = take(&place, OUTCOMES);
     runtime->queue_length = take(&place, 1);
     runtime->queue = take(&place, queue_size());
     return place;
@@ -328,6 +329,9 @@ static bool events_are_sane(const Runtime *runtime) {
         if (!counts || !is_whole(runtime->active[i], 0.0, 1.0))
             return false;
     }
+    for (int i = 0; i < OUTCOMES; i++)
+        if (!is_whole(runtime->outcomes[i], 0.0, LARGEST_WHOLE - 1.0))
+            return false;
     return is_whole(*runtime->late_policy, LATE_REPLAY, LATE_LATE) && queue_is_sane(runtime);
 }
 

@@ -30,6 +30,7 @@ typedef struct {
     double *active, *raised, *seen;    /* by triggered event: clock active (FMI 3), count (FMI 2), count handled */
     double *stamps;                    /* by triggered event: instant [s] of the next announcement */
     double *late_policy, *horizon;     /* parameters: a LatePolicy, and how far back late events can be replayed [s] */
+    double *outcomes;                  /* events so far, by Outcome; no replay takes them back */
     double *queue_length, *queue;      /* events announced and not yet applied; see events.c */
     double *y, *x_next;                /* results; decide nothing */
     double *derivatives, *indicators;  /* results */

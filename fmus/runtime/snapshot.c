@@ -10,7 +10,6 @@ typedef struct {
     uint64_t model; /* digest of the token, against bytes of another model */
     uint64_t size;  /* in bytes, as a whole */
     int64_t mode;
-    int64_t rejected, lost;
     double start_time;
     Clock clock;
     JournalMark past;
@@ -46,8 +45,6 @@ static void fill(Snapshot *snapshot, const Instance *instance, JournalMark past)
     snapshot->model = token_digest();
     snapshot->size = snapshot_size(past);
     snapshot->mode = instance->mode;
-    snapshot->rejected = instance->rejected;
-    snapshot->lost = instance->lost;
     snapshot->start_time = instance->start_time;
     snapshot->clock = instance->runtime.clock;
     snapshot->past = past;
@@ -97,8 +94,6 @@ PRIVATE Status instance_restore(Instance *instance, const char *function, const 
         return instance_fail(instance, "%s: the state is one of %s, in which this instance for %s cannot be", function, mode_name(snapshot->mode),
                              instance->exchange ? "model exchange" : instance->event_mode_used ? "co-simulation" : "co-simulation without event mode");
     instance->mode = snapshot->mode;
-    instance->rejected = snapshot->rejected;
-    instance->lost = snapshot->lost;
     instance->start_time = snapshot->start_time;
     instance->runtime.clock = snapshot->clock;
     memcpy(instance->runtime.memory, snapshot->memory, runtime_memory_length() * sizeof(double));
@@ -135,10 +130,6 @@ PRIVATE Status instance_serialize(const Instance *instance, const char *function
     return STATUS_OK;
 }
 
-static bool is_counter(int64_t value) {
-    return value >= 0 && value < INT64_MAX / 2;
-}
-
 /* Bytes that come from outside: everything that later serves as an index or decides how time runs is checked, the lengths before
    all else. */
 static bool is_sane(const Snapshot *snapshot, size_t size) {
@@ -148,7 +139,7 @@ static bool is_sane(const Snapshot *snapshot, size_t size) {
         return false;
     int64_t mode = snapshot->mode;
     bool known = mode > 0 && mode <= MODE_ANY && (mode & (mode - 1)) == 0;
-    if (!known || !is_counter(snapshot->rejected) || !is_counter(snapshot->lost) || !isfinite(snapshot->start_time))
+    if (!known || !isfinite(snapshot->start_time))
         return false;
     return runtime_is_sane(&snapshot->clock, snapshot->memory, !(mode & BEFORE_TIME)) &&
            journal_is_sane(past, snapshot->memory + runtime_memory_length(), &snapshot->clock);

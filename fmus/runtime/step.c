@@ -25,8 +25,6 @@ static Status check_step(const Instance *instance, const char *function, double 
 static void remember(Instance *instance) {
     Undo *undo = &instance->undo;
     undo->clock = instance->runtime.clock;
-    undo->rejected = instance->rejected;
-    undo->lost = instance->lost;
     journal_guard(&instance->journal);
     memcpy(undo->memory, instance->runtime.memory, runtime_used_length(&instance->runtime) * sizeof(double));
 }
@@ -38,8 +36,6 @@ static void undo_step(Instance *instance) {
     memcpy(runtime->memory, undo->memory, runtime_used_length(runtime) * sizeof(double));
     runtime->clock = undo->clock;
     journal_undo(&instance->journal);
-    instance->rejected = undo->rejected;
-    instance->lost = undo->lost;
 }
 
 /* -- moving ------------------------------------------------------------------------------------------------------ */

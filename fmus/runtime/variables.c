@@ -49,6 +49,7 @@ static double *place_of(Instance *instance, const Variable *variable) {
     case ROLE_STAMP: return &runtime->stamps[variable->index];
     case ROLE_POLICY: return runtime->late_policy;
     case ROLE_HORIZON: return runtime->horizon;
+    case ROLE_OUTCOME: return &runtime->outcomes[variable->index];
     case ROLE_DERIVATIVE: return &runtime->derivatives[variable->index];
     case ROLE_INDICATOR: return &runtime->indicators[variable->index];
     }
@@ -56,7 +57,8 @@ static double *place_of(Instance *instance, const Variable *variable) {
 }
 
 static bool is_real(Role role) {
-    return !(ROLES(role) & (ROLES(ROLE_COUNT) | ROLES(ROLE_CLOCK) | ROLES(ROLE_POLICY) | ROLES(ROLE_INTEGER_OUTPUT)));
+    unsigned others = ROLES(ROLE_COUNT) | ROLES(ROLE_CLOCK) | ROLES(ROLE_POLICY) | ROLES(ROLE_INTEGER_OUTPUT) | ROLES(ROLE_OUTCOME);
+    return !(ROLES(role) & others);
 }
 
 /* -- computing --------------------------------------------------------------------------------------------------- */

@@ -103,11 +103,17 @@ def conversion(source: Unit, target: Unit) -> tuple[float, float]:
     Angles in rad are treated as pure numbers, as SI does.
 
     Raises:
-        UnitError: the units measure different things.
+        UnitError: the units measure different things, or one of them nothing: its factor is zero or not finite.
     """
     if source.exponents[:-1] != target.exponents[:-1]:
         raise UnitError(f"different dimensions: {_dimension(source)} and {_dimension(target)}")
+    if source.factor == 0.0 or target.factor == 0.0 or not all(map(math.isfinite, (*_scale(source), *_scale(target)))):
+        raise UnitError(f"a unit with the factor and offset {_scale(source)} or {_scale(target)} measures nothing")
     return source.factor / target.factor, (source.offset - target.offset) / target.factor
+
+
+def _scale(unit: Unit) -> tuple[float, float]:
+    return unit.factor, unit.offset
 
 
 def _symbol_and_power(token: str, name: str) -> tuple[Unit, int]:

@@ -15,10 +15,11 @@ from cosim import Scenario
 OBSERVERS = ("differentiator_cdo", "takagi_sugeno_cdo", "multirate_cdo", "discrete_uio")
 PLANTS = ("locomotive", "odometer", "driver")
 VARIANTS = {
-    "plants as FMI 3 FMUs, observers as blocks": {},
-    "plants as FMI 2 FMUs, observers as blocks": {f"{name}.as": "fmu2" for name in PLANTS},
-    "everything as FMI 3 FMUs": {f"{name}.as": "fmu3" for name in OBSERVERS},
-    "everything as blocks": {f"{name}.as": "block3" for name in PLANTS},
+    "default: everything as FMI 3 FMUs, the compiled stepper": {},
+    "the Python stepper": {"master.stepper": "python"},
+    "everything as FMI 2 FMUs": {f"{name}.as": "fmu2" for name in (*PLANTS, *OBSERVERS)},
+    "observers as blocks": {f"{name}.as": "block3" for name in OBSERVERS},
+    "everything as blocks": {f"{name}.as": "block3" for name in (*PLANTS, *OBSERVERS)},
 }
 
 

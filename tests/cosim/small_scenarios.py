@@ -15,7 +15,7 @@ def small(**changes: Any) -> Scenario:
     )
     scenario.add("odometer", model="odometer", **{"as": "block3"})
     scenario.add("driver", model="driver", **{"as": "block3"}, parameters={"profile_speed": 10.0})
-    scenario.add("observer", observer="takagi_sugeno_cdo", parameters={"estimated_speed": 10.0})
+    scenario.add("observer", observer="takagi_sugeno_cdo", **{"as": "block3"}, parameters={"estimated_speed": 10.0})
     scenario.connect(
         "driver.effort -> locomotive.effort, observer.effort",
         "locomotive.wheel_speed -> odometer.wheel_speed",

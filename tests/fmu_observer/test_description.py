@@ -46,6 +46,7 @@ TABLE = [
     ("internal_step", "parameter", "fixed", "exact", "s", 0.01),
     ("seed", "parameter", "fixed", "exact", None, 0.0),
 ]
+OUTCOMES = ("accepted", "replayed", "late", "rejected", "lost")
 EVENTS = {
     2: [("kick_count", "Integer"), ("kick_time", "Real"), ("mark_count", "Integer"), ("mark_time", "Real")],
     3: [("kick", "Clock"), ("kick_time", "Float64"), ("mark", "Clock"), ("mark_time", "Float64")],
@@ -78,10 +79,15 @@ def test_event_variables_follow(version: Any) -> None:
 @BOTH
 def test_the_event_protocol_follows_and_then_the_derivatives(version: Any) -> None:
     late = EventProtocol(late_policy="late", replay_horizon=3.0)
-    policy, horizon, *rates = describe(SWING, version, protocol=late).modelVariables[len(TABLE) + 4 :]
+    policy, horizon, *others = describe(SWING, version, protocol=late).modelVariables[len(TABLE) + 4 :]
+    counts, rates = others[: len(OUTCOMES)], others[len(OUTCOMES) :]
     assert (policy.name, policy.type, policy.causality, policy.start) == ("late_policy", "Enumeration", "parameter", "3")
     assert [item.name for item in policy.declaredType.items] == ["replay", "reject", "late"]
     assert (horizon.name, horizon.unit, horizon.start) == ("replay_horizon", "s", "3.0")
+    whole = "Integer" if version == 2 else "Int32"
+    assert [v.name for v in counts] == [f"events.{outcome}" for outcome in OUTCOMES]
+    kinds = {(v.type, v.causality, v.variability, v.initial, v.start, v.unit) for v in counts}
+    assert kinds == {(whole, "local", "discrete", "calculated", None, None)}
     found = [(v.name, v.causality, v.initial, v.unit, v.derivative.name) for v in rates]
     assert found == [
         ("der(angle)", "local", "calculated", "rad/s", "angle"),
@@ -175,7 +181,8 @@ def test_value_references_are_contiguous_and_in_the_order_of_the_runtime(system:
         assert names[first : first + len(expected)] == expected
     assert table.inputs == 1
     assert table.protocol - table.events == 2 * len(system.triggered_events)
-    assert table.derivatives - table.protocol == (2 if system.triggered_events else 0)
+    assert table.outcomes - table.protocol == (2 if system.triggered_events else 0)
+    assert table.derivatives - table.outcomes == (len(OUTCOMES) if system.triggered_events else 0)
     assert names[table.derivatives : table.indicators] == [
         f"der({n})" for n in scalar_names(system.states)[: system.continuous_count]
     ]

@@ -301,8 +301,8 @@ class Component:
         return getattr(self.slave, others[kind]) if kind in others else real
 
     def values(self) -> np.ndarray:
-        """All outputs and states; not what is derived from them."""
-        derived = ("der(", "event_indicator.")
+        """All outputs and states; not what is derived from them, nor counts of events."""
+        derived = ("der(", "event_indicator.", "events.")
         names = [v.name for v in self.description.modelVariables if v.causality in {"output", "local"}]
         return self.get(*(name for name in names if not name.startswith(derived)))
 

@@ -14,9 +14,41 @@ from pages import PAGES, Block, blocks
 import cosim.cli
 import fmus.cli
 import plant_models
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
 
 PROGRAMS = {"cosim": cosim.cli.main, "fmus": fmus.cli.main}
 WITH_CODE = [page for page in PAGES if any(b.language in ("python", "toml", "sh") and b.command is None for b in blocks(page))]
+
+
+class Engine(HybridSystem):
+    """Its torque falls with the speed of the shaft."""
+
+    name = "engine"
+    description = "An engine"
+    source = "tests"
+    inputs = (input_signal("speed", "rad/s"),)
+    outputs = (output_signal("torque", "N.m"),)
+
+    def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"torque": 100.0 - 2.0 * u.speed}
+
+
+class Load(HybridSystem):
+    """A mass that turns."""
+
+    name = "load"
+    description = "A load"
+    source = "tests"
+    states = (state("turning", "rad/s"),)
+    inputs = (input_signal("torque", "N.m"),)
+    outputs = (output_signal("speed", "rad/s"),)
+    parameters = (parameter("inertia", "kg.m2", 1.0, min=1e-3),)
+
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
+        return vector(u.torque / p.inertia)
+
+    def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"speed": x[0]}
 
 
 def run_commands(page: Path, block: Block) -> None:
@@ -34,7 +66,9 @@ def run_python(page: Path, block: Block, names: dict[str, Any]) -> None:
 @pytest.mark.parametrize("page", WITH_CODE, ids=lambda p: p.name)
 def test_blocks_of_a_page(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    fmus.build_fmu(plant_models.Locomotive(), "vendor.fmu", preset="chapter_3_four_axles")  # the reader's own
+    fmus.build_fmu(plant_models.Locomotive(), "vendor.fmu", preset="chapter_3_four_axles")  # the reader's own, and two more
+    fmus.build_fmu(Engine(), "engine.fmu", fmi_version=2)
+    fmus.build_fmu(Load(), "load.fmu", fmi_version=3)
     names: dict[str, Any] = {"__name__": "page"}
     for block in blocks(page):
         if block.command is not None:

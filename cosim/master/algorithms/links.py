@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,6 +48,20 @@ def fed_back(links: Sequence[Link], members: range | None = None) -> list[Link]:
 def interface(links: Sequence[Link], members: range | None = None) -> np.ndarray:
     """Columns of the values that are fed back, each once, ascending, shape (n,)."""
     return np.unique(np.array([link.column for link in fed_back(links, members)], dtype=np.intp))
+
+
+def downstream(plan: Plan, names: Collection[str]) -> np.ndarray:
+    """Mask of the values of components that take something of the named ones, directly or round about, shape (n,)."""
+    links = plan_links(plan)
+    reached: set[int] = set()
+    new = {place for place, step in enumerate(plan.steps) if step.component.name in names}
+    while new:
+        new = {link.target for link in links if link.source in new} - reached
+        reached |= new
+    mask = np.zeros(len(plan.values), dtype=bool)
+    for place in reached:
+        mask[plan.steps[place].columns] = True
+    return mask
 
 
 def span(steps: Sequence[PlannedComponent]) -> slice:

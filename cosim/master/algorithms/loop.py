@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.coupling.plan import Plan
+from cosim.coupling.plan import Plan, Service
 from cosim.errors import RunError
 from cosim.master.algorithms.acceleration import make_acceleration, scaled_norm
 from cosim.master.algorithms.history import History, Search, shown
@@ -29,11 +29,13 @@ class Start:
 
     Args:
         states: of the members. values: of the members, shape (q,). untouched: of all components, shape (k,).
+        services: those of the plan and their states, where members are moved for good; None for trials.
     """
 
     states: list[Any]
     values: np.ndarray
     untouched: np.ndarray
+    services: Sequence[tuple[Service, Any]] | None = None
 
 
 class IteratedLoop:
@@ -41,7 +43,7 @@ class IteratedLoop:
 
     The last sweep is kept: the inputs of that sweep and the outputs it left agree within the tolerances. Where somebody took
     over how a member is moved (balises are delivered within the loop), trial sweeps take the plain steps, and the last guess is
-    stepped once more, for good.
+    stepped once more, for good. What jumps then is iterated on with the jump.
 
     Args:
         plan: prepared, components initialised. members: places of the loop's components in it. links: of the plan.
@@ -105,23 +107,32 @@ class IteratedLoop:
     # -- iteration --------------------------------------------------------------------------------------------------
 
     def _iterate(self, t: float, until: float, start: Start) -> None:
-        settings, z = self.settings, self._plan.values[self._columns]
         residuals: list[float] = []
+        z = self._search(t, until, start, self._plan.values[self._columns], residuals)
+        if any(step.move != step.drive for step in self.steps):
+            services = [(service, service.save_within()) for service in self._plan.services]
+            self._restore(start)
+            self._search(t, until, replace(start, services=services), z, residuals)
+        self.history.add(Search(until, tuple(residuals)))
+
+    def _search(self, t: float, until: float, start: Start, z: np.ndarray, residuals: list[float]) -> np.ndarray:
+        """Sweep until what comes back is the guess, shape (n,), which is returned; the residuals are added to those so far."""
+        settings, before = self.settings, len(residuals)
         while True:
             g = self._try(t, until, start, z, residuals)
-            residuals.append(scaled_norm(z, g, settings.relative_tolerance, settings.absolute_tolerance))
-            if residuals[-1] <= 1.0 or any(step.component.terminated for step in self.steps):
-                break
-            if len(residuals) >= settings.max_iterations or not np.isfinite(residuals[-1]):
+            residual = scaled_norm(z, g, settings.relative_tolerance, settings.absolute_tolerance)
+            settled = residual <= 1.0 or any(step.component.terminated for step in self.steps)
+            if not settled or before == 0 or len(residuals) > before:
+                residuals.append(residual)
+            if settled:
+                return z
+            sweeps = len(residuals) - before
+            if sweeps >= settings.max_iterations or not np.isfinite(residual):
                 raise self._failure(until, start, z, g, residuals)
-            if len(residuals) == 1:
+            if sweeps == 1:
                 self._acceleration.begin(np.maximum(np.maximum(np.abs(z), np.abs(g)), settings.absolute_tolerance))
             z = np.where(self._jumps, g, self._acceleration.next(z, g))  # there is nothing between two discrete values
             self._restore(start)
-        self.history.add(Search(until, tuple(residuals)))
-        if any(step.move != step.drive for step in self.steps):
-            self._restore(start)
-            self._sweep(t, until, start, z, for_good=True)
 
     def _try(self, t: float, until: float, start: Start, z: np.ndarray, residuals: Sequence[float]) -> np.ndarray:
         """Step all members once; returns what comes back for the guess `z`, shape (n,)."""
@@ -136,7 +147,7 @@ class IteratedLoop:
         back: np.ndarray = self._plan.values[self._columns]
         return back
 
-    def _sweep(self, t: float, until: float, start: Start, z: np.ndarray, *, for_good: bool = False) -> None:
+    def _sweep(self, t: float, until: float, start: Start, z: np.ndarray) -> None:
         """One step of all members; for good, each is moved by whoever took it over, and finds its outputs as they were at `t`."""
         values, first = self._plan.values, self._span.start
         values[self._span] = start.values
@@ -144,7 +155,7 @@ class IteratedLoop:
         self._plan.untouched[:] = start.untouched
         for step, known in zip(self.steps, self._known, strict=True):
             step.prepare(t, until, ends_known=known)
-            if for_good:
+            if start.services is not None:
                 step.outputs[:] = start.values[step.columns.start - first : step.columns.stop - first]
                 step.move(t, until)
             else:
@@ -153,6 +164,8 @@ class IteratedLoop:
     def _restore(self, start: Start) -> None:
         for step, state in zip(self.steps, start.states, strict=True):
             step.component.restore(state)
+        for service, state in start.services or ():
+            service.restore_within(state)
 
     def _release(self, start: Start) -> None:
         for step, state in zip(self.steps, start.states, strict=True):

@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from cosim.components.component import TIME_TOLERANCE
+from cosim.errors import CouplingError, RunError
 from cosim.master.control.control import StepControl
-from cosim.master.system import Row, System
+from cosim.master.system import Checkpoint, Row, System
 
 SAFETY = 0.5
 """A longer step is tried where its expected error is below this share of the tolerance."""
@@ -46,19 +47,25 @@ class DoublingStep(StepControl):
     """Steps as long as the error allows, up to the communication step.
 
     Args:
-        system: what is stepped; all its components must save their state.
+        system: what is stepped; all its components must save their state and vary their step.
         tolerance: bound of the error of a step in every continuous signal, relative to its size, absolute below 1.
         order: of the error of one step in its length: 2 with held inputs, 3 with lines.
         smallest_step: no step is shorter [s]; there a too large error is accepted, counted and told.
 
     Raises:
-        CouplingError: a component cannot save its state.
+        CouplingError: a component cannot save its state, or cannot vary its step.
     """
 
     name = "doubling"
 
     def __init__(self, system: System, tolerance: float, order: int = 2, smallest_step: float | None = None) -> None:
         system.demand_states("Error control (master.control = 'doubling')")
+        rigid = [step.component.name for step in system.plan.steps if not step.component.can_vary_step]
+        if rigid:
+            raise CouplingError(
+                "Error control (master.control = 'doubling') divides communication steps, and these components cannot vary "
+                f"theirs: {', '.join(rigid)}. Use master.control = 'fixed'."
+            )
         super().__init__(system)
         self.tolerance, self.order, self.smallest_step = tolerance, order, smallest_step
         self.tally = Tally()
@@ -78,6 +85,8 @@ class DoublingStep(StepControl):
             found, error = taken
             rows += found
             place += 1
+            if place < 2**level:
+                self._close_pair(rows, _between(t, until, place, level + 1)[0])
             if self._ended():
                 break
             if level > 0 and place % 2 == 0 and error * 2**self.order < SAFETY:
@@ -106,17 +115,11 @@ class DoublingStep(StepControl):
 
     def _try(self, times: tuple[float, float, float], finest: bool) -> tuple[Sequence[Row], float] | None:
         """One step over begin, middle, end [s] and its error; None where it was taken back."""
-        begin, middle, end = times
+        begin, _, end = times
         system = self.system
         checkpoint = system.save()
         try:
-            system.advance(begin, end)
-            coarse = system.plan.values.copy()
-            system.restore(checkpoint)
-            rows = [*system.advance(begin, middle)]
-            if not self._ended():
-                rows += system.advance(middle, end)
-            error = self._error(coarse)
+            rows, error = self._twice(times, checkpoint, finest)
             if error > 1.0 and not finest:
                 system.restore(checkpoint)
                 self.tally.rejected += 1
@@ -126,12 +129,40 @@ class DoublingStep(StepControl):
         self._count(begin, end - begin, error)
         return rows, error
 
+    def _twice(self, times: tuple[float, float, float], checkpoint: Checkpoint, finest: bool) -> tuple[list[Row], float]:
+        """The step whole, then in two halves; a step that fails may be too long, so its error is infinite."""
+        try:
+            return self._whole_and_halves(times, checkpoint)
+        except RunError:
+            if finest or not all(step.component.usable for step in self.system.plan.steps):
+                raise
+            return [], inf
+
+    def _whole_and_halves(self, times: tuple[float, float, float], checkpoint: Checkpoint) -> tuple[list[Row], float]:
+        """Rows of the halves, and the error."""
+        begin, middle, end = times
+        system = self.system
+        system.advance(begin, end)
+        coarse = system.plan.values.copy()
+        system.restore(checkpoint)
+        rows = [*system.advance(begin, middle)]
+        self._close_pair(rows, middle)
+        if not self._ended():
+            rows += system.advance(middle, end)
+        return rows, self._error(coarse)
+
+    def _close_pair(self, rows: list[Row], t: float) -> None:
+        """An event at the end of a step within the communication step: nobody else gives the row after it."""
+        if rows and abs(rows[-1][0] - t) <= TIME_TOLERANCE:
+            rows.append((t, self.system.plan.values.copy()))
+
     def _error(self, coarse: np.ndarray) -> float:
         """Error of the two halves as a multiple of the tolerance, by Richardson's extrapolation; of the worst signal."""
         fine = self.system.plan.values[self._watched]
         scale = self.tolerance * np.maximum(1.0, np.abs(fine))
-        difference = np.abs(fine - coarse[self._watched]) / (2.0 ** (self.order - 1) - 1.0)
-        return float(np.max(difference / scale, initial=0.0))
+        with np.errstate(invalid="ignore"):  # what is no number is no small error
+            difference = np.abs(fine - coarse[self._watched]) / (2.0 ** (self.order - 1) - 1.0)
+            return float(np.nan_to_num(np.max(difference / scale, initial=0.0), nan=inf, posinf=inf))
 
     def _count(self, begin: float, length: float, error: float) -> None:
         tally = self.tally

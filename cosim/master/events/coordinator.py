@@ -96,11 +96,12 @@ class EventCoordinator:
 
     def save(self) -> Any:
         """What events change here; the states of the components are saved elsewhere."""
-        return [participant.save() for participant in self._participants]
+        return [participant.save() for participant in self._participants], self.iteration.count, self.iteration.longest
 
     def restore(self, state: Any) -> None:
         """Return to what was saved."""
-        for participant, saved in zip(self._participants, state, strict=True):
+        participants, self.iteration.count, self.iteration.longest = state
+        for participant, saved in zip(self._participants, participants, strict=True):
             participant.restore(saved)
 
     # -- parts of a step --------------------------------------------------------------------------------------------
@@ -176,9 +177,7 @@ class EventCoordinator:
         self.iteration.run(t)
         changed = ~((before == plan.values) | (np.isnan(before) & np.isnan(plan.values)))
         if changed[plan.continuous].any():
-            for step in plan.steps:
-                if step.carrier is not None:
-                    step.carrier.forget()
+            self._system.begin_lines(t, changed, np.ones_like(changed))
         first = [] if row_before else [(t, before)]
         if until - t > TIME_TOLERANCE:
             return [*first, (t, plan.values.copy())]

@@ -43,9 +43,9 @@ class Carrier(ABC):
         self._inputs.gather()
         self.line.bend(self._inputs.buffer, until, ends_known=ends_known)
 
-    def forget(self) -> None:
-        """Something jumped: no line leads over it."""
-        self.line.forget()
+    def forget(self, jumped: np.ndarray) -> None:
+        """Values of the plan that jumped, as a mask of shape (n,): no line of an input leads over it."""
+        self.line.forget(jumped[self._inputs.sources])
 
     def save(self) -> Any:
         """What a step changes here."""

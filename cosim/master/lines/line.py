@@ -79,9 +79,9 @@ class Line:
         values: np.ndarray = self._history.later + self.slope * (time - self._history.later_at)
         return values
 
-    def forget(self) -> None:
-        """Something jumped: no line leads over it."""
-        self._history.earlier_at[:] = self._history.later_at[:] = np.nan
+    def forget(self, which: np.ndarray) -> None:
+        """Inputs whose source jumped, as a mask of shape (m,): no line leads over it."""
+        self._history.earlier_at[which] = self._history.later_at[which] = np.nan
 
     def save(self) -> History:
         """What a step changes here."""

@@ -12,7 +12,7 @@ from iterated_runs import run
 from test_algorithms import load, worst_error
 from zoo.masses import Chain, cuts
 
-PAGE = Path(__file__).parents[2] / "docs" / "algorithms.md"
+PAGE = Path(__file__).parents[4] / "docs" / "algorithms.md"
 CHAIN = Chain.two()
 LONG = 5.0
 """Length of a run [s]."""

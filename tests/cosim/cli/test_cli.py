@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -10,7 +12,7 @@ from small_scenarios import small
 
 from cosim import Scenario
 from cosim.cli import main
-from cosim.cli.run import parse_setting
+from cosim.cli.scenarios import parse_setting
 from cosim.results.folder import read_results
 
 
@@ -114,8 +116,19 @@ def test_a_setting_is_a_toml_value_where_it_is_one(text: str, expected: tuple[st
     assert parse_setting(text) == expected
 
 
+def test_a_reader_that_leaves_is_no_reason_for_a_traceback() -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "cosim.cli", "list", "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    process.stdout.close()
+    _, told = process.communicate(timeout=120)
+    assert (process.returncode, told) == (2, "")
+
+
 def test_a_usage_error_exits_with_2(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as error:
-        main(["run", "--seeds", "0"])
-    assert error.value.code == 2
-    assert "at least 1" in capsys.readouterr().err
+    for given, message in (("0", "at least 1"), ("many", "expected a whole number (got 'many')")):
+        with pytest.raises(SystemExit) as error:
+            main(["run", "--seeds", given])
+        assert error.value.code == 2
+        assert message in capsys.readouterr().err

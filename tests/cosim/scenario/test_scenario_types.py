@@ -80,7 +80,7 @@ def test_a_file_with_everything_in_it(tmp_path: Path) -> None:
             r"one.u_vector: expected 3 values for a Float64 array of shape \(3,\) \(got 2 in shape \(2,\)\)",
         ),
         ([], {"u_int8": 1.5}, r"one.u_int8: expected a whole number for a Int8 \(got 1.5\)"),
-        ([], {"u_int8": 300}, r"setting u_int8 = 300 failed"),
+        ([], {"u_int8": 300}, r"one.u_int8: expected -128 to 127 for a Int8 \(got 300\)"),
         ([], {"u_string": 3}, r"one.u_string: expected a text for a String \(got 3\)"),
         ([], {"u_binary": "xyz"}, r"one.u_binary: expected bytes or a hexadecimal text"),
         ([], {"u_float64": "3"}, r"one.u_float64: expected a number, or a list of numbers for a vector \(got '3'\)"),

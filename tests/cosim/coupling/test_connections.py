@@ -129,7 +129,7 @@ def test_no_unit_on_one_side_is_taken_as_it_is() -> None:
         ("meter.speed", "reader.force", r"units 'km/h' and 'N' do not fit: different dimensions"),
         ("meter.sped", "reader.speed", r"meter: no variable 'sped'; did you mean 'speed'\?"),
         ("metre.speed", "reader.speed", r"Connection source 'metre.speed'.*did you mean 'meter'\?"),
-        ("meter.speed", "reader", r"Connection target 'reader': expected 'component.signal'"),
+        ("meter.speed", "reader", r"Connection target 'reader': expected 'component.signal'; which signal of reader\?"),
         ("meter.speed", "reader.heard", r"reader.heard has causality 'output', expected input; such variables: speed, force"),
         ("reader.speed", "meter.speed", r"reader.speed has causality 'input', expected output"),
         ("meter.speed", "reader.gain", r"reader.gain has causality 'parameter', expected input"),

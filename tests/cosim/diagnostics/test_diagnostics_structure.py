@@ -10,7 +10,7 @@ import pytest
 from hand_made_structures import coupled
 from small_scenarios import small
 from zoo.build import linear_fmu
-from zoo.events import receiver_fmu, triggered_fmu
+from zoo.events import countdown_fmu, periodic_fmu, receiver_fmu, triggered_fmu
 from zoo.typed import typed_fmu
 
 from cosim import Scenario
@@ -90,10 +90,13 @@ def test_nothing_is_built_loaded_or_instantiated(monkeypatch: pytest.MonkeyPatch
     def refuse(*_: Any, **__: Any) -> Any:
         raise AssertionError("not for a look at the structure")
 
-    for place in ("fmus.cached_fmu", "cosim.components.component.Component.instantiate", "ctypes.CDLL.__init__"):
+    for place in ("fmus.cache.cache_entry", "cosim.components.component.Component.instantiate", "ctypes.CDLL.__init__"):
         monkeypatch.setattr(place, refuse)
-    structure = Scenario.load("freight_profile_d").structure()
-    assert {part.kind for part in structure.parts} == {"FMU", "block"}
+    scenario = Scenario.load("freight_profile_d").set("driver.as", "block3")
+    structure = scenario.structure()
+    assert {part.name for part in structure.parts if part.kind == "block"} == {"driver"}
+    with pytest.raises(AssertionError, match="not for a look"):
+        scenario.run()
 
 
 @pytest.mark.compiler
@@ -111,6 +114,19 @@ def test_clocks_and_arrays(tmp_path: Path) -> None:
     kinds = {p.name: p.kind for p in structure.part("a").outputs}
     assert (kinds["y_matrix"], kinds["y_string"]) == ("Float64[2x3]", "String")
     assert {p.name for p in structure.part("b").inputs if p.connected} == {"u_matrix"}
+
+
+@pytest.mark.compiler
+def test_input_clocks_say_when_they_tick(tmp_path: Path) -> None:
+    for name, fmu in {"sampler": periodic_fmu, "bell": countdown_fmu}.items():
+        fmu(tmp_path, name)
+    scenario = Scenario(stop=1.0, step=0.1, folder=tmp_path)
+    for name in ("sampler", "bell"):
+        scenario.add(name, fmu=f"{name}.fmu")
+    lines = {line.split()[0]: line for line in section(scenario.structure().text(), "Inputs and outputs")}
+    assert lines["sampler.tick"].endswith("Clock    ticks by the time (constant)")
+    assert lines["bell.alarm"].endswith("ticks by the time (countdown)")
+    assert lines["sampler.u"].endswith("keeps its start value")
 
 
 def test_mistakes_are_named_as_a_run_names_them(tmp_path: Path) -> None:

@@ -89,7 +89,7 @@ def test_integers_are_exact_to_the_last_bit_and_never_wrapped(typed3: Component,
         typed3.set_start(f"u_{name}", value)
         assert exact(typed3, f"y_{name}") == value ^ 1
     for value in (low - 1, high + 1):
-        with pytest.raises(RunError, match=f"setting u_{name} = {value} failed"):
+        with pytest.raises(CouplingError, match=f"expected {low} to {high} for a .*got {value}"):
             typed3.set_start(f"u_{name}", value)
 
 

@@ -21,6 +21,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "on the track": {"balises.layout": "spacing", "balises.spacing": 17.3, "balises.track_end": 400.0},
     "close together": {"balises.layout": "positions", "balises.positions": [20.0, 20.05, 20.11, 21.0, 60.0]},
     "stale": {"balises.timing": "stale"},
+    "thinned": {"master.record_every": 3, "stop": 10.0},
     "FMI 2": {f"{name}.as": "fmu2" for name in (*OBSERVERS, "locomotive", "driver")},
 }  # fmt: skip
 

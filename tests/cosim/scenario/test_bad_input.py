@@ -28,6 +28,11 @@ SETTINGS: dict[str, tuple[dict[str, Any], str]] = {
     "unknown model": ({"report.observers": ["x y"]}, "report.observers"),
     "unknown key": ({"balises.spaceing": 3.0}, "balises.spaceing: unknown key.*'spacing'"),
     "unknown top-level key": ({"stepp": 3.0}, "stepp: unknown key.*'step'"),
+    "unknown iteration key": ({"master.iteration": {"max_iteration": 3}}, "max_iteration: unknown key.*'max_iterations'"),
+    "a word that log does not know": (
+        {"driver.log": "everything"},
+        r"driver\.log: expected 'all', 'errors', 'none', or a list of log categories \(got .everything.\)$",
+    ),
     "balises unsorted": ({"balises.positions": [3.0, 1.0]}, "increasing position.*number 2 at 1 m follows number 1 at 3 m"),
     "two balises at one place": ({"balises.positions": [1.0, 1.0]}, "one at a place"),
     "balise outside the track": ({"balises.track_end": 3.0}, "'B3' at 4 m lies outside the track from 0 m to 3 m"),
@@ -190,6 +195,23 @@ def test_a_run_that_turns_to_nan_keeps_its_rows_and_ends_with_2(tmp_path: Path, 
 
 
 # -- what a sceptical user tried ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "needed"),
+    [
+        ("threads", 2, "algorithm = 'jacobi'"),
+        ("tolerance", 1e-3, "control = 'doubling'"),
+        ("smallest_step", 1e-3, "control = 'doubling'"),
+    ],
+)
+def test_a_setting_without_effect_is_told(key: str, value: float, needed: str) -> None:
+    told: list[str] = []
+    small().run(overrides={f"master.{key}": value, "stop": 0.02}, warn=told.append)
+    assert f"master.{key} has no effect without master.{needed}." in told
+    name, wanted = needed.replace("'", "").split(" = ")
+    small().run(overrides={f"master.{key}": value, f"master.{name}": wanted, "stop": 0.02}, warn=told.append)
+    assert sum("has no effect" in text for text in told) == 1
 
 
 @pytest.mark.parametrize(

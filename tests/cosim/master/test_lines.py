@@ -118,7 +118,7 @@ def test_no_line_leads_over_a_jump_and_saved_lines_come_back() -> None:
         line.bend(np.array([value]), t + 0.1)
     saved = line.save()
     assert line.at(0.2)[0] == pytest.approx(3.0)
-    line.forget()
+    line.forget(np.array([True]))
     source.time = 0.2
     line.bend(np.array([50.0]), 0.3)
     assert line.at(0.3)[0] == 50.0

@@ -37,6 +37,7 @@ as = "block3"
 parameters = { profile_speed = 10.0 }
 [components.observer]
 observer = "takagi_sugeno_cdo"
+as = "block3"
 parameters = { estimated_speed = 10.0 }
 [balises]
 position = "locomotive.position"
@@ -46,6 +47,9 @@ layout = "csv"
 file = "balises.csv"
 method = "rollback"
 """
+
+
+OUTCOME_OF = {None: "replayed", "reject": "rejected", "late": "late"}
 
 
 @pytest.fixture
@@ -162,13 +166,19 @@ def test_sealed_receivers_treat_late_telegrams_as_blocks_do(realisation: str, po
     """By the FMU's own parameter; the block of the same FMI version does the same, but for roundings of a divided cell."""
     changes: dict[str, Any] = {"stop": 0.8, "balises.latency": 0.1, "balises.latency_jitter": 0.1}
     changes |= {} if policy is None else {"observer.late_policy": policy, "observer.replay_horizon": 4.0}
-    runs = []
+    runs, fates, counts = [], [], []
     for kind in (realisation, realisation.replace("fmu", "block")):
         outcome = small().run(overrides=changes | {"observer.as": kind})
         assert outcome.failure is None
         assert not any("late" in w for w in outcome.warnings if "rejected" not in w)
         runs.append(outcome.result.table)
+        fates.append([e.outcomes["observer"] for e in outcome.result.events])
+        counts.append(outcome.result.summary["components"][-1]["events"])
     sealed, block = runs
+    assert fates[0] == fates[1]
+    assert counts[0] == counts[1]
+    assert set(fates[0]) - {"undelivered"} == {OUTCOME_OF[policy]}
+    assert counts[0][OUTCOME_OF[policy]] > 0
     for name in ("observer.position", "observer.speed"):
         np.testing.assert_allclose(sealed[name], block[name], rtol=1e-12, atol=1e-12)
     told = small().run(overrides={"stop": 0.8}).result.table
@@ -195,7 +205,7 @@ def test_an_fmu_that_does_not_say_what_it_does_with_late_telegrams_is_warned_abo
             if entry.filename == "modelDescription.xml":
                 content = re.sub(rb'<Enumeration name="late_policy".*?/>', b"", content, flags=re.DOTALL)
             target.writestr(entry, content)
-    file.write_text(TOML.replace('observer = "takagi_sugeno_cdo"', 'fmu = "vendor.fmu"'))
+    file.write_text(TOML.replace('observer = "takagi_sugeno_cdo"\nas = "block3"', 'fmu = "vendor.fmu"'))
     scenario = Scenario.load(file)
     warnings = scenario.run(overrides={"balises.latency": 0.1}).warnings
     assert any("observer: a sealed FMU without a parameter late_policy" in w for w in warnings)

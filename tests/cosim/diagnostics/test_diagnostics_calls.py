@@ -33,7 +33,7 @@ from cosim.report.html import report_page
 LINE = re.compile(
     r"(?P<time>\S+) (?P<who>\S+) (?P<what>\w+)\((?P<arguments>.*)\) -> (?P<status>[\w ]+), (?P<us>[\d.]+) us(, (?P<out>.*))?"
 )
-TESTS = Path(__file__).parents[1]
+TESTS = Path(__file__).parents[2]
 INTEGRATOR: Any = {"A": [[0.0]], "B": [[1.0]], "C": [[1.0]], "D": [[0.0]], "inputs": ["u"], "outputs": ["y"]}
 
 
@@ -73,6 +73,7 @@ def test_a_native_run_is_logged_call_by_call(version: Any, tmp_path: Path) -> No
     for name in ("first", "second"):
         own = "".join(c["what"].removeprefix(f"fmi{version}") for c in calls if c["who"] == name)
         assert re.fullmatch(LIFE[version], own), own
+    assert (calls[0]["time"], calls[-1]["time"]) == ("-", "0.3")
     begin = next(i for i, c in enumerate(calls) if c["what"].endswith("DoStep"))
     end = next(i for i, c in enumerate(calls) if "Terminate" in c["what"])
     real = "Float64" if version == 3 else "Real"
@@ -343,13 +344,18 @@ def test_counts_are_those_of_the_call_log(version: int, tmp_path: Path) -> None:
 
 @pytest.mark.compiler
 def test_both_steppers_count_the_same(tmp_path: Path) -> None:
-    counts = []
+    counts, rows = [], []
     for stepper in ("python", "compiled"):
         outcome = pair(tmp_path, 2).set("stop", 20.0).master(stepper=stepper).run(warn=lambda _: None)
         assert outcome.failure is None
         counts.append([{k: v["calls"] for k, v in c["cost"].items()} for c in outcome.result.summary["components"]])
+        rows.append(cost_rows(outcome.result))
     assert counts[0] == counts[1]
     assert counts[0][0]["doStep"] == 200
+    steps, reading = zip(*(row[1:3] for row in (rows[0][0], rows[1][0])), strict=True)
+    assert all(float(cell.removeprefix("200 / ")) > 0.0 for cell in steps)
+    assert "–" not in reading[0]
+    assert reading[1].endswith(" / –")  # in C reading is counted and not timed
 
 
 def test_the_closing_table_and_the_report_show_them() -> None:

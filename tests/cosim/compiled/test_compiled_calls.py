@@ -16,7 +16,7 @@ from cosim import Scenario
 RECEIVER, PLANT = "takagi_sugeno_cdo", "locomotive"
 FUNCTIONS = (
     "fmi3SetFloat64", "fmi3DoStep", "fmi3GetFloat64", "fmi3EnterEventMode", "fmi3SetClock", "fmi3UpdateDiscreteStates",
-    "fmi3EnterStepMode", "fmi3SetFMUState",
+    "fmi3EnterStepMode", "fmi3SetFMUState", "fmi3GetFMUState", "fmi3FreeFMUState",
 )  # fmt: skip
 INSTANT = 0.213
 ERROR = 3
@@ -108,8 +108,9 @@ def _places() -> list[tuple[str, str, int, int]]:
     """Component, function, steps done, and which call since then: in an ordinary step, and all around the first telegram."""
     around = 21  # steps before the one with the telegram
     plain = [(RECEIVER, f, 9, 1) for f in FUNCTIONS[:3]]
-    plant = [(PLANT, f, around + i, 1) for f in (*FUNCTIONS[:3], "fmi3SetFMUState") for i in (0, 1)]
-    moves = [(RECEIVER, f, around + i, n) for f in FUNCTIONS[:3] for i in (0, 1) for n in (1, 2)]
+    plant = [(PLANT, f, around + 1, 1) for f in ("fmi3DoStep", "fmi3GetFloat64", "fmi3SetFMUState", "fmi3FreeFMUState")]
+    plant += [(PLANT, "fmi3GetFMUState", around, 1)]
+    moves = [(RECEIVER, f, around + i, 1 + i) for f in FUNCTIONS[:3] for i in (0, 1)]
     events = [(RECEIVER, f, around + 1, 1) for f in FUNCTIONS[3:7]]
     return plain + plant + moves + events
 
@@ -126,7 +127,7 @@ def test_any_call_may_fail(spied: Callable[[Wrap], None]) -> None:
         python, compiled = both(scenario(0.0))
         failures += python.failure is not None
         assert_same(python, compiled)
-    assert failures > 20
+    assert failures > 10
 
 
 def test_what_an_update_asks_for_is_given(spied: Callable[[Wrap], None]) -> None:

@@ -1,0 +1,54 @@
+"""What the commands that take a scenario share: the argument, the overrides, and loading with them."""
+
+from __future__ import annotations
+
+import argparse
+import tomllib
+from typing import Any
+
+from cosim.errors import ScenarioError
+from cosim.scenario import Scenario
+
+DEFAULT = "freight_profile_d"
+OVERRIDES = "override component.parameter, master.KEY, balises.KEY, report.KEY or a top-level key; may be repeated"
+
+
+def add_scenario(parser: argparse.ArgumentParser, default: str | None = DEFAULT) -> None:
+    """Add the arguments ``SCENARIO`` and ``--set`` to a command.
+
+    Args:
+        parser: of the command. default: the scenario where none is given; None where one must be.
+    """
+    what = "name of a shipped scenario, or a file (.toml or .ssp)"
+    if default is None:
+        parser.add_argument("scenario", help=what)
+    else:
+        parser.add_argument("scenario", nargs="?", default=default, help=f"{what} (default: {default})")
+    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="settings", help=OVERRIDES)
+
+
+def load_scenario(options: argparse.Namespace) -> Scenario:
+    """The scenario that the arguments name, with its overrides.
+
+    Raises:
+        ScenarioError: there is none, or an override is not ``NAME=VALUE``.
+    """
+    scenario = Scenario.load(options.scenario)
+    for setting in options.settings:
+        scenario.set(*parse_setting(setting))
+    return scenario
+
+
+def parse_setting(text: str) -> tuple[str, Any]:
+    """``name=value`` with the value read as a TOML value where it is one, else as text.
+
+    Raises:
+        ScenarioError: there is no ``=``.
+    """
+    name, sign, value = text.partition("=")
+    if not sign or not name.strip():
+        raise ScenarioError(f"--set {text!r}: expected NAME=VALUE, for instance --set locomotive.mass=80e3.")
+    try:
+        return name.strip(), tomllib.loads(f"value = {value.strip()}")["value"]
+    except tomllib.TOMLDecodeError:
+        return name.strip(), value.strip()

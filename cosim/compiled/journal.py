@@ -1,0 +1,109 @@
+"""The journal of the stepper: calls of a step that Python may have to do again, and what was said, as in ``stepper.h``."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterator, Sequence
+from enum import IntEnum
+
+import numpy as np
+
+from cosim.compiled.answers import Answer
+
+STEPS_AT_MOST = 68
+"""Of the plant in a step over a balise: the whole step, `MAX_ROOT_STEPS` of the root search, to the stamp, again to the end."""
+
+CALLS_OF_EVENT = 12
+FMI2, FMI3 = 2, 3
+
+
+class Call(IntEnum):
+    """Functions in a journal."""
+
+    SET = 0
+    STEP = 1
+    GET = 2
+    ENTER_EVENT = 3
+    SET_CLOCK = 4
+    SET_REALS = 5
+    UPDATE = 6
+    ENTER_STEP = 7
+    COUNT = 8
+    SAVE = 9
+    RESTORE = 10
+    RELEASE = 11
+
+    def function(self, version: int) -> str | None:
+        """Name of the function; None where it depends on the type of the variables."""
+        if self in (Call.SET, Call.GET):
+            return None
+        if self is Call.STEP:
+            return f"fmi{version}DoStep"
+        return NAMES[self] if version == FMI3 else NAMES[self].replace("fmi3", "fmi2").replace("FMUState", "FMUstate")
+
+
+NAMES = {
+    Call.ENTER_EVENT: "fmi3EnterEventMode", Call.SET_CLOCK: "fmi3SetClock", Call.SET_REALS: "fmi3SetFloat64",
+    Call.UPDATE: "fmi3UpdateDiscreteStates", Call.ENTER_STEP: "fmi3EnterStepMode", Call.COUNT: "fmi3GetInt32",
+    Call.SAVE: "fmi3GetFMUState", Call.RESTORE: "fmi3SetFMUState", Call.RELEASE: "fmi3FreeFMUState",
+}  # fmt: skip
+
+
+class CNote(ctypes.Structure):
+    """`Note`."""
+
+    _fields_ = (
+        *((name, ctypes.c_int64) for name in ("slave", "call", "port", "status")),
+        ("flags", ctypes.c_int64 * 5),
+        ("number", ctypes.c_double),
+        ("state", ctypes.c_void_p),
+        *((name, ctypes.c_int64) for name in ("first", "bytes")),
+    )
+
+
+class CJournal(ctypes.Structure):
+    """`Journal`."""
+
+    _fields_ = (
+        ("on", ctypes.c_int64),
+        ("notes", ctypes.POINTER(CNote)),
+        ("count", ctypes.c_int64),
+        ("bytes", ctypes.c_void_p),
+        ("used", ctypes.c_int64),
+    )
+
+
+class Journal:
+    """Room for the calls of one step.
+
+    Args:
+        head: the structure. calls: of all slaves in an ordinary step. values: what all of them read in it [bytes].
+    """
+
+    def __init__(self, head: CJournal, calls: int, values: int) -> None:
+        self._head = head
+        self._notes = (CNote * (STEPS_AT_MOST * (calls + CALLS_OF_EVENT)))()
+        self._bytes = np.zeros(STEPS_AT_MOST * (values + 64), dtype=np.uint8)
+        head.notes, head.bytes = ctypes.cast(self._notes, ctypes.POINTER(CNote)), self._bytes.ctypes.data
+
+    def read(self, versions: Sequence[int]) -> Iterator[tuple[int, Call, int, Answer]]:
+        """Place of the slave, function, port, answer; in the order of the calls.
+
+        Args:
+            versions: of FMI, of each slave.
+        """
+        for note in self._notes[: self._head.count]:
+            yield note.slave, Call(note.call), note.port, self._answer(note, versions[note.slave])
+
+    def _answer(self, note: CNote, version: int) -> Answer:
+        call = Call(note.call)
+        if call is Call.STEP and version == FMI3:
+            event, terminate, early = (bool(flag) for flag in note.flags[:3])
+            return Answer(note.status, (event, terminate, early, note.number))
+        if call is Call.UPDATE:
+            return Answer(note.status, (*(bool(flag) for flag in note.flags), note.number))
+        if call is Call.SAVE:
+            return Answer(note.status, (note.state,))
+        if call in (Call.GET, Call.COUNT):
+            return Answer(note.status, values=self._bytes[note.first : note.first + note.bytes].tobytes())
+        return Answer(note.status)

@@ -1,0 +1,253 @@
+/* One slave: its functions, its variables, one step of it. Part of `stepper.c`. */
+#if !defined(_WIN32)
+#define _POSIX_C_SOURCE 199309L /* clock_gettime */
+#endif
+#include "stepper.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <string.h>
+#include <time.h>
+
+#if defined(_WIN32)
+#define EXPORTED __declspec(dllexport)
+#else
+#define EXPORTED __attribute__((visibility("default")))
+#endif
+
+#define STATUS_WARNING 1 /* in all versions of FMI: more than this is a failure */
+#define TIME_TOLERANCE 1e-9 /* communication times closer than this are the same [s], as in the components */
+
+/* -- the journal: calls that Python may have to repeat ---------------------------------------------------------------- */
+
+/* What was called last, with the status in the program. */
+static Note *note(Program *program, int64_t slave, int64_t call, int64_t port) {
+    Journal *journal = &program->journal;
+    Note *made = &journal->notes[journal->count++];
+    *made = (Note){.slave = slave, .call = call, .port = port, .status = program->status, .number = INFINITY};
+    return made;
+}
+
+static void note_bytes(Program *program, Note *made, const void *values, size_t bytes) {
+    Journal *journal = &program->journal;
+    made->first = journal->used;
+    made->bytes = (int64_t)bytes;
+    memcpy(journal->bytes + journal->used, values, bytes);
+    journal->used += (int64_t)bytes;
+}
+
+/* -- functions of FMI ---------------------------------------------------------------------------------------------- */
+
+typedef int (*Transfer12)(void *instance, const uint32_t *references, size_t count, void *values);
+typedef int (*Transfer3)(void *instance, const uint32_t *references, size_t count, void *values, size_t value_count);
+typedef int (*DoStep1)(void *instance, double t, double h, char new_step);
+typedef int (*DoStep2)(void *instance, double t, double h, int no_set_state);
+typedef int (*Enter)(void *instance);
+typedef int (*SetClock)(void *instance, const uint32_t *references, size_t count, const bool *values);
+typedef int (*SetReals)(void *instance, const uint32_t *references, size_t count, const double *values, size_t value_count);
+typedef int (*Update)(void *instance, bool *again, bool *terminate, bool *nominals, bool *values, bool *next_defined, double *next);
+typedef int (*Counts)(void *instance, const uint32_t *references, size_t count, int32_t *values, size_t value_count);
+typedef int (*SaveState)(void *instance, void **state);
+typedef int (*RestoreState)(void *instance, void *state);
+typedef int (*DoStep3)(void *instance, double t, double h, bool no_set_state, bool *event, bool *terminate, bool *early, double *reached);
+
+static int transfer(const Slave *slave, const Port *port) {
+    size_t count = (size_t)port->reference_count;
+    if (slave->fmi_version == 3)
+        return ((Transfer3)port->function)(slave->instance, port->references, count, port->raw, (size_t)port->raw_count);
+    return ((Transfer12)port->function)(slave->instance, port->references, count, port->raw);
+}
+
+static bool called_step(Program *program, const Slave *slave, double t, double h) {
+    if (slave->fmi_version == 1) {
+        program->status = ((DoStep1)slave->do_step)(slave->instance, t, h, 1);
+        return program->status <= STATUS_WARNING;
+    }
+    if (slave->fmi_version == 2) {
+        program->status = ((DoStep2)slave->do_step)(slave->instance, t, h, 0);
+        return program->status <= STATUS_WARNING;
+    }
+    bool event = false, terminate = false, early = false;
+    double reached = t + h; /* for slaves that do not fill it in */
+    program->status = ((DoStep3)slave->do_step)(slave->instance, t, h, false, &event, &terminate, &early, &reached);
+    const bool came_short = t + TIME_TOLERANCE < reached && reached < t + h - TIME_TOLERANCE;
+    if (program->status <= STATUS_WARNING && !terminate && !early && !came_short && !(event && slave->heeds_events))
+        return true;
+    program->event = event;
+    program->terminate = terminate;
+    program->early = early;
+    program->reached = reached;
+    return false;
+}
+
+/* True where the step was taken as asked and nothing is to be seen to. */
+static bool do_step(Program *program, int64_t which, double t, double h) {
+    bool ordinary = called_step(program, &program->slaves[which], t, h);
+    if (program->journal.on) {
+        Note *made = note(program, which, CALL_STEP, 0); /* nothing said: as far as it was asked to go */
+        if (!ordinary && program->slaves[which].fmi_version == 3) {
+            made->flags[0] = program->event;
+            made->flags[1] = program->terminate;
+            made->flags[2] = program->early;
+            made->number = program->reached;
+        }
+    }
+    return ordinary;
+}
+
+/* -- variables ----------------------------------------------------------------------------------------------------- */
+
+#define UNPACK(type) \
+    for (int64_t i = 0; i < port->count; i++) \
+        port->values[port->places[i]] = (double)((const type *)port->raw)[port->elements[i]]; \
+    return
+
+static void unpack(const Port *port) {
+    switch (port->kind) {
+    case KIND_FLOAT64: UNPACK(double);
+    case KIND_FLOAT32: UNPACK(float);
+    case KIND_INT8: UNPACK(int8_t);
+    case KIND_UINT8: UNPACK(uint8_t);
+    case KIND_INT16: UNPACK(int16_t);
+    case KIND_UINT16: UNPACK(uint16_t);
+    case KIND_INT32: UNPACK(int32_t);
+    case KIND_UINT32: UNPACK(uint32_t);
+    case KIND_INT64: UNPACK(int64_t);
+    case KIND_UINT64: UNPACK(uint64_t);
+    }
+    bool narrow = port->kind == KIND_BOOLEAN8;
+    for (int64_t i = 0; i < port->count; i++) { /* a slave may say 2 for true */
+        int64_t at = port->elements[i];
+        port->values[port->places[i]] = narrow ? ((const uint8_t *)port->raw)[at] != 0 : ((const int32_t *)port->raw)[at] != 0;
+    }
+}
+
+/* Whole numbers are rounded to even, as in Python; what the type cannot hold is refused. The upper bound is the first double above. */
+#define PACK(type, lowest, above) \
+    for (int64_t i = 0; i < port->count; i++) { \
+        double value = rint(port->values[port->places[i]]); \
+        if (!(value >= (lowest) && value < (above))) \
+            return false; \
+        ((type *)port->raw)[port->elements[i]] = (type)value; \
+    } \
+    return true
+
+static bool pack_float(const Port *port) {
+    for (int64_t i = 0; i < port->count; i++) {
+        double value = port->values[port->places[i]];
+        float narrow = (float)value;
+        if (isinf(narrow) && !isinf(value))
+            return false;
+        ((float *)port->raw)[port->elements[i]] = narrow;
+    }
+    return true;
+}
+
+static bool pack_double(const Port *port) {
+    for (int64_t i = 0; i < port->count; i++)
+        ((double *)port->raw)[port->elements[i]] = port->values[port->places[i]];
+    return true;
+}
+
+static bool pack_boolean(const Port *port) {
+    for (int64_t i = 0; i < port->count; i++) {
+        double value = port->values[port->places[i]];
+        if (!isfinite(value))
+            return false;
+        bool truth = rint(value) != 0.0;
+        if (port->kind == KIND_BOOLEAN8)
+            ((uint8_t *)port->raw)[port->elements[i]] = truth;
+        else
+            ((int32_t *)port->raw)[port->elements[i]] = truth;
+    }
+    return true;
+}
+
+static bool pack(const Port *port) {
+    switch (port->kind) {
+    case KIND_FLOAT64: return pack_double(port);
+    case KIND_FLOAT32: return pack_float(port);
+    case KIND_INT8: PACK(int8_t, -0x1p7, 0x1p7);
+    case KIND_UINT8: PACK(uint8_t, 0.0, 0x1p8);
+    case KIND_INT16: PACK(int16_t, -0x1p15, 0x1p15);
+    case KIND_UINT16: PACK(uint16_t, 0.0, 0x1p16);
+    case KIND_INT32: PACK(int32_t, -0x1p31, 0x1p31);
+    case KIND_UINT32: PACK(uint32_t, 0.0, 0x1p32);
+    case KIND_INT64: PACK(int64_t, -0x1p63, 0x1p63);
+    case KIND_UINT64: PACK(uint64_t, 0.0, 0x1p64);
+    default: return pack_boolean(port);
+    }
+}
+
+static void gather(const Slave *slave, const double *values) {
+    if (slave->factors == NULL) {
+        for (int64_t i = 0; i < slave->input_count; i++)
+            slave->inputs[i] = values[slave->sources[i]];
+        return;
+    }
+    for (int64_t i = 0; i < slave->input_count; i++)
+        slave->inputs[i] = values[slave->sources[i]] * slave->factors[i] + slave->offsets[i];
+}
+
+/* -- one slave ----------------------------------------------------------------------------------------------------- */
+
+static bool stopped(Program *program, int64_t stop, int64_t slave, int64_t port) {
+    program->stop = stop;
+    program->slave = slave;
+    program->port = port;
+    return false;
+}
+
+static bool send_inputs(Program *program, int64_t which) {
+    const Slave *slave = &program->slaves[which];
+    for (int64_t i = 0; i < slave->write_count; i++) /* first of all, so that a refused value touches nothing */
+        if (slave->writes[i].places != NULL && !pack(&slave->writes[i]))
+            return stopped(program, STOP_REFUSED, which, i);
+    for (int64_t i = 0; i < slave->write_count; i++) {
+        program->status = transfer(slave, &slave->writes[i]);
+        if (program->journal.on)
+            note(program, which, CALL_SET, i);
+        if (program->status > STATUS_WARNING)
+            return stopped(program, STOP_WRITE, which, i);
+    }
+    return true;
+}
+
+static bool read_outputs(Program *program, int64_t which) {
+    const Slave *slave = &program->slaves[which];
+    for (int64_t i = 0; i < slave->read_count; i++) {
+        program->status = transfer(slave, &slave->reads[i]);
+        if (program->journal.on)
+            note_bytes(program, note(program, which, CALL_GET, i), slave->reads[i].raw, (size_t)slave->reads[i].raw_bytes);
+        if (program->status > STATUS_WARNING)
+            return stopped(program, STOP_READ, which, i);
+        if (slave->reads[i].places != NULL)
+            unpack(&slave->reads[i]);
+    }
+    return true;
+}
+
+static double now(void) {
+    struct timespec t;
+#if defined(_WIN32)
+    timespec_get(&t, TIME_UTC);
+#else
+    clock_gettime(CLOCK_MONOTONIC, &t);
+#endif
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static bool move(Program *program, int64_t which, double t, double h, bool timed) {
+    Slave *slave = &program->slaves[which];
+    if (!send_inputs(program, which))
+        return false;
+    slave->calls++;
+    double begin = timed ? now() : 0.0;
+    bool ordinary = do_step(program, which, t, h);
+    if (timed)
+        slave->seconds += now() - begin;
+    if (!ordinary)
+        return stopped(program, STOP_STEP, which, 0);
+    return read_outputs(program, which);
+}
