@@ -73,9 +73,13 @@ class Passings:
         self._told += count
 
     def close(self) -> None:
-        """Add events to the counters of the receivers; they are timed with the steps that they belong to."""
+        """Add events and states to the counters of the components; they are timed with the steps that they belong to."""
         for telling in self._tellings.values():
-            telling.component.tallies["event"].add(0.0, self._told)
+            for kind in ("event", "get", "set"):  # a step to the telegram and one from there on: inputs and outputs once more
+                telling.component.tallies[kind].add(0.0, self._told)
+        plant = self.localiser.watch.component.tallies
+        for kind, count in (("save", self._told), ("restore", self._plant.more_calls), ("release", self._told)):
+            plant[kind].add(0.0, int(count))  # each step of the plant beyond the first begins with its state restored
         self._told = 0
 
     # -- set-up -----------------------------------------------------------------------------------------------------
@@ -94,6 +98,7 @@ class Passings:
         first = plan.steps[place].columns.start
         columns = first + watch.position_column, first + watch.speed_column
         places = layout.positions if isinstance(layout, TrackLayout) else np.zeros(0)
+        self._plant = program.slaves[place]
         program.watch(place, *columns, (watch.position_scale, watch.speed_scale), places, ACCELERATION_LIMIT)
         if isinstance(layout, InstantLayout):
             head.by_instant, head.instant_count = True, len(layout.instants)

@@ -261,6 +261,8 @@ class CompiledStepper:
 
     def close(self) -> None:
         """Add what was done here to the counters of the components."""
+        if self._passings is not None:
+            self._passings.close()
         for step, slave in zip(self.plan.steps, self._program.slaves, strict=True):
             component, calls, over = step.component, slave.calls + slave.all_calls, self._program.head.balises.steps
             component.calls += calls + slave.more_calls
@@ -270,8 +272,6 @@ class CompiledStepper:
             if self._program.head.sampled:
                 component.seconds += slave.seconds * max(calls - over, 0) / self._program.head.sampled
             slave.calls = slave.all_calls = slave.more_calls = 0
-        if self._passings is not None:
-            self._passings.close()
 
 
 def _load() -> Any:

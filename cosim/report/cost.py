@@ -84,4 +84,4 @@ def _cell(cost: Mapping[str, Any], kinds: Sequence[str], timed: bool) -> str:
     found = [cost[kind] for kind in kinds if isinstance(cost.get(kind), Mapping)]
     calls = sum(int(number_entry(entry, "calls") or 0) for entry in found)
     seconds = sum(number_entry(entry, "seconds") or 0.0 for entry in found)
-    return f"{calls} / {f'{1000 * seconds:.3g}' if timed else DASH}" if calls else DASH
+    return f"{calls} / {f'{1000 * seconds:.3g}' if timed and seconds else DASH}" if calls else DASH

@@ -61,3 +61,13 @@ def test_other_ways_to_localise_stay_with_python(method: str) -> None:
     stepper = Scenario.load("freight_profile_d").run(overrides=overrides, warn=lambda _: None).result.summary["master"]["stepper"]
     assert stepper["name"] == "python"
     assert method in stepper["reason"]
+
+
+def test_calls_are_counted_as_in_python() -> None:
+    counts = []
+    for stepper in ("python", "compiled"):
+        outcome = Scenario.load("freight_profile_d").set("stop", 5.0).master(stepper=stepper).run(warn=lambda _: None)
+        assert outcome.failure is None
+        counts.append([{k: v["calls"] for k, v in c["cost"].items()} for c in outcome.result.summary["components"]])
+    assert counts[0] == counts[1]
+    assert counts[0][0]["restore"] > counts[0][0]["save"] > 10
