@@ -305,17 +305,6 @@ class Component(ABC):
         tell, buffer = make_derivative_writer(self, names)
         return self._guarded(f"derivatives of {_shown(names)}", tell), buffer
 
-    def set_input_derivatives(self, names: Sequence[str], order: int, values: Sequence[float]) -> None:
-        """Tell derivatives of inputs for the coming step (FMI 1 and 2); arguments and errors as for `make_derivative_writer`.
-
-        Args:
-            names: of real inputs. order: of the derivatives, 1 or more.
-            values: shape (len(names),) [unit of the input / s**order].
-        """
-        tell, buffer = make_derivative_writer(self, names, order)
-        buffer[:] = values
-        self._guard(f"derivatives of {_shown(names)}", tell)
-
     def directional_derivative(self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]) -> np.ndarray:
         """Derivatives of scalars and elements `unknowns` along a direction in `knowns`, where declared.
 

@@ -17,13 +17,11 @@ if TYPE_CHECKING:
     from cosim.components.component import Component
 
 
-def make_derivative_writer(
-    component: Component, names: Sequence[str], order: int = 1
-) -> tuple[Callable[[], None], np.ndarray]:  # fmt: skip
-    """A call of setRealInputDerivatives, and the array of shape (len(names),) it tells from.
+def make_derivative_writer(component: Component, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
+    """A call of setRealInputDerivatives of first order, and the array of shape (len(names),) it tells from.
 
     Args:
-        component: an instantiated slave of FMI 1 or 2. names: of real inputs. order: of the derivatives.
+        component: an instantiated slave of FMI 1 or 2. names: of real inputs.
 
     Raises:
         CouplingError: the slave does not take derivatives, or a name is no real input.
@@ -39,7 +37,7 @@ def make_derivative_writer(
     turn = signs(component, names)
     held = buffer if turn is None else np.zeros(len(names))
     make = _native_teller if is_native(component.slave) else _teller
-    tell = make(component, references, order, held)
+    tell = make(component, references, held)
     if turn is None:
         return tell, buffer
 
@@ -50,11 +48,11 @@ def make_derivative_writer(
     return turn_and_tell, buffer
 
 
-def _native_teller(component: Component, references: Sequence[int], order: int, values: np.ndarray) -> Callable[[], None]:
+def _native_teller(component: Component, references: Sequence[int], values: np.ndarray) -> Callable[[], None]:
     count = len(references)
     call = getattr(component.slave, f"fmi{component.fmi_version}SetRealInputDerivatives")
     pointer = values.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
-    orders = (ctypes.c_int * count)(*[order] * count)
+    orders = (ctypes.c_int * count)(*[1] * count)
     arguments = (component.slave.component, (ctypes.c_uint32 * count)(*references), count, orders, pointer)
 
     def tell() -> None:
@@ -63,8 +61,8 @@ def _native_teller(component: Component, references: Sequence[int], order: int, 
     return tell
 
 
-def _teller(component: Component, references: Sequence[int], order: int, values: np.ndarray) -> Callable[[], None]:
-    call, orders = component.slave.setRealInputDerivatives, [order] * len(references)
+def _teller(component: Component, references: Sequence[int], values: np.ndarray) -> Callable[[], None]:
+    call, orders = component.slave.setRealInputDerivatives, [1] * len(references)
     return lambda: call(list(references), orders, values.tolist())
 
 

@@ -15,7 +15,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cosim.components.component import Component
-from cosim.components.derivatives import make_derivative_writer
 from cosim.components.fmi3 import FMI3Component
 from cosim.coupling.graph import declared_feedthrough
 from cosim.coupling.inputs import Inputs
@@ -81,7 +80,7 @@ class DerivativeCarrier(Carrier):
         super().__init__(line, inputs)
         self._moving = np.flatnonzero(line.continuous)
         names = [inputs.names[i] for i in self._moving]
-        self._tell, self._slopes = make_derivative_writer(component, names)
+        self._tell, self._slopes = component.make_derivative_writer(names)
 
     def send(self, t: float, until: float) -> None:  # noqa: D102 - see Carrier
         self._inputs.buffer[:] = self.line.at(t)

@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 from coupled_runs import Balises, Listener, Motion, Pushed, block, positions, run
+from fmpy.fmi1 import FMICallException
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from linear_runs import LinearRun, load, prepare, run_cut
 from mock_slaves import Counter, component
 from zoo.masses import Chain, cuts
 
+from cosim.errors import RunError
 from cosim.master.algorithms.gauss_seidel import GaussSeidel
 from cosim.master.algorithms.jacobi import Jacobi
 from cosim.master.lines.line import Line
@@ -86,6 +88,21 @@ def test_substeps_follow_the_line(tmp_path: Path) -> None:
         distances.append(max(np.abs(means.table[s] - line.table[s]).max() for s in line.cut.signals.values()))
     assert distances[0] / distances[1] == pytest.approx(4.0, rel=0.1)
     assert distances[1] / distances[2] == pytest.approx(4.0, rel=0.1)
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_a_slave_that_refuses_a_slope_ends_the_run_in_words(version: int, tmp_path: Path) -> None:
+    cut = cuts(CHAIN)["displacement-displacement"]
+    parts = load(cut, tmp_path, version, input_derivatives=True)
+
+    def refuse(*_arguments: Any) -> None:
+        raise FMICallException(f"fmi{version}SetRealInputDerivatives", 3)
+
+    setattr(parts["mass2"].slave, f"fmi{version}SetRealInputDerivatives", refuse)
+    master, _ = prepare(parts, cut.connections, 0.1, 5, inputs="extrapolate")
+    with pytest.raises(RunError, match=r"Component 'mass2' at t = 0 s: derivatives of p_left, v_left failed: fmi.SetReal"):
+        master.run()
+    close(master.plan)
 
 
 def test_without_connected_inputs_lines_change_nothing() -> None:
