@@ -7,66 +7,42 @@ library or a block makes no difference here. The dialects are in `fmi1`, `fmi2` 
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from time import perf_counter
 from typing import Any
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
-from fmpy.model_description import ModelDescription, ModelVariable
+from fmpy.model_description import ModelDescription
 
-from cosim.components.capabilities import read_capabilities, tool_warning
+from cosim.components.capabilities import tool_warning
 from cosim.components.derivatives import directional_derivative, make_derivative_writer
-from cosim.components.elements import Element, Variables, described, elements_of
+from cosim.components.described import Described, EventPort
 from cosim.components.start_values import StartValue, refusal, typed_value, typed_values
-from cosim.components.units import Units
 from cosim.components.values import element_reader, element_writer, exact_reader, exact_writer, write_start
 from cosim.diagnostics.log_choice import LogSwitch, log_switch, switch_log
 from cosim.diagnostics.messages import LogChoice, MessageLog
 from cosim.diagnostics.native_log import forget
 from cosim.diagnostics.tally import Tally, count_methods, new_tallies
-from cosim.errors import CouplingError, RunError, nearest
+from cosim.errors import CouplingError, RunError
 from fmu_observer.event_protocol import OUTCOME_VARIABLES
 from fmus.exact_ports import Values
-from plant_models.hybrid.units import Unit, UnitError
 
 TIME_TOLERANCE = 1e-9
 """Communication times closer than this are the same [s]; a billionth of a second is above rounding at 1e5 s."""
 
-NUMERIC_TYPES = frozenset(
-    {"Real", "Integer", "Boolean", "Enumeration", "Float64", "Float32"}
-    | {f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)}
-)
-"""Types whose values a table of numbers can hold. Integers beyond 2**53 are rounded in it; see `exact_reader`."""
-
 NEVER = math.inf
 NOT_PREPARED: Callable[[], None] | None = None
+Step = Callable[[float, float], Any]
+Refused = Callable[[FMICallException, float, float], None]
 FATAL = 4  # FMI status: the slave must not be called again
-OWN_TOOL = "fmu-observer"
 WITHOUT_STATES = "without it: algorithm gauss-seidel or jacobi, control fixed, no balise method rollback"
 NAMES_SHOWN = 6
 
 
-@dataclass(frozen=True)
-class EventPort:
-    """A triggered event a component declares.
-
-    Args:
-        name: the event.
-        trigger: value reference of the clock (FMI 3) or of the count (FMI 2).
-        stamp: value reference of ``<name>_time``, or None where the component has none.
-        payload: field of the event (``position``, ...) -> value reference.
-    """
-
-    name: str
-    trigger: int
-    stamp: int | None
-    payload: Mapping[str, int]
-
-
-class Component(ABC):
+class Component(Described):
     """One stepped thing, from instantiation to the end.
 
     The life: `configure`, `instantiate`, `set_start`, `enter_initialization`, readers and writers in turn,
@@ -86,20 +62,13 @@ class Component(ABC):
         release_files: called once at the end, e.g. to remove an unpacked archive.
     """
 
-    fmi_version: int
-    real_type: str
-    event_needs_step: bool
-    """Whether an event that was told happens in the next step only (FMI 2), or at once (FMI 3)."""
-
     def __init__(
         self, name: str, slave: Any, description: ModelDescription, *, source: str = "", kind: str = "FMU",
         release_files: Callable[[], None] | None = None,
     ) -> None:  # fmt: skip
-        self.name, self.slave, self.description, self.source, self.kind = name, slave, description, source, kind
-        self.capabilities = read_capabilities(description)
-        self.variables = Variables({v.name: v for v in description.modelVariables})
+        super().__init__(name, description, source, kind)
+        self.slave = slave
         self.negated: frozenset[str] = frozenset()  # variables whose slave holds the value with the other sign (FMI 1)
-        self.events: dict[str, EventPort] = self._find_events()
         self.starts: dict[str, StartValue] = {}
         self.seconds, self.calls = 0.0, 0
         self.time = math.nan
@@ -111,84 +80,14 @@ class Component(ABC):
         self.clock: Callable[[], float] | None = None  # says where it stands [s] while somebody else than Python steps it
         self.log: LogSwitch | None = None
         self.tallies = new_tallies()
-        self._units = Units(description)
         self._outcomes, self._read_outcomes = np.zeros(len(OUTCOME_VARIABLES)), NOT_PREPARED
 
-    # -- what it is -------------------------------------------------------------------------------------------------
+    # -- how it stands ----------------------------------------------------------------------------------------------
 
     @property
     def running(self) -> bool:
         """Whether initialisation is over and the end has not come."""
         return self._running
-
-    @property
-    def can_save(self) -> bool:
-        """Whether the component says that its state can be saved and restored."""
-        return self.capabilities.canGetAndSetFMUState
-
-    @property
-    def can_vary_step(self) -> bool:
-        """Whether the component says that the communication step may vary."""
-        return self.capabilities.canHandleVariableCommunicationStepSize
-
-    @property
-    def restores_exactly(self) -> bool:
-        """Whether its states are known to be exact without a probe: those of blocks and of the FMUs this package exports."""
-        return self.can_save and (self.kind == "block" or self.description.generationTool == OWN_TOOL)
-
-    def names(self, causality: str) -> list[str]:
-        """Names of the numeric scalars and elements of one causality, without the triggers, stamps and payloads of events."""
-        hidden = self.event_references() if causality == "input" else set()
-        variables = self.description.modelVariables
-        found = [v for v in variables if v.causality == causality and v.type in NUMERIC_TYPES and v.valueReference not in hidden]
-        return [name for v in found for name in ([e.name for e in elements_of(v)] if v.shape else [v.name])]
-
-    def elements(self, name: str) -> list[Element]:
-        """The elements of a variable, row by row; a scalar or a single element is alone.
-
-        Raises:
-            CouplingError: there is no such variable or element.
-        """
-        self.variable(name)
-        return self.variables.expanded(name)
-
-    def variable(self, name: str, *causalities: str) -> ModelVariable:
-        """The variable of this name, or the array that holds the element of this name.
-
-        Raises:
-            CouplingError: there is none, or it has another causality; the nearest names are suggested.
-        """
-        try:
-            found = self.variables[name]
-        except KeyError as error:
-            array = self.variables.get(name.partition("[")[0])
-            if array is not None and array.shape:
-                raise CouplingError(f"{self.name}: no element {name!r} in a {described(array)}; the first is 1.") from error
-            candidates = [v.name for v in self.variables.values() if not causalities or v.causality in causalities]
-            raise CouplingError(f"{self.name}: no variable {name!r}; {nearest(name, candidates)}") from error
-        if causalities and found.causality not in causalities:
-            raise CouplingError(
-                f"{self.name}.{name} has causality '{found.causality}', expected {' or '.join(causalities)}; "
-                f"such variables: {', '.join(self.names(causalities[0])) or 'none'}."
-            )
-        return found
-
-    def unit_name(self, name: str) -> str | None:
-        """Name of a variable's unit, its own or that of its declared type; None where there is none."""
-        return self._units.name(self.variables[name])
-
-    def unit(self, name: str) -> Unit | None:
-        """The unit of a variable from the FMU's own unit definitions, or None where it declares none.
-
-        A relative quantity (a temperature difference) has no offset.
-
-        Raises:
-            UnitError: a unit name without definition that cannot be understood.
-        """
-        try:
-            return self._units.of(self.variables[name])
-        except UnitError as error:
-            raise UnitError(f"{self.name}.{name}: {error}") from error
 
     @property
     def usable(self) -> bool:
@@ -202,7 +101,7 @@ class Component(ABC):
 
     # -- life -------------------------------------------------------------------------------------------------------
 
-    def configure(self, starts: Mapping[str, StartValue]) -> None:  # noqa: B027 - only FMI 3 has structural parameters
+    def configure(self, starts: Mapping[str, StartValue]) -> None:
         """Take the structural parameters among start values: the shapes of arrays follow from them. Before `instantiate`.
 
         Raises:
@@ -252,20 +151,6 @@ class Component(ABC):
             raise CouplingError(refusal(f"{self.name}.{name} cannot be set", error)) from error
         self._guard(f"setting {name} = {value!r}", lambda: write_start(self, variable, element, values))
         self.starts[name] = value
-
-    def settable(self, name: str) -> ModelVariable:
-        """The variable of this name, or the array that holds the element of this name, if a start value can be set.
-
-        Raises:
-            CouplingError: there is none, or it cannot be set.
-        """
-        variable = self.variable(name)
-        if variable.causality in ("output", "independent", "calculatedParameter") or variable.variability == "constant":
-            what = "is constant" if variable.variability == "constant" else f"has causality '{variable.causality}'"
-            raise CouplingError(f"{self.name}.{name} cannot be set: it {what}.")
-        if variable.type == "Clock":
-            raise CouplingError(f"{self.name}.{name} cannot be set: it is a Clock, which ticks by itself or at events.")
-        return variable
 
     @abstractmethod
     def enter_initialization(self, start_time: float, stop_time: float) -> None:
@@ -425,9 +310,6 @@ class Component(ABC):
     @abstractmethod
     def _instantiate(self) -> None: ...
 
-    @abstractmethod
-    def _find_events(self) -> dict[str, EventPort]: ...
-
     def __init_subclass__(cls, **named: Any) -> None:
         super().__init_subclass__(**named)
         count_methods(cls)
@@ -448,18 +330,19 @@ class Component(ABC):
     def _free_library(self) -> None:
         self.slave.freeLibrary()
 
-    def _payload_of(self, event: str, references: Mapping[str, int]) -> dict[str, int]:
-        prefix = f"{event}_"
-        reserved = {f"{event}_time", f"{event}_count"}
-        real = {n: r for n, r in references.items() if self.variables[n].type == self.real_type and not self.variables[n].shape}
-        return {n.removeprefix(prefix): r for n, r in real.items() if n.startswith(prefix) and n not in reserved}
-
-    def event_references(self) -> set[int]:
-        """Value references of the triggers, stamps and payloads of all events: the master sets them, no connection may."""
-        hidden: set[int] = set()
-        for event in self.events.values():
-            hidden |= {event.trigger, *event.payload.values()} | ({event.stamp} if event.stamp is not None else set())
-        return hidden
+    def _step_whole(self, do_step: Step, refused: Refused, t: float, until: float) -> None:
+        """One timed doStep of a slave that gets to `until` [s] or refuses (FMI 1, 2)."""
+        begin = perf_counter()
+        try:
+            do_step(t, until - t)
+            self.time = until
+        except FMICallException as error:
+            refused(error, t, until)
+        except Exception as error:
+            raise self._explained("doStep", error, t) from error
+        finally:
+            self.seconds += perf_counter() - begin
+            self.calls += 1
 
     def _unguarded_reader(self, names: Sequence[str], values: np.ndarray) -> Callable[[], None]:
         return element_reader(self, names, values)

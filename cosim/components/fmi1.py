@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Mapping, Sequence
-from time import perf_counter
 from typing import Any
 
 import numpy as np
 from fmpy.fmi1 import FMICallException, fmi1LastSuccessfulTime
 from fmpy.model_description import ModelDescription
 
-from cosim.components.component import Component, EventPort
+from cosim.components.component import Component
+from cosim.components.described import EventPort
 from cosim.components.start_values import typed_value
 from cosim.components.values import negative
 from cosim.diagnostics.native_log import fmi1_callbacks
@@ -91,17 +91,7 @@ class FMI1Component(Component):
         self._initialized = self._running = True
 
     def advance(self, t: float, until: float) -> None:  # noqa: D102 - see Component
-        begin = perf_counter()
-        try:
-            self._do_step(t, until - t)
-            self.time = until
-        except FMICallException as error:
-            self._refused(error, t, until)
-        except Exception as error:
-            raise self._explained("doStep", error, t) from error
-        finally:
-            self.seconds += perf_counter() - begin
-            self.calls += 1
+        self._step_whole(self._do_step, self._refused, t, until)
 
     def _refused(self, error: FMICallException, t: float, until: float) -> None:
         if error.status == PENDING:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Mapping
-from time import perf_counter
 from typing import Any
 
 from fmpy.fmi1 import FMICallException
@@ -15,7 +14,8 @@ from fmpy.fmi2 import (
     fmi2Terminated,
 )
 
-from cosim.components.component import TIME_TOLERANCE, Component, EventPort
+from cosim.components.component import TIME_TOLERANCE, Component
+from cosim.components.described import EventPort
 from cosim.diagnostics.native_log import fmi2_callbacks
 from fmus.native_calls import prepared_call
 
@@ -60,17 +60,7 @@ class FMI2Component(Component):
         self._running = True
 
     def advance(self, t: float, until: float) -> None:  # noqa: D102 - see Component
-        begin = perf_counter()
-        try:
-            self._do_step(t, until - t)
-            self.time = until
-        except FMICallException as error:
-            self._after_refusal(error, t, until)
-        except Exception as error:
-            raise self._explained("doStep", error, t) from error
-        finally:
-            self.seconds += perf_counter() - begin
-            self.calls += 1
+        self._step_whole(self._do_step, self._after_refusal, t, until)
 
     def tell(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Component
         self._counts[event.name] += 1

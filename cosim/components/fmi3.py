@@ -11,7 +11,8 @@ from typing import Any
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from cosim.components.clocks import ClockSchedule
-from cosim.components.component import NEVER, TIME_TOLERANCE, Component, EventPort
+from cosim.components.component import NEVER, TIME_TOLERANCE, Component
+from cosim.components.described import EventPort
 from cosim.components.intermediate import IntermediateUpdate
 from cosim.components.interruption import EventMet
 from cosim.components.quick_calls import quicken

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 from fmpy.model_description import ModelVariable
 
-from cosim.components.component import NUMERIC_TYPES, Component
+from cosim.components.component import Component
+from cosim.components.described import NUMERIC_TYPES
 from cosim.components.elements import Element, described, elements_of
 from cosim.coupling.transformation import Transformation
 from cosim.errors import CouplingError, nearest

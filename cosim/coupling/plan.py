@@ -12,7 +12,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from cosim.components.component import NUMERIC_TYPES, Component
+from cosim.components.component import Component
+from cosim.components.described import NUMERIC_TYPES
 from cosim.coupling.clocks import ClockConnection
 from cosim.coupling.connection import Connection
 from cosim.coupling.inputs import Inputs, connected_inputs

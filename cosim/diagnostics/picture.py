@@ -18,7 +18,8 @@ from matplotlib.patches import Circle, FancyBboxPatch, PathPatch, Polygon
 from matplotlib.path import Path as Curve
 from matplotlib.textpath import TextPath
 
-from cosim.diagnostics.layout import EVENT_PORT, FOOT, PAD, Box, Edge, Frame, Layout, Size, Wire, lay_out
+from cosim.diagnostics.layout import EVENT_PORT, lay_out
+from cosim.diagnostics.shapes import FOOT, PAD, Box, Edge, Frame, Layout, Size, Wire
 from cosim.diagnostics.structure import Link, Part, Structure
 from cosim.errors import OutputError
 from cosim.report.style import RC, new_figure, styled

@@ -7,7 +7,8 @@ from typing import Any
 
 from fmpy.model_description import ModelVariable
 
-from cosim.components.component import NUMERIC_TYPES, Component
+from cosim.components.component import Component
+from cosim.components.described import NUMERIC_TYPES
 from cosim.components.start_values import StartValue, refusal, typed_value, typed_values
 from cosim.components.structure import STRUCTURAL
 from cosim.errors import CouplingError

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from cosim.balises.early_return import EarlyReturnLocaliser
-from cosim.components.component import OWN_TOOL
+from cosim.components.described import OWN_TOOL
 from cosim.components.fmi3 import FMI3Component
 from cosim.coupling.plan import Plan, PlannedComponent
 from cosim.master.events.coordinator import EventCoordinator

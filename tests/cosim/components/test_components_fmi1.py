@@ -14,7 +14,8 @@ from zoo.build import linear_fmu
 from zoo.events import awkward_fmu
 from zoo.typed import typed_fmu
 
-from cosim.components.component import Component, EventPort
+from cosim.components.component import Component
+from cosim.components.described import EventPort
 from cosim.components.fmi1 import FMI1Component
 from cosim.components.loading import describe_fmu, load_fmu
 from cosim.coupling.connection import connect

@@ -17,8 +17,9 @@ from matplotlib.image import imread
 from matplotlib.transforms import Bbox
 
 from cosim.diagnostics import picture
-from cosim.diagnostics.layout import EVENT_PORT, Box, Layout, Wire, lay_out
+from cosim.diagnostics.layout import EVENT_PORT, lay_out
 from cosim.diagnostics.picture import COLOURS, box_size, forward_curves, structure_figure, text_width, wires_of
+from cosim.diagnostics.shapes import Box, Layout, Wire
 from cosim.diagnostics.structure import Balises, Link, Structure
 from cosim.errors import OutputError
 

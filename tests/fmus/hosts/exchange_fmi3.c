@@ -36,6 +36,8 @@ typedef struct {
 
 #define M ((Model3 *)model)
 
+#include "exchange_calls.h"
+
 static void log_message(void *environment, fmi3Status status, const char *category, const char *message) {
     (void)environment, (void)category;
     fprintf(stderr, "[%d]: %s\n", (int)status, message);
@@ -43,10 +45,6 @@ static void log_message(void *environment, fmi3Status status, const char *catego
 
 static int enter_initialization(Model *model) {
     return (int)M->EnterInitializationMode(M->c, fmi3False, 0.0, 0.0, fmi3False, 0.0);
-}
-
-static int exit_initialization(Model *model) {
-    return (int)M->ExitInitializationMode(M->c);
 }
 
 static int set_reals(Model *model, const unsigned *references, size_t count, const double *values) {
@@ -69,32 +67,8 @@ static int update(Model *model, double *next_time) {
     return status;
 }
 
-static int enter_event_mode(Model *model) {
-    return (int)M->EnterEventMode(M->c);
-}
-
-static int enter_continuous_time_mode(Model *model) {
-    return (int)M->EnterContinuousTimeMode(M->c);
-}
-
-static int set_time(Model *model, double t) {
-    return (int)M->SetTime(M->c, t);
-}
-
-static int set_states(Model *model, const double *x, size_t count) {
-    return (int)M->SetContinuousStates(M->c, x, count);
-}
-
-static int get_states(Model *model, double *x, size_t count) {
-    return (int)M->GetContinuousStates(M->c, x, count);
-}
-
 static int get_derivatives(Model *model, double *dx, size_t count) {
     return (int)M->GetContinuousStateDerivatives(M->c, dx, count);
-}
-
-static int get_indicators(Model *model, double *z, size_t count) {
-    return (int)M->GetEventIndicators(M->c, z, count);
 }
 
 static int directional(Model *model, unsigned unknown, unsigned known, double seed, double *sensitivity) {
@@ -105,11 +79,6 @@ static int do_step(Model *model, double t, double h) {
     fmi3Boolean event, terminate, early;
     double last;
     return (int)M->DoStep(M->c, t, h, fmi3True, &event, &terminate, &early, &last);
-}
-
-static void must(const char *call, int status) {
-    if (status > SLAVE_WARNING)
-        die("%s returned status %d", call, status);
 }
 
 static size_t save(Model *model, char **bytes) {
@@ -131,11 +100,6 @@ static int try_restore(Model *model, const char *bytes, size_t size) {
     status = (int)M->SetFMUState(M->c, state);
     must("fmi3FreeFMUState", (int)M->FreeFMUState(M->c, &state));
     return status;
-}
-
-static void close_model(Model *model) {
-    M->FreeInstance(M->c);
-    free(model);
 }
 
 Model *open_model3(const char *name, const char *library, const char *token, const char *resources) {
