@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from fmu_observer.observers import DifferentiatorCdo, DiscreteUio, MultirateCdo, TakagiSugenoCdo
-from fmu_observer.slip import SlipIndicator
+from fmu_observer import detection
+from fmu_observer.observers import train
 from plant_models.hybrid import HybridSystem
 
-OBSERVERS: dict[str, type[HybridSystem]] = {
-    system.name: system for system in (DifferentiatorCdo, TakagiSugenoCdo, MultirateCdo, DiscreteUio, SlipIndicator)
-}
+OBSERVERS: dict[str, type[HybridSystem]] = {system.name: system for system in (*train.SYSTEMS, *detection.SYSTEMS)}

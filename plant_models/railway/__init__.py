@@ -1,8 +1,7 @@
-"""Railway plants: the train, its sensor, its driver, and the laws they are made of."""
+"""Railway plants: what rolls, what it measures, what drives it, and the ground under it."""
 
-from plant_models.railway.balise_reader import BaliseReader
-from plant_models.railway.driver import Driver
-from plant_models.railway.locomotive import Locomotive
-from plant_models.railway.odometer import Odometer
+from plant_models.railway import control, sensors, vehicle
 
-__all__ = ["BaliseReader", "Driver", "Locomotive", "Odometer"]
+SYSTEMS = (*vehicle.SYSTEMS, *sensors.SYSTEMS, *control.SYSTEMS)
+
+__all__ = ["SYSTEMS"]

@@ -23,7 +23,7 @@ from cosim.master.axis import TimeAxis
 from cosim.master.lines.draw import draw_lines
 from cosim.master.master import Master, close
 from cosim.results.result import BaliseRecord
-from fmu_observer.observers.high_gain_observer import HighGainTrainObserver
+from fmu_observer.observers.train.high_gain_observer import HighGainTrainObserver
 from plant_models.hybrid import (
     HybridSystem,
     TriggeredEvent,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fmu_observer.observers import DifferentiatorCdo, DiscreteUio, MultirateCdo, TakagiSugenoCdo, TrainObserver
+from fmu_observer.observers.train import DifferentiatorCdo, DiscreteUio, MultirateCdo, TakagiSugenoCdo, TrainObserver
 from plant_models.hybrid import HybridSystem, NumpyKernel, Runtime, scalar_names
 
 MASS, DAVIS_A, DAVIS_B, DAVIS_C, RADIUS, INERTIA = 90000.0, 900.0, 32.4, 1.65287, 0.575, 225.0

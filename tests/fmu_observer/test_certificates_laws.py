@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from observer_bench import DAVIS_A, DAVIS_B, DAVIS_C, Bench, SteadyMotion, in_step
 
-from fmu_observer.observers import DifferentiatorCdo, DiscreteUio, MultirateCdo, TakagiSugenoCdo, TrainObserver
+from fmu_observer.observers.train import DifferentiatorCdo, DiscreteUio, MultirateCdo, TakagiSugenoCdo, TrainObserver
 
 MOTION = SteadyMotion(speed=25.0)
 INTEGRATION = 1e-6  # relative: RK4 at 1 ms, and what the differentiator's chatter leaves in the speed

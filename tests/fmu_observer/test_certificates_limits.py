@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fmu_observer.certificates import SampledError, certify_sampled_error, first_unstable_gap
-from fmu_observer.observers import DifferentiatorCdo, MultirateCdo, TakagiSugenoCdo
+from fmu_observer.observers.train import DifferentiatorCdo, MultirateCdo, TakagiSugenoCdo
 
 READING = 0.01  # relative: the independent measurement is given to two or three digits
 

@@ -7,7 +7,7 @@ import pytest
 from observer_bench import TRAIN_OBSERVERS
 
 from fmu_observer.certificates import Certificate, TwoRateError, certify_two_rate_error
-from fmu_observer.observers import DifferentiatorCdo, DiscreteUio, TakagiSugenoCdo, TrainObserver
+from fmu_observer.observers.train import DifferentiatorCdo, DiscreteUio, TakagiSugenoCdo, TrainObserver
 
 
 @pytest.mark.parametrize("make", TRAIN_OBSERVERS.values(), ids=TRAIN_OBSERVERS)

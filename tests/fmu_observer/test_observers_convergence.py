@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from observer_bench import INERTIA, MASS, RADIUS, TRAIN_OBSERVERS, SteadyMotion, random_gaps, started
 
-from fmu_observer.observers import DifferentiatorCdo, DiscreteUio, MultirateCdo, TakagiSugenoCdo, TrainObserver
+from fmu_observer.observers.train import DifferentiatorCdo, DiscreteUio, MultirateCdo, TakagiSugenoCdo, TrainObserver
 
 CONVERGED = (
     1e-4  # [m], [m/s] after 20 s: decay rates are 0.5 1/s and faster, so exp(-10) of an error of 19 m/s would remain at most

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from observer_bench import INERTIA, RADIUS, Bench, SteadyMotion
 
-from fmu_observer.observers import DifferentiatorCdo
-from fmu_observer.observers.differentiator import differentiator_flow, filtering_differentiator_flow, signed_power
-from fmu_observer.observers.differentiator_gains import LEVANT_GAINS
+from fmu_observer.observers.continuous.differentiator import differentiator_flow, filtering_differentiator_flow, signed_power
+from fmu_observer.observers.continuous.differentiator_gains import LEVANT_GAINS
+from fmu_observer.observers.train import DifferentiatorCdo
 
 STEP, END = 1e-3, 10.0
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from observer_bench import SteadyMotion, in_step
 
-from fmu_observer.observers import MultirateCdo
+from fmu_observer.observers.train import MultirateCdo
 
 MOTION = SteadyMotion(speed=20.0)
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from observer_bench import TRAIN_OBSERVERS, Bench, SteadyMotion, random_gaps, started
 
 from fmu_observer import OBSERVERS
-from fmu_observer.observers import TrainObserver
-from fmu_observer.slip import SlipIndicator
+from fmu_observer.detection import SlipIndicator
+from fmu_observer.observers.train import TrainObserver
 
 MOTION = SteadyMotion(speed=15.0, acceleration=0.1, slip_speed=0.4)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from observer_bench import SteadyMotion, in_step, random_gaps, started
 
-from fmu_observer.observers import TakagiSugenoCdo
+from fmu_observer.observers.train import TakagiSugenoCdo
 
 
 def test_a_frozen_premise_keeps_the_odometer_of_the_last_balise() -> None:

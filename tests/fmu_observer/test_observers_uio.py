@@ -5,8 +5,8 @@ import pytest
 from observer_bench import DAVIS_B, DAVIS_C, MASS, Bench
 from scipy.linalg import expm
 
-from fmu_observer.observers import DiscreteUio
-from fmu_observer.observers.uio_design import UioCovariances, discretise, uio_gains, uio_matrices
+from fmu_observer.design.uio_design import UioCovariances, discretise, uio_gains, uio_matrices
+from fmu_observer.observers.train import DiscreteUio
 
 SLOPE = (DAVIS_B + DAVIS_C * 50.0 / 3.6) / MASS
 PRINTED_AD = np.array([

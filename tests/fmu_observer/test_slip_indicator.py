@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from observer_bench import Bench
 
-from fmu_observer.slip import SlipIndicator, indicator_level
+from fmu_observer.detection import SlipIndicator, indicator_level
 
 
 def settled(odometer: float, speed: float, **parameters: float) -> dict[str, float]:

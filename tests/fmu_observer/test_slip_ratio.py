@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fmu_observer.slip import (
+from fmu_observer.detection import (
     odometer_slip,
     odometer_slip_from_speed_slip,
     speed_slip,

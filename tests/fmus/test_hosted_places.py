@@ -18,7 +18,7 @@ from hosted_models import Gatekeeper, Lister, Needy, not_a_block
 from hosted_runs import Loaded, initialize, references
 
 from fmu_observer.block import make_block
-from fmu_observer.observers import TakagiSugenoCdo
+from fmu_observer.observers.train import TakagiSugenoCdo
 from fmus.cli import main
 from fmus.hosted import HostedExportError, build_hosted_fmu
 from fmus.hosted.host import OWN_VERSION, HostError, check_package, package_version

@@ -19,8 +19,8 @@ from cosim.balises.hermite import HermiteStep
 from cosim.balises.layout import by_positions, by_spacing
 from plant_models import BaliseReader
 from plant_models.hybrid import NumpyKernel, Runtime
-from plant_models.railway.balise_layout import Spacing
-from plant_models.railway.hermite_cubic import HermiteCubic
+from plant_models.railway.sensors.hermite_cubic import HermiteCubic
+from plant_models.railway.track.balise_layout import Spacing
 
 Motion = Callable[[float], tuple[float, float]]  # time [s] -> position [m], speed [m/s]
 

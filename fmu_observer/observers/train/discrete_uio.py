@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.certificates import Certificate, TwoRateError, certify_two_rate_error
-from fmu_observer.observers.train_observer import POSITION, Estimate, TrainObserver
-from fmu_observer.observers.uio_design import uio_matrices
+from fmu_observer.design.uio_design import uio_matrices
+from fmu_observer.observers.train.train_observer import POSITION, Estimate, TrainObserver
 from plant_models.hybrid import PeriodicEvent, memory, parameter, state, vector
 from plant_models.hybrid.system import Array
 

@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fmu_observer.certificates import Certificate, SampledError, certify_sampled_error
-from fmu_observer.observers.high_gain import HIGH_GAIN_K, correction, innovation_decay
-from fmu_observer.observers.train_observer import BALISE_INNOVATION, POSITION, SPEED, Estimate, TrainObserver
-from fmu_observer.observers.train_resistance import drag_slope_range, rolling_drag
+from fmu_observer.observers.train.high_gain import HIGH_GAIN_K, correction, innovation_decay
+from fmu_observer.observers.train.train_observer import BALISE_INNOVATION, POSITION, SPEED, Estimate, TrainObserver
+from fmu_observer.observers.train.train_resistance import drag_slope_range, rolling_drag
 from plant_models.hybrid import Signal, parameter, vector
 from plant_models.hybrid.system import Array
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fmu_observer.observers.differentiator_gains import LEVANT_GAINS
+from fmu_observer.observers.continuous.differentiator_gains import LEVANT_GAINS
 from plant_models.hybrid.system import Array
 
 

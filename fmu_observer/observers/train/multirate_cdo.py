@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 from fmu_observer.certificates import Certificate, SampledError
-from fmu_observer.observers.high_gain import HIGH_GAIN_K, correction, innovation_decay
-from fmu_observer.observers.high_gain_observer import HighGainTrainObserver
+from fmu_observer.observers.train.high_gain import HIGH_GAIN_K, correction, innovation_decay
+from fmu_observer.observers.train.high_gain_observer import HighGainTrainObserver
 from plant_models.hybrid import PeriodicEvent, parameter, state, vector
 from plant_models.hybrid.system import Array
 

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from plant_models.hybrid.signal import Signal, parameter
 from plant_models.hybrid.system import Array
-from plant_models.railway.table import inside_any, piecewise_constant, piecewise_linear
+from plant_models.railway.track.table import inside_any, piecewise_constant, piecewise_linear
 
 ZoneAxis = Literal["time", "position"]
 GradientShape = Literal["constant", "linear"]

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from fmu_observer.certificates import Certificate, SampledError, certify_sampled_error
-from fmu_observer.observers.train_observer import BALISE_INNOVATION, POSITION, SPEED, Estimate, TrainObserver
+from fmu_observer.observers.train.train_observer import BALISE_INNOVATION, POSITION, SPEED, Estimate, TrainObserver
 from plant_models.hybrid import memory, parameter, vector
 from plant_models.hybrid.system import Array
 

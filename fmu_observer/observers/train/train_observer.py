@@ -14,8 +14,14 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from fmu_observer.certificates import Certificate
-from fmu_observer.slip.indicator import FILTERED_SLIP, SLIP_OUTPUTS, SLIP_PARAMETERS, indicator_level, slip_filter_derivative
-from fmu_observer.slip.ratio import odometer_slip
+from fmu_observer.detection.slip_indicator import (
+    FILTERED_SLIP,
+    SLIP_OUTPUTS,
+    SLIP_PARAMETERS,
+    indicator_level,
+    slip_filter_derivative,
+)
+from fmu_observer.detection.slip_ratio import odometer_slip
 from plant_models.hybrid import (
     HybridSystem,
     PeriodicEvent,

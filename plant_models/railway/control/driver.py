@@ -12,7 +12,7 @@ import numpy as np
 
 from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
 from plant_models.hybrid.system import Array
-from plant_models.railway.table import piecewise_linear
+from plant_models.railway.track.table import piecewise_linear
 
 PROFILE_POINTS = 8
 _KMH_50 = 50.0 / 3.6

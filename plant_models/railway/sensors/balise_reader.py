@@ -21,8 +21,8 @@ from plant_models.hybrid import (
     vector,
 )
 from plant_models.hybrid.system import Array
-from plant_models.railway.balise_layout import BaliseLayout, Positions, Spacing
-from plant_models.railway.hermite_cubic import HermiteCubic
+from plant_models.railway.sensors.hermite_cubic import HermiteCubic
+from plant_models.railway.track.balise_layout import BaliseLayout, Positions, Spacing
 
 LayoutShape = Literal["spacing", "positions"]
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.slip.ratio import odometer_slip
+from fmu_observer.detection.slip_ratio import odometer_slip
 from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
 from plant_models.hybrid.system import Array
 

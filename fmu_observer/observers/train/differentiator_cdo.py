@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from fmu_observer.observers.differentiator import filtering_differentiator_flow
-from fmu_observer.observers.high_gain_observer import HighGainTrainObserver
+from fmu_observer.observers.continuous.differentiator import filtering_differentiator_flow
+from fmu_observer.observers.train.high_gain_observer import HighGainTrainObserver
 from plant_models.hybrid import parameter, state
 from plant_models.hybrid.system import Array
 

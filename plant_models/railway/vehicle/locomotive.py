@@ -13,8 +13,8 @@ import numpy as np
 from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
 from plant_models.hybrid.system import Array
 from plant_models.railway.adhesion import ADHESION_LAWS
-from plant_models.railway.resistance import GRAVITY, gradient_resistance, moving_resistance
-from plant_models.railway.track import GradientShape, Track, ZoneAxis
+from plant_models.railway.track.track import GradientShape, Track, ZoneAxis
+from plant_models.railway.vehicle.resistance import GRAVITY, gradient_resistance, moving_resistance
 
 _CHAPTER_3 = {"davis_b": 32.0, "davis_c": 1.7}
 _TABLE_4_1 = {"mass": 166e3, "davis_b": 32.4, "davis_c": 1.6529}

@@ -1,0 +1,1 @@
+"""Observers whose measurements are there at all times."""
