@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from fmu_observer import detection
-from fmu_observer.observers import train
+from fmu_observer.observers import continuous, discrete, sampled, train
 from plant_models.hybrid import HybridSystem
 
-OBSERVERS: dict[str, type[HybridSystem]] = {system.name: system for system in (*train.SYSTEMS, *detection.SYSTEMS)}
+ROOMS = (train, sampled, continuous, discrete, detection)
+
+OBSERVERS: dict[str, type[HybridSystem]] = {system.name: system for room in ROOMS for system in room.SYSTEMS}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
 from inspect import Parameter, signature
+from sys import modules
 from typing import Any
 
 from fmu_observer import OBSERVERS
@@ -68,6 +69,37 @@ def recipe_options(name: str) -> dict[str, Any]:
         if p.kind in {Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY}
     }
     return dict.fromkeys(cls.option_choices) | named
+
+
+def by_room(registry: Mapping[str, type[HybridSystem]]) -> dict[str, list[str]]:
+    """Names of a registry, grouped by the room of the house a system lives in.
+
+    Args:
+        registry: class by model name.
+
+    Returns:
+        Names by the first line of the room's description; what the user registered comes last.
+    """
+    rooms: dict[str, list[str]] = {}
+    own: list[str] = []
+    for name, cls in registry.items():
+        room = modules.get(cls.__module__.rpartition(".")[0])
+        shipped = room is not None and cls in getattr(room, "SYSTEMS", ())
+        words = (room.__doc__ or room.__name__).splitlines()[0].rstrip(".") if room is not None else ""
+        (rooms.setdefault(words, []) if shipped else own).append(name)
+    return rooms | ({"Registered here": own} if own else {})
+
+
+def recipe_presets(name: str) -> tuple[list[str], str | None]:
+    """Presets of a model with its default options, and the default preset.
+
+    Args:
+        name: model name, one of `RECIPES`.
+    """
+    cls = RECIPES[name]
+    required = (p.default is Parameter.empty and p.kind is not Parameter.VAR_KEYWORD for p in signature(cls).parameters.values())
+    made = cls if any(required) else cls()  # presets may depend on the options
+    return list(made.presets), made.default_preset
 
 
 def _nearest(name: str, known: Mapping[str, Any]) -> str:

@@ -109,8 +109,15 @@ class InstantLayout:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_sorted", self.instants.tolist())
-        if np.any(np.diff(self.instants) <= 0.0) or np.any(~np.isfinite(self.instants)):
-            raise ScenarioError("Balise instants must be finite and increasing.")
+        if np.any(~np.isfinite(self.instants)):
+            raise ScenarioError("Balise instants must be finite and increasing; one is not finite.")
+        late = np.flatnonzero(np.diff(self.instants) <= 0.0)
+        if late.size:
+            i = int(late[0])
+            raise ScenarioError(
+                f"Balise instants must be finite and increasing: number {i + 2} at {self.instants[i + 1]:g} s follows number "
+                f"{i + 1} at {self.instants[i]:g} s."
+            )
 
     def within(self, t: float, until: float) -> list[float]:
         """Instants in ``(t, until]`` [s]."""

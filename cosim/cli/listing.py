@@ -34,14 +34,41 @@ def execute(options: argparse.Namespace) -> int:
     for kind, entries in data.items():
         print(f"{kind}:")
         width = max(map(len, entries), default=0)
-        for name, entry in entries.items():
-            print(f"  {name:<{width}}  {entry['description']}")
-            extras = [f"[{entry['source']}]"] if entry["source"] else []
-            extras += [f"presets: {', '.join(entry['presets'])}"] if entry.get("presets") else []
-            extras += [f"options: {', '.join(entry['options'])}"] if entry.get("options") else []
-            if extras:
-                print(f"  {'':<{width}}  {'; '.join(extras)}")
+        for room, names in _rooms(kind, entries).items():
+            if room:
+                print(f"\n  # {room}")
+            for name in names:
+                print(f"  {name:<{width}}  {entries[name]['description']}")
+                for line in _details(kind, name, entries[name]):
+                    print(f"  {'':<{width}}  {line}")
+        print()
     return 0
+
+
+def _rooms(kind: str, entries: Mapping[str, Any]) -> dict[str, list[str]]:
+    """Names by the room they live in; scenarios live in none."""
+    if kind == "scenarios":
+        return {"": list(entries)}
+    from fmus.recipes import RECIPES, by_room  # noqa: PLC0415 - CasADi is loaded only by those who list
+
+    return by_room({name: RECIPES[name] for name in entries})
+
+
+def _details(kind: str, name: str, entry: Mapping[str, Any]) -> list[str]:
+    """Source, presets and options of an entry, a line each."""
+    lines = [f"[{entry['source']}]"] if entry["source"] else []
+    if kind == "scenarios":
+        return lines
+    from fmus.cli.build import legal  # noqa: PLC0415
+    from fmus.recipes import RECIPES  # noqa: PLC0415
+
+    choices = RECIPES[name].option_choices
+    if entry["presets"]:
+        lines.append(f"presets: {', '.join(entry['presets'])}")
+    if entry["options"]:
+        words = {option: legal(choices[option]).removeprefix(", ").removeprefix("one of ") for option in entry["options"]}
+        lines.append("options: " + ", ".join(f"{option} ({values})" if values else option for option, values in words.items()))
+    return lines
 
 
 def _what(text: str) -> str:
@@ -77,11 +104,13 @@ def catalogue() -> dict[str, dict[str, dict[str, Any]]]:
 
 
 def _systems(registry: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    from fmus.recipes import recipe_presets  # noqa: PLC0415
+
     return {
         name: {
             "description": " ".join(system.description.split()),
             "source": system.source,
-            "presets": list(system.presets),
+            "presets": recipe_presets(name)[0],
             "options": list(system.option_choices),
         }
         for name, system in registry.items()

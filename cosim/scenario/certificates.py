@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from cosim.balises.layout import InstantLayout, Layout
 from cosim.errors import CertificateError
 from cosim.scenario.models import make_system
 from cosim.scenario.schema import BalisesTable, ComponentTable
+from fmu_observer.observers.parameter_values import parameter_values
 
 
 @dataclass(frozen=True)
@@ -21,14 +23,19 @@ class ExpectedGap:
     Args:
         seconds: [s], or None where it cannot be known before the run.
         reason: where the number comes from.
+        distance: longest way to a balise, from another one or from the start of the track [m]; None where time decides.
+        spacings: shortest and longest way between two balises [m]; None where time decides, or there is but one.
     """
 
     seconds: float | None
     reason: str
+    distance: float | None = None
+    spacings: tuple[float, float] | None = None
 
 
 NO_BALISES = ExpectedGap(None, "no balise instant lies within the run")
 
+ROUNDING = 1e-9  # relative, of distances between positions
 ASKED_FOR_LIMITS_ONLY = 0.5
 """A gap to ask for [s] where only the limits of a certificate are of interest; they do not depend on it."""
 
@@ -43,11 +50,14 @@ def expected_gap(layout: Layout, table: BalisesTable, start: float) -> ExpectedG
     if isinstance(layout, InstantLayout):
         gaps = np.diff([start, *layout.instants[layout.instants > start]])
         return ExpectedGap(float(gaps.max()), "longest gap between the balise instants") if len(gaps) else NO_BALISES
+    between = np.diff(layout.positions)
+    spacings = (float(between.min()), float(between.max())) if len(between) else None
+    distance = float(np.diff([min(table.track_start, layout.positions[0]), *layout.positions]).max())
     if table.expected_speed is None:
-        return ExpectedGap(None, "balises are laid by position; give balises.expected_speed to check")
-    spacing = float(np.diff([min(table.track_start, layout.positions[0]), *layout.positions]).max())
-    reason = f"up to {spacing:g} m between balises or to the first one, at the expected {table.expected_speed:g} m/s"
-    return ExpectedGap(spacing / table.expected_speed, reason)
+        reason = "balises are laid by position; give balises.expected_speed to check"
+        return ExpectedGap(None, reason, distance, spacings)
+    reason = f"up to {distance:g} m between balises or to the first one, at the expected {table.expected_speed:g} m/s"
+    return ExpectedGap(distance / table.expected_speed, reason, distance, spacings)
 
 
 def check_certificates(
@@ -69,35 +79,57 @@ def check_certificates(
     if mode == "ignore":
         return certificates, warnings
     for name, table in components.items():
-        certify = getattr(make_system(table, where), "certify", None)
-        if certify is None:
+        system = make_system(table, where)
+        if not hasattr(system, "certify"):
             warnings.append(
                 f"{name}: not checked against the balise gaps; an FMU or a model without certificate cannot tell its limit."
             )
             continue
-        certificates[name], doubt = _judge(name, table, certify, gap)
-        warnings += doubt
+        certificates[name], doubt = _judge(name, table, system, gap)
+        warnings += [*doubt, *_other_spacing(name, table, system, gap)]
     if mode == "require" and warnings:
         raise CertificateError(f"{where}: certificates = 'require' and not all hold.\n" + "\n".join(warnings))
     return certificates, warnings
 
 
-def _judge(name: str, table: ComponentTable, certify: Callable[..., Any], gap: ExpectedGap) -> tuple[dict[str, Any], list[str]]:
-    """Certificate of one observer as plain data, and what speaks against it."""
+def _judge(name: str, table: ComponentTable, system: Any, gap: ExpectedGap) -> tuple[dict[str, Any], list[str]]:
+    """Certificate of one observer as plain data, and what speaks against it, with what would be certified instead."""
     asked = ASKED_FOR_LIMITS_ONLY if gap.seconds is None else gap.seconds
-    certificate = certify(asked, parameters=_numbers(table), preset=table.preset)
+    in_use = {"parameters": given_parameters(table), "preset": table.preset}
+    certificate = system.certify(asked, **in_use)
     data: dict[str, Any] = certificate.to_dict() | {"explanation": certificate.explain()}
     if gap.seconds is None:
         known = f"its gains are certified up to {certificate.aperiodic_limit:.3g} s"
+        if gap.distance is not None and 0.0 < certificate.aperiodic_limit < inf:
+            known += f", enough for {gap.distance:g} m from {gap.distance / certificate.aperiodic_limit:.3g} m/s on"
         doubt = f"{name}: balise gaps cannot be known before this run ({gap.reason}); {known}."
         unknown = dict.fromkeys(("max_gap", "spectral_radius", "quadratic_margin", "holds"))
         return data | unknown | {"explanation": doubt}, [doubt]
     if certificate.holds:
         return data, []
-    return data, [f"{certificate.explain()} Expected: {gap.seconds:.3g} s ({gap.reason})."]
+    advice = system.advise(gap.seconds, **in_use) if hasattr(system, "advise") else None
+    instead = f" Instead: {advice}." if advice else ""
+    return data, [f"{certificate.explain()} Expected: {gap.seconds:.3g} s ({gap.reason}).{instead}"]
 
 
-def _numbers(table: ComponentTable) -> dict[str, Any]:
+def _other_spacing(name: str, table: ComponentTable, system: Any, gap: ExpectedGap) -> list[str]:
+    """A doubt where an observer expects balises at another spacing than the layout's, and does not learn it."""
+    if gap.spacings is None or "expected_spacing" not in {s.name for s in system.parameter_signals}:
+        return []
+    values = system.unpack_parameters(parameter_values(system, given_parameters(table), table.preset))
+    expected, error = float(values.expected_spacing), float(values.assumed_spacing_error)
+    shortest, longest = gap.spacings
+    within = expected * (1.0 - error) <= shortest * (1.0 + ROUNDING) and longest <= expected * (1.0 + error) * (1.0 + ROUNDING)
+    if within or system.options.get("spacing") == "learnt":
+        return []
+    return [
+        f"{name}: expects balises every {expected:g} m within {100.0 * error:g} %, but the layout has them {shortest:g} to "
+        f"{longest:g} m apart; set expected_spacing and assumed_spacing_error, or let it learn the spacing."
+    ]
+
+
+def given_parameters(table: ComponentTable) -> dict[str, Any]:
+    """What the table of a component says of the parameters of its system, by name."""
     system = make_system(table, "")
     assert system is not None
     known = {n for s in system.parameter_signals for n in (s.name, *s.scalar_names)}

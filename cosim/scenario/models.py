@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -41,8 +41,7 @@ def make_system(table: ComponentTable, where: str) -> HybridSystem | None:
         kind = "model" if table.model is not None else "observer"
         raise ScenarioError(f"{where}: unknown {kind} {name!r}; {nearest(name, registry)}")
     factory = registry[name]
-    _check_options(factory, table.options, where)
-    system = factory(**table.options)
+    system = factory(**_chosen_options(factory, table.options, where))
     if table.preset is not None and table.preset not in system.presets:
         raise ScenarioError(f"{where}: {name} has no preset {table.preset!r}; {nearest(table.preset, system.presets)}")
     return system
@@ -113,12 +112,19 @@ def native_fmu(system: HybridSystem, version: Any, preset: str | None, where: st
         raise cannot_build(where, system, error) from error
 
 
-def _check_options(factory: type[HybridSystem], options: Mapping[str, Any], where: str) -> None:
+def _chosen_options(factory: type[HybridSystem], options: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """The options as the system names them: a whole number may be written 2.0, but truth values and numbers are not the same."""
+    chosen: dict[str, Any] = {}
     for key, value in options.items():
         if key not in factory.option_choices:
             raise ScenarioError(f"{where}: {factory.name} has no option {key!r}; {nearest(key, factory.option_choices)}")
         choices = factory.option_choices[key]
-        if choices and value not in choices:
-            raise ScenarioError(
-                f"{where}: option {key} = {value!r} of {factory.name}; choose from {', '.join(map(repr, choices))}."
-            )
+        same = [choice for choice in choices if choice == value and isinstance(choice, bool) == isinstance(value, bool)]
+        if choices and not same:
+            raise ScenarioError(f"{where}: option {key} = {value!r} of {factory.name}; choose {_legal(choices)}.")
+        chosen[key] = same[0] if same else value
+    return chosen
+
+
+def _legal(choices: Sequence[Any]) -> str:
+    return f"{choices[0]} to {choices[-1]}" if isinstance(choices, range) else f"from {', '.join(map(repr, choices))}"

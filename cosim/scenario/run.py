@@ -39,6 +39,7 @@ from cosim.scenario.layouts import make_layout
 from cosim.scenario.master import idle_settings, make_master, slow_last
 from cosim.scenario.models import component_factories, protocol_parameters
 from cosim.scenario.outcome import Outcome
+from cosim.scenario.premises import premise_findings
 from cosim.scenario.roles import ROLES, check_roles
 from cosim.scenario.schema import ScenarioTable, step_count
 from cosim.scenario.starts import start_values
@@ -99,6 +100,7 @@ class _Setup:
         self.certificates: dict[str, dict[str, Any]] = {}
         self.factories: dict[str, Callable[[], Component]] = {}
         self.components: dict[str, Component] = {}
+        self.connections: list[Connection] = []
         self.plan: Plan | None = None
         self.choice: Choice | None = None
         self.algorithm = AlgorithmChoice()
@@ -125,7 +127,7 @@ class _Setup:
             self.components[name].configure(table.components[name].parameters)
             self._warn_of_tool(self.components[name])
         clocks, pairs = connect_clocks(pairs, self.components)
-        connections = connect(pairs, self.components)
+        connections = self.connections = connect(pairs, self.components)
         receivers, plant = self._balise_roles()
         check_roles(table, self.components, self.where)
         groups = execution_groups(slow_last(self.components, table), connections, self._before(plant, receivers))
@@ -164,14 +166,15 @@ class _Setup:
             failure = "The run was interrupted; what was computed so far is kept."
         if master.ended_early is not None:
             self._warn(master.ended_early)
-        for warning in master.control.warnings():
+        premises, left = premise_findings(master.recorder.table(), self.table.components, self.connections)
+        for warning in (*master.control.warnings(), *left):
             self._warn(warning)
         summary = run_summary(name, self.table, self.plan, master, self.setup_seconds)
         events = [] if self.service is None else self._all_telegrams(self.service)
         self._warn_of_rejections()
         self._warn_of_logs()
         summary |= self._balise_summary([e.stamp for e in events if e.kind == "true"])
-        summary |= {"certificates": self.certificates, "warnings": self.warnings, "notes": self.notes}
+        summary |= {"certificates": self.certificates, "premises": premises} | {"warnings": self.warnings, "notes": self.notes}
         table, signals = in_si(master.recorder.table(), self.plan.signals, self._unit)
         messages = in_order(component.messages for component in self.components.values())
         result = Result(table, signals, events, summary, failure, messages)

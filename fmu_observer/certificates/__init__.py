@@ -2,13 +2,19 @@
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error
 from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.gap_error import GapError, first_unstable_gap
+from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.quadratic import QuadraticForm, common_quadratic_form, decrease
+from fmu_observer.certificates.riccati_error import RiccatiError
 from fmu_observer.certificates.sample_products import TwoRateError, certify_two_rate_error
-from fmu_observer.certificates.sampled_error import SampledError, first_unstable_gap
+from fmu_observer.certificates.sampled_error import SampledError
 
 __all__ = [
     "Certificate",
+    "GapError",
+    "ImpulsiveError",
     "QuadraticForm",
+    "RiccatiError",
     "SampledError",
     "TwoRateError",
     "certify_sampled_error",

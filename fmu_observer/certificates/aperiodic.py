@@ -1,6 +1,6 @@
 """Certificates of continuous-discrete observers: every mixture of gaps up to a limit, by one Lyapunov function.
 
-It uses the exact transitions of `sampled_error` and the candidates of `quadratic`, and believes only what it recomputes.
+It uses the exact transitions of `gap_error` and the candidates of `quadratic`, and believes only what it recomputes.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from math import inf
 import numpy as np
 
 from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.gap_error import GapError, first_unstable_gap
 from fmu_observer.certificates.quadratic import (
     Condition,
     common_quadratic_form,
@@ -20,13 +21,13 @@ from fmu_observer.certificates.quadratic import (
     inequalities,
     transition_condition,
 )
-from fmu_observer.certificates.sampled_error import SampledError, first_unstable_gap
 
 MARGIN = 1e-6  # smallest recomputed decrease, in scaled coordinates, that counts: a thousand times the rounding of the check
 SHORTEST_HORIZON = 20.0  # [s]
 COARSE, FINE = 12, 2400  # gaps a vertex for finding the Lyapunov matrix, and for checking it
 CUTS = 4
 SMALLEST_LIMIT = 1e-4  # of the constant limit: below it the aperiodic limit counts as zero
+LARGEST_GROWTH = 1e60  # an error that grows more over a gap is beyond what a quadratic form in floating point can judge
 LIMIT_TOLERANCE = 2e-4  # relative width of the last bisection interval
 
 
@@ -38,7 +39,7 @@ class _Decrease:
     P: np.ndarray | None
 
 
-def certify_sampled_error(vertices: tuple[SampledError, ...], max_gap: float, error_model: str) -> Certificate:
+def certify_sampled_error(vertices: tuple[GapError, ...], max_gap: float, error_model: str) -> Certificate:
     """Certificate of an observer whose error is, at any time, that of one of the vertices.
 
     Args:
@@ -48,7 +49,12 @@ def certify_sampled_error(vertices: tuple[SampledError, ...], max_gap: float, er
 
     Returns:
         The certificate, without observer and preset.
+
+    Raises:
+        ValueError: the vertices are errors of different components.
     """
+    if not all(vertices[0].comparable(vertex) for vertex in vertices):
+        raise ValueError("Certificate: the vertices must be errors of the same components, reset in the same way; they are not.")
     horizon = max(SHORTEST_HORIZON, 4.0 * max_gap)
     constant_limit = first_unstable_gap(vertices, horizon)
     found = _common_decrease(vertices, max_gap)
@@ -68,7 +74,7 @@ def certify_sampled_error(vertices: tuple[SampledError, ...], max_gap: float, er
 
 
 @lru_cache(maxsize=256)
-def aperiodic_limit(vertices: tuple[SampledError, ...], horizon: float) -> float:
+def aperiodic_limit(vertices: tuple[GapError, ...], horizon: float) -> float:
     """Longest gap [s] up to which one quadratic Lyapunov function covers all gaps; inf if it covers the horizon.
 
     By bisection: a function that covers a set of gaps covers every smaller one.
@@ -84,13 +90,16 @@ def aperiodic_limit(vertices: tuple[SampledError, ...], horizon: float) -> float
 
 
 @lru_cache(maxsize=256)
-def _common_decrease(vertices: tuple[SampledError, ...], longest: float) -> _Decrease:
+def _common_decrease(vertices: tuple[GapError, ...], longest: float) -> _Decrease:
     """Seek one P for all vertices and all gaps in (0, longest] on a coarse grid, and recompute on a fine one.
 
     Where the fine grid finds a gap that the candidate does not cover, that gap joins the coarse grid.
     """
     scale = _scaling(vertices)
-    fine = [_conditions(vertex, longest, FINE, scale) for vertex in vertices]
+    with np.errstate(over="ignore", invalid="ignore"):
+        fine = [_conditions(vertex, longest, FINE, scale) for vertex in vertices]
+    if not all(np.abs(condition.N).max() < LARGEST_GROWTH for condition in fine):  # NaN included
+        return _Decrease(-inf, None)
     sought = _pick(fine, range(0, FINE + 1, FINE // COARSE))
     best = _Decrease(-inf, None)
     for _ in range(CUTS):
@@ -108,16 +117,18 @@ def _common_decrease(vertices: tuple[SampledError, ...], longest: float) -> _Dec
     return best
 
 
-def _conditions(vertex: SampledError, longest: float, count: int, scale: np.ndarray) -> Condition:
+def _conditions(vertex: GapError, longest: float, count: int, scale: np.ndarray) -> Condition:
     """``(Phi' P Phi - P) / (rate gap) < 0`` at gaps from 0 to `longest`, in scaled coordinates.
 
-    At gap 0 the quotient is the derivative: the condition of the flow for infinitely frequent balises.
+    At gap 0 the quotient is the derivative: the condition of the flow for infinitely frequent samples.
     """
-    rate = _rate(vertex)
-    gaps, matrices = vertex.transitions(longest, count)
     scaling = scale[None, :] / scale[:, None]
-    start = flow_condition(vertex.continuous_limit * scaling / rate)
-    return start.joined(transition_condition(matrices * scaling, rate * gaps))
+    limit = vertex.continuous_limit
+    if limit is None:  # the resets alone contract: nothing to divide by the gap, and no gap shorter than the first of the grid
+        return transition_condition(vertex.transitions(longest, count + 1)[1] * scaling)
+    gaps, matrices = vertex.transitions(longest, count)
+    start = flow_condition(limit * scaling / vertex.rate)
+    return start.joined(transition_condition(matrices * scaling, vertex.rate * gaps))
 
 
 def _largest_between(values: np.ndarray) -> float:
@@ -135,12 +146,6 @@ def _pick(conditions: list[Condition], indices: Sequence[int]) -> Condition:
     return reduce(Condition.joined, parts)
 
 
-def _rate(vertex: SampledError) -> float:
-    """Natural rate of the closed error equations [1/s]."""
-    return max(float(np.abs(np.linalg.eigvals(vertex.continuous_limit)).max()), 1e-9)
-
-
-def _scaling(vertices: tuple[SampledError, ...]) -> np.ndarray:
-    """Size of the error components relative to the first: the j-th derivative is of the size rate^j."""
-    rate = max(_rate(vertex) for vertex in vertices)
-    return np.asarray(rate ** np.arange(vertices[0].size))
+def _scaling(vertices: tuple[GapError, ...]) -> np.ndarray:
+    """Size of the error components relative to the first, at the fastest rate of the vertices."""
+    return vertices[0].units(max(vertex.rate for vertex in vertices))

@@ -25,6 +25,7 @@ class Certificate:
         error_model: the error equations used, and what they leave out.
         observer: model name. preset: preset started from. parameters: the values that decide stability.
         notes: further conditions checked.
+        event: what the gaps lie between, for the words.
         lyapunov_matrix: P of the Lyapunov function ``e' P e`` at `max_gap`, rows of shape (n, n); empty when there is none.
     """
 
@@ -40,6 +41,7 @@ class Certificate:
     preset: str = ""
     parameters: tuple[tuple[str, float], ...] = ()
     notes: tuple[str, ...] = ()
+    event: str = "balise"
     lyapunov_matrix: tuple[tuple[float, ...], ...] = ()
 
     def explain(self) -> str:
@@ -61,16 +63,16 @@ class Certificate:
     def _verdict(self) -> str:
         gap = f"{self.max_gap:.4g} s"
         if self.holds:
-            return f"stable for every sequence of balise gaps up to {gap} (limit {self._limit(self.aperiodic_limit)})"
+            return f"stable for every sequence of {self.event} gaps up to {gap} (limit {self._limit(self.aperiodic_limit)})"
         if self.spectral_radius >= 1.0:
             return (
-                f"UNSTABLE at a constant balise gap of {gap}: the error grows {self.spectral_radius:.4g} times from balise to "
-                f"balise; constant gaps are stable below: {self._limit(self.constant_limit)}; mixed gaps are certified up to: "
-                f"{self._limit(self.aperiodic_limit)}"
+                f"UNSTABLE at a constant {self.event} gap of {gap}: the error grows {self.spectral_radius:.4g} times from "
+                f"{self.event} to {self.event}; constant gaps are stable below: {self._limit(self.constant_limit)}; "
+                f"mixed gaps are certified up to: {self._limit(self.aperiodic_limit)}"
             )
         return (
-            f"NOT CERTIFIED for mixed balise gaps up to {gap}: that constant gap is stable, but sequences of different gaps are "
-            f"certified only up to: {self._limit(self.aperiodic_limit)}"
+            f"NOT CERTIFIED for mixed {self.event} gaps up to {gap}: that constant gap is stable, but sequences of different "
+            f"gaps are certified only up to: {self._limit(self.aperiodic_limit)}"
         )
 
     def _limit(self, limit: float) -> str:

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
+from fmu_observer.design.discretisation import process_covariance
+
 
 @dataclass(frozen=True)
 class UioCovariances:
@@ -89,16 +91,6 @@ def uio_gains(covariances: UioCovariances, drag_slope: float) -> tuple[np.ndarra
 def _channel_gain(A: np.ndarray, density: float, variance: float, interval: float) -> np.ndarray:
     """Filter gain ``P C' / (C P C' + R)`` of a chain of three, white noise into its last state, first state measured."""
     C = np.array([[1.0, 0.0, 0.0]])
-    transition, process = _van_loan(A, np.diag([0.0, 0.0, density]), interval)
+    transition, process = expm(A * interval), process_covariance(A, np.diag([0.0, 0.0, density]), interval)
     P = solve_discrete_are(transition.T, C.T, process, np.array([[variance]]))
     return np.asarray((P @ C.T)[:, 0] / (C @ P @ C.T + variance)[0, 0])
-
-
-def _van_loan(A: np.ndarray, density: np.ndarray, interval: float) -> tuple[np.ndarray, np.ndarray]:
-    """Transition matrix and covariance of the integrated white noise over an interval (Van Loan, IEEE TAC 23 (1978) 395)."""
-    n = len(A)
-    block = np.zeros((2 * n, 2 * n))
-    block[:n, :n], block[:n, n:], block[n:, n:] = -A, density, A.T
-    exponential = expm(block * interval)
-    transition = exponential[n:, n:].T
-    return transition, transition @ exponential[:n, n:]

@@ -10,6 +10,7 @@ import numpy as np
 from fmus.check.steppable import FAILURES, Steppable
 
 WARM_UP_STEPS = 5
+SLOW_STEPS = 25  # a quarter of a second at the usual step: what is sampled at 10 Hz moves in it
 EXCITATIONS = (0.0, 1.0, 1e3, 1e5)
 SPREADS = (0.0, 0.1)
 END = 1e6
@@ -60,27 +61,36 @@ class Bench:
         """Names of the outputs that are read."""
         return self.component.names("output")
 
+    @property
+    def discrete(self) -> np.ndarray:
+        """Whether each output is declared discrete, shape (q,)."""
+        return np.array([self.component.variables[n].variability == "discrete" for n in self.output_names], dtype=bool)
+
     def excite(self) -> bool:
         """Find inputs under which the outputs move; an amplitude that breaks the FMU is none.
 
         First the same value for all inputs, then a different one for each (a difference of inputs is zero under equal ones), then
-        a change of the inputs (what has no memory moves with them only).
+        a change of the inputs (what has no memory moves with them only), then more steps (a sensor may be sampled slowly).
         """
         if self.excited is None:
             tries = [(amplitude, spread) for spread in SPREADS for amplitude in EXCITATIONS]
-            self.excited = any(self._moves(*one) for one in tries) or any(self._moves(*one, change=True) for one in tries)
+            self.excited = any(
+                self._moves(*one, change=change, steps=steps)
+                for change, steps in ((False, WARM_UP_STEPS), (True, WARM_UP_STEPS), (False, SLOW_STEPS))
+                for one in tries
+            )
             if not self.excited:
                 self.amplitude = self.spread = 0.0
         return self.excited
 
-    def _moves(self, amplitude: float, spread: float, *, change: bool = False) -> bool:
+    def _moves(self, amplitude: float, spread: float, *, change: bool, steps: int) -> bool:
         self.amplitude, self.spread = amplitude, spread
         try:
             before = self.begin()
             if change:
                 before = self.steps((self.h,))[-1]
                 self.set_inputs(elsewhere(amplitude))
-            after = self.steps((self.h,) * WARM_UP_STEPS)[-1]
+            after = self.steps((self.h,) * steps)[-1]
         except FAILURES:
             return False
         moving = np.count_nonzero(~np.isclose(before, after, rtol=1e-12, atol=0.0) & np.isfinite(after))

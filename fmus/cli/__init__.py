@@ -64,16 +64,30 @@ def _parser() -> argparse.ArgumentParser:
 
 def _list(_options: argparse.Namespace) -> int:
     recipes = import_module("fmus.recipes")
-    for name, cls in recipes.RECIPES.items():
-        print(f"{name:24} {_first_line(cls.description)}")
-        if cls.presets:
-            print(
-                f"{'':24}   presets: {', '.join(cls.presets)}"
-                + (f" (default {cls.default_preset})" if cls.default_preset else "")
-            )
-        for option, default in recipes.recipe_options(name).items():
-            print(f"{'':24}   option {option} = {default}{build_cli.legal(cls.option_choices.get(option))}")
+    width = max(map(len, recipes.RECIPES))
+    for room, names in recipes.by_room(recipes.RECIPES).items():
+        print(f"# {room}")
+        for name in names:
+            print(f"{name:<{width}} {_first_line(recipes.RECIPES[name].description)}")
+            for line in _choices(name):
+                print(f"{'':{width}}   {line}")
+        print()
     return OK
+
+
+def _choices(name: str) -> list[str]:
+    """Presets and options of a model in words; an option that no word can set is left out."""
+    recipes = import_module("fmus.recipes")
+    cls, lines = recipes.RECIPES[name], []
+    presets, chosen = recipes.recipe_presets(name)
+    if presets:
+        default = f" (default {chosen})" if chosen else ""
+        lines.append(f"presets: {', '.join(presets)}{default}")
+    for option, value in recipes.recipe_options(name).items():
+        legal = build_cli.legal(cls.option_choices.get(option))
+        if legal or value is not None:
+            lines.append(f"option {option} = {value}{legal}")
+    return lines
 
 
 def _first_line(text: str) -> str:

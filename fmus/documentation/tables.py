@@ -15,7 +15,7 @@ from plant_models.hybrid import HybridSystem
 
 UNITS_OF_TYPES = {"Clock": "clock", "Integer": "whole number", "Int32": "whole number", "Enumeration": "choice"}
 
-_known: WeakKeyDictionary[HybridSystem, tuple[tuple[str, tuple[str, str], str], ...]] = WeakKeyDictionary()
+_known: WeakKeyDictionary[HybridSystem, tuple[tuple[str, tuple[str, str], str, str], ...]] = WeakKeyDictionary()
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -99,24 +99,25 @@ def certificate_section(system: HybridSystem) -> str:
     if system not in _known:  # it takes up to half a second; FMI 2 and FMI 3 say the same
         _known[system] = _certificates(system)
     found = _known[system]
-    rows = [[f"<code>{escape(name)}</code>", *limits] for name, limits, _ in found]
-    head = ["preset", "mixed balise gaps certified up to", "constant gap unstable from"]
-    texts = "".join(f"<p>{inline(text)}</p>" for text in dict.fromkeys(text for *_, text in found))
+    rows = [[f"<code>{escape(name)}</code>", *limits] for name, limits, *_ in found]
+    event = next((event for *_, event in found if event), "sample")
+    head = ["preset", f"mixed {event} gaps certified up to", "constant gap unstable from"]
+    texts = "".join(f"<p>{inline(text)}</p>" for text in dict.fromkeys(text for _, _, text, _ in found))
     return table(head, rows) + texts
 
 
-def _certificates(system: HybridSystem) -> tuple[tuple[str, tuple[str, str], str], ...]:
-    """Preset, its two limits and what was checked."""
+def _certificates(system: HybridSystem) -> tuple[tuple[str, tuple[str, str], str, str], ...]:
+    """Preset, its two limits, what was checked, and the event that gaps lie between."""
     found = []
     for preset in (*system.presets,) or (None,):
         try:
             certificate = system.certify(0.1, preset=preset)  # type: ignore[attr-defined] # the limits do not depend on the gap asked for
             limits = (_limit(certificate.aperiodic_limit, certificate), _limit(certificate.constant_limit, certificate))
             notes = f" Also checked: {'; '.join(certificate.notes)}." if certificate.notes else ""
-            text = f"Checked on the {certificate.error_model}.{notes}"
+            text, event = f"Checked on the {certificate.error_model}.{notes}", certificate.event
         except Exception as error:  # a user's own check may fail in any way; the FMU is none the worse
-            limits, text = ("unknown", "unknown"), f"The check failed: {error}"
-        found.append((preset or "declared starts", limits, text))
+            limits, text, event = ("unknown", "unknown"), f"The check failed: {error}", ""
+        found.append((preset or "declared starts", limits, text, event))
     return tuple(found)
 
 

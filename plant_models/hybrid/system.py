@@ -19,7 +19,7 @@ from plant_models.hybrid.resource import Resource
 from plant_models.hybrid.signal import Signal, parameter, scalar_names, width
 
 Array = Any  # a NumPy array, or a symbolic array with NumPy's shapes and broadcasting
-Method = Literal["rk4", "rosenbrock"]
+Method = Literal["rk4", "rosenbrock", "euler"]
 
 RESERVED_NAMES = frozenset({"time", "internal_step", "seed", "late_policy", "replay_horizon"})
 
@@ -56,7 +56,9 @@ class HybridSystem:
        smaller than the friction.
     6. Numbers that shape the equations themselves (an order, a mode) are constructor arguments, listed in `options`.
     7. A vector parameter that an exported model reads from a file of its own is listed in `resources`.
-    8. A system that cannot be traced says ``traceable = False`` and may then use any Python.
+    8. Where only some states are stiff, `stiff` names all of these and `rosenbrock` treats them alone implicitly. The step
+       keeps its order; with all states that carry a conserved sum among them, momentum say, it stays conserved.
+    9. A system that cannot be traced says ``traceable = False`` and may then use any Python.
     """
 
     name: str = ""
@@ -68,6 +70,7 @@ class HybridSystem:
     parameters: tuple[Signal, ...] = ()
     events: tuple[Event, ...] = ()
     frictions: tuple[str, ...] = ()
+    stiff: tuple[str, ...] = ()
     resources: tuple[Resource, ...] = ()
     presets: Mapping[str, Mapping[str, Any]] = {}
     default_preset: str | None = None
@@ -223,6 +226,13 @@ class HybridSystem:
         names = scalar_names(self.states)
         return [names.index(name) for name in self.frictions]
 
+    def stiff_mask(self) -> np.ndarray | None:
+        """1 for continuous states that `rosenbrock` treats implicitly, else 0, shape (nc,); None where it treats all so."""
+        if not self.stiff:
+            return None
+        continuous = [s for s in self.states if s.variability == "continuous"]
+        return np.array([float(s.name in self.stiff) for s in continuous for _ in range(s.width)])
+
     # -- internals --------------------------------------------------------------------------------------------------
 
     def _starts_under(self, preset: str | None, signals: Sequence[Signal]) -> np.ndarray:
@@ -250,6 +260,9 @@ class HybridSystem:
             raise ValueError(f"{where}: names used twice or reserved: {', '.join(repeated)}.")
         self._check_causalities(where)
         self._check_event_prefixes(where)
+        unknown_stiff = sorted(set(self.stiff) - {s.name for s in self.states if s.variability == "continuous"})
+        if unknown_stiff:
+            raise ValueError(f"{where}: stiff names {unknown_stiff}; expected names of continuous states.")
         variabilities = [s.variability for s in self.states]
         if variabilities != sorted(variabilities):  # "continuous" sorts before "discrete"
             raise ValueError(f"{where}: list continuous states before memory.")

@@ -158,8 +158,9 @@ def test_a_terminated_block_says_how_to_begin_again(version: int) -> None:
 @pytest.mark.parametrize("name", sorted(OBSERVERS))
 @pytest.mark.parametrize("version", [2, 3])
 def test_shipped_observers_run_in_simulate_fmu(name: str, version: int) -> None:
-    block = make_block(OBSERVERS[name](), version)  # type: ignore[arg-type]
-    result = _simulate(block, start_values={"odometer": 14.0})
+    system = OBSERVERS[name]()
+    block = make_block(system, version)  # type: ignore[arg-type]
+    result = _simulate(block, start_values={"odometer": 14.0} if "odometer" in {i.name for i in system.inputs} else {})
     assert len(result) == 21
     assert all(np.isfinite(result[column]).all() for column in result.dtype.names)
 

@@ -1,5 +1,7 @@
 """Certified limits against independently measured numbers and closed forms."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -65,10 +67,26 @@ def test_no_limit_within_the_horizon_is_infinite() -> None:
     assert certificate.holds
 
 
-@pytest.mark.parametrize("theta", [0.0, -1.0])
-def test_no_correction_or_a_wrong_one_has_no_stable_gap(theta: float) -> None:
-    certificate = DifferentiatorCdo().certify(0.5, {"theta": theta})
+@pytest.mark.parametrize("gains", [{"theta": 0.0}, {"high_gain": (-2.0, -1.0)}], ids=["none", "wrong sign"])
+def test_no_correction_or_a_wrong_one_has_no_stable_gap(gains: dict[str, float | tuple[float, float]]) -> None:
+    certificate = DifferentiatorCdo().certify(0.5, gains)
     assert (certificate.constant_limit, certificate.aperiodic_limit, certificate.holds) == (0.0, 0.0, False)
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ({"theta": -1.0}, r"'theta' to certify must be at least 0 1/s, got \[-1.0\]"),
+        ({"mass": 0.0}, r"'mass' to certify must be at least 1 kg"),
+        ({"theta": "eight"}, r"'theta' to certify needs 1 finite number\(s\), got 'eight'"),
+        ({"high_gain": (2.0, float("nan"))}, r"'high_gain' to certify needs 2 finite number\(s\)"),
+        ({"high_gain": (2.0, 1.0, 0.5)}, r"'high_gain' to certify needs 2 finite number\(s\)"),
+    ],
+)
+def test_values_that_cannot_be_are_refused(value: dict[str, Any], message: str) -> None:
+    """A negative mass was once found unstable, a mass of zero divided by."""
+    with pytest.raises(ValueError, match=message):
+        DifferentiatorCdo().certify(0.5, value)
 
 
 def test_transitions_on_a_grid_are_the_single_ones() -> None:

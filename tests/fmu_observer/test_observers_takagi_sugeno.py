@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from observer_bench import SteadyMotion, in_step, random_gaps, started
 
+from fmu_observer.observers.parameter_values import parameter_values
 from fmu_observer.observers.train import TakagiSugenoCdo
 
 
@@ -63,3 +64,14 @@ def test_the_published_decay_works_at_short_gaps() -> None:
 def test_an_unknown_premise_is_refused() -> None:
     with pytest.raises(ValueError, match="unknown premise 'thawed'"):
         TakagiSugenoCdo(premise="thawed")  # type: ignore[arg-type]
+
+
+def test_vertices_at_one_speed_are_one_linear_model() -> None:
+    """At that speed the weight was 0/0."""
+    observer = TakagiSugenoCdo(premise="live")
+    values = parameter_values(observer, {"premise_min": 50.0})
+    u = observer.start_inputs()
+    u[1] = 50.0  # odometer
+    x = observer.start_state()
+    assert np.isfinite(observer.state_derivative(0.0, x, u, values)).all()
+    assert observer.input_signals[1].name == "odometer"

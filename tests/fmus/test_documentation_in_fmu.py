@@ -74,9 +74,11 @@ def test_certificates_are_those_of_the_observer(name: str) -> None:
     rows = {row[0].text_content(): [cell.text_content() for cell in row[1:]] for row in tables.xpath("//tbody/tr")}
     for preset in list(system.presets) or [None]:
         certificate = system.certify(0.2, preset=preset)
-        limits = [f"{limit:.3g} s" for limit in (certificate.aperiodic_limit, certificate.constant_limit)]
+        found = (certificate.aperiodic_limit, certificate.constant_limit)
+        limits = [f"none up to {certificate.horizon:g} s" if limit == float("inf") else f"{limit:.3g} s" for limit in found]
         assert rows[preset or "declared starts"][-2:] == limits
         assert certificate.error_model in tables.text_content()
+        assert f"mixed {certificate.event} gaps certified up to" in tables.text_content()
 
 
 def test_events_are_told_as_the_version_of_fmi_does() -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 import fmpy
 import pytest
 
+import plant_models
 from fmus import RECIPES, UnknownRecipeError, cached_fmu, recipe
 from fmus.cli import main
 
@@ -22,6 +23,17 @@ def test_list_shows_every_model(capsys: Output) -> None:
     shown = capsys.readouterr().out
     assert all(name in shown for name in RECIPES)
     assert "locomotive" in shown
+    rows = shown.splitlines()
+    assert sorted(row.split()[0] for row in rows if row[:1].isalpha()) == sorted(RECIPES)
+    assert rows[0].startswith("# What rolls")
+    assert "gains = None" not in shown  # no word on the command line can set it
+
+
+def test_a_system_of_ones_own_is_listed_last(capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
+    own = type("Own", (RECIPES["odometer"],), {"name": "own_odometer"})
+    monkeypatch.setitem(plant_models.PLANTS, "own_odometer", own)
+    assert main(["list"]) == 0
+    assert capsys.readouterr().out.split("# ")[-1].startswith("Registered here\nown_odometer")
 
 
 @pytest.mark.compiler

@@ -141,3 +141,11 @@ def test_the_traced_derivative_at_zero_slip_is_the_closed_form_slope(name: str, 
 def test_a_peak_needs_a_speed() -> None:
     with pytest.raises(ValueError, match=r"positive speed, got 0\.0 m/s"):
         POLACH_DRY.peak(0.0)
+
+
+@pytest.mark.parametrize(("curve", "kmh"), [(POLACH_DRY, 120.0), (POLACH_WET, 160.0)])
+def test_the_peak_is_the_first_maximum_where_a_spinning_wheel_finds_more(curve: PolachCurve, kmh: float) -> None:
+    slip, peak = curve.peak(kmh / 3.6)
+    assert slip < 0.1
+    assert curve.coefficient(10.0, kmh / 3.6) > peak  # what a search for the largest value would return
+    assert max(curve.coefficient(slip * f, kmh / 3.6) for f in (0.98, 1.02)) < peak

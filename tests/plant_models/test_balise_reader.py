@@ -317,6 +317,17 @@ def test_positions_that_are_set_later_need_no_order() -> None:
     assert places(heard) == [12.0, 40.0, 90.0]
 
 
+@pytest.mark.parametrize("entries", [(10.0, 10.0, 20.0), (10.0, 10.0, 10.0), (20.0, 10.0, 10.0), (10.0, 20.0, 10.0)])
+@pytest.mark.parametrize("step", [0.1, 2.0])
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_entries_at_one_place_are_one_balise(entries: tuple[float, ...], step: float, sense: float) -> None:
+    """Parameters can be set to anything in an FMU; counted twice, such a place announced the next balise before its time."""
+    values = {f"positions[{i + 1}]": sense * p for i, p in enumerate(entries)} | {"positions[4]": 1e30, "positions[5]": 1e30}
+    heard = ride(reader(POSITIONS, **values), accelerated(sense * 5.0, sense * 10.0, 0.0), grid(step, round(6.0 / step)))
+    assert places(heard) == [sense * p for p in sorted(set(entries))]
+    assert stamps(heard) == pytest.approx([(p - 5.0) / 10.0 for p in sorted(set(entries))])
+
+
 @pytest.mark.parametrize("system", [SPACING, POSITIONS], ids=["spacing", "positions"])
 def test_traced_and_numpy_kernels_agree(system: BaliseReader) -> None:
     values = {"positions[1]": 7.0, "positions[2]": 3.0} if system is POSITIONS else {"first_balise": 3.0, "balise_spacing": 4.0}

@@ -77,10 +77,20 @@ def test_friction_never_drives_whatever_the_sign() -> None:
 
 def test_an_unknown_method_and_a_missing_jacobian_are_named() -> None:
     system = Hyperbola()
-    system.method = "euler"  # type: ignore[assignment]
+    system.method = "heun"  # type: ignore[assignment]
     arguments = (system, 0.0, 0.1, system.start_state(), system.start_inputs(), system.start_parameters())
-    with pytest.raises(ValueError, match=r"hyperbola: unknown method 'euler'"):
+    with pytest.raises(ValueError, match=r"hyperbola: unknown method 'heun'"):
         step(*arguments)
     implicit = ImplicitHyperbola()
     with pytest.raises(ValueError, match="needs the Jacobian"):
         step(implicit, 0.0, 0.1, implicit.start_state(), implicit.start_inputs(), implicit.start_parameters())
+
+
+def test_explicit_euler_is_one_evaluation_a_step() -> None:
+    """``dx = -2 t x^2`` at t = 1/2 by hand: 1, then 1 - h, then (1 - h) - h (1 - h)^2."""
+    system = Hyperbola()
+    system.method = "euler"
+    x = np.array([1.0])
+    for expected in (0.9, 0.9 - 0.1 * 0.81):
+        x = step(system, 0.5, 0.1, x, system.start_inputs(), system.start_parameters())
+        np.testing.assert_allclose(x, [expected], rtol=1e-15)

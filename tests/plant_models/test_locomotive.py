@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from railway_runs import ALL_DEGRADED, NO_ZONES, outputs, parameters, rolling, sampled, started
 from scipy.optimize import brentq
@@ -170,8 +170,24 @@ def test_a_standing_train_rolls_away_where_they_cannot(brake: float, more: float
     assert runtime.x[1] == pytest.approx(-more / (MASS + ROTATING), rel=2e-3, abs=0.03 * 0.5 * ROTATING / MASS)
 
 
+@settings(max_examples=20)
+@given(name=st.sampled_from(list(TRAINS)), effort=st.floats(0.0, 900.0), degraded=st.booleans())
+@example(name="burckhardt", effort=899.9, degraded=False)  # the wheel's step shoots past what it settles at
+@example(name="polach", effort=900.0, degraded=False)  # rounding decides nothing
+def test_traction_that_the_resistance_can_hold_moves_the_wheel_and_not_the_train(
+    name: str, effort: float, degraded: bool
+) -> None:
+    runtime = started(TRAINS[name], **(ALL_DEGRADED if degraded else NO_ZONES))
+    runtime.u[0] = effort
+    rows = sampled(runtime, TIMES[:50])
+    assert (rows[:, :2] == 0.0).all()
+    assert outputs(runtime)["adhesion_force"] == pytest.approx(effort, rel=1e-9, abs=1e-9)
+
+
 @settings(max_examples=25)
 @given(name=st.sampled_from(list(TRAINS)), effort=st.floats(0.0, 350e3), degraded=st.booleans())
+@example(name="burckhardt", effort=879.0, degraded=False)  # just below what holds the train
+@example(name="burckhardt", effort=900.0, degraded=True)  # exactly what holds it
 def test_a_wheel_that_spins_from_standstill_stays_finite_and_the_rail_gives_no_more_than_it_has(
     name: str, effort: float, degraded: bool
 ) -> None:

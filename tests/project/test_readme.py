@@ -108,6 +108,7 @@ def test_nothing_is_imported_that_is_not_a_dependency() -> None:
     known = {
         *requirements(PROJECT["project"]["dependencies"]),
         *requirements(extras["hosted"]),
+        *requirements(extras["lmi"]),
         *PACKAGES,
         *sys.stdlib_module_names,
     }
@@ -125,6 +126,7 @@ def test_the_extras_are_named(extra: str) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_links_and_pictures_exist(page: Path) -> None:
-    targets = re.findall(r"\]\(([^)#]+?)(?:#[^)]*)?\)", page.read_text(encoding="utf-8"))
+    prose = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    targets = re.findall(r"\]\(([^)#]+?)(?:#[^)]*)?\)", prose)
     missing = [t for t in targets if not (page.parent / t).exists() and not (page.parent / f"{t}.md").exists()]
     assert missing == []

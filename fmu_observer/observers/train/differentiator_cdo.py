@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from fmu_observer.observers.continuous.differentiator import filtering_differentiator_flow
 from fmu_observer.observers.train.high_gain_observer import HighGainTrainObserver
-from plant_models.hybrid import parameter, state
+from fmu_observer.observers.train.wheel_stage import DifferentiatorStage
 from plant_models.hybrid.system import Array
 
-FIRST = 3  # the first-stage states stand behind position, speed and innovation
+FIRST, END = 3, 8  # the first-stage states stand behind position, speed and innovation
+STAGE = DifferentiatorStage()
 
 
 class DifferentiatorCdo(HighGainTrainObserver):
@@ -33,26 +33,16 @@ class DifferentiatorCdo(HighGainTrainObserver):
     name = "differentiator_cdo"
     description = "Filtering sliding-mode differentiator and high-gain continuous-discrete observer"
     source = "Bouchama 2024, (3.17)-(3.43)"
-    first_stage_states = (
-        state("filter_1", "rad.s2", 0.0, "First filter state of the differentiator"),
-        state("filter_2", "rad.s", 0.0, "Second filter state of the differentiator"),
-        state("filter_3", "rad", 0.0, "Third filter state of the differentiator"),
-        state("wheel_rate", "rad/s", 0.0, "Filtered wheel angular speed"),
-        state("wheel_acceleration", "rad/s2", 0.0, "Wheel angular acceleration"),
-    )
-    first_stage_parameters = (
-        parameter("jerk_bound", "m/s3", 10.0, "Bound of the odometer's second derivative [ours]", min=1e-6),
-    )
+    first_stage_states = STAGE.states
+    first_stage_parameters = STAGE.parameters
     stability_parameters = ("theta", "high_gain")
     presets: Mapping[str, Mapping[str, Any]] = {"as_published": {"theta": 8.0, "high_gain": (2.0, 1.0), "n_axles": 1.0}}
     default_preset = "as_published"
 
     def adhesion(self, x: Array, u: Any, p: Any) -> Array:
         """``F_ad = effort - (J / r) Z1`` [N], (3.22)."""
-        return u.effort - p.n_axles * p.wheel_inertia / p.wheel_radius * x[FIRST + 4]
+        return STAGE.adhesion(x[FIRST:END], u, p)
 
     def first_stage_flow(self, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
         """The filtering differentiator of the wheel rate ``y / r``, (3.18)."""
-        w, z = [x[FIRST], x[FIRST + 1], x[FIRST + 2]], [x[FIRST + 3], x[FIRST + 4]]
-        dw, dz = filtering_differentiator_flow(w, z, u.odometer / p.wheel_radius, p.jerk_bound / p.wheel_radius)
-        return (*dw, *dz)
+        return STAGE.flow(x[FIRST:END], u, p)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
 
 from fmu_observer.certificates import Certificate, SampledError, certify_sampled_error
+from fmu_observer.design.certified_gains import certified_gains
+from fmu_observer.observers.parameter_values import Value
 from fmu_observer.observers.train.high_gain import HIGH_GAIN_K, correction, innovation_decay
 from fmu_observer.observers.train.train_observer import BALISE_INNOVATION, POSITION, SPEED, Estimate, TrainObserver
 from fmu_observer.observers.train.train_resistance import drag_slope_range, rolling_drag
@@ -34,10 +37,19 @@ class HighGainTrainObserver(TrainObserver):
 
     def __init__(self, **options: Any) -> None:
         self.estimator_states = (POSITION, SPEED, BALISE_INNOVATION, *self.first_stage_states)
-        gain = parameter(self.theta_name, "1/s", 8.0, "High gain at balises, at most 4 / longest gap", min=0.0)
-        shape = parameter("high_gain", "1", HIGH_GAIN_K, "Shape K of the high gain", size=2)
-        self.estimator_parameters = (gain, shape, *self.first_stage_parameters)
+        self.estimator_parameters = (*self.gain_parameters(), *self.first_stage_parameters)
         super().__init__(**options)
+
+    def gain_parameters(self) -> tuple[Signal, ...]:
+        """Theta and the shape of the gain."""
+        return (
+            parameter(self.theta_name, "1/s", 8.0, "High gain at balises, at most 4 / longest gap", min=0.0),
+            parameter("high_gain", "1", HIGH_GAIN_K, "Shape K of the high gain", size=2),
+        )
+
+    def theta_in_force(self, x: Array, p: Any) -> Array:
+        """High gain at balises [1/s]."""
+        return getattr(p, self.theta_name)
 
     @abstractmethod
     def adhesion(self, x: Array, u: Any, p: Any) -> Array:
@@ -49,7 +61,7 @@ class HighGainTrainObserver(TrainObserver):
 
     def estimator_flow(self, t: Array, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
         """Derivatives of position, speed, innovation and first stage."""
-        theta = getattr(p, self.theta_name)
+        theta = self.theta_in_force(x, p)
         speed, innovation = x[1], x[2]
         on_position, on_speed = correction(theta, p.high_gain, innovation)
         traction = np.maximum(self.adhesion(x, u, p), 0.0)  # a negative one is a brake: see friction
@@ -65,6 +77,11 @@ class HighGainTrainObserver(TrainObserver):
         """At a balise the innovation is set anew; position and speed stay continuous."""
         rest = [x[i] for i in range(3, self.state_count)]
         return vector(x[0], x[1], x[0] - u.balise_position, *rest)
+
+    def alternative(self, max_gap: float, certify: Callable[[Mapping[str, Value]], Certificate]) -> str | None:
+        """The largest theta that is certified."""
+        gains = certified_gains(max_gap, lambda theta: {self.theta_name: theta}, certify)
+        return None if gains is None else f"{self.theta_name} at most {gains[self.theta_name]:g} is certified for {max_gap:.3g} s"
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate of ``de = [[0, 1], [0, -s]] e - theta inv(Delta) K eta`` for all drag slopes s of the speed range."""

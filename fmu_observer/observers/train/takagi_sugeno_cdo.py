@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from fmu_observer.certificates import Certificate, SampledError, certify_sampled_error
+from fmu_observer.design.certified_gains import balise_family, certified_gains
+from fmu_observer.observers.parameter_values import Value
 from fmu_observer.observers.train.train_observer import BALISE_INNOVATION, POSITION, SPEED, Estimate, TrainObserver
 from plant_models.hybrid import memory, parameter, vector
 from plant_models.hybrid.system import Array
@@ -101,6 +103,12 @@ class TakagiSugenoCdo(TrainObserver):
         weight = (self._weight_at(u.odometer, p),) if self.premise == "frozen" else ()
         return vector(x[0], x[1], x[0] - u.balise_position, x[3], *weight)
 
+    def premise_range(self, p: Any) -> tuple[str, float, float]:
+        """Input or output that the weights depend on, and the speeds of the vertices [m/s], between which they are exact."""
+        signal = "speed" if self.premise == "estimated" else "odometer"
+        low, high = sorted((float(p.premise_min), float(p.premise_max)))
+        return signal, low, high
+
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate over the two vertices and three mixtures of them."""
         vertices = tuple(self._error_at(h, p) for h in (1.0, 0.75, 0.5, 0.25, 0.0))
@@ -113,6 +121,20 @@ class TakagiSugenoCdo(TrainObserver):
             span = float(p.davis_c) * (fastest - slowest) / float(p.mass)
             model += f"; so is the change of the weights within a gap, which moves the drag slope by at most {span:.1e} 1/s"
         return certify_sampled_error(vertices, max_gap, model)
+
+    def alternative(self, max_gap: float, certify: Callable[[Mapping[str, Value]], Certificate]) -> str | None:
+        """A decay that is consistent with the balise gains in use, else the largest high gain that is certified."""
+        consistent = round(dict(certify({}).parameters)["balise_gain_position[1]"], 1)
+        if consistent > 0.0 and certify({"innovation_decay": consistent}).holds:
+            return f"innovation_decay = {consistent:g} is certified for {max_gap:.3g} s"
+        gains = certified_gains(max_gap, balise_family, certify)
+        if gains is None:
+            return None
+        position, speed = gains["balise_gain_position"], gains["balise_gain_speed"]
+        return (
+            f"innovation_decay = balise_gain_position = {position:g}, balise_gain_speed = {speed:g} and odometer gains of 0 are "
+            f"certified for {max_gap:.3g} s"
+        )
 
     def _error_at(self, h: float, p: Any) -> SampledError:
         # Estimated weights multiply the estimate's own error too: c (v^2 - w^2) has the slope c (v + w), twice the vertex's.
@@ -127,7 +149,8 @@ class TakagiSugenoCdo(TrainObserver):
 
     @staticmethod
     def _weight_at(speed: Array, p: Any) -> Array:
-        return np.clip((p.premise_max - speed) / (p.premise_max - p.premise_min), 0.0, 1.0)
+        span = p.premise_max - p.premise_min  # at equal vertices any weight is right
+        return np.clip((p.premise_max - speed) / np.where(span == 0.0, 1.0, span), 0.0, 1.0)
 
 
 def _blend(h: Array, values: Sequence[Array]) -> Array:

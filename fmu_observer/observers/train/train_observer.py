@@ -6,10 +6,8 @@ It knows the single-mass train (mass, Davis resistance, wheelset) and nothing of
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from math import isfinite
-from typing import Any, ClassVar, NamedTuple
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,8 +20,9 @@ from fmu_observer.detection.slip_indicator import (
     slip_filter_derivative,
 )
 from fmu_observer.detection.slip_ratio import odometer_slip
+from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.parameter_values import Value
 from plant_models.hybrid import (
-    HybridSystem,
     PeriodicEvent,
     Signal,
     TriggeredEvent,
@@ -44,8 +43,6 @@ BALISE = TriggeredEvent(
     "A balise is passed, at its own time stamp",
 )
 
-Value = float | Sequence[float]
-
 
 class Estimate(NamedTuple):
     """What a train observer believes: position [m], speed [m/s], adhesion force [N], balise innovation [m]."""
@@ -56,7 +53,7 @@ class Estimate(NamedTuple):
     innovation: Array
 
 
-class TrainObserver(HybridSystem):
+class TrainObserver(GapCertified):
     """Base of the observers of a train ``dp = v``, ``M dv = F_ad - a sgn(v) - b v - c v|v|`` (Bouchama 2024, (3.1)-(3.3)).
 
     The contract:
@@ -73,14 +70,14 @@ class TrainObserver(HybridSystem):
     estimator_states: tuple[Signal, ...] = ()
     estimator_memory: tuple[Signal, ...] = ()
     estimator_parameters: tuple[Signal, ...] = ()
-    estimator_events: tuple[PeriodicEvent, ...] = ()
-    stability_parameters: ClassVar[tuple[str, ...]] = ()
+    estimator_events: tuple[PeriodicEvent | TriggeredEvent, ...] = ()
+    stability_parameters: tuple[str, ...] = ()
 
-    inputs = (
+    inputs: tuple[Signal, ...] = (
         input_signal("effort", "N", 0.0, "Applied effort at the wheel rim: traction positive, brake negative"),
         input_signal("odometer", "m/s", 0.0, "Odometer speed r w"),
     )
-    outputs = (
+    outputs: tuple[Signal, ...] = (
         output_signal("position", "m", "Estimated position"),
         output_signal("speed", "m/s", "Estimated speed", display_unit="km/h"),
         *SLIP_OUTPUTS,
@@ -113,10 +110,6 @@ class TrainObserver(HybridSystem):
     def estimate(self, x: Array, u: Any, p: Any) -> Estimate:
         """Position, speed, adhesion force and innovation."""
 
-    @abstractmethod
-    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
-        """Certificate of the estimation error for balise gaps up to `max_gap` [s], gains from the named tuple `p`."""
-
     # -- what follows -----------------------------------------------------------------------------------------------
 
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
@@ -140,52 +133,29 @@ class TrainObserver(HybridSystem):
             return np.zeros(0)
         return vector((p.davis_a + np.maximum(-self.estimate(x, u, p).adhesion_force, 0.0)) / p.mass)
 
-    def certify(self, max_gap: float, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Certificate:
-        """Exact stability check of the gains in use for balise gaps up to `max_gap`.
+    def advise(self, max_gap: float, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> str | None:
+        """What to change where the gains in use are not certified: gains near them that are, by their own certificate.
 
         Args:
-            max_gap: longest expected time between two balises [s].
-            parameters: values by name that replace those of the preset, scalars or whole vectors (``theta``,
-                ``balise_gain_speed[1]``, ``balise_gain_speed``).
-            preset: preset to start from; by default the observer's own default.
+            max_gap, parameters, preset: as in `certify`.
 
         Returns:
-            The certificate; ask its `holds` and `explain()`.
+            A clause such as ``theta at most 3.91 is certified for 1.02 s``; None where the gains in use are certified, or no
+            other ones are known.
 
         Raises:
-            ValueError: the gap is not positive and finite, a parameter is unknown, not finite or of another size, or the preset
-                is unknown.
+            ValueError: as in `certify`.
         """
-        if not (isfinite(max_gap) and max_gap > 0.0):
-            raise ValueError(f"{self.name}: max_gap must be positive and finite [s], got {max_gap!r}.")
-        values = self._parameter_values(parameters or {}, preset)
-        certificate = self.error_certificate(float(max_gap), self.unpack_parameters(values))
-        chosen = preset or self.default_preset or "declared starts"
-        return replace(certificate, observer=self.name, preset=chosen, parameters=self._stability_values(values))
+        if self.certify(max_gap, parameters, preset).holds:
+            return None
+        return self.alternative(max_gap, lambda gains: self.certify(max_gap, {**(parameters or {}), **gains}, preset))
+
+    def alternative(self, max_gap: float, certify: Callable[[Mapping[str, Value]], Certificate]) -> str | None:
+        """Clause that names certified gains for a gap [s], or None; `certify` judges changes to the values in use."""
+        return None
 
     # -- internals --------------------------------------------------------------------------------------------------
 
-    def _parameter_values(self, overrides: Mapping[str, Value], preset: str | None) -> np.ndarray:
-        values = self.start_parameters(preset)
-        names = [name for signal in self.parameter_signals for name in signal.scalar_names]
-        vectors = {signal.name: signal.scalar_names for signal in self.parameter_signals}
-        for name, value in overrides.items():
-            targets = (name,) if name in names else vectors.get(name)
-            if targets is None:
-                raise ValueError(f"{self.name}: unknown parameter {name!r} to certify; it has: {', '.join(vectors)}.")
-            elements = np.asarray(value, dtype=float)
-            if elements.size not in (1, len(targets)) or not np.all(np.isfinite(elements)):
-                raise ValueError(
-                    f"{self.name}: parameter {name!r} to certify needs {len(targets)} finite number(s), got {value!r}."
-                )
-            values[[names.index(target) for target in targets]] = elements
-        return values
-
-    def _stability_values(self, values: np.ndarray) -> tuple[tuple[str, float], ...]:
-        named = self.unpack_parameters(values)
-        chosen = [s for s in self.parameter_signals if s.name in self.stability_parameters]
-        return tuple(
-            (name, float(value))
-            for signal in chosen
-            for name, value in zip(signal.scalar_names, np.atleast_1d(getattr(named, signal.name)), strict=True)
-        )
+    def deciding_parameters(self) -> tuple[Signal, ...]:
+        """Those that decide stability, as the observer names them."""
+        return tuple(s for s in self.parameter_signals if s.name in self.stability_parameters)

@@ -67,17 +67,24 @@ class PolachCurve:
         return 2.0 / np.pi * self.stiffness * (self.ka + self.ks)
 
     def peak(self, speed: float) -> tuple[float, float]:
-        """Slip of the largest coefficient and that coefficient [1], at one speed [m/s]; a numerical search, not traceable.
+        """Slip of the first maximum of the coefficient, and the coefficient there [1], at one speed; a search, not traceable.
+
+        Not the largest value at any slip: above 60 km/h (dry) or 80 km/h (wet) that is the coefficient of a wheel that spins
+        without bound, where the friction has ceased to fall. No controller seeks that, and no slip is near it.
+
+        Args:
+            speed: [m/s].
 
         Raises:
-            ValueError: the speed is not positive.
+            ValueError: the speed is not positive, or the coefficient falls at no slip up to 10.
         """
         if speed <= 0.0:
             raise ValueError(f"The peak of a Polach curve needs a positive speed, got {speed} m/s.")
-        # Two maxima can exist: scan first on a logarithmic grid, then refine between the neighbours of the best point.
-        slips = np.geomspace(1e-4, 10.0, 400)
-        best = int(np.argmax(self.coefficient(slips, speed)))
-        bounds = (slips[max(best - 1, 0)], slips[min(best + 1, len(slips) - 1)])
+        slips = np.geomspace(1e-4, 10.0, 4000)
+        falling = np.flatnonzero(np.diff(self.coefficient(slips, speed)) < 0.0)
+        if falling.size == 0:
+            raise ValueError(f"The Polach curve has no peak at {speed:.4g} m/s: its coefficient rises at all slips up to 10.")
+        bounds = (slips[max(int(falling[0]) - 1, 0)], slips[int(falling[0]) + 1])
         found = minimize_scalar(lambda s: -self.coefficient(s, speed), bounds=bounds, method="bounded", options={"xatol": 1e-10})
         return float(found.x), float(-found.fun)
 

@@ -20,6 +20,7 @@ from plant_models.hybrid import (
     parameter,
     vector,
 )
+from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.system import Array
 from plant_models.railway.sensors.hermite_cubic import HermiteCubic
 from plant_models.railway.track.balise_layout import BaliseLayout, Positions, Spacing
@@ -59,6 +60,8 @@ class BaliseReader(HybridSystem):
     in the step before, and are announced one step later with the same stamps. With the wrong value all stamps are off by one
     step. At the start the inputs must hold the plant's start position and speed: by an exchange in initialisation mode, or by
     start values; with 0 the first step brings them all the same. Steps may vary.
+
+    Two balises at one place are refused where they are given as an option, and taken as one where parameters or the file say so.
 
     Args:
         layout: ``spacing``: balises at equal distances; ``positions``: a list, which an FMU reads from its file
@@ -100,10 +103,9 @@ class BaliseReader(HybridSystem):
     ) -> None:  # fmt: skip
         if layout not in self.option_choices["layout"]:
             raise ValueError(f"Unknown layout {layout!r}; choose one of: spacing, positions.")
-        if pending_capacity < 1:
-            raise ValueError(f"balise_reader: pending_capacity must be at least 1, got {pending_capacity}.")
+        require_whole("balise_reader", pending_capacity=pending_capacity)
         self.pending_capacity = pending_capacity
-        self._layout: BaliseLayout = Spacing() if layout == "spacing" else Positions(balise_capacity, positions)
+        self._layout: BaliseLayout = Spacing() if layout == "spacing" else Positions(balise_capacity, positions, pending_capacity)
         self.resources = (Resource("positions", "balises.csv", "position"),) if layout == "positions" else ()
         self.parameters = (_INPUT_INSTANT, *self._layout.parameters)
         self.states = (*_SAMPLE, *_announcements(pending_capacity))

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.signal import Signal, parameter
 from plant_models.hybrid.system import Array
 
@@ -75,25 +76,32 @@ class Spacing:
 class Positions:
     """Balises at the entries of the vector ``positions``, in any order; entries that are not used hold `UNUSED`.
 
+    Entries set to one place at run time are one balise.
+
     Args:
         size: number of entries.
         positions: start values [m], no more than `size`.
+        told_apart: number of passings in a stretch up to which entries at one place are recognised; beyond it each one counts.
 
     Raises:
         ValueError: there are too many positions, one is not finite, or they do not increase.
     """
 
-    def __init__(self, size: int, positions: Sequence[float]) -> None:
-        places = tuple(float(position) for position in positions)
-        if size < 1:
-            raise ValueError(f"balise_reader: balise_capacity must be at least 1, got {size}.")
+    def __init__(self, size: int, positions: Sequence[float], told_apart: int = 8) -> None:
+        require_whole("balise_reader", balise_capacity=size)
+        places = _places(positions)
         if len(places) > size:
             raise ValueError(f"balise_reader: {len(places)} positions were given, but balise_capacity is {size}; raise it.")
         if any(not isfinite(place) for place in places):
             raise ValueError("balise_reader: a balise position is not a finite number.")
-        if any(later <= earlier for earlier, later in pairwise(places)):
-            raise ValueError("balise_reader: balises must be listed in increasing position, one at a place.")
-        self.size = size
+        wrong = [i for i, (earlier, later) in enumerate(pairwise(places), start=1) if later <= earlier]
+        if wrong:
+            i = wrong[0]
+            raise ValueError(
+                f"balise_reader: balises must be listed in increasing position, one at a place: number {i + 1} at "
+                f"{places[i]:g} m follows number {i} at {places[i - 1]:g} m."
+            )
+        self.size, self.told_apart = size, told_apart
         start = (*places, *[UNUSED] * (size - len(places)))
         text = "Positions of the balises; 1e30 where an entry is not used"
         self.parameters: tuple[Signal, ...] = (parameter("positions", "m", start, text, size=size),)
@@ -104,7 +112,11 @@ class Positions:
         for i in range(self.size):
             place = direction * p.positions[i]
             passed = passed + np.where(place > direction * before, np.where(place <= direction * after, 1.0, 0.0), 0.0)
-        return passed
+        distinct, at = 0.0 * before, before
+        for _ in range(self.told_apart + 1):
+            at = self.next(at, direction, p)
+            distinct = distinct + np.where(direction * at <= direction * after, 1.0, 0.0)
+        return np.where(distinct <= self.told_apart, distinct, passed)
 
     def next(self, position: Array, direction: Array, p: Any) -> Array:
         """See `BaliseLayout`."""
@@ -113,6 +125,13 @@ class Positions:
             place = direction * p.positions[i]
             nearest = np.where(place > direction * position, np.minimum(nearest, place), nearest)
         return direction * nearest
+
+
+def _places(positions: object) -> tuple[float, ...]:
+    try:
+        return tuple(map(float, positions))  # type: ignore[call-overload] # what cannot be is refused
+    except (TypeError, ValueError):
+        raise ValueError(f"balise_reader: positions must be a list of numbers [m], got {positions!r}.") from None
 
 
 def _place(k: Array, p: Any) -> Array:

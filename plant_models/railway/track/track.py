@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
+from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.signal import Signal, parameter
 from plant_models.hybrid.system import Array
 from plant_models.railway.track.table import inside_any, piecewise_constant, piecewise_linear
@@ -44,8 +45,7 @@ class Track:
     ) -> None:  # fmt: skip
         _check("zones", zones, ("time", "position"))
         _check("gradient_shape", gradient_shape, ("constant", "linear"))
-        if min(zone_count, gradient_count) < 1:
-            raise ValueError(f"Track: zone_count and gradient_count must be at least 1, got {zone_count} and {gradient_count}.")
+        require_whole("Track", zone_count=zone_count, gradient_count=gradient_count)
         self.zones = zones
         self.gradient_shape = gradient_shape
         self.parameters = _parameters(zones, zone_count, gradient_count)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from small_scenarios import small
 
+from cosim import Scenario
 from cosim.cli import main
 from cosim.errors import CosimError
 from cosim.results.folder import read_results
@@ -23,6 +24,9 @@ SETTINGS: dict[str, tuple[dict[str, Any], str]] = {
     "wrong type": ({"stop": "soon"}, "stop: .*number.*soon"),
     "unknown preset": ({"observer.preset": "repared"}, "components.observer.*no preset 'repared'.*'repaired'"),
     "unknown option": ({"observer.options.premis": "live"}, "no option 'premis'.*premise"),
+    "option out of range": ({"locomotive.options.zone_count": 65}, "zone_count = 65 of locomotive; choose 1 to 64"),
+    "option no whole number": ({"locomotive.options.zone_count": 2.5}, "zone_count = 2.5 of locomotive; choose 1 to 64"),
+    "option of another kind": ({"locomotive.options.zone_count": True}, "zone_count = True of locomotive; choose 1 to 64"),
     "bad option": ({"observer.options.premise": "dead"}, "'dead'.*'frozen'"),
     "unknown parameter": ({"locomotive.mas": 1.0}, "locomotive: no variable 'mas'.*'mass'"),
     "unknown model": ({"report.observers": ["x y"]}, "report.observers"),
@@ -57,6 +61,12 @@ def test_a_wrong_setting_is_named_with_what_was_expected(case: str) -> None:
     settings, message = SETTINGS[case]
     with pytest.raises(CosimError, match=message):
         small().run(overrides=settings)
+
+
+def test_a_whole_number_may_be_written_with_a_point() -> None:
+    """2.0 is in 0 ... 5, so it passed the check and then failed as an index, with a traceback."""
+    s = Scenario(stop=0.2, step=0.1).add("slope", observer="levant_differentiator", options={"order": 2.0})
+    assert "slope.derivative_2" in s.run().result.table.dtype.names
 
 
 CONNECTIONS = {

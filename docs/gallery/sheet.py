@@ -1,0 +1,122 @@
+"""A sheet of the gallery: what was published beside what is measured here, with a reason where they differ, and a figure.
+
+Used by the numbered scripts of this folder. A script makes one sheet and ends with ``sheet.finish()``, which prints the table and
+leaves ``NN_name.json`` and ``NN_name.png`` in the folder given by ``--out``, or in ``results/gallery``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import asdict, dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from PIL import Image
+
+mpl.use("Agg")
+
+SAME = 1e-2
+COLOURS = 256
+
+
+@dataclass(frozen=True)
+class Line:
+    """One compared quantity.
+
+    Args:
+        quantity: what it is, with its conditions. unit: of both numbers.
+        published: as printed; None where the thesis prints none, a text where it tells a story.
+        measured: what comes out here, a number or a text.
+        why: why the two differ; required unless both are numbers within `SAME` of each other.
+        repeats: relative difference that another machine may show.
+    """
+
+    quantity: str
+    unit: str
+    published: float | str | None
+    measured: float | str
+    why: str = ""
+    repeats: float = SAME
+
+    def differs(self) -> bool:
+        """Whether the reader needs a reason."""
+        if isinstance(self.published, str) or isinstance(self.measured, str):
+            return self.published != self.measured
+        return self.published is None or abs(self.measured - self.published) > SAME * abs(self.published)
+
+
+class Sheet:
+    """Collects lines and a figure of one script.
+
+    Args:
+        script: the script's ``__file__``. title: of the page. source: figures, tables or equations of the thesis it is about.
+    """
+
+    def __init__(self, script: str, title: str, source: str) -> None:
+        self.name = Path(script).stem
+        self.title, self.source = title, source
+        self.lines: list[Line] = []
+        parser = argparse.ArgumentParser(description=title)
+        parser.add_argument("--out", type=Path, default=Path("results/gallery"), help="folder for the table and the figure")
+        self.out: Path = parser.parse_args().out
+
+    def add(
+        self,
+        quantity: str,
+        unit: str,
+        published: float | str | None,
+        measured: float | str,
+        why: str = "",
+        *,
+        repeats: float = SAME,
+    ) -> None:
+        """Add a line; see `Line`.
+
+        Raises:
+            ValueError: the measured number is not finite, or a reason is missing.
+        """
+        number = measured if isinstance(measured, str) else float(measured)
+        line = Line(quantity, unit, published, number, why, repeats)
+        if not isinstance(number, str) and not isfinite(number):
+            raise ValueError(f"{self.name}: {quantity} is {number}.")
+        if line.differs() and not why:
+            raise ValueError(f"{self.name}: {quantity}: measured {number}, published {published}; give the reason.")
+        self.lines.append(line)
+
+    def finish(self, figure: Any = None) -> None:
+        """Print the table and write both files.
+
+        Args:
+            figure: a matplotlib figure, or None for a table alone.
+        """
+        self.out.mkdir(parents=True, exist_ok=True)
+        print(f"{self.title} ({self.source})\n\n{text_table(self.lines)}")
+        content = {"title": self.title, "source": self.source, "figure": figure is not None}
+        content["lines"] = [asdict(line) for line in self.lines]
+        (self.out / f"{self.name}.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+        if figure is not None:
+            path = self.out / f"{self.name}.png"
+            figure.savefig(path, dpi=80)
+            with Image.open(path) as picture:  # curves need few colours: half of the size or less
+                smaller = picture.convert("RGB").quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+            smaller.save(path, optimize=True)
+
+
+def text_table(lines: list[Line]) -> str:
+    """The lines as aligned text, reasons below."""
+    rows = [("quantity", "unit", "published", "measured")]
+    rows += [(line.quantity, line.unit, shown(line.published), shown(line.measured)) for line in lines]
+    widths = [max(len(row[i]) for row in rows) for i in range(4)]
+    text = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    reasons = dict.fromkeys(line.why for line in lines if line.why)
+    return "\n".join([text[0], "-" * len(text[0]), *text[1:], *(f"- {reason}" for reason in reasons)])
+
+
+def shown(value: float | str | None) -> str:
+    """A number in four digits, a text as it is, a dash for nothing."""
+    if value is None:
+        return "–"
+    return value if isinstance(value, str) else f"{value:.4g}"

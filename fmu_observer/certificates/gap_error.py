@@ -1,0 +1,129 @@
+"""How an estimation error moves from one sample to the next, exactly: what every kind of sampled error has in common.
+
+An error equation says what flows between samples and how it starts after one; the transition over a gap is one matrix
+exponential, no bound and no approximation. The search for certificates (`aperiodic`) sees this face only.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from functools import lru_cache
+from math import inf
+
+import numpy as np
+
+from fmu_observer.certificates.exponential import small_exponential
+
+SCAN_POINTS = 4000
+BISECTIONS = 40
+
+
+class GapError(ABC):
+    """Error equations of a sampled observer as seen from sample to sample; subclasses are hashable values."""
+
+    @property
+    @abstractmethod
+    def size(self) -> int:
+        """Number of error components that count from sample to sample, n."""
+
+    @property
+    @abstractmethod
+    def continuous_limit(self) -> np.ndarray | None:
+        """Error matrix for infinitely frequent samples, shape (n, n); None where a sample does not leave an error as it is."""
+
+    @property
+    def rate(self) -> float:
+        """Natural rate of the closed error equations [1/s]."""
+        assert self.continuous_limit is not None, "without a continuous limit a subclass has a rate of its own"
+        return max(float(np.abs(np.linalg.eigvals(self.continuous_limit)).max()), 1e-9)
+
+    def units(self, rate: float) -> np.ndarray:
+        """Size of the error components relative to the first, shape (n,): the j-th derivative is of the size rate^j."""
+        return np.asarray(rate ** np.arange(self.size))
+
+    def comparable(self, other: GapError) -> bool:
+        """Whether the components of both are the same, so that one Lyapunov function can be asked of both."""
+        return type(self) is type(other) and self.size == other.size
+
+    @abstractmethod
+    def transition(self, gap: float) -> np.ndarray:
+        """Error just before the next sample from the error just before this one, Phi(gap), shape (n, n)."""
+
+    @abstractmethod
+    def transitions(self, longest: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Transitions at `count` equidistant gaps in (0, longest]: gaps of shape (count,), matrices of shape (count, n, n)."""
+
+    def spectral_radius(self, gap: float) -> float:
+        """Factor by which the error grows per sample at a constant gap [1]; stable below 1, inf beyond the range of numbers."""
+        transition = self.transition(gap)
+        return float(np.abs(np.linalg.eigvals(transition)).max()) if np.isfinite(transition).all() else inf
+
+
+class GeneratorError(GapError):
+    """A sampled error with one constant generator between samples: the transition is its exponential, closed over a sample."""
+
+    @property
+    @abstractmethod
+    def generator(self) -> np.ndarray:
+        """Matrix of everything that flows between samples, shape (N, N)."""
+
+    @abstractmethod
+    def close(self, exponentials: np.ndarray) -> np.ndarray:
+        """Exponentials of shape (count, N, N) as transitions of shape (count, n, n)."""
+
+    def transition(self, gap: float) -> np.ndarray:
+        """Error just before the next sample from the error just before this one, Phi(gap), shape (n, n)."""
+        with np.errstate(over="ignore", invalid="ignore"):  # an unstable error may leave the range of numbers
+            return np.asarray(self.close(small_exponential(self.generator * gap)[None])[0])
+
+    def transitions(self, longest: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Transitions at `count` equidistant gaps in (0, longest]: gaps of shape (count,), matrices of shape (count, n, n)."""
+        powers = matrix_powers(small_exponential(self.generator * (longest / count)), count)
+        with np.errstate(over="ignore", invalid="ignore"):  # an unstable error may leave the range of numbers
+            return longest / count * np.arange(1, count + 1), self.close(powers)
+
+
+def matrix_powers(step: np.ndarray, count: int) -> np.ndarray:
+    """``step^k`` for k = 1 .. count, shape (count, n, n)."""
+    powers = np.empty((count, *step.shape))
+    powers[0] = step
+    filled = 1
+    with np.errstate(over="ignore", invalid="ignore"):  # an unstable error may leave the range of numbers
+        while filled < count:  # doubling: powers[k + filled] = powers[k] step^filled
+            more = min(filled, count - filled)
+            powers[filled : filled + more] = powers[:more] @ powers[filled - 1]
+            filled += more
+    return powers
+
+
+def first_unstable_gap(vertices: Sequence[GapError], horizon: float) -> float:
+    """First constant gap at which some vertex is unstable, by scanning (0, horizon] and bisection.
+
+    Args:
+        vertices: error equations. horizon: longest gap searched [s].
+
+    Returns:
+        The gap [s]; 0 if even infinitely frequent samples do not stabilise, inf if no gap up to the horizon is unstable.
+    """
+    return min(_first_unstable_gap_of(vertex, horizon) for vertex in vertices)
+
+
+@lru_cache(maxsize=256)
+def _first_unstable_gap_of(vertex: GapError, horizon: float) -> float:
+    limit = vertex.continuous_limit
+    if limit is not None and np.linalg.eigvals(limit).real.max() >= 0.0:
+        return 0.0
+    gaps, matrices = vertex.transitions(horizon, SCAN_POINTS)
+    finite = np.isfinite(matrices).all(axis=(1, 2))
+    radii = np.full(len(gaps), inf)
+    radii[finite] = np.abs(np.linalg.eigvals(matrices[finite])).max(axis=1)
+    unstable = np.flatnonzero(radii >= 1.0)
+    if unstable.size == 0:
+        return inf
+    high = float(gaps[unstable[0]])
+    low = high - horizon / SCAN_POINTS
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if vertex.spectral_radius(middle) < 1.0 else (low, middle)
+    return high

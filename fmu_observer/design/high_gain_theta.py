@@ -1,0 +1,64 @@
+"""The smallest high gain theta that a Lyapunov function proves. Plain NumPy and SciPy."""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+
+import numpy as np
+from scipy.linalg import solve_continuous_lyapunov
+
+from fmu_observer.models import ObserverModel
+from fmu_observer.models.model import shift_matrix
+
+THETAS = np.geomspace(1.0, 1e4, 4001)
+
+
+def binomial_gain(order: int) -> np.ndarray:
+    """Shape K of the gain with all poles of ``A - K C`` at -1, shape (n,): (2, 1), (3, 3, 1), ..."""
+    return np.asarray(np.poly(-np.ones(order))[1:])
+
+
+def lyapunov_size(K: np.ndarray) -> float:
+    """``lmax(P)`` of ``(A - K C)' P + P (A - K C) = -I`` for the chain of integrators [s]; inf when A - K C is not Hurwitz."""
+    closed = chain_error(K)
+    if np.linalg.eigvals(closed).real.max() >= 0.0:
+        return inf
+    return float(np.linalg.eigvalsh(solve_continuous_lyapunov(closed.T, -np.eye(len(closed))))[-1])
+
+
+def chain_error(K: np.ndarray) -> np.ndarray:
+    """``A - K C`` with A the shift matrix and the first state measured, shape (n, n)."""
+    closed = shift_matrix(len(K))
+    closed[:, 0] -= K
+    return np.asarray(closed)
+
+
+def theta_from_lipschitz(model: ObserverModel, K: np.ndarray) -> float:
+    """Theta above which the error decays, ``max(1, 2 sqrt(n) lmax(P) lipschitz)`` [1/s].
+
+    In the coordinates ``e_i / theta^(i-1)`` the linear part grows with theta and a triangular phi does not: each of its n rows
+    stays below the Lipschitz constant times the norm of the scaled error.
+
+    Args:
+        model: in normal form, its `lipschitz` known. K: shape (n,).
+    """
+    return max(1.0, 2.0 * sqrt(model.order) * lyapunov_size(K) * model.lipschitz)
+
+
+def theta_from_slopes(model: ObserverModel, K: np.ndarray) -> float:
+    """The same with the slopes of phi instead of one constant: smaller, because damping and coupling shrink with theta [1/s].
+
+    Returns:
+        The smallest theta of a fine grid from which on ``theta > 2 lmax(P) |inv(S) slope S|``; inf without slopes or when there
+        is none.
+    """
+    size = lyapunov_size(K)
+    if not model.slopes or size == inf:
+        return inf
+    sizes = THETAS[:, None] ** np.arange(model.order)
+    steepest = [np.linalg.norm(slope * sizes[:, None, :] / sizes[:, :, None], 2, axis=(1, 2)) for slope in model.slopes]
+    enough = np.max(steepest, axis=0) * 2.0 * size < THETAS
+    if not enough[-1]:
+        return inf
+    failing = np.flatnonzero(~enough)
+    return float(THETAS[failing[-1] + 1] if failing.size else THETAS[0])

@@ -1,0 +1,21 @@
+"""Theorem 7: gains of Takagi-Sugeno observers by linear matrix inequalities. Solving needs the extra `lmi`."""
+
+from fmu_observer.design.theorem7.design import (
+    InfeasibleDesign,
+    Theorem7Design,
+    design_theorem7,
+    largest_eta,
+    largest_gap,
+    search_eta,
+)
+from fmu_observer.design.theorem7.train import design_train_gains
+
+__all__ = [
+    "InfeasibleDesign",
+    "Theorem7Design",
+    "design_theorem7",
+    "design_train_gains",
+    "largest_eta",
+    "largest_gap",
+    "search_eta",
+]

@@ -1,0 +1,231 @@
+"""Theorem 7 as a design tool: gains for a model, a gap and a decay, or the attenuation of given gains, checked in NumPy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import inf, sqrt
+from typing import Any
+
+import numpy as np
+
+from fmu_observer.design.theorem7.check import margins
+from fmu_observer.design.theorem7.inequalities import Theorem7Problem
+from fmu_observer.design.theorem7.solve import Candidate, Gains, candidates
+from fmu_observer.models import TakagiSugenoModel, find_takagi_sugeno_model
+from fmu_observer.models.checks import checked_matrix
+from fmu_observer.observability import require_detectable_vertices
+
+BISECTIONS = 7
+SMALLEST = 1e-3  # of what was asked: below it nothing is called feasible
+
+
+@dataclass(frozen=True)
+class Theorem7Design:
+    """Gains with their proof.
+
+    Attributes:
+        model: name of the model. gap: tau_M [s]. eta: decay of the sampled gain [1/s]. mu: premise mismatch [1/s].
+        gamma: attenuation from noise and disturbance to the error, in the exponentially weighted variables; inf where only the
+            decay was asked for.
+        sampled_gain: K_i1, shape (N, n, q1). continuous_gain: K_i2, shape (N, n, q2).
+        margins: every inequality recomputed in NumPy, by name; all positive.
+        options: the further arguments. status: what the solver called its answer, which is not what was relied on.
+        lyapunov_matrix: P in the coordinates ``T x``, shape (n, n).
+    """
+
+    model: str
+    gap: float
+    eta: float
+    mu: float
+    gamma: float
+    sampled_gain: np.ndarray
+    continuous_gain: np.ndarray
+    margins: Mapping[str, float]
+    options: Mapping[str, Any]
+    status: str
+    lyapunov_matrix: np.ndarray
+
+    @property
+    def margin(self) -> float:
+        """Smallest margin."""
+        return min(self.margins.values())
+
+    def parameters(self) -> dict[str, Any]:
+        """Parameters of `GeneralTakagiSugenoCdo` with these gains, by name."""
+        return {
+            "innovation_decay": self.eta,
+            "sampled_gain": tuple(map(float, self.sampled_gain.ravel())),
+            "continuous_gain": tuple(map(float, self.continuous_gain.ravel())),
+        }
+
+    def explain(self) -> str:
+        """One sentence for the user, numbers included."""
+        attenuation = "decay only" if self.gamma == inf else f"gamma = {self.gamma:.4g}"
+        return (
+            f"Theorem 7 holds for {self.model} with gaps up to {self.gap:g} s and eta = {self.eta:g} 1/s: {attenuation}; "
+            f"{len(self.margins)} inequalities recomputed, smallest margin {self.margin:.2g}."
+        )
+
+
+class InfeasibleDesign(ValueError):  # noqa: N818 - what it is, not an "Error" of the program
+    """Theorem 7 has no solution for what was asked.
+
+    Attributes:
+        nearest_eta: largest decay found feasible at the gap asked for [1/s]; None when none is, down to a thousandth.
+        nearest_gap: longest gap found feasible at the decay asked for [s]; None likewise.
+    """
+
+    def __init__(self, message: str, nearest_eta: float | None, nearest_gap: float | None) -> None:
+        super().__init__(message)
+        self.nearest_eta, self.nearest_gap = nearest_eta, nearest_gap
+
+
+def design_theorem7(
+    model: str | TakagiSugenoModel, gap: float, eta: float, *, gains: Gains | None = None, performance: bool = True,
+    mu: float = 0.0, disturbance: bool = True, scaling: Sequence[float] | None = None, two_vertex: bool = False,
+) -> Theorem7Design:  # fmt: skip
+    """Gains of the observer (2.6) with the least gamma, or the least gamma of given gains: Bouchama 2024, Theorem 7.
+
+    Args:
+        model: a Takagi-Sugeno model or the name of one.
+        gap: longest gap between samples tau_M [s].
+        eta: decay rate of the sampled gain; the error is proven to fall as ``exp(-eta t)`` without noise [1/s].
+        gains: K_i1 of shape (N, n, q1) and K_i2 of shape (N, n, q2) to analyse; None to seek them.
+        performance: seek the least gamma; False asks for the decay only and seeks the largest margin.
+        mu: bound of the premise mismatch [1/s]; the thesis prints none.
+        disturbance: with the channel of G and w. Without it the least gamma is met by ignoring the continuous output.
+        scaling: n positive numbers T; errors are measured, and the problem solved, in ``T x``; None for the model's own. Needed
+            where states differ by decades.
+        two_vertex: the sharper variant that asks at the beginning and the end of a gap separately.
+
+    Returns:
+        The design; every inequality recomputed with the returned gains.
+
+    Raises:
+        InfeasibleDesign: there is no solution; the message says what was tried and the nearest feasible eta and gap.
+        UnobservableError: there is none because a vertex has a mode that does not decay and is not measured; it is named.
+        ValueError: an argument is not legal, or the gains have another shape.
+        ImportError: cvxpy (extra `lmi`) is not installed.
+    """
+    chosen = find_takagi_sugeno_model(model)
+    options: dict[str, Any] = {"disturbance": disturbance, "scaling": scaling, "two_vertex": two_vertex}
+    problem = Theorem7Problem.of(chosen, gap, eta, mu=mu, **options)
+    if performance and not (problem.noises or problem.channel):
+        raise ValueError(f"Theorem 7: {chosen.name} has neither noise nor disturbance to attenuate; ask with performance=False.")
+    scaled = None if gains is None else _scaled(chosen, problem, gains)
+    found = _checked(problem, performance, scaled)
+    if found is None:
+        raise _infeasible(chosen, problem, performance, scaled)
+    candidate, checked = found
+    T = problem.T[None, :, None]
+    return Theorem7Design(
+        model=chosen.name,
+        gap=gap,
+        eta=eta,
+        mu=mu,
+        gamma=sqrt(candidate.unknowns.gamma2) if performance else inf,
+        sampled_gain=candidate.sampled_gain / T,
+        continuous_gain=candidate.continuous_gain / T,
+        margins=checked,
+        options=options | {"performance": performance},
+        status=candidate.status,
+        lyapunov_matrix=candidate.unknowns.P,
+    )
+
+
+def _checked(problem: Theorem7Problem, performance: bool, gains: Gains | None) -> tuple[Candidate, dict[str, float]] | None:
+    """A candidate whose inequalities all hold when recomputed, or None."""
+    for candidate in candidates(problem, performance, gains):
+        found = margins(problem, candidate.unknowns, performance)
+        if min(found.values()) > 0.0:
+            return candidate, found
+    return None
+
+
+def _scaled(model: TakagiSugenoModel, problem: Theorem7Problem, gains: Gains) -> Gains:
+    wanted = [(model.vertices, model.order, len(C)) for C in (model.C_sampled, model.C_continuous)]
+    if len(gains) != len(wanted):
+        raise ValueError(f"Theorem 7: gains must be a pair, of the sampled and of the continuous outputs; got {len(gains)}.")
+    arrays = [
+        checked_matrix("Theorem 7", f"the {name} gain", K, shape, "vertices, states, measurements")
+        for name, K, shape in zip(("sampled", "continuous"), gains, wanted, strict=True)
+    ]
+    return arrays[0] * problem.T[None, :, None], arrays[1] * problem.T[None, :, None]
+
+
+# -- what is feasible -------------------------------------------------------------------------------------------------
+
+
+def largest_eta(model: str | TakagiSugenoModel, gap: float, most: float, **options: Any) -> float | None:
+    """Largest decay eta up to `most` [1/s] for which the error can be proven to fall at this gap, by bisection; None if none is.
+
+    Args:
+        model: a model or the name of one. gap: longest gap [s]. options: gains, mu, disturbance, scaling, two_vertex of
+            `design_theorem7`.
+    """
+    chosen, gains = find_takagi_sugeno_model(model), options.pop("gains", None)
+    problem = Theorem7Problem.of(chosen, gap, most, **options)
+    return _largest(problem, "eta", most, None if gains is None else _scaled(chosen, problem, gains))
+
+
+def largest_gap(model: str | TakagiSugenoModel, eta: float, most: float, **options: Any) -> float | None:
+    """Longest gap up to `most` [s] for which the error can be proven to fall with this eta, by bisection; None if none is.
+
+    Args:
+        model: a model or the name of one. eta: decay [1/s]. options: as of `largest_eta`.
+    """
+    chosen, gains = find_takagi_sugeno_model(model), options.pop("gains", None)
+    problem = Theorem7Problem.of(chosen, most, eta, **options)
+    return _largest(problem, "gap", most, None if gains is None else _scaled(chosen, problem, gains))
+
+
+def search_eta(
+    model: str | TakagiSugenoModel, gap: float, etas: Sequence[float], **options: Any
+) -> dict[float, Theorem7Design | None]:  # fmt: skip
+    """A design for each of several decays, the grid search of Remark 8; None where there is none.
+
+    Args:
+        model: a model or the name of one. gap: longest gap [s]. etas: decays [1/s]. options: as of `design_theorem7`.
+    """
+    designs: dict[float, Theorem7Design | None] = {}
+    for eta in etas:
+        try:
+            designs[float(eta)] = design_theorem7(model, gap, eta, **options)
+        except InfeasibleDesign:
+            designs[float(eta)] = None
+    return designs
+
+
+def _largest(problem: Theorem7Problem, name: str, most: float, gains: Gains | None) -> float | None:
+    """Largest value of a field of the problem at which the decay is feasible, between a thousandth of `most` and `most`."""
+
+    def feasible(value: float) -> bool:
+        return _checked(replace(problem, **{name: value}), False, gains) is not None  # type: ignore[arg-type]
+
+    if feasible(most):
+        return most
+    low, high = SMALLEST * most, most
+    if not feasible(low):
+        return None
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if feasible(middle) else (low, middle)
+    return low
+
+
+def _infeasible(model: TakagiSugenoModel, problem: Theorem7Problem, performance: bool, gains: Gains | None) -> InfeasibleDesign:
+    require_detectable_vertices(model, "Theorem 7")
+    eta, gap = _largest(problem, "eta", problem.eta, gains), _largest(problem, "gap", problem.gap, gains)
+    tried = [f"gaps up to {problem.gap:g} s", f"eta = {problem.eta:g} 1/s", f"mu = {problem.mu:g}"]
+    tried.append("free gains" if gains is None else "the gains given")
+    tried.append("decay and attenuation" if performance else "decay only")
+    if problem.two_vertex:
+        tried.append("both ends of a gap separately")
+    if eta == problem.eta:
+        advice = "The decay alone is feasible: give other coordinates by `scaling`, or ask with performance=False."
+    else:
+        near_eta = "no eta at this gap" if eta is None else f"eta = {eta:.3g} 1/s at this gap"
+        near_gap = "no gap at this eta" if gap is None else f"gaps up to {gap:.3g} s at this eta"
+        advice = f"Nearest found feasible: {near_eta}; {near_gap}."
+    return InfeasibleDesign(f"Theorem 7 has no solution for {model.name} with {', '.join(tried)}. {advice}", eta, gap)

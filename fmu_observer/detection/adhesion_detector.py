@@ -1,0 +1,143 @@
+"""The adhesion-condition detector: which of two creep curves the wheel is on, by the slip nearest to an optimum."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from fmu_observer.detection.adhesion_map import MAP_SPEEDS, AdhesionMap, degraded_map, nominal_map, published_map
+from fmu_observer.detection.slip_indicator import DEGRADED, NOMINAL
+from fmu_observer.detection.slip_ratio import speed_slip_from_odometer_slip
+from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, state, vector
+from plant_models.hybrid.system import Array
+from plant_models.railway.track.table import piecewise_linear
+
+SlipDefinition = Literal["odometer", "speed"]
+
+LARGEST_SLIP = 0.95  # of the odometer ratio: beyond, the wheel spins under a train that stands, 19 times over
+FILTERED, CONDITION, CONTRARY_TIME = range(3)  # indices of the state
+
+
+class AdhesionDetector(HybridSystem):
+    """Nominal or degraded adhesion from slip and speed: Bouchama 2024, (4.16)-(4.17).
+
+    At the speed V the maps give the slip ``s_n(V)`` and ``s_d(V)`` at which the nominal and the degraded creep curve peak. With
+    the magnitude s of the slip the adhesion is nominal where ``|s_n - s| + alpha < |s_d - s|``, else degraded: the slip has to be
+    nearer to the nominal optimum by alpha. In effect that is a threshold on the slip, ``(s_n + s_d - alpha) / 2``, that falls
+    with the speed from 21 % at 5 km/h to 4.5 % at 50 km/h.
+
+    Slips of one definition only can be compared. The maps are relative to the train speed, like Polach's s; the observers' slip
+    (3.49) is relative to the odometer. It is converted, ``s / (1 - s)``, before the comparison. The thesis compares the
+    two as they are: ``slip_definition="speed"`` fed with (3.49) does that.
+
+    The slip is filtered, judged every `check_period`, and a new verdict counts when it has stood for `debounce_time` [ours].
+    Below `min_speed` the last verdict stays. `adhesion_limit` is the peak of the curve judged to be in force.
+
+    Args:
+        slip_definition: denominator of the input `slip`: ``odometer``, (3.49) and (4.14), or ``speed``, (3.13).
+
+    Presets: `polach` (default): maps computed from Polach's curves, dry and wet. `as_published`: the printed Table 4.5.
+    """
+
+    name = "adhesion_detector"
+    description = "Nominal or degraded adhesion, by the optimal slip of two creep curves nearest to the slip"
+    source = "Bouchama 2024, (4.16)-(4.17), Table 4.5; filter and debouncing ours"
+    internal_step = 1e-2
+    states = (
+        state("filtered_slip", "1", 0.0, "Magnitude of the slip relative to the train speed, filtered"),
+        memory("judged_condition", "1", NOMINAL, "Verdict in force"),
+        memory("contrary_time", "s", 0.0, "Time for which the other verdict has been reached without a break"),
+    )
+    inputs = (
+        input_signal("slip", "1", 0.0, "Slip ratio of the chosen definition"),
+        input_signal("speed", "m/s", 0.0, "Train speed, estimated or measured"),
+    )
+    outputs = (
+        output_signal("condition", "1", "1 nominal, 2 degraded adhesion, debounced", variability="discrete"),
+        output_signal("raw_condition", "1", "The verdict on the filtered slip now"),
+        output_signal("nominal_optimum", "1", "Optimal slip on nominal adhesion at this speed"),
+        output_signal("degraded_optimum", "1", "Optimal slip on degraded adhesion at this speed"),
+        output_signal("adhesion_limit", "1", "Largest adhesion coefficient at this speed in the condition judged"),
+    )
+    events = (PeriodicEvent("check", "check_period", description="The filtered slip is judged"),)
+    default_preset = "polach"
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"slip_definition": ("odometer", "speed")}
+
+    def __init__(self, slip_definition: SlipDefinition = "odometer") -> None:
+        if slip_definition not in self.option_choices["slip_definition"]:
+            raise ValueError(f"{self.name}: unknown slip_definition {slip_definition!r}; use 'odometer' or 'speed'.")
+        self.slip_definition = slip_definition
+        computed = _map_values(nominal_map(), degraded_map())
+        self.parameters = (
+            parameter("map_speed", "m/s", MAP_SPEEDS, "Speeds of the maps, ascending", size=len(MAP_SPEEDS)),
+            *(parameter(name, "1", values, _TEXTS[name], size=len(values)) for name, values in computed.items()),
+            parameter("advantage", "1", 0.01, "How much nearer the nominal optimum has to be, alpha", min=0.0),
+            parameter("slip_filter_time", "s", 0.2, "Time constant of the slip filter", min=0.01),
+            parameter("debounce_time", "s", 0.5, "Time for which a new verdict has to stand", min=0.0),
+            parameter("min_speed", "m/s", 0.5, "Speed below which nothing is judged", min=0.0),
+            parameter("check_period", "s", 0.05, "Time between two checks", min=1e-4),
+        )
+        self.presets = {"polach": computed, "as_published": _map_values(published_map(False), published_map(True))}
+        super().__init__(slip_definition=slip_definition)
+
+    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Derivative of the filtered slip, shape (1,)."""
+        return vector((self._magnitude(u.slip) - x[FILTERED]) / p.slip_filter_time)
+
+    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """A check: a contrary verdict that has stood long enough comes into force."""
+        verdict = np.where(np.abs(u.speed) > p.min_speed, self._verdict(x, u, p), x[CONDITION])
+        time = np.where(verdict != x[CONDITION], x[CONTRARY_TIME] + p.check_period, 0.0)
+        changes = time - p.check_period >= p.debounce_time - 1e-9  # at its first check a verdict has stood for no time
+        changed = np.where(time > 0.0, np.where(changes, verdict, x[CONDITION]), x[CONDITION])
+        return vector(x[FILTERED], changed, np.where(changed != x[CONDITION], 0.0, time))
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """Verdicts, the two optima and the adhesion limit."""
+        nominal, degraded = self._at_speed(u, p, p.nominal_slip_map, p.degraded_slip_map)
+        high, low = self._at_speed(u, p, p.nominal_peak_map, p.degraded_peak_map)
+        return {
+            "condition": x[CONDITION],
+            "raw_condition": self._verdict(x, u, p),
+            "nominal_optimum": nominal,
+            "degraded_optimum": degraded,
+            "adhesion_limit": np.where(x[CONDITION] == DEGRADED, low, high),
+        }
+
+    def _verdict(self, x: Array, u: Any, p: Any) -> Array:
+        nominal, degraded = self._at_speed(u, p, p.nominal_slip_map, p.degraded_slip_map)
+        return condition_of(x[FILTERED], nominal, degraded, p.advantage)
+
+    def _magnitude(self, slip: Array) -> Array:
+        if self.slip_definition == "speed":
+            return np.abs(slip)
+        return np.abs(speed_slip_from_odometer_slip(np.minimum(slip, LARGEST_SLIP)))
+
+    @staticmethod
+    def _at_speed(u: Any, p: Any, nominal: Array, degraded: Array) -> tuple[Array, Array]:
+        speed = np.abs(u.speed)
+        return piecewise_linear(speed, p.map_speed, nominal), piecewise_linear(speed, p.map_speed, degraded)
+
+
+def condition_of(slip: Array, nominal_optimum: Array, degraded_optimum: Array, advantage: Array) -> Array:
+    """1 (nominal) where ``|s_n - s| + alpha < |s_d - s|``, else 2 (degraded): Bouchama 2024, (4.17).
+
+    Args:
+        slip: its magnitude [1]. nominal_optimum, degraded_optimum: of the same definition [1]. advantage: alpha [1].
+    """
+    nearer = np.abs(nominal_optimum - slip) + advantage < np.abs(degraded_optimum - slip)
+    return np.where(nearer, NOMINAL, DEGRADED)
+
+
+_TEXTS = {
+    "nominal_slip_map": "Optimal slip on nominal adhesion, relative to the train speed",
+    "degraded_slip_map": "Optimal slip on degraded adhesion, relative to the train speed",
+    "nominal_peak_map": "Largest adhesion coefficient, nominal",
+    "degraded_peak_map": "Largest adhesion coefficient, degraded",
+}
+
+
+def _map_values(nominal: AdhesionMap, degraded: AdhesionMap) -> dict[str, tuple[float, ...]]:
+    return dict(zip(_TEXTS, (nominal.slips, degraded.slips, nominal.peaks, degraded.peaks), strict=True))

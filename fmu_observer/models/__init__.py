@@ -1,0 +1,24 @@
+"""What an observer believes of its plant: equations, signals, constants. No observer and no gain lives here."""
+
+from fmu_observer.models.freight_train import freight_train
+from fmu_observer.models.linear_pendulum import linear_pendulum
+from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.pendulum import pendulum
+from fmu_observer.models.registry import MODELS, find_model
+from fmu_observer.models.sector_nonlinearity import sector_nonlinearity
+from fmu_observer.models.takagi_sugeno import Premise, TakagiSugenoModel
+from fmu_observer.models.takagi_sugeno_registry import TAKAGI_SUGENO_MODELS, find_takagi_sugeno_model
+
+__all__ = [
+    "MODELS",
+    "TAKAGI_SUGENO_MODELS",
+    "ObserverModel",
+    "Premise",
+    "TakagiSugenoModel",
+    "find_model",
+    "find_takagi_sugeno_model",
+    "freight_train",
+    "linear_pendulum",
+    "pendulum",
+    "sector_nonlinearity",
+]

@@ -1,0 +1,66 @@
+"""An observer model over one sampling period, for observers that live at the samples. Plain NumPy that traces, no gain.
+
+The period may be a traced value: it is a parameter of the observers and may differ from the one they were designed for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from fmu_observer.models.model import ObserverModel
+from plant_models.hybrid.exact_jacobian import exact_jacobian
+from plant_models.hybrid.integration import rk4_step
+from plant_models.hybrid.system import Array, vector
+
+TAYLOR_DEGREE = 10
+SQUARINGS = 6  # the remainder of the series is below 1e-14 while the norm of A times the period is below 16
+SUBSTEPS = 4  # Runge-Kutta steps in one period of a nonlinear model
+
+
+def zero_order_hold(A: np.ndarray, B: np.ndarray, period: Array) -> tuple[Array, Array]:
+    """``A_d = exp(A T)`` and ``B_d = (integral of exp(A s) from 0 to T) B``, exact for inputs held over the period.
+
+    By scaling, Taylor polynomial and squaring of a fixed number each, so that it traces.
+
+    Args:
+        A: shape (n, n). B: shape (n, m). period: T [s], a number or a traced scalar, norm(A) T below 16.
+
+    Returns:
+        A_d of shape (n, n) and B_d of shape (n, m).
+    """
+    n, m = B.shape
+    block = np.zeros((n + m, n + m))
+    block[:n, :n], block[:n, n:] = A, B
+    scaled = block * (period / 2.0**SQUARINGS)
+    identity = np.eye(n + m)
+    exponential = identity
+    for k in range(TAYLOR_DEGREE, 0, -1):
+        exponential = identity + scaled @ exponential / float(k)
+    for _ in range(SQUARINGS):
+        exponential = exponential @ exponential
+    return exponential[:n, :n], exponential[:n, n:]
+
+
+def transition(model: ObserverModel, x: Array, u: Array, period: Array) -> Array:
+    """The state one period later, inputs held, shape (n,).
+
+    Exact for a linear model; for a nonlinear one by 4 classical Runge-Kutta steps (error of the order (period / 4)^5).
+
+    Args:
+        model: the model. x: state, shape (n,). u: inputs, shape (m,). period: T [s].
+    """
+    if model.phi is None:
+        A, B = zero_order_hold(model.A, model.B, period)
+        return A @ x + B @ u if len(model.inputs) else A @ x
+    for _ in range(SUBSTEPS):
+        x = rk4_step(lambda _t, at: model.flow(at, u), 0.0, period / SUBSTEPS, x)
+    return x
+
+
+def transition_jacobian(model: ObserverModel) -> Callable[[Array, Array, Array], Array]:
+    """Exact Jacobian of `transition` by x: a function of (x, u, period) that returns shape (n, n); also on traced symbols."""
+    m = len(model.inputs)
+    jacobian = exact_jacobian(lambda x, known: transition(model, x, known[:m], known[m]), model.order, m + 1)
+    return lambda x, u, period: jacobian(x, vector(*(u[i] for i in range(m)), period))

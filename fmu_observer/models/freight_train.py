@@ -1,0 +1,44 @@
+"""The single-mass train as observers with balises see it: position and speed from an effort. Data only."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fmu_observer.models.model import ObserverModel, shift_matrix
+from plant_models.hybrid import input_signal, state, vector
+from plant_models.hybrid.system import Array
+
+MASS = 90e3  # [kg]
+DAVIS_A, DAVIS_B, DAVIS_C = 900.0, 32.4, 1.65287  # [N], [N.s/m], [N.s2/m2]
+TOP_SPEED = 50.0  # [m/s]
+REST = 0.1  # [m/s]; below it the constant resistance fades, so that it cannot push a train that stands
+
+
+def freight_train() -> ObserverModel:
+    """``dp = v``, ``M dv = F - a - b v - c v |v|``, the position comes from balises: Bouchama 2024, (3.1)-(3.3), (3.24)-(3.25).
+
+    For a generic observer the constant resistance is a smooth function of the speed near rest, and no dry friction; the observers
+    of `observers.train` hold a standing train exactly.
+    """
+    slopes = tuple(np.array([[0.0, 0.0], [0.0, -(DAVIS_B + 2.0 * DAVIS_C * v) / MASS]]) for v in (0.0, TOP_SPEED))
+    return ObserverModel(
+        name="freight_train",
+        description="Single-mass train, its position measured at balises",
+        source="Bouchama 2024, (3.24)-(3.25)",
+        states=(state("position", "m", 0.0, "Position of the train"), state("speed", "m/s", 1.0, "Speed of the train")),
+        inputs=(input_signal("effort", "N", 0.0, "Effort at the wheel rim: traction > 0, brake < 0"),),
+        measurements=(input_signal("position", "m", 0.0, "Position of the balise just passed"),),
+        A=shift_matrix(2),
+        B=np.array([[0.0], [1.0 / MASS]]),
+        C=np.array([[1.0, 0.0]]),
+        phi=_remainder,
+        lipschitz=(DAVIS_B + 2.0 * DAVIS_C * TOP_SPEED) / MASS,
+        slopes=slopes,
+        event="balise",
+        sample_period=0.5,
+    )
+
+
+def _remainder(x: Array, _u: Array) -> Array:
+    resistance = DAVIS_A * np.clip(x[1] / REST, -1.0, 1.0) + DAVIS_B * x[1] + DAVIS_C * x[1] * np.abs(x[1])
+    return vector(0.0 * x[0], -resistance / MASS)

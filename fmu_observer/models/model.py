@@ -1,0 +1,151 @@
+"""The observer model: ``dx = A x + B u + phi(x, u)``, ``y = C x``, with the names and units of its signals. A value.
+
+It knows signals and arrays; it does not move by itself and holds no gain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import inf
+
+import numpy as np
+
+from fmu_observer.models.checks import check_identifiers, check_numbers, check_signals, checked_matrix
+from plant_models.hybrid import Signal
+from plant_models.hybrid.exact_jacobian import exact_jacobian
+from plant_models.hybrid.system import Array, vector
+
+PROBES = 5  # states at which a phi of unknown slope is looked at
+
+Remainder = Callable[[Array, Array], Array]  # (x of shape (n,), u of shape (m,)) -> shape (n,)
+
+
+@dataclass(frozen=True, eq=False)
+class ObserverModel:
+    """What an observer believes of its plant.
+
+    Args:
+        name: identifier. description: one line. source: where the equations come from.
+        states: scalar `state` signals named by the quantity (``angle``); their starts are the observer's starts.
+        inputs: scalar `input_signal`s, the known inputs u.
+        measurements: scalar `input_signal`s named by the quantity; measured continuously an observer calls them
+            ``measured_angle``, at an event ``<event>_angle``.
+        A: shape (n, n). B: shape (n, m). C: shape (q, n).
+        phi: nonlinear remainder, plain NumPy that can be traced; None for a linear model.
+        lipschitz: Lipschitz constant of `phi` in x over the range the model is used in [1/s]. Where none is given it is the
+            largest norm of the slopes; without these inf, unless `phi` does not depend on x.
+        slopes: matrices of shape (n, n) whose convex hull holds the Jacobian of `phi` over that range. Certificates of a
+            nonlinear model need them.
+        event: name of the event at which a sampled measurement arrives.
+        sample_period: sampling period [s] that observers assume unless told otherwise.
+
+    Raises:
+        ValueError: a shape does not fit the signals, a number is not finite, a name is no identifier or stands twice, or nothing
+            is measured; the message names it.
+    """
+
+    name: str
+    description: str
+    source: str
+    states: tuple[Signal, ...]
+    inputs: tuple[Signal, ...]
+    measurements: tuple[Signal, ...]
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    phi: Remainder | None = None
+    lipschitz: float = 0.0
+    slopes: tuple[np.ndarray, ...] = field(default=())
+    event: str = "sample"
+    sample_period: float = 0.1
+
+    def __post_init__(self) -> None:
+        where = f"Observer model {self.name!r}"
+        check_identifiers(where, name=self.name, event=self.event)
+        check_signals(where, states=self.states, inputs=self.inputs, measurements=self.measurements)
+        check_numbers(where, {"sample_period": self.sample_period}, {"lipschitz": self.lipschitz})
+        n, m, q = self.order, len(self.inputs), len(self.measurements)
+        reason = f"{n} states, {m} inputs and {q} measurements"
+        for name, shape in {"A": (n, n), "B": (n, m), "C": (q, n)}.items():
+            object.__setattr__(self, name, checked_matrix(where, name, getattr(self, name), shape, reason))
+        slopes = tuple(checked_matrix(where, "a slope", slope, (n, n), reason) for slope in self.slopes)
+        object.__setattr__(self, "slopes", slopes)
+        self._check_remainder(where)
+        if self.phi is not None and self.lipschitz == 0.0:
+            object.__setattr__(self, "lipschitz", self._lipschitz())
+
+    def _check_remainder(self, where: str) -> None:
+        """phi is tried at the starts: a wrong shape would be broadcast in silence."""
+        if self.phi is None:
+            return
+        starts = [np.array([float(s.start_values[0]) for s in signals]) for signals in (self.states, self.inputs)]
+        try:
+            found = np.shape(self.phi(*starts))
+        except Exception as error:
+            raise ValueError(f"{where}: phi(x, u) fails at the start values: {error}") from error
+        if found != (self.order,):
+            raise ValueError(
+                f"{where}: phi(x, u) returns shape {found}, expected {(self.order,)}, one value a state, as of vector(...)."
+            )
+
+    @property
+    def order(self) -> int:
+        """Number of states, n."""
+        return len(self.states)
+
+    def remainder(self, x: Array, u: Array) -> Array:
+        """``phi(x, u)``, shape (n,); zero for a linear model."""
+        return 0.0 * x if self.phi is None else self.phi(x, u)
+
+    def flow(self, x: Array, u: Array) -> Array:
+        """``A x + B u + phi(x, u)``, shape (n,)."""
+        linear = self.A @ x
+        driven = linear + self.B @ u if len(self.inputs) else linear
+        return driven + self.remainder(x, u)
+
+    def measured(self, x: Array) -> Array:
+        """``C x``, shape (q,)."""
+        return self.C @ x
+
+    @cached_property
+    def jacobian(self) -> Callable[[Array, Array], Array]:
+        """Exact Jacobian of `flow` by x, a function of (x, u) that returns shape (n, n); works on traced symbols too."""
+        return exact_jacobian(self.flow, self.order, len(self.inputs))
+
+    @property
+    def drifts(self) -> tuple[np.ndarray, ...]:
+        """``A + slope`` for every slope: vertices of the Jacobian of the flow, each of shape (n, n).
+
+        Raises:
+            ValueError: phi depends on x and no slopes are given.
+        """
+        if self.phi is not None and self.lipschitz > 0.0 and not self.slopes:
+            raise ValueError(
+                f"Observer model {self.name!r}: nothing can be certified without the slopes of its nonlinear part phi; give "
+                "`slopes`, matrices whose convex hull holds the Jacobian of phi over the range of use."
+            )
+        return tuple(self.A + slope for slope in self.slopes) or (self.A,)
+
+    def _lipschitz(self) -> float:
+        """What the slopes say; without slopes 0 if the Jacobian of phi vanishes at a few states, else inf, for unknown."""
+        if self.slopes:
+            return max(float(np.linalg.norm(slope, 2)) for slope in self.slopes)
+        at, u = np.random.default_rng(0).normal(size=(PROBES, self.order)), np.ones(len(self.inputs))
+        rounding = 1e-12 * max(1.0, float(np.abs(self.A).max()))
+        try:
+            found = [np.abs(np.asarray(self.jacobian(x, u)) - self.A).max() for x in at]
+        except Exception:  # phi worked at the starts, so what fails is the tracing
+            return inf
+        return 0.0 if all(size <= rounding for size in found) else inf
+
+
+def shift_matrix(length: int, width: int = 1) -> np.ndarray:
+    """Block upper shift matrix of a chain of `length` blocks of `width` states, shape (length * width, length * width)."""
+    return np.kron(np.diag(np.ones(length - 1), 1), np.eye(width))
+
+
+def stacked(values: tuple[Array, ...]) -> Array:
+    """Scalars as a vector; an empty tuple gives shape (0,)."""
+    return vector(*values) if values else np.zeros(0)

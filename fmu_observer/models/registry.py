@@ -1,0 +1,29 @@
+"""The models that observers know by name: what `model=` may say."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from fmu_observer.models.freight_train import freight_train
+from fmu_observer.models.linear_pendulum import linear_pendulum
+from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.pendulum import pendulum
+
+MODELS: dict[str, Callable[[], ObserverModel]] = {
+    "pendulum": pendulum,
+    "linear_pendulum": linear_pendulum,
+    "freight_train": freight_train,
+}
+
+
+def find_model(model: str | ObserverModel) -> ObserverModel:
+    """The model itself, or the one of that name.
+
+    Raises:
+        ValueError: the name is unknown.
+    """
+    if isinstance(model, ObserverModel):
+        return model
+    if not isinstance(model, str) or model not in MODELS:
+        raise ValueError(f"Unknown observer model {model!r}; known are: {', '.join(MODELS)}. Or give an ObserverModel.")
+    return MODELS[model]()

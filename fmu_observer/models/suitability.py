@@ -1,0 +1,62 @@
+"""What an observer asks of its model: linear, one measurement, a chain of integrators. Raises in words where it is not so."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fmu_observer.models.model import ObserverModel, shift_matrix
+
+POINTS = 5  # states at which the structure of the Jacobian is looked at
+
+
+def require_linear(model: ObserverModel, observer: str, instead: str) -> None:
+    """The model has no nonlinear remainder.
+
+    Raises:
+        ValueError: it has one; the message names the observer to take instead.
+    """
+    if model.phi is not None:
+        raise ValueError(
+            f"{observer}: model {model.name!r} is nonlinear (it has a remainder phi), not dx = A x + B u. Use {instead!r}, or "
+            f"give a linearised ObserverModel."
+        )
+
+
+def require_single_output(model: ObserverModel, observer: str) -> None:
+    """The model has one measurement.
+
+    Raises:
+        ValueError: it has several or none.
+    """
+    if len(model.measurements) != 1:
+        raise ValueError(
+            f"{observer}: model {model.name!r} has {len(model.measurements)} measurements, expected one. Use 'luenberger' or "
+            "'thau', whose gains are of shape (n, q)."
+        )
+
+
+def require_triangular_chain(model: ObserverModel, observer: str) -> None:
+    """A is the shift matrix, the first state is measured, and phi_i depends on x_1 ... x_i only: Bouchama 2024, (1.10).
+
+    The last is read off the exact Jacobian of phi at a few states.
+
+    Raises:
+        ValueError: one of them is not so; the message says which.
+    """
+    require_single_output(model, observer)
+    n = model.order
+    where = f"{observer}: model {model.name!r} is not in the normal form (1.10): "
+    if not np.array_equal(model.A, shift_matrix(n)):
+        raise ValueError(f"{where}A must be the upper shift matrix with everything else in phi, got {model.A.tolist()}.")
+    if not np.array_equal(model.C, np.eye(n)[:1]):
+        raise ValueError(f"{where}the first state must be measured, C = {np.eye(n)[:1].tolist()}, got {model.C.tolist()}.")
+    generator = np.random.default_rng(0)
+    at = generator.normal(size=(POINTS, n))
+    remainders = [np.asarray(model.jacobian(x, np.ones(len(model.inputs)))) - model.A for x in at]
+    above = np.abs(np.triu(np.stack(remainders), 1)).max(axis=0)
+    if above.max() > 0.0:
+        row, column = map(int, np.argwhere(above > 0.0)[0])
+        names = [s.name for s in model.states]
+        raise ValueError(
+            f"{where}phi of {names[row]!r} must not depend on {names[column]!r}, which stands behind it in the chain."
+        )

@@ -1,0 +1,77 @@
+"""First academic example of chapter 2: four states, its error equations can be brought to triangular form. Data only."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fmu_observer.models.model import ObserverModel, shift_matrix
+from fmu_observer.models.sector_nonlinearity import sector_nonlinearity
+from fmu_observer.models.takagi_sugeno import Premise, TakagiSugenoModel
+from plant_models.hybrid import input_signal, state, vector
+from plant_models.hybrid.system import Array
+
+LARGEST_PREMISE = 5.0  # sum of the printed bounds, 1 of sin(y1) and 4 of y2^2
+STATES = tuple(state(f"x{i}", "1", 0.0, f"State {i}") for i in (1, 2, 3, 4))
+INPUTS = (input_signal("drive", "1", 0.0, "Known input u"),)
+FIRST = input_signal("x1", "1", 0.0, "First output")
+SECOND = input_signal("x2", "1", 0.0, "Second output")
+SOURCE = "Bouchama 2024, section 2.5.1"
+
+
+def triangularisable_example() -> TakagiSugenoModel:
+    """``dx4 = -19.5 x2 - 19.5 x3 - 3.3 (sin x1 + x2^2) x4`` behind three linear rows, x1 sampled, x2 continuous.
+
+    Bouchama 2024, section 2.5.1. The premise ``sin(y1) + y2^2`` has the printed bounds -5 and 5; the print uses -4 and 4 for
+    y2^2, which cannot be negative, and its gains belong to these vertices.
+    """
+    return sector_nonlinearity(
+        premises=(Premise("damping", "1", -LARGEST_PREMISE, LARGEST_PREMISE, _damping, "sin(x1) + x2^2"),),
+        A=lambda f: [
+            [-1.25, -48.6, 1.0, 0.0],
+            [1.0, 0.0, 0.0, 1.0],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.0, -19.5, -19.5, -3.3 * f[0]],
+        ],
+        B=lambda _f: [[21.6], [0.0], [0.0], [0.0]],
+        name="triangularisable_example",
+        description="Four states with one premise, first example of chapter 2",
+        source=SOURCE,
+        states=STATES,
+        inputs=INPUTS,
+        sampled=(FIRST,),
+        continuous=(SECOND,),
+        C_sampled=np.eye(4)[:1],
+        C_continuous=np.eye(4)[1:2],
+        G=np.eye(4)[:, 3:],
+        max_gap=0.2,
+        scaling=(1.0, 1.0, 0.3, 1.0 / 60.0),
+    )
+
+
+def triangularisable_chain() -> ObserverModel:
+    """The same plant as a chain of two blocks of two, both outputs sampled: Bouchama 2024, (2.42).
+
+    ``dx = A x + g(x) + B u`` with A the block shift; x3 in row 1 and x4 in row 2 come from it.
+    """
+    return ObserverModel(
+        name="triangularisable_chain",
+        description="First example of chapter 2 as a chain of two blocks",
+        source="Bouchama 2024, (2.42)",
+        states=STATES,
+        inputs=INPUTS,
+        measurements=(FIRST, SECOND),
+        A=shift_matrix(2, 2),
+        B=np.array([[21.6], [0.0], [0.0], [0.0]]),
+        C=np.eye(4)[:2],
+        phi=_remainder,
+        sample_period=0.2,
+    )
+
+
+def _damping(x: Array, _u: Array) -> Array:
+    return np.sin(x[0]) + x[1] * x[1]
+
+
+def _remainder(x: Array, _u: Array) -> Array:
+    damping = 3.3 * (np.sin(x[0]) + x[1] * x[1])
+    return vector(-1.25 * x[0] - 48.6 * x[1], 1.0 * x[0], 1.0 * x[1], -19.5 * x[1] - 19.5 * x[2] - damping * x[3])

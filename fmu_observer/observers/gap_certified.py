@@ -1,0 +1,62 @@
+"""What every observer corrected by samples answers: whether its gains are stable for gaps up to a given length.
+
+It knows hybrid systems and certificates, and nothing of models or of how an observer corrects itself.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import replace
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from fmu_observer.certificates import Certificate
+from fmu_observer.observers.parameter_values import Value, parameter_values
+from plant_models.hybrid import HybridSystem, Signal
+
+
+class GapCertified(HybridSystem):
+    """A hybrid system with a certificate for sampling gaps; a subclass writes `error_certificate`."""
+
+    @abstractmethod
+    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+        """Certificate of the estimation error for gaps up to `max_gap` [s], gains from the named tuple `p`."""
+
+    def certify(self, max_gap: float, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Certificate:
+        """Exact stability check of the gains in use for sampling gaps up to `max_gap`.
+
+        Args:
+            max_gap: longest expected time between two samples [s].
+            parameters: values by name that replace those of the preset, scalars or whole vectors (``theta``, ``high_gain[1]``,
+                ``high_gain``).
+            preset: preset to start from; by default the observer's own default.
+
+        Returns:
+            The certificate; ask its `holds` and `explain()`.
+
+        Raises:
+            ValueError: the gap is not positive and finite, a parameter is unknown, not finite or of another size, or the preset
+                is unknown.
+        """
+        if not (isfinite(max_gap) and max_gap > 0.0):
+            raise ValueError(f"{self.name}: max_gap must be positive and finite [s], got {max_gap!r}.")
+        values = self.unpack_parameters(parameter_values(self, parameters, preset))
+        certificate = self.error_certificate(float(max_gap), values)
+        chosen = preset or self.default_preset or "declared starts"
+        event = next((e.name for e in self.triggered_events if len(self.triggered_events) == 1), "sample")
+        deciding = self._deciding_values(values)
+        return replace(certificate, observer=self.name, preset=chosen, parameters=deciding, event=event)
+
+    def deciding_parameters(self) -> tuple[Signal, ...]:
+        """What the certificate names as the values it judged: all parameters but the timing, unless a subclass knows better."""
+        return tuple(s for s in self.parameters if s.name != "sample_period")
+
+    def _deciding_values(self, values: Any) -> tuple[tuple[str, float], ...]:
+        return tuple(
+            (name, float(value))
+            for signal in self.deciding_parameters()
+            for name, value in zip(signal.scalar_names, np.atleast_1d(getattr(values, signal.name)), strict=True)
+        )

@@ -1,0 +1,152 @@
+"""Base of the generic observers: signals, gains and conditions of an observer of any `ObserverModel`.
+
+It knows models and hybrid systems, and nothing of how an observer corrects itself.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from fmu_observer.condition import Condition
+from fmu_observer.models import MODELS, ObserverModel, find_model
+from fmu_observer.models.model import stacked
+from fmu_observer.observers.parameter_values import Value, parameter_values
+from plant_models.hybrid import (
+    HybridSystem,
+    PeriodicEvent,
+    Signal,
+    TriggeredEvent,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+    state,
+)
+from plant_models.hybrid.signal import Variability
+from plant_models.hybrid.system import Array
+
+Timing = Literal["continuous", "periodic", "event"]
+
+
+class ModelObserver(HybridSystem):
+    """Base of the observers of a model ``dx = A x + B u + phi(x, u)``, ``y = C x`` (`ObserverModel`).
+
+    The contract:
+
+    1. A subclass sets `timing`: measurements are ``continuous`` inputs ``measured_<y>``; or such inputs read at a ``periodic``
+       event `sampling`; or the payload ``<event>_<y>`` of a triggered ``event``, the model's own.
+    2. The state begins with the estimates ``estimated_<x>``, n of them, which flow; behind them stand `extra_states`, continuous
+       too, then `extra_memory`. Where `discrete` is set the estimates are memory and stand behind `extra_states`. A subclass sets
+       both before ``super().__init__``.
+    3. It writes `flow` or `jump` or both, and `condition_of`, the existence or stability condition for the gains in use.
+    4. Gains are parameters (`gain_parameter`), so they can be changed in an FMU; their starts come from a design rule that the
+       subclass names. Matrices are flat, row by row; `as_matrix` restores them.
+    5. Outputs are the estimates under the names of the model's states.
+
+    Args:
+        model: a model or the name of one in `MODELS`.
+        options: further options of the subclass.
+
+    Raises:
+        ValueError: the model is unknown, or it does not suit the observer.
+    """
+
+    timing: ClassVar[Timing] = "continuous"
+    discrete: ClassVar[bool] = False
+    extra_states: tuple[Signal, ...] = ()
+    extra_memory: tuple[Signal, ...] = ()
+    gain_parameters: tuple[Signal, ...] = ()
+    extra_outputs: tuple[Signal, ...] = ()
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(MODELS)}
+
+    def __init__(self, model: str | ObserverModel = "pendulum", **options: Any) -> None:
+        self.model = find_model(model)
+        estimates = self._estimates()
+        self.states = (*self.extra_states, *estimates) if self.discrete else (*estimates, *self.extra_states)
+        self.states = (*self.states, *self.extra_memory)
+        measured = () if self.timing == "event" else tuple(_renamed(s, "measured_") for s in self.model.measurements)
+        self.inputs = (*self.model.inputs, *measured)
+        moves: Variability = "discrete" if self.discrete else "continuous"
+        self.outputs = (
+            *(output_signal(s.name, s.unit, f"Estimate: {s.description}", variability=moves) for s in self.model.states),
+            *self.extra_outputs,
+        )
+        period = parameter("sample_period", "s", self.model.sample_period, "Sampling period of the measurements", min=1e-6)
+        self.parameters = (*self.gain_parameters, *((period,) if self.timing == "periodic" else ()))
+        self.events = self._events()
+        super().__init__(model=self.model.name, **options)
+
+    # -- what a subclass writes -------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def condition_of(self, p: Any) -> Condition:
+        """The condition for the gains in the named tuple `p`."""
+
+    # -- what it may use --------------------------------------------------------------------------------------------
+
+    def estimates(self, x: Array) -> Array:
+        """The estimates within the state, shape (n,)."""
+        first = sum(s.width for s in self.extra_states) if self.discrete else 0
+        return x[first : first + self.model.order]
+
+    def known(self, u: Any) -> Array:
+        """The model's inputs, shape (m,)."""
+        return stacked(tuple(getattr(u, s.name) for s in self.model.inputs))
+
+    def measured(self, u: Any) -> Array:
+        """The measurements, shape (q,); at a triggered event only in its jump."""
+        prefix = f"{self.model.event}_" if self.timing == "event" else "measured_"
+        return stacked(tuple(getattr(u, f"{prefix}{s.name}") for s in self.model.measurements))
+
+    def gain_parameter(self, name: str, start: np.ndarray, description: str, unit: str = "1") -> Signal:
+        """A gain as a parameter, flat, row by row; a single number where it has only one element and one dimension."""
+        values = np.asarray(start, dtype=float)
+        if values.ndim == 0:
+            return parameter(name, unit, float(values), description)
+        return parameter(name, unit, tuple(map(float, values.ravel())), description, size=values.size)
+
+    def innovation(self, x: Array, u: Any) -> Array:
+        """``C xh - y``, shape (q,)."""
+        return self.model.measured(self.estimates(x)) - self.measured(u)
+
+    # -- what follows -----------------------------------------------------------------------------------------------
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """The estimates."""
+        estimates = self.estimates(x)
+        return {s.name: estimates[i] for i, s in enumerate(self.model.states)}
+
+    def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
+        """Existence or stability condition, as numbers, for the gains of a preset with some replaced.
+
+        Raises:
+            ValueError: a parameter is unknown, not finite or of another size, or the preset is unknown.
+        """
+        return self.condition_of(self.unpack_parameters(parameter_values(self, parameters, preset, "to judge")))
+
+    # -- internals --------------------------------------------------------------------------------------------------
+
+    def _estimates(self) -> tuple[Signal, ...]:
+        kind = memory if self.discrete else state
+        return tuple(kind(f"estimated_{s.name}", s.unit, s.start, f"Estimate: {s.description}") for s in self.model.states)
+
+    def _events(self) -> tuple[Any, ...]:
+        if self.timing == "periodic":
+            return (PeriodicEvent("sampling", "sample_period", description="The measurements are read"),)
+        if self.timing == "event":
+            payload = tuple(_renamed(s, f"{self.model.event}_", "discrete") for s in self.model.measurements)
+            return (TriggeredEvent(self.model.event, payload, "A measurement arrives, at its own time stamp"),)
+        return ()
+
+
+def as_matrix(flat: Array, rows: int, columns: int) -> Array:
+    """A flat parameter, row by row, as a matrix of shape (rows, columns)."""
+    return np.reshape(flat, (rows, columns))
+
+
+def _renamed(signal: Signal, prefix: str, variability: Literal["continuous", "discrete"] = "continuous") -> Signal:
+    return input_signal(f"{prefix}{signal.name}", signal.unit, signal.start, signal.description, variability=variability)

@@ -1,0 +1,100 @@
+"""Base of the observers that a sampled measurement corrects by way of an innovation held or decaying until the next one.
+
+It knows models and certificates; the chain form that high-gain observers ask for is checked here.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampled_error
+from fmu_observer.models import ObserverModel
+from fmu_observer.models.model import shift_matrix
+from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.model_observer import ModelObserver
+from plant_models.hybrid import Signal, state
+from plant_models.hybrid.system import Array
+
+
+class SampledObserver(ModelObserver, GapCertified):
+    """Base of the observers corrected at the model's own `event`, its payload the measurements, periodic or not.
+
+    A subclass writes `flow`, `jump`, `condition_of` and `vertex_error`, the error equations for one Jacobian of the model.
+    """
+
+    timing = "event"
+    internal_step = 5e-3
+
+    @abstractmethod
+    def vertex_error(self, drift: np.ndarray, p: Any) -> ImpulsiveError:
+        """Error equations where the model's flow has the Jacobian `drift`, shape (n, n)."""
+
+    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+        """Certificate over the vertices of the model's Jacobian."""
+        vertices = tuple(self.vertex_error(drift, p) for drift in self.model.drifts)
+        return certify_sampled_error(vertices, max_gap, self.error_model())
+
+    def error_model(self) -> str:
+        """The error equations of the certificate in words."""
+        linear = f"error equations of the model {self.model.name!r}"
+        if not self.model.slopes:
+            return f"{linear}, exact if it is linear; {self.remark()}"
+        count = len(self.model.slopes)
+        return f"{linear} at the {count} extreme slope(s) of its nonlinear part, the slope constant over a gap; {self.remark()}"
+
+    def remark(self) -> str:
+        """What else the certificate leaves out."""
+        return "noise and model errors, inputs to it, are left out"
+
+    @property
+    def outputs_count(self) -> int:
+        """Number of measurements, q."""
+        return len(self.model.measurements)
+
+    def levels(self) -> tuple[int, ...]:
+        """Place of every estimate in its chain of derivatives, for a model in chain form."""
+        return tuple(i // self.outputs_count for i in range(self.model.order))
+
+    def sampled_part(self, x: Array) -> Array:
+        """What stands behind the estimates, shape (q,)."""
+        n = self.model.order
+        return x[n : n + self.outputs_count]
+
+
+def per_measurement(model: ObserverModel, name: str, description: str, kind: Callable[..., Signal] = state) -> Signal:
+    """A state (or memory, by `kind`) per measurement: a scalar with its unit, or a vector, with the unit if they share one.
+
+    Raises:
+        ValueError: the model has no measurement.
+    """
+    units = {s.unit for s in model.measurements}
+    if not units:
+        raise ValueError(f"Observer model {model.name!r} has no measurement; an observer needs at least one.")
+    unit = units.pop() if len(units) == 1 else "1"
+    return kind(name, unit, 0.0, description, size=None if len(model.measurements) == 1 else len(model.measurements))
+
+
+def check_chain(model: ObserverModel, who: str) -> int:
+    """Width of the chain of a model in the normal form that high-gain observers need.
+
+    Returns:
+        Number of states in a block, which is the number of measurements.
+
+    Raises:
+        ValueError: A is no block shift matrix, or the measurements are not the first block.
+    """
+    n, q = model.order, len(model.measurements)
+    fits = q > 0 and n % q == 0
+    if fits:
+        fits = np.array_equal(model.A, shift_matrix(n // q, q)) and np.array_equal(model.C, np.eye(q, n))
+    if not fits:
+        raise ValueError(
+            f"{who} does not suit the model {model.name!r}: it needs A the block shift matrix and C = [I 0], each state the "
+            f"derivative of the one before and the first block measured; got A = {model.A.tolist()}, C = {model.C.tolist()}. "
+            "Put the rest into phi."
+        )
+    return q

@@ -1,0 +1,210 @@
+"""High-gain train observer whose gain follows the gap it expects: balises laid by distance, speeds that change. Ours."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from fmu_observer.certificates import Certificate, SampledError
+from fmu_observer.certificates.adapting_gain import GainAdaptation, certify_adapting_gain
+from fmu_observer.design.certified_gains import certified_gains, rounded_down
+from fmu_observer.observers.parameter_values import Value
+from fmu_observer.observers.train.high_gain import HIGH_GAIN_K, correction
+from fmu_observer.observers.train.high_gain_observer import TOP_SPEED, HighGainTrainObserver
+from fmu_observer.observers.train.train_observer import TrainObserver
+from fmu_observer.observers.train.train_resistance import drag_slope_range
+from fmu_observer.observers.train.wheel_stage import WHEEL_STAGES
+from plant_models.hybrid import PeriodicEvent, Signal, memory, output_signal, parameter, vector
+from plant_models.hybrid.system import Array
+
+FirstStage = Literal["effort", "differentiator", "multirate"]
+SpeedSource = Literal["odometer", "estimated"]
+SpacingSource = Literal["expected", "learnt"]
+
+FIRST = 3  # the first-stage states stand behind position, speed and innovation
+ADVISED_RATIO, ADVISED_SHARES = 2.0, (3.0, 1.5)  # what `advise` tries: ratio, and theta_min times the longest gap
+SHORTEST_LEARNT = 0.25  # of the expected spacing: nearer to the last one a balise teaches no spacing
+
+
+class EffortStage:
+    """No stage at all: the applied effort stands for the adhesion force, and the inertia of the wheels is neglected."""
+
+    states: tuple[Signal, ...] = ()
+    parameters: tuple[Signal, ...] = ()
+    events: tuple[PeriodicEvent, ...] = ()
+    stability_parameters: tuple[str, ...] = ()
+
+    def adhesion(self, z: Array, u: Any, p: Any) -> Array:
+        """The effort [N]."""
+        return u.effort
+
+    def flow(self, z: Array, u: Any, p: Any) -> tuple[Array, ...]:
+        """No states."""
+        return ()
+
+    def sampled(self, z: Array, u: Any) -> tuple[Array, ...]:
+        """No states."""
+        return ()
+
+
+STAGES = {"effort": EffortStage, **WHEEL_STAGES}
+
+
+class AdaptiveGainCdo(HighGainTrainObserver):
+    """High-gain observer with ``theta = clip(ratio v / d, theta_min, theta_max)``, set at each balise: ours.
+
+    The equations are those of `HighGainTrainObserver`; v is the speed at the balise, d the spacing that is expected, so that
+    theta times the gap is about `ratio` whatever the speed. Bouchama 2024 has constant gains only: theta = 8 diverges for
+    spacings of 8.7 m and more at 14 m/s. Theta is memory: it is in force, with its own decay of the innovation, until the
+    next balise.
+
+    `certify(max_gap)` assumes what must be assumed of a journey: the speed is never below ``d / max_gap`` (with the tolerance of
+    d), acceleration and deceleration stay within `assumed_acceleration`, v is right within `assumed_speed_error`
+    and each spacing is d within `assumed_spacing_error`. These three act on the certificate only. A smaller ratio leaves
+    more room for changing speeds, a larger one corrects faster; theta_min at most ``4 / longest gap``.
+
+    Args:
+        first_stage: where the adhesion force comes from. ``effort``: the applied effort, blind to slip of the wheels but robust
+            between balises far apart. ``differentiator``: of a fast odometer. ``multirate``: of a sampled one.
+        gain_speed: where v comes from. ``odometer``; or ``estimated``, free of slip but only as good as the estimate: a wrong
+            start then also makes the gain wrong, and the certificate speaks only from the time the estimate is within tolerance.
+        spacing: ``expected``: d is the parameter. ``learnt``: d is the distance between the last two balises, the parameter
+            before there are two; a balise nearer than a quarter of the parameter to the last one does not change d.
+    """
+
+    name = "adaptive_gain_cdo"
+    description = "High-gain continuous-discrete observer whose gain follows the expected balise gap"
+    source = "ours, after Bouchama 2024, (3.24)-(3.43)"
+    outputs = (*TrainObserver.outputs, output_signal("gain", "1/s", "High gain theta in force"))
+    stability_parameters: tuple[str, ...] = (
+        "ratio", "theta_min", "theta_max", "expected_spacing", "high_gain", "assumed_acceleration", "assumed_speed_error",
+        "assumed_spacing_error",
+    )  # fmt: skip
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "first_stage": tuple(STAGES),
+        "gain_speed": ("odometer", "estimated"),
+        "spacing": ("expected", "learnt"),
+    }
+
+    def __init__(
+        self, first_stage: FirstStage = "effort", gain_speed: SpeedSource = "odometer", spacing: SpacingSource = "expected"
+    ) -> None:
+        chosen = {"first_stage": first_stage, "gain_speed": gain_speed, "spacing": spacing}
+        for option, value in chosen.items():
+            if value not in self.option_choices[option]:
+                choices = ", ".join(map(str, self.option_choices[option]))
+                raise ValueError(f"{self.name}: unknown {option} {value!r}; use one of: {choices}.")
+        self.stage, self.gain_speed, self.spacing = STAGES[first_stage](), gain_speed, spacing
+        self.first_stage_states, self.estimator_events = self.stage.states, self.stage.events
+        self.first_stage_parameters = self.stage.parameters
+        self.stability_parameters = (*type(self).stability_parameters, *self.stage.stability_parameters)
+        self.estimator_memory = (memory("theta", "1/s", 1.0, "High gain in force since the last balise"),)
+        if spacing == "learnt":
+            self.estimator_memory += (
+                memory("last_balise", "m", 0.0, "Position of the last balise"),
+                memory(
+                    "learnt_spacing", "m", -1.0, "Distance between the last two balises; 0 before the second one, -1 before any"
+                ),
+            )
+        super().__init__(**chosen)
+
+    def gain_parameters(self) -> tuple[Signal, ...]:
+        """The rule of the gain, and what its certificate assumes."""
+        return (
+            parameter("ratio", "1", 2.5, "Gain times the expected gap", min=0.0),
+            parameter("theta_min", "1/s", 0.1, "Smallest gain, at most 4 / longest gap", min=1e-4),
+            parameter("theta_max", "1/s", 8.0, "Largest gain", min=1e-4),
+            parameter("expected_spacing", "m", 50.0, "Expected distance between balises", min=1e-3),
+            parameter("high_gain", "1", HIGH_GAIN_K, "Shape K of the high gain", size=2),
+            parameter("assumed_acceleration", "m/s2", 0.7, "Largest acceleration, for the certificate only", min=0.0),
+            parameter(
+                "assumed_speed_error", "1", 0.05, "Largest relative error of v, for the certificate only", min=0.0, max=1.0
+            ),
+            parameter(
+                "assumed_spacing_error", "1", 0.0, "Largest relative error of d, for the certificate only", min=0.0, max=1.0
+            ),
+        )
+
+    def theta_in_force(self, x: Array, p: Any) -> Array:
+        """High gain since the last balise [1/s]."""
+        return x[self.continuous_count]
+
+    def adhesion(self, x: Array, u: Any, p: Any) -> Array:
+        """Adhesion force of the first stage [N]."""
+        return self.stage.adhesion(self._wheel(x), u, p)
+
+    def first_stage_flow(self, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
+        """Derivatives of the first stage."""
+        return self.stage.flow(self._wheel(x), u, p)
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """The estimate with slip and indicator, and the gain in force."""
+        return super().output(t, x, u, p) | {"gain": self.theta_in_force(x, p)}
+
+    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """At a balise innovation and gain are set anew; an odometer sample goes to the first stage."""
+        if event != "balise":
+            parts = [x[i] for i in range(self.state_count)]
+            parts[FIRST : FIRST + len(self.stage.states)] = self.stage.sampled(self._wheel(x), u)
+            return vector(*parts)
+        speed = np.abs(u.odometer if self.gain_speed == "odometer" else x[1])
+        spacing, learnt = self._spacing(x, u, p)
+        theta = np.clip(p.ratio * speed / spacing, p.theta_min, np.maximum(p.theta_max, p.theta_min))  # as certified
+        kept = [x[i] for i in range(FIRST, self.continuous_count)]
+        return vector(x[0], x[1], x[0] - u.balise_position, *kept, theta, *learnt)
+
+    def alternative(self, max_gap: float, certify: Callable[[Mapping[str, Value]], Certificate]) -> str | None:
+        """The ratio and theta_min of a few that are certified; where none is, a constant theta."""
+        for share in ADVISED_SHARES:
+            rule = {"ratio": ADVISED_RATIO, "theta_min": rounded_down(share / max_gap)}
+            if certify(rule).holds:
+                return f"ratio = {ADVISED_RATIO:g} and theta_min = {rule['theta_min']:g} are certified for {max_gap:.3g} s"
+        gains = certified_gains(max_gap, lambda theta: {"theta_min": theta, "theta_max": theta}, certify)
+        return None if gains is None else f"theta_min = theta_max = {gains['theta_min']:g} is certified for {max_gap:.3g} s"
+
+    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+        """Certificate over all gaps, gains and changes of gain that the assumed journey allows."""
+        slowest, fastest = drag_slope_range(p, 0.0, TOP_SPEED)
+        adaptation = GainAdaptation(
+            ratio=float(p.ratio), theta_min=float(p.theta_min), theta_max=float(max(p.theta_max, p.theta_min)),
+            spacing=float(p.expected_spacing), high_gain=(float(p.high_gain[0]), float(p.high_gain[1])),
+            drag_slopes=(float(slowest), float(fastest)), acceleration=float(p.assumed_acceleration),
+            speed_tolerance=float(p.assumed_speed_error), spacing_tolerance=float(p.assumed_spacing_error),
+            learnt=self.spacing == "learnt",
+        )  # fmt: skip
+        certificate = certify_adapting_gain(adaptation, max_gap, _error_model(adaptation))
+        if not self.stage.events:
+            return certificate
+        gain = correction(float(p.theta_1), p.wheel_high_gain, 1.0)
+        wheel = SampledError.of([[0.0, 1.0], [0.0, 0.0]], gain, float(p.theta_1) * float(p.wheel_high_gain[0]))
+        radius = wheel.spectral_radius(float(p.odometer_period))
+        note = f"wheel stage at its odometer period of {float(p.odometer_period):g} s: spectral radius {radius:.4f}"
+        return replace(certificate, holds=certificate.holds and radius < 1.0, notes=(note,))
+
+    def _spacing(self, x: Array, u: Any, p: Any) -> tuple[Array, tuple[Array, ...]]:
+        """Spacing d to expect [m], and the memory of balises after this one."""
+        if self.spacing == "expected":
+            return p.expected_spacing, ()
+        last, before = x[self.continuous_count + 1], x[self.continuous_count + 2]
+        distance = np.abs(u.balise_position - last)
+        usable = np.where(distance >= SHORTEST_LEARNT * p.expected_spacing, 1.0, 0.0) * np.where(before >= 0.0, 1.0, 0.0)
+        learnt = np.where(usable > 0.0, distance, np.maximum(before, 0.0))
+        return np.where(learnt > 0.0, learnt, p.expected_spacing), (u.balise_position + 0.0 * last, learnt)
+
+    def _wheel(self, x: Array) -> Array:
+        return x[FIRST : FIRST + len(self.stage.states)]
+
+
+def _error_model(adaptation: GainAdaptation) -> str:
+    a, far = adaptation, adaptation.slowest_speed(1.0)
+    learnt = ", the gain set by a spacing learnt within the same range" if a.learnt else ""
+    return (
+        "position and speed error in units of the gain in force, for every change of gain that a train can cause whose speed is "
+        f"never below {far:g} m over the longest gap and whose acceleration stays within {a.acceleration:g} m/s2, with balises "
+        f"every {a.spacing:g} m within {100.0 * a.spacing_tolerance:g} % and a speed known within "
+        f"{100.0 * a.speed_tolerance:g} %{learnt}; drag slope of 0 to {TOP_SPEED:g} m/s, constant over a gap; standstill and the "
+        "error of the adhesion force, an input to it, are left out"
+    )

@@ -1,0 +1,108 @@
+"""First stages of the cascades: the adhesion force from the applied effort and the odometer. They know the wheelset only.
+
+A stage reads its own slice ``z`` of an observer's state, so that any second stage can stand on it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+from fmu_observer.observers.continuous.differentiator import filtering_differentiator_flow
+from fmu_observer.observers.train.high_gain import HIGH_GAIN_K, correction, innovation_decay
+from plant_models.hybrid import PeriodicEvent, Signal, parameter, state
+from plant_models.hybrid.system import Array
+
+
+class WheelStage(Protocol):
+    """What a second stage needs of a first one.
+
+    1. `states` are laid out next to each other in the observer's state; their slice is ``z``.
+    2. `flow` returns one derivative for each, `sampled` their values after an odometer sample.
+    3. `events` are the odometer samples it needs, if any.
+    """
+
+    states: tuple[Signal, ...]
+    parameters: tuple[Signal, ...]
+    events: tuple[PeriodicEvent, ...]
+    stability_parameters: tuple[str, ...]
+
+    def adhesion(self, z: Array, u: Any, p: Any) -> Array:
+        """Adhesion force [N]."""
+
+    def flow(self, z: Array, u: Any, p: Any) -> tuple[Array, ...]:
+        """Derivatives of the stage's states."""
+
+    def sampled(self, z: Array, u: Any) -> tuple[Array, ...]:
+        """The stage's states after an odometer sample."""
+
+
+class DifferentiatorStage:
+    """Filtering differentiator of ``y / r`` (n = 1, nf = 3), ``F_ad = effort - (J / r) Z1``: Bouchama 2024, (3.18)-(3.22)."""
+
+    states: tuple[Signal, ...] = (
+        state("filter_1", "rad.s2", 0.0, "First filter state of the differentiator"),
+        state("filter_2", "rad.s", 0.0, "Second filter state of the differentiator"),
+        state("filter_3", "rad", 0.0, "Third filter state of the differentiator"),
+        state("wheel_rate", "rad/s", 0.0, "Filtered wheel angular speed"),
+        state("wheel_acceleration", "rad/s2", 0.0, "Wheel angular acceleration"),
+    )
+    parameters: tuple[Signal, ...] = (
+        parameter("jerk_bound", "m/s3", 10.0, "Bound of the odometer's second derivative [ours]", min=1e-6),
+    )
+    events: tuple[PeriodicEvent, ...] = ()
+    stability_parameters: tuple[str, ...] = ()
+
+    def adhesion(self, z: Array, u: Any, p: Any) -> Array:
+        """``F_ad = effort - (J / r) Z1`` [N], (3.22)."""
+        return u.effort - p.n_axles * p.wheel_inertia / p.wheel_radius * z[4]
+
+    def flow(self, z: Array, u: Any, p: Any) -> tuple[Array, ...]:
+        """The filtering differentiator of the wheel rate ``y / r``, (3.18)."""
+        filters, rates = [z[0], z[1], z[2]], [z[3], z[4]]
+        dw, dz = filtering_differentiator_flow(filters, rates, u.odometer / p.wheel_radius, p.jerk_bound / p.wheel_radius)
+        return (*dw, *dz)
+
+    def sampled(self, z: Array, u: Any) -> tuple[Array, ...]:
+        """Nothing is sampled."""
+        return tuple(z[i] for i in range(5))
+
+
+class MultirateStage:
+    """High-gain observer of ``r w`` at odometer samples, ``F_ad = -(J / r^2) z2``: Bouchama 2024, (3.50)-(3.67).
+
+    The printed scalings of the second state (``-int F_ad``, later ``-(r / J) F_ad``) are dimensionally wrong; the one here,
+    ``z2 = -(r^2 / J) F_ad``, is re-derived.
+    """
+
+    states: tuple[Signal, ...] = (
+        state("wheel_speed_estimate", "m/s", 0.0, "Estimate of the wheel circumferential speed r w"),
+        state("adhesion_deceleration", "m/s2", 0.0, "Deceleration of r w by adhesion, -(r^2/J) F_ad"),
+        state("odometer_innovation", "m/s", 0.0, "Error seen at the last odometer sample, decaying since"),
+    )
+    parameters: tuple[Signal, ...] = (
+        parameter("theta_1", "1/s", 8.0, "High gain of the wheel observer; stable up to 5 / odometer_period", min=0.0),
+        parameter("wheel_high_gain", "1", HIGH_GAIN_K, "Shape K of the wheel observer's gain", size=2),
+        parameter("odometer_period", "s", 0.1, "Sampling period of the odometer", min=1e-4),
+    )
+    events: tuple[PeriodicEvent, ...] = (PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read"),)
+    stability_parameters: tuple[str, ...] = ("theta_1", "wheel_high_gain", "odometer_period")
+
+    def adhesion(self, z: Array, u: Any, p: Any) -> Array:
+        """``F_ad = -(J / r^2) z2`` [N]."""
+        return -p.n_axles * p.wheel_inertia / p.wheel_radius**2 * z[1]
+
+    def flow(self, z: Array, u: Any, p: Any) -> tuple[Array, ...]:
+        """``r w``, its deceleration by adhesion, and the decaying innovation."""
+        on_speed, on_adhesion = correction(p.theta_1, p.wheel_high_gain, z[2])
+        driven = p.wheel_radius**2 / (p.n_axles * p.wheel_inertia) * u.effort
+        return z[1] + driven - on_speed, -on_adhesion, innovation_decay(p.theta_1, p.wheel_high_gain, z[2])
+
+    def sampled(self, z: Array, u: Any) -> tuple[Array, ...]:
+        """The innovation is set anew."""
+        return z[0], z[1], z[0] - u.odometer
+
+
+WHEEL_STAGES: dict[str, type[DifferentiatorStage] | type[MultirateStage]] = {
+    "multirate": MultirateStage,
+    "differentiator": DifferentiatorStage,
+}

@@ -1,0 +1,52 @@
+"""First academic plant of chapter 2: four states, one nonlinear damping. Knows only the hybrid foundation."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid.system import Array
+
+
+class TriangularisablePlant(HybridSystem):
+    """Four states whose last is damped by ``3.3 (sin x1 + x2^2)``: Bouchama 2024, (2.40)-(2.41).
+
+    Its error equations can be brought to triangular form, so high-gain observers apply as well. Driven by the printed
+    ``u = sin t - sin 7t`` times `drive_gain`, plus the input `drive`; the drive that acts is an output, for the observer. It
+    starts at ones.
+    """
+
+    name = "triangularisable_plant"
+    description = "First academic plant of chapter 2: four states, one nonlinear damping"
+    source = "Bouchama 2024, section 2.5.1"
+    internal_step = 1e-3
+    states = tuple(state(f"state_{i}", "1", 1.0, f"State {i}") for i in (1, 2, 3, 4))
+    inputs = (input_signal("drive", "1", 0.0, "Added to the printed drive"),)
+    outputs = (
+        *(output_signal(f"x{i}", "1", f"State {i}") for i in (1, 2, 3, 4)),
+        output_signal("total_drive", "1", "Drive u that acts"),
+    )
+    parameters = (
+        parameter("drive_gain", "1", 1.0, "Size of the printed drive"),
+        parameter("damping_gain", "1", 3.3, "Factor of sin(x1) + x2^2"),
+    )
+
+    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Derivatives of the four states, shape (4,)."""
+        damping = p.damping_gain * (np.sin(x[0]) + x[1] * x[1])
+        return vector(
+            -1.25 * x[0] - 48.6 * x[1] + x[2] + 21.6 * self._drive(t, u, p),
+            x[0] + x[3],
+            x[1],
+            -19.5 * x[1] - 19.5 * x[2] - damping * x[3],
+        )
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """The states and the drive."""
+        return {f"x{i + 1}": x[i] for i in range(4)} | {"total_drive": self._drive(t, u, p)}
+
+    @staticmethod
+    def _drive(t: Array, u: Any, p: Any) -> Array:
+        return p.drive_gain * (np.sin(t) - np.sin(7.0 * t)) + u.drive

@@ -1,0 +1,40 @@
+"""Exact Jacobians of functions written in plain NumPy, usable inside a system's own flow and jump.
+
+The function is traced once by CasADi and differentiated; the result is again a function of numbers or of traced symbols. It knows
+nothing of systems.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import casadi as ca
+import numpy as np
+
+from plant_models.hybrid.system import Array
+
+SYMBOLIC = ca.ArrayInterface.SX
+
+
+def exact_jacobian(function: Callable[[Array, Array], Array], states: int, inputs: int) -> Callable[[Array, Array], Array]:
+    """The Jacobian ``d function(x, u) / d x`` as a function of (x, u).
+
+    Args:
+        function: plain NumPy without branching on values; x of shape (states,), u of shape (inputs,), returns shape (rows,).
+        states: number of states. inputs: number of inputs.
+
+    Returns:
+        A function of x and u that returns shape (rows, states), for numbers and for traced symbols.
+    """
+    x, u = ca.SX.sym("x", states), ca.SX.sym("u", inputs)
+    value = function(SYMBOLIC(x, shape=(states,)), SYMBOLIC(u, shape=(inputs,)))
+    columns = ca.SX(value) if getattr(value, "size", 1) else ca.SX(0, 1)
+    traced = ca.Function("jacobian", [x, u], [ca.densify(ca.jacobian(columns, x))])
+    shape = (columns.numel(), states)
+
+    def jacobian(at: Array, known: Array) -> Array:
+        if isinstance(at, ca.ArrayInterface) or isinstance(known, ca.ArrayInterface):
+            return SYMBOLIC(traced(ca.SX(at), ca.SX(known)), shape=shape)
+        return np.asarray(traced(at, known), dtype=float).reshape(shape)
+
+    return jacobian

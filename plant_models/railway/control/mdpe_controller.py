@@ -1,0 +1,306 @@
+"""The MDPE controller: the observer-based control of the train, one regulator for each mode and adhesion level.
+
+A sampled controller as a hybrid system of its own. It knows estimates by name only, and no observer; regulator, switch, limits,
+blending and coupler protection come from their own files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, vector
+from plant_models.hybrid.system import Array
+from plant_models.railway.control.available_adhesion import next_available_effort
+from plant_models.railway.control.brake_blending import air_brake_demand, built_up_after, electric_part
+from plant_models.railway.control.coupler_protection import effort_steps
+from plant_models.railway.control.effort_limits import electric_brake_limit, stepped_towards, traction_limit
+from plant_models.railway.control.logic import either, every, holds, some
+from plant_models.railway.control.mode_switch import (
+    COMBINED,
+    ELECTRIC,
+    INDIRECT,
+    NOMINAL,
+    TRACTION,
+    Situation,
+    next_level,
+    next_mode,
+)
+from plant_models.railway.control.sampled_regulator import (
+    RegulatorGains,
+    next_integral,
+    pole_placement,
+    tracking_integral,
+    wanted_force,
+)
+
+
+class _Memory(NamedTuple):
+    """What the controller remembers from one control instant to the next, in the order of `states`."""
+
+    effort: Array
+    demand: Array
+    integral: Array
+    error: Array
+    feedforward: Array
+    target: Array
+    mode: Array
+    level: Array
+    quiet_time: Array
+    available: Array
+    built_up: Array
+    sanding: Array
+
+
+class _Limits(NamedTuple):
+    """Limits of this instant [N], all but the signs positive: traction, electric brake, and the steps of the effort."""
+
+    traction: Array
+    electric: Array
+    down: Array
+    up: Array
+
+
+class _Regulated(NamedTuple):
+    """Force behind its limits [N] and the integral for the next instant [N]."""
+
+    target: Array
+    integral: Array
+
+
+class MdpeController(HybridSystem):
+    """Speed control with eight regulators, a switch, and limits that follow the estimated adhesion and the coupler.
+
+    Every `control_period`: ``F = M a_ref + M g slope + d_hat + Kp e + I`` with ``e = v_ref - speed``, limited, and shared between
+    the electric drive and the air brake.
+
+    - **Regulators**: PI, one for each mode (traction, electric, indirect, combined brake) and adhesion level (nominal, degraded).
+      Both poles of the train's mass under a regulator lie at ``exp(-omega T)``, with ``omega`` from `bandwidth_nominal` or
+      `bandwidth_degraded`. The active one gives back what its limits cut off (anti-windup). The inactive ones hold the integral
+      with which they would have asked for the force of this instant, so a change of mode or level makes no jump.
+    - **Switch**: mode by sign of the force, tracking error, reference, speed, coupler force and adhesion level, with hysteresis
+      (`next_mode`). Degraded adhesion counts at once, nominal after `recovery_time`.
+    - **Pre-saturation**: the electric effort stays within effort limit, power limit and the available adhesion. That is cut to
+      `adhesion_margin` of the estimated adhesion force while ``|slip| > slip_limit``, and to the force itself when
+      the adhesion becomes degraded; then it rises by `recovery_nominal` or `recovery_degraded` a second.
+    - **Coupler protection**: the effort moves by `effort_rate` at most, less as the coupler is loaded beyond its soft limit, and
+      back beyond its limit. Only the cut in slip, and the limits of effort and power, are quicker.
+    - **Blending**: in brake the electric effort is what air has not built up yet. In the combined mode both share by capacity.
+    - **Sand** is requested where slip is beyond its limit and the train is off its reference by more than `sanding_error`:
+      when the estimated adhesion alone does not do.
+
+    The estimates must not hold one thing twice: with a `disturbance_force` that contains the gradient (the augmented observers'),
+    leave `slope` unconnected. Unconnected estimates are harmless (no slip, nominal, no coupler force).
+
+    Numbers: none are printed; all are ours. Bandwidths: where the drive acts, a decade below the slowest coupler mode (0.822 Hz),
+    0.5 rad/s; where air alone acts, well below the reciprocal of its build-up time, 0.2 rad/s; combined, their geometric mean;
+    degraded, half. `effort_rate`: the nominal start, 0.5 m/s2 of 166 t = 83 kN, in one period of the slowest coupler mode.
+    `slip_limit`: the smallest optimal slip of degraded adhesion in Table 4.5 (7.2 % at 50 km/h). Coupler: 150 and 250 kN, far
+    below the 850 kN at which a standard screw coupling may break. Electric brake: 150 kN, usual for freight trains.
+
+    Presets: `train` (default; 166 t with air brake), `single_mass` (90 t without air brake: the plant `locomotive`).
+
+    Source: Bouchama 2024, section 4.5, Table 4.3, figure 4.16 (the parts), section 4.1 (350 kN, 4.2 MW); laws and numbers ours.
+    """
+
+    name = "mdpe_controller"
+    description = "Observer-based train control: regulators by mode and adhesion, limits by estimated adhesion and coupler force"
+    source = "Bouchama 2024, section 4.5 and Table 4.3; gains and thresholds ours"
+    internal_step = 1e-2  # nothing flows
+    states = (
+        memory("held_effort", "N", 0.0, "Effort of this period"),
+        memory("held_demand", "1", 0.0, "Demand to the air brake of this period"),
+        memory("integral", "N", 0.0, "Integral of the active regulator"),
+        memory("last_error", "m/s", 0.0, "Tracking error at the last instant"),
+        memory("last_feedforward", "N", 0.0, "Feedforward at the last instant"),
+        memory("target_force", "N", 0.0, "Force behind the limits, before blending and rates"),
+        memory("held_mode", "1", TRACTION, "Mode"),
+        memory("held_level", "1", NOMINAL, "Adhesion level"),
+        memory("quiet_time", "s", 0.0, "Time for which the adhesion has been reported nominal"),
+        memory("available_effort", "N", 350e3, "Effort that the rail is believed to bear"),
+        memory("built_up_brake", "N", 0.0, "Force that the air brake is believed to have built up"),
+        memory("sanding", "1", 0.0, "1 while sand is requested"),
+    )
+    inputs = (
+        input_signal("odometer", "m/s", 0.0, "Odometer speed", display_unit="km/h"),
+        input_signal("speed", "m/s", 0.0, "Estimated speed of the train", display_unit="km/h"),
+        input_signal("adhesion_force", "N", 0.0, "Estimated adhesion force of the locomotive"),
+        input_signal("slip", "1", 0.0, "Estimated slip ratio"),
+        input_signal("adhesion_condition", "1", 1.0, "Adhesion as detected: 1 nominal, 2 degraded"),
+        input_signal("coupler_force", "N", 0.0, "Estimated force in the first coupler, tension > 0"),
+        input_signal("disturbance_force", "N", 0.0, "Estimated force that resists beyond mass times acceleration"),
+        input_signal("slope", "1", 0.0, "Gradient of the track from the track data, uphill > 0; sine of the angle"),
+        input_signal("speed_reference", "m/s", 0.0, "Speed to be driven", display_unit="km/h"),
+        input_signal("acceleration_reference", "m/s2", 0.0, "Acceleration of the reference"),
+    )
+    outputs = (
+        output_signal(
+            "effort", "N", "Effort of the locomotive's drive: traction > 0, electric brake < 0", variability="discrete"
+        ),
+        output_signal("brake_demand", "1", "Demand to the air brake, 0..1", variability="discrete"),
+        output_signal("mode", "1", "1 traction, 2 electric, 3 indirect, 4 combined brake", variability="discrete"),
+        output_signal("adhesion_level", "1", "Adhesion that counts: 1 nominal, 2 degraded", variability="discrete"),
+        output_signal("sanding_request", "1", "1 while sand is requested", variability="discrete"),
+        output_signal("effort_available", "N", "Effort that the rail is believed to bear", variability="discrete"),
+        output_signal("speed_error", "m/s", "Reference minus estimated speed, now", display_unit="km/h"),
+        output_signal("drive_power", "W", "Power of the drive at the wheels, now; braking < 0"),
+    )
+    parameters = (
+        parameter("control_period", "s", 0.1, "Control period T", min=1e-3),
+        parameter("mass", "kg", 166e3, "Mass of the train M", min=1.0),
+        parameter("gravity", "m/s2", 9.81, "Acceleration of gravity g", min=0.0),
+        parameter("bandwidth_nominal", "rad/s", (0.5, 0.5, 0.2, 0.32), "Bandwidth of the regulators, nominal", min=1e-3, size=4),
+        parameter("bandwidth_degraded", "rad/s", (0.25, 0.25, 0.1, 0.16), "Bandwidth, degraded adhesion", min=1e-3, size=4),
+        parameter("effort_limit", "N", 350e3, "Largest traction effort", min=1.0),
+        parameter("power_limit", "W", 4.2e6, "Largest traction power", min=1.0),
+        parameter("electric_brake_limit", "N", 150e3, "Largest electric brake effort", min=0.0),
+        parameter("electric_fade_start", "m/s", 2.0, "Speed below which the electric brake fades", min=0.0, display_unit="km/h"),
+        parameter("electric_fade_end", "m/s", 0.5, "Speed below which it is gone", display_unit="km/h"),
+        parameter("full_brake_force", "N", 164e3, "Air brake force of the whole train at demand 1; 0 for none", min=0.0),
+        parameter("brake_build_up_time", "s", 1.5, "Time constant with which the air brake builds up", min=0.01),
+        parameter("brake_release_time", "s", 8.0, "Time constant with which it is released", min=0.01),
+        parameter("adhesion_margin", "1", 0.85, "Share of the estimated adhesion force that is used in slip", min=0.0, max=1.0),
+        parameter("slip_limit", "1", 0.072, "Slip beyond which the effort is cut", min=0.0),
+        parameter(
+            "slip_min_speed", "m/s", 1.0, "Slip counts only where wheel or train move faster", min=0.0, display_unit="km/h"
+        ),
+        parameter("smallest_effort", "N", 10e3, "Effort to which adhesion may cut at most", min=0.0),
+        parameter("recovery_nominal", "N/s", 50e3, "Rise of the available effort, nominal adhesion", min=0.0),
+        parameter("recovery_degraded", "N/s", 5e3, "Rise of the available effort, degraded adhesion", min=0.0),
+        parameter("recovery_time", "s", 5.0, "Time of nominal reports until the adhesion counts as nominal", min=0.0),
+        parameter("effort_rate", "N/s", 68e3, "Largest rate of the effort", min=1.0),
+        parameter("coupler_soft_limit", "N", 150e3, "Coupler force from which the rate is reduced", min=0.0),
+        parameter("coupler_limit", "N", 250e3, "Coupler force that the effort must not exceed", min=1.0),
+        parameter("acceleration_band", "m/s2", 0.05, "Reference acceleration that counts as none", min=0.0),
+        parameter("error_band", "m/s", 0.1, "Error within which the train coasts", min=0.0, display_unit="km/h"),
+        parameter("service_deceleration", "m/s2", 0.2, "Deceleration of the reference from which air is used", min=0.0),
+        parameter("combined_error", "m/s", 0.5, "Excess speed from which both brakes act", min=0.0, display_unit="km/h"),
+        parameter("sanding_error", "m/s", 2.0, "Tracking error in slip from which sand is used", min=0.0, display_unit="km/h"),
+        parameter("holding_effort", "N", 60e3, "Brake force that holds the train at standstill", min=0.0),
+        parameter("standstill_speed", "m/s", 0.1, "Speed below which the train stands", min=0.0, display_unit="km/h"),
+    )
+    events = (PeriodicEvent("control", "control_period", description="Decision and control law"),)
+    presets: Mapping[str, Mapping[str, Any]] = {
+        "train": {},
+        "single_mass": {
+            "mass": 90e3, "full_brake_force": 0.0, "electric_brake_limit": 350e3,
+            "electric_fade_start": 0.0, "electric_fade_end": -1.0,
+        },
+    }  # fmt: skip
+    default_preset = "train"
+
+    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Decide, regulate, limit, share: the memory for the coming period, shape (12,) or (12, members)."""
+        m = _Memory(*(x[i] for i in range(len(_Memory._fields))))
+        error = u.speed_reference - u.speed
+        feedforward = p.mass * (u.acceleration_reference + p.gravity * u.slope) + u.disturbance_force
+        standing = _standing(u, p)
+        sliding = _sliding(u, p)
+        level, quiet = next_level(m.level, m.quiet_time, u.adhesion_condition, p.control_period, p.recovery_time)
+        available = _available(m, u, p, level, sliding)
+        wanted = wanted_force(_gains(m.mode, m.level, p), m.integral, feedforward, error)
+        slower = np.minimum(np.abs(u.speed), np.abs(u.odometer))  # a locked wheel has no electric brake
+        mode = next_mode(Situation(m.mode, level, wanted, error, u.acceleration_reference, slower, u.coupler_force, standing), p)
+        limits = _limits(m, u, p, available)
+        regulated = _regulate(m, mode, level, error, feedforward, limits, p)
+        target = either(standing, 0.0, regulated.target)
+        effort, demand = _share(m, mode, target, standing, limits, p)
+        asked = demand * p.full_brake_force
+        built_up = built_up_after(m.built_up, asked, p.control_period, p.brake_build_up_time, p.brake_release_time)
+        sanding = every(sliding, holds(np.abs(error) > p.sanding_error))
+        integral = either(standing, 0.0, regulated.integral)
+        return vector(*_Memory(
+            effort, demand, integral, error, feedforward, target, mode, level, quiet, available, built_up, sanding
+        ))  # fmt: skip
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """What was decided at the last control instant."""
+        m = _Memory(*(x[i] for i in range(len(_Memory._fields))))
+        return {
+            "effort": m.effort,
+            "brake_demand": m.demand,
+            "mode": m.mode,
+            "adhesion_level": m.level,
+            "sanding_request": m.sanding,
+            "effort_available": m.available,
+            "speed_error": u.speed_reference - u.speed,
+            "drive_power": m.effort * u.odometer,
+        }
+
+
+def _standing(u: Any, p: Any) -> Array:
+    """1 where the train is to stand and does, by estimate and odometer: a locked wheel is no standing train."""
+    fastest = np.maximum(np.abs(u.speed), np.abs(u.odometer))
+    to_stand = every(holds(u.speed_reference <= 0.0), holds(u.acceleration_reference <= 0.0))
+    return every(to_stand, holds(fastest < p.standstill_speed))
+
+
+def _sliding(u: Any, p: Any) -> Array:
+    """1 where the slip is beyond its limit and wheel or train move: near standstill a slip ratio says nothing."""
+    fastest = np.maximum(np.abs(u.speed), np.abs(u.odometer))
+    return every(holds(np.abs(u.slip) > p.slip_limit), holds(fastest > p.slip_min_speed))
+
+
+def _available(m: _Memory, u: Any, p: Any, level: Array, sliding: Array) -> Array:
+    degraded = holds(level > 1.5)
+    recovery = p.control_period * either(degraded, p.recovery_degraded, p.recovery_nominal)
+    return next_available_effort(
+        m.available, u.adhesion_force, sliding, every(degraded, holds(m.level < 1.5)), recovery,
+        margin=p.adhesion_margin, floor=p.smallest_effort, limit=np.maximum(p.effort_limit, p.electric_brake_limit),
+    )  # fmt: skip
+
+
+def _limits(m: _Memory, u: Any, p: Any, available: Array) -> _Limits:
+    electric = electric_brake_limit(u.odometer, p.electric_brake_limit, p.electric_fade_start, p.electric_fade_end)
+    largest = p.effort_rate * p.control_period
+    down, up = effort_steps(m.effort, u.coupler_force, largest, p.coupler_soft_limit, p.coupler_limit)
+    return _Limits(
+        np.minimum(traction_limit(u.odometer, p.effort_limit, p.power_limit), available),
+        np.minimum(electric, available),
+        down,
+        up,
+    )
+
+
+def _gains(mode: Array, level: Array, p: Any) -> RegulatorGains:
+    chosen = [either(holds(level > 1.5), p.bandwidth_degraded[i], p.bandwidth_nominal[i]) for i in range(4)]
+    bandwidth = chosen[0]
+    for number, candidate in zip((ELECTRIC, INDIRECT, COMBINED), chosen[1:], strict=True):
+        bandwidth = np.where(mode == number, candidate, bandwidth)
+    return pole_placement(bandwidth, p.mass, p.control_period)
+
+
+def _regulate(
+    m: _Memory, mode: Array, level: Array, error: Array, feedforward: Array, limits: _Limits, p: Any
+) -> _Regulated:  # fmt: skip
+    gains = _gains(mode, level, p)
+    changed = some(holds(mode != m.mode), holds(level != m.level))
+    # The new regulator starts from the force of the last instant; a step of the feedforward since then is kept.
+    integral = either(changed, tracking_integral(gains, m.target, m.feedforward, m.error), m.integral)
+    wanted = wanted_force(gains, integral, feedforward, error)
+    lowest, highest = _range(m, mode, limits, p)
+    target = np.minimum(np.maximum(wanted, lowest), highest)
+    return _Regulated(target, next_integral(gains, integral, error, target - wanted))
+
+
+def _range(m: _Memory, mode: Array, limits: _Limits, p: Any) -> tuple[Array, Array]:
+    """Smallest and largest force of a mode [N]. A loaded coupler counts as a limit, else the integral would wind up."""
+    unloaded = p.effort_rate * p.control_period
+    more = np.where(limits.up < unloaded, np.maximum(m.effort + limits.up, 0.0), limits.traction)
+    less = np.where(limits.down < unloaded, np.maximum(limits.down - m.effort, 0.0), limits.electric)
+    traction, electric = np.minimum(limits.traction, more), np.minimum(limits.electric, less)
+    brake = np.where(mode == ELECTRIC, electric, np.where(mode == INDIRECT, p.full_brake_force, p.full_brake_force + electric))
+    driving = holds(mode == TRACTION)
+    return either(driving, 0.0, -brake), either(driving, traction, 0.0)
+
+
+def _share(m: _Memory, mode: Array, target: Array, standing: Array, limits: _Limits, p: Any) -> tuple[Array, Array]:
+    """Effort [N] and demand to the air brake [1] for a target force."""
+    capacity = p.full_brake_force + np.where(mode == COMBINED, limits.electric, 0.0)
+    braked = either(standing, -p.holding_effort, target)
+    demand = either(holds(mode > 2.5), air_brake_demand(braked, capacity, p.full_brake_force), 0.0)
+    wanted = either(holds(mode == TRACTION), target, electric_part(braked, m.built_up, limits.electric))
+    effort = stepped_towards(m.effort, wanted, limits.down, limits.up)
+    return np.minimum(np.maximum(effort, -limits.electric), limits.traction), demand

@@ -1,0 +1,117 @@
+"""The mission: the speed reference of a journey over a given distance, by time or by place.
+
+A generator as a hybrid system of its own; knows the hybrid foundation and the closed form of the journey.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter
+from plant_models.hybrid.system import Array
+from plant_models.railway.control.logic import either, every, holds
+from plant_models.railway.control.trapezoid import Trapezoid, braking_curve
+
+BrakingPoint = Literal["time", "position"]
+_KMH_35, _KMH_50 = 35.0 / 3.6, 50.0 / 3.6
+ARRIVED = 4.0
+
+
+class Mission(HybridSystem):
+    """Speed and acceleration reference: up with `acceleration`, hold `target_speed`, down with `deceleration` to the stop.
+
+    With ``braking="time"`` the reference is the trapezoid whose area is `distance`. With ``braking="position"`` the brake begins
+    where the input `position`, measured or estimated, meets the braking curve ``v = sqrt(2 d (distance - s))``, and the
+    reference follows that curve: what was lost in slip is made up for before the stop. It falls to zero `stopping_tolerance`
+    before the stopping point, where the curve is at ``sqrt(2 d tolerance)`` (0.2 m/s): without that a train that stands a
+    millimetre short would be sent on.
+
+    Where the distance is too short for the target speed, the train turns from acceleration to braking at once.
+
+    Args:
+        braking: ``time`` or ``position``.
+
+    Raises:
+        ValueError: an unknown option.
+
+    Presets: `sc1` (35 km/h, soft acceleration 0.35 m/s2; default), `sc2` and `sc3` (35 km/h, nominal 0.5 m/s2), `sc4` (50 km/h,
+    soft). All: 850 m, -0.4 m/s2.
+
+    Source: Bouchama 2024, section 4.5 and Table 4.4; the trapezoid, the curve and the tolerance are ours.
+    """
+
+    name = "mission"
+    description = "Mission: speed reference of a journey over a distance, braking by time or by position"
+    source = "Bouchama 2024, section 4.5 and Table 4.4"
+    internal_step = 1e-2  # nothing flows
+    outputs = (
+        output_signal("speed_reference", "m/s", "Speed to be driven", display_unit="km/h"),
+        output_signal("acceleration_reference", "m/s2", "Acceleration to be driven"),
+        output_signal("position_reference", "m", "Distance run by the reference in time"),
+        output_signal("phase", "1", "0 waiting, 1 accelerating, 2 holding, 3 braking, 4 arrived", variability="discrete"),
+    )
+    parameters = (
+        parameter("target_speed", "m/s", _KMH_35, "Speed of the hold phase", min=0.1, display_unit="km/h"),
+        parameter("acceleration", "m/s2", 0.35, "Acceleration: 0.5 nominal, 0.35 soft", min=1e-3),
+        parameter("deceleration", "m/s2", 0.4, "Deceleration, a positive number", min=1e-3),
+        parameter("distance", "m", 850.0, "Distance from the start to the stop", min=1.0),
+        parameter("departure_time", "s", 0.0, "Time of departure", min=0.0),
+        parameter("start_position", "m", 0.0, "Position from which the distance counts"),
+        parameter("stopping_tolerance", "m", 0.05, "Distance before the stop at which the reference is zero", min=0.0),
+    )
+    presets: Mapping[str, Mapping[str, Any]] = {
+        "sc1": {"target_speed": _KMH_35, "acceleration": 0.35},
+        "sc2": {"target_speed": _KMH_35, "acceleration": 0.5},
+        "sc3": {"target_speed": _KMH_35, "acceleration": 0.5},
+        "sc4": {"target_speed": _KMH_50, "acceleration": 0.35},
+    }
+    default_preset = "sc1"
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"braking": ("time", "position")}
+
+    def __init__(self, *, braking: BrakingPoint = "time") -> None:
+        if braking not in self.option_choices["braking"]:
+            raise ValueError(f"Unknown braking {braking!r} of the mission; choose one of: time, position.")
+        self._by_position = braking == "position"
+        if self._by_position:
+            self.inputs = (input_signal("position", "m", 0.0, "Position of the train, measured or estimated"),)
+        super().__init__(braking=braking)
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """References and phase."""
+        elapsed = t - p.departure_time
+        journey = Trapezoid(p.target_speed, p.acceleration, p.deceleration, p.distance)
+        values = _by_curve(elapsed, u.position - p.start_position, p) if self._by_position else _by_time(elapsed, journey)
+        return {**values, "position_reference": journey.position(elapsed)}
+
+
+def _by_time(elapsed: Array, journey: Trapezoid) -> dict[str, Array]:
+    phase = journey.phase(elapsed)
+    return {
+        "speed_reference": journey.speed(elapsed),
+        "acceleration_reference": _acceleration(phase, journey.acceleration, journey.deceleration),
+        "phase": phase,
+    }
+
+
+def _by_curve(elapsed: Array, run: Array, p: Any) -> dict[str, Array]:
+    remaining = p.distance - run
+    departed = holds(elapsed >= 0.0)
+    rising = np.maximum(p.acceleration * elapsed, 0.0)
+    ahead = np.minimum(rising, p.target_speed)
+    curve = braking_curve(remaining, p.deceleration)
+    arrived = every(departed, holds(remaining <= p.stopping_tolerance))
+    braking = every(departed, holds(curve <= ahead))
+    cruising = either(holds(rising < p.target_speed), 1.0, 2.0)
+    phase = departed * either(arrived, ARRIVED, either(braking, 3.0, cruising))
+    return {
+        "speed_reference": either(arrived, 0.0, np.minimum(ahead, curve)),
+        "acceleration_reference": _acceleration(phase, p.acceleration, p.deceleration),
+        "phase": phase,
+    }
+
+
+def _acceleration(phase: Array, acceleration: Array, deceleration: Array) -> Array:
+    return np.where(phase == 1.0, acceleration, np.where(phase == 3.0, -deceleration, 0.0))

@@ -1,0 +1,332 @@
+"""The multi-vehicle train: a locomotive on its wheelsets, wagons on couplers, a brake pipe through all of them.
+
+Declares the hybrid system and puts its forces together; wheelset, coupler, brake, resistance and track come from their own files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid.system import Array
+from plant_models.railway.adhesion import ADHESION_LAWS
+from plant_models.railway.track.track import GradientShape, Track, ZoneAxis
+from plant_models.railway.vehicle.coupler import COUPLER_PARAMETERS, coupler_force
+from plant_models.railway.vehicle.pneumatic_brake import BRAKE_PARAMETERS, BrakePipe, brake_force, filling
+from plant_models.railway.vehicle.resistance import GRAVITY, gradient_resistance, moving_resistance
+from plant_models.railway.vehicle.wheelset import Wheelset
+
+AXLE_POSITIONS = {1: (9.75,), 4: (3.3, 5.9, 13.6, 16.2)}  # [m] behind the front of 19.5 m; bogies 2.6 m, 10.3 m apart
+ONE_WHEEL = 225.0  # [kg.m2], the inertia printed in Table 4.2
+
+
+class Train(HybridSystem):
+    """One locomotive and n wagons: ``J dw_k = r F_k - r F_ad,k``, ``M_i dv_i = F_ad - F_r,i - F_b,i - F_g,i + Fc_{i-1} - Fc_i``.
+
+    Vehicle 1 is the locomotive, vehicle ``i + 1`` wagon i. The states are the position of the locomotive's front, the speeds of
+    all vehicles, the elongations ``e_i = p_i - p_{i+1}`` of the couplers beyond their neutral places (so vehicle lengths do not
+    appear in them), the rates of the locomotive's wheelsets and the pressures in the brake cylinders.
+
+    **Locomotive.** Each of its axles carries the same share of its weight and has its own wheelset and adhesion; wagons roll
+    without slip. `effort` is the sum over the axles and shared equally, or one value per axle. A negative effort is the electric
+    brake. `brake_demand` is the indirect brake of the whole train, the locomotive's too; both may act at once. Axle k passes a
+    zone at ``position - axle_position[k]``, and finds there ``axle_degraded[k]`` of the degradation: below 1 for axles whose
+    rail those before them have cleaned. The odometer's `wheel_speed` is that of the first axle, the one on the worst rail.
+
+    **Wheel inertia.** The thesis prints one wheel's J = 225 kg.m2 and one rotating mass. Here every axle has 225, which makes
+    3.0 % of the locomotive's mass, a usual figure; `table_4_2_one_axle` has 225 in all, 0.76 %.
+
+    **Wagon brakes.** `brake_demand` 0 .. 1 is the depression in the brake pipe over that of the full service brake. It runs
+    down the pipe as a wave, `BrakePipe`; each vehicle's cylinder fills, `filling`; the shoes are dry friction, `brake_force`.
+    What is dry friction (brakes, the constant Davis terms, the hold of standing braked wheels) can stop a vehicle and
+    hold it, never push it.
+
+    **Track.** The gradient acts on each vehicle at its middle, the lengths of those before it behind the front. lie
+    along the track by default; by time they reach all axles at once.
+
+    Args:
+        wagons: number of wagons, 1 to 20.
+        axles: wheelsets of the locomotive, 4 or 1.
+        effort_per_axle: `effort` is a vector, one value for each axle.
+        adhesion: ``burckhardt`` (3.12) or ``polach`` (3.4)-(3.10).
+        zones: zones of degraded adhesion along ``position`` or ``time``.
+        zone_count: number of zones.
+        gradient_shape: gradient ``constant`` between its points, or ``linear``.
+        gradient_count: number of gradient points.
+        delay_samples: readings of the brake demand from vehicle to vehicle.
+
+    Raises:
+        ValueError: an unknown option, or a number out of its range.
+
+    Presets: `table_4_2` (default; damping sign repaired), `table_4_2_one_axle` (total wheel inertia as printed), `as_published`
+    (printed damping sign of (4.6): every coupler mode grows, to 400 m/s between vehicles after 3 s).
+
+    Source: Bouchama 2024, (4.1)-(4.6), Table 4.2, section 4.1. Ours: adhesion on the locomotive's own weight (the thesis does
+    not say), brake force, brake delay, cylinder times, axle positions, set-valued friction, free play and pre-load.
+    """
+
+    name = "train"
+    description = "Multi-vehicle train: effort and brake demand in, motion, slip of each axle and coupler forces out"
+    source = "Bouchama 2024, (4.1)-(4.6), Table 4.2 and section 4.1"
+    method = "rosenbrock"  # the wheels' time constants are far below the step near standstill
+    stiff = ("train_speed", "wagon_velocity", "axle_rate")  # with all momenta among them; the couplers are slow: 3.4 Hz
+    internal_step = 1e-3  # to 4e-6 m/s in smooth motion, 5e-4 where a vehicle starts or stops, 2e-3 at the knocks of free play
+    presets: Mapping[str, Mapping[str, Any]] = {}
+    default_preset = "table_4_2"
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "wagons": range(1, 21),
+        "axles": (4, 1),
+        "effort_per_axle": (False, True),
+        "adhesion": tuple(ADHESION_LAWS),
+        "zones": ("position", "time"),
+        "zone_count": range(1, 65),
+        "gradient_shape": ("constant", "linear"),
+        "gradient_count": range(1, 65),
+        "delay_samples": range(1, 101),
+    }
+
+    def __init__(
+        self, *, wagons: int = 4, axles: Literal[1, 4] = 4, effort_per_axle: bool = False,
+        adhesion: Literal["burckhardt", "polach"] = "burckhardt", zones: ZoneAxis = "position", zone_count: int = 3,
+        gradient_shape: GradientShape = "constant", gradient_count: int = 4, delay_samples: int = 5,
+    ) -> None:  # fmt: skip
+        _check(wagons, axles, effort_per_axle, adhesion, delay_samples)
+        self.wagons, self.axles, self.effort_per_axle = wagons, axles, effort_per_axle
+        self._law = ADHESION_LAWS[adhesion]()
+        self._track = Track(zones, zone_count, gradient_shape, gradient_count)
+        self._pipe = BrakePipe(wagons + 1, delay_samples)
+        self.states = (*_states(wagons, axles), self._pipe.memory)
+        self.frictions = ("train_speed", *(f"wagon_velocity[{i + 1}]" for i in range(wagons)),
+                          *(f"axle_rate[{k + 1}]" for k in range(axles)))  # fmt: skip
+        self.inputs = _inputs(axles if effort_per_axle else None)
+        self.outputs = _outputs(wagons, axles)
+        self.parameters = (*_parameters(wagons, axles), *self._law.parameters, *self._track.parameters)
+        self.events = (self._pipe.event,)
+        self.presets = {
+            "table_4_2": {},
+            "table_4_2_one_axle": {"wheel_inertia": ONE_WHEEL / axles},
+            "as_published": {"coupler_damping": -5e4},
+        }
+        super().__init__(
+            wagons=wagons, axles=axles, effort_per_axle=effort_per_axle, adhesion=adhesion, zones=zones, zone_count=zone_count,
+            gradient_shape=gradient_shape, gradient_count=gradient_count, delay_samples=delay_samples,
+        )  # fmt: skip
+
+    def rolling(self, speed: float, wheel_radius: float = 0.575) -> dict[str, float]:
+        """Start values by name of a train that rolls as one at `speed` [m/s], its wheels without slip [m]."""
+        starts = {"train_speed": speed, **{f"wagon_velocity[{i + 1}]": speed for i in range(self.wagons)}}
+        return starts | {f"axle_rate[{k + 1}]": speed / wheel_radius for k in range(self.axles)}
+
+    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Derivatives of the continuous states without dry friction, shape (nc,) or (nc, members)."""
+        now = _Now(self, x)
+        wheelsets = self._wheelsets(t, now, u, p)
+        pushes = self._pushes(now, wheelsets, p)
+        accelerations = [push / mass for push, mass in zip(pushes, self._masses(p), strict=True)]
+        elongating = [now.speeds[i] - now.speeds[i + 1] for i in range(self.wagons)]
+        fillings = [filling(now.cylinders[i], self._pipe.pressure(now.readings, i, p), p) for i in range(self.wagons + 1)]
+        return vector(now.speeds[0], *elongating, *accelerations, *(w.acceleration(p) for w in wheelsets), *fillings)
+
+    def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Dry friction on the speeds [m/s2] and on the wheel rates [rad/s2], shape (1 + wagons + axles,)."""
+        now = _Now(self, x)
+        wheelsets = self._wheelsets(t, now, u, p)
+        limits = [davis + other for davis, other in self._dry_limits(now, wheelsets, p)]
+        decelerations = [limit / mass for limit, mass in zip(limits, self._masses(p), strict=True)]
+        return vector(*decelerations, *(w.friction(p) for w in wheelsets))
+
+    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """The brake demand is read, and all earlier readings move down the pipe; shape (n,) or (n, members)."""
+        count = self.continuous_count
+        return vector(*(x[i] for i in range(count)), *self._pipe.shifted(_Now(self, x).readings, u.brake_demand))
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """The declared outputs; at rest the forces are those that hold the vehicles."""
+        now = _Now(self, x)
+        wheelsets = self._wheelsets(t, now, u, p)
+        pushes = self._pushes(now, wheelsets, p)
+        limits = self._dry_limits(now, wheelsets, p)
+        dry = [_resolved(push, limit[0], v) for push, limit, v in zip(pushes, limits, now.speeds, strict=True)]
+        other = [_resolved(push - d, limit[1], v) for push, d, limit, v in zip(pushes, dry, limits, now.speeds, strict=True)]
+        creeps = [w.creep_force(p) for w in wheelsets]
+        slips = [w.slip(p) for w in wheelsets]
+        rims = [p.wheel_radius * rate for rate in now.rates]
+        return {
+            "position": now.position,
+            "speed": now.speeds[0],
+            "acceleration": (pushes[0] - dry[0] - other[0]) / p.mass,
+            "wheel_speed": rims[0],
+            "slip": slips[0],
+            "adhesion_force": _sum(creeps) - other[0],
+            "resistance_force": _sum([r + d for r, d in zip(self._resistances(now, p), dry, strict=True)]),
+            "gradient_force": _sum(self._gradients(now, p)),
+            "wagon_brake_force": _sum(other[1:]),
+            "adhesion_degraded": _largest([w.degraded for w in wheelsets]),
+            "axle_speed": vector(*rims),
+            "axle_slip": vector(*slips),
+            "axle_creep_force": vector(*creeps),
+            "wagon_speed": vector(*now.speeds[1:]),
+            "coupler_force": vector(*self._couplers(now, p)),
+            "pipe_pressure": vector(*(self._pipe.pressure(now.readings, i, p) for i in range(self.wagons + 1))),
+            "cylinder_pressure": vector(*now.cylinders),
+        }
+
+    # -- forces, all against the motion but those of rail and couplers ------------------------------------------------
+
+    def _wheelsets(self, t: Array, now: _Now, u: Any, p: Any) -> list[Wheelset]:
+        weight = p.mass * p.gravity / self.axles
+        pneumatic = brake_force(now.cylinders[0], p.braked_mass, p) / self.axles
+        wheelsets = []
+        for k, rate in enumerate(now.rates):
+            effort = u.effort[k] if self.effort_per_axle else u.effort / self.axles
+            degraded = p.axle_degraded[k] * self._track.degraded(t, now.position - p.axle_position[k], p)
+            brake = np.maximum(-effort, 0.0) + pneumatic
+            wheelsets.append(Wheelset(self._law, rate, now.speeds[0], np.maximum(effort, 0.0), brake, weight, degraded))
+        return wheelsets
+
+    def _pushes(self, now: _Now, wheelsets: list[Wheelset], p: Any) -> list[Array]:
+        """Forces on the vehicles without dry friction [N]."""
+        couplers = [0.0, *self._couplers(now, p), 0.0]
+        resistances, gradients = self._resistances(now, p), self._gradients(now, p)
+        pushes = [couplers[i] - couplers[i + 1] - resistances[i] - gradients[i] for i in range(self.wagons + 1)]
+        return [pushes[0] + _sum([w.creep_force(p) for w in wheelsets]), *pushes[1:]]
+
+    def _couplers(self, now: _Now, p: Any) -> list[Array]:
+        return [coupler_force(e, now.speeds[i] - now.speeds[i + 1], p) for i, e in enumerate(now.elongations)]
+
+    def _resistances(self, now: _Now, p: Any) -> list[Array]:
+        first = moving_resistance(now.speeds[0], p.davis_b, p.davis_c)
+        return [first, *(moving_resistance(v, p.wagon_davis_b, p.wagon_davis_c) for v in now.speeds[1:])]
+
+    def _gradients(self, now: _Now, p: Any) -> list[Array]:
+        place = now.position - 0.5 * p.length
+        places = [place]
+        for i, elongation in enumerate(now.elongations):
+            place = place - elongation - (0.5 * (p.length + p.wagon_length) if i == 0 else p.wagon_length)
+            places.append(place)
+        slopes = [self._track.gradient(place, p) for place in places]
+        return [gradient_resistance(mass, p.gravity, i) for mass, i in zip(self._masses(p), slopes, strict=True)]
+
+    def _dry_limits(self, now: _Now, wheelsets: list[Wheelset], p: Any) -> list[tuple[Array, Array]]:
+        """Dry frictions of each vehicle [N]: the constant Davis term, and brake shoes or the hold of braked wheels."""
+        first = (p.davis_a, _sum([w.hold(p) for w in wheelsets]))
+        shoes = [brake_force(now.cylinders[i + 1], p.wagon_braked_mass[i], p) for i in range(self.wagons)]
+        return [first, *((p.wagon_davis_a, force) for force in shoes)]
+
+    def _masses(self, p: Any) -> list[Array]:
+        return [p.mass, *(p.wagon_mass[i] for i in range(self.wagons))]
+
+
+class _Now:
+    """The state by what it means: lists of scalars (or of batches of them)."""
+
+    def __init__(self, train: Train, x: Array) -> None:
+        n, axles = train.wagons, train.axles
+        ends = np.cumsum([1, n, n + 1, axles, n + 1])
+        position, self.elongations, self.speeds, self.rates, self.cylinders, self.readings = (
+            [x[i] for i in range(low, high)] for low, high in zip([0, *ends], [*ends, x.shape[0]], strict=True)
+        )
+        self.position = position[0]
+
+
+def _resolved(push: Array, limit: Array, speed: Array) -> Array:
+    """Dry friction [N] up to a limit against the motion, or, at rest, against what pushes."""
+    return np.where(speed == 0.0, np.clip(push, -limit, limit), np.sign(speed) * limit)
+
+
+def _sum(values: list[Array]) -> Array:
+    total = values[0]
+    for value in values[1:]:
+        total = total + value
+    return total
+
+
+def _largest(values: list[Array]) -> Array:
+    largest = values[0]
+    for value in values[1:]:
+        largest = np.maximum(largest, value)
+    return largest
+
+
+def _states(wagons: int, axles: int) -> tuple[Any, ...]:
+    return (
+        state("train_position", "m", 0.0, "Position of the locomotive's front at start"),
+        state("elongation", "m", 0.0, "Elongation of each coupler beyond its neutral place at start", size=wagons),
+        state("train_speed", "m/s", 0.0, "Speed of the locomotive at start"),
+        state("wagon_velocity", "m/s", 0.0, "Speed of each wagon at start", size=wagons),
+        state("axle_rate", "rad/s", 0.0, "Angular speed of each axle at start; speed / wheel_radius where it rolls", size=axles),
+        state("cylinder", "Pa", 0.0, "Pressure in the brake cylinders at start, the locomotive's first", size=wagons + 1),
+    )
+
+
+def _inputs(size: int | None) -> tuple[Any, ...]:
+    whole = "Effort at the rims, shared by the axles: traction > 0, electric brake < 0"
+    each = "Effort at the rims of each axle: traction > 0, electric brake < 0"
+    return (
+        input_signal("effort", "N", 0.0, whole if size is None else each, size=size),
+        input_signal("brake_demand", "1", 0.0, "Indirect brake: depression of the pipe over that of the full service brake"),
+    )
+
+
+def _outputs(wagons: int, axles: int) -> tuple[Any, ...]:
+    return (
+        output_signal("position", "m", "Position of the locomotive's front"),
+        output_signal("speed", "m/s", "Speed of the locomotive", display_unit="km/h"),
+        output_signal("acceleration", "m/s2", "Acceleration of the locomotive"),
+        output_signal("wheel_speed", "m/s", "Circumferential speed of the first axle, r*w", display_unit="km/h"),
+        output_signal("slip", "1", "Slip ratio of the first axle (r*w - v) / max(|v|, slip_floor), (3.13)"),
+        output_signal("adhesion_force", "N", "Force of the rail on all wheels of the locomotive"),
+        output_signal("resistance_force", "N", "Running resistance of the train, against the motion"),
+        output_signal("gradient_force", "N", "Downhill pull on the train as a resistance, uphill > 0"),
+        output_signal("wagon_brake_force", "N", "Force of the wagons' brakes, against the motion"),
+        output_signal("adhesion_degraded", "1", "0 nominal .. 1 degraded adhesion, of the axle where it is largest"),
+        output_signal("axle_speed", "m/s", "Circumferential speed of each axle", display_unit="km/h", size=axles),
+        output_signal("axle_slip", "1", "Slip ratio of each axle", size=axles),
+        output_signal("axle_creep_force", "N", "Force of the rail on each axle by the adhesion curve", size=axles),
+        output_signal("wagon_speed", "m/s", "Speed of each wagon", display_unit="km/h", size=wagons),
+        output_signal("coupler_force", "N", "Force in each coupler, tension > 0", size=wagons),
+        output_signal("pipe_pressure", "Pa", "Brake pipe at each vehicle", display_unit="bar", size=wagons + 1),
+        output_signal("cylinder_pressure", "Pa", "Brake cylinder of each vehicle", display_unit="bar", size=wagons + 1),
+    )
+
+
+def _parameters(wagons: int, axles: int) -> tuple[Any, ...]:
+    return (
+        parameter("mass", "kg", 90e3, "Mass of the locomotive M_1", min=1.0),
+        parameter("length", "m", 19.5, "Length of the locomotive", min=0.0),
+        parameter("braked_mass", "kg", 80e3, "Braked mass of the locomotive's indirect brake", min=0.0),
+        parameter("wheel_inertia", "kg.m2", ONE_WHEEL, "Moment of inertia of one axle of the locomotive J", min=1e-3),
+        parameter("wheel_radius", "m", 0.575, "Radius of the locomotive's wheels r", min=1e-3),
+        parameter("gravity", "m/s2", GRAVITY, "Acceleration of gravity g", min=0.0),
+        parameter("davis_a", "N", 900.0, "Running resistance of the locomotive, constant part; dry friction", min=0.0),
+        parameter("davis_b", "N.s/m", 32.4, "Running resistance of the locomotive, viscous part", min=0.0),
+        parameter("davis_c", "N.s2/m2", 1.6529, "Running resistance of the locomotive, aerodynamic part", min=0.0),
+        parameter("slip_floor", "m/s", 0.5, "Smallest speed the slip refers to", min=1e-3, display_unit="km/h"),
+        parameter("axle_position", "m", AXLE_POSITIONS[axles], "Distance of each axle from the front", min=0.0, size=axles),
+        parameter("axle_degraded", "1", 1.0, "Share of a zone's degradation that each axle finds", min=0.0, max=1.0, size=axles),
+        parameter("wagon_mass", "kg", 19e3, "Mass of each wagon M_i", min=1.0, size=wagons),
+        parameter("wagon_length", "m", 14.06, "Length of a wagon", min=0.0),
+        parameter("wagon_braked_mass", "kg", 21e3, "Braked mass of each wagon", min=0.0, size=wagons),
+        parameter("wagon_davis_a", "N", 190.0, "Running resistance of a wagon, constant part; dry friction", min=0.0),
+        parameter("wagon_davis_b", "N.s/m", 6.8, "Running resistance of a wagon, viscous part", min=0.0),
+        parameter("wagon_davis_c", "N.s2/m2", 2.3, "Running resistance of a wagon, aerodynamic part", min=0.0),
+        *COUPLER_PARAMETERS,
+        *BRAKE_PARAMETERS,
+    )  # fmt: skip
+
+
+def _check(wagons: int, axles: int, effort_per_axle: bool, adhesion: str, delay_samples: int) -> None:
+    if not isinstance(wagons, int) or not 1 <= wagons <= 20:
+        hint = " For a locomotive alone use the model 'locomotive'." if wagons == 0 else ""
+        raise ValueError(f"train: wagons must be a whole number from 1 to 20, got {wagons!r}.{hint}")
+    if axles not in AXLE_POSITIONS:
+        raise ValueError(f"train: the locomotive has 4 axles, or 1 that stands for all; got axles = {axles!r}.")
+    if not isinstance(effort_per_axle, bool):
+        raise ValueError(f"train: effort_per_axle must be true or false, got {effort_per_axle!r}.")
+    if adhesion not in ADHESION_LAWS:
+        raise ValueError(f"Unknown adhesion {adhesion!r}; choose one of: {', '.join(ADHESION_LAWS)}.")
+    if not isinstance(delay_samples, int) or delay_samples < 1:
+        raise ValueError(f"train: delay_samples must be a whole number, 1 at least, got {delay_samples!r}.")
