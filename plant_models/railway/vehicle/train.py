@@ -44,8 +44,8 @@ class Train(HybridSystem):
     What is dry friction (brakes, the constant Davis terms, the hold of standing braked wheels) can stop a vehicle and
     hold it, never push it.
 
-    **Track.** The gradient acts on each vehicle at its middle, the lengths of those before it behind the front. lie
-    along the track by default; by time they reach all axles at once.
+    **Track.** The gradient acts on each vehicle at its middle, the lengths of those before it behind the front. Zones
+    lie along the track by default; by time they reach all axles at once.
 
     Args:
         wagons: number of wagons, 1 to 20.
