@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from sheet import Sheet
-from train_scenarios import NOT_PRINTED, SOURCE, SPEED_ERRORS, figure, indicated, mean_speed_error, run, sanding_time, slide, yes
+from shipped import run
+from train_scenarios import NOT_PRINTED, SOURCE, SPEED_ERRORS, figure, indicated, mean_speed_error, sanding_time, slide, yes
 
 if __name__ == "__main__":
     sheet = Sheet(__file__, "Sc1: observer-based control, 35 km/h, clear water", SOURCE)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from sheet import Sheet
+from shipped import run
 from train_scenarios import (
     DEPARTURE,
     NOT_PRINTED,
@@ -11,7 +12,6 @@ from train_scenarios import (
     figure,
     indicated,
     mean_speed_error,
-    run,
     sanding_time,
     slide,
     yes,

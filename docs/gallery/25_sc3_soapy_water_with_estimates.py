@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from sheet import Sheet
-from train_scenarios import JUDGED_FROM, NOT_PRINTED, SOURCE, figure, mean_speed_error, run, sanding_time, slide
+from shipped import run
+from train_scenarios import JUDGED_FROM, NOT_PRINTED, SOURCE, figure, mean_speed_error, sanding_time, slide
 
 EFFORT_LIMIT = 350e3  # [N], of the locomotive
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from sheet import Sheet
-from train_scenarios import DEPARTURE, NOT_PRINTED, SOURCE, figure, mean_speed_error, run, sanding_time, slide, yes
+from shipped import run
+from train_scenarios import DEPARTURE, NOT_PRINTED, SOURCE, figure, mean_speed_error, sanding_time, slide, yes
 
 if __name__ == "__main__":
     sheet = Sheet(__file__, "Sc4: observer-based control, 50 km/h, soapy water", SOURCE)

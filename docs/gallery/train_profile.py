@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import matplotlib.pyplot as plt
 import numpy as np
-from sheet import Sheet
+from sheet import SAME, Sheet
+from shipped import run
 
-from cosim import Outcome, Scenario
+from cosim import Outcome
 
 ZONES = {"traction zone": (10.0, 20.0), "braking zone": (70.0, 80.0)}  # printed
 OBSERVERS = {
@@ -28,16 +31,25 @@ def compare(script: str, scenario: str, title: str) -> None:
         script: the script's ``__file__``. scenario: name of a shipped scenario. title: of the sheet.
     """
     sheet = Sheet(script, title, "Bouchama 2024, sections 3.4 and 3.5, Figures 3.9-3.16, 3.18-3.23")
-    outcome = Scenario.load(scenario).run(warn=lambda _warning: None)
-    if outcome.failure is not None:
-        raise RuntimeError(outcome.failure)
+    outcome = run(scenario)
+    add_largest_errors(sheet, outcome)
+    sheet.finish(_figure(outcome))
+
+
+def add_largest_errors(sheet: Sheet, outcome: Outcome, prefix: str = "", repeats: Mapping[str, float] | None = None) -> None:
+    """Lines with the largest speed error of each observer in both zones.
+
+    Args:
+        sheet: where they go. outcome: of a run. prefix: of the quantities.
+        repeats: by observer, the relative difference that another machine may show.
+    """
     t, true = outcome["time"], outcome["locomotive.speed"]
     for name, (label, published) in OBSERVERS.items():
         error = np.abs(outcome[f"{name}.speed"] - true)
         for zone, (start, end) in ZONES.items():
             largest = float(error[(t >= start) & (t <= end)].max())
-            sheet.add(f"{label}: largest speed error, {zone}", "m/s", published.get(zone), largest, NO_DATA)
-    sheet.finish(_figure(outcome))
+            words = f"{prefix}{label}: largest speed error, {zone}"
+            sheet.add(words, "m/s", published.get(zone), largest, NO_DATA, repeats=(repeats or {}).get(name, SAME))
 
 
 def _figure(outcome: Outcome) -> plt.Figure:

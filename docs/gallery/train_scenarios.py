@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -47,18 +46,6 @@ class Slide:
     onset: float
     end: float
     lost: float
-
-
-def run(name: str, changes: Mapping[str, Any] | None = None) -> Outcome:
-    """Run a shipped scenario.
-
-    Raises:
-        RuntimeError: the run failed.
-    """
-    outcome = Scenario.load(name).run(overrides=changes, warn=lambda _warning: None)
-    if outcome.failure is not None:
-        raise RuntimeError(outcome.failure)
-    return outcome
 
 
 def connections_with(name: str, exchanged: Mapping[str, str]) -> list[str]:

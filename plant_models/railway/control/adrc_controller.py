@@ -13,6 +13,7 @@ import numpy as np
 from plant_models.hybrid import HybridSystem, Signal, input_signal, output_signal, parameter, state, vector
 from plant_models.hybrid.system import Array
 from plant_models.railway.control.brake_blending import air_brake_demand, building_up, electric_part
+from plant_models.railway.control.drive_and_brakes import DRIVE_AND_BRAKES, PRESETS
 from plant_models.railway.control.effort_limits import electric_brake_limit, traction_limit
 from plant_models.railway.control.extended_state_observer import observer_derivative, rejecting_force
 from plant_models.railway.control.logic import either, every, holds
@@ -87,25 +88,12 @@ class AdrcController(HybridSystem):
         parameter("mass", "kg", 166e3, "Mass of the train M", min=1.0),
         parameter("control_bandwidth", "rad/s", 0.5, "Bandwidth of the control law wc", min=1e-3),
         parameter("observer_bandwidth", "rad/s", 1.5, "Bandwidth of the extended state observer wo", min=1e-3),
-        parameter("effort_limit", "N", 350e3, "Largest traction effort", min=1.0),
-        parameter("power_limit", "W", 4.2e6, "Largest traction power", min=1.0),
-        parameter("electric_brake_limit", "N", 150e3, "Largest electric brake effort", min=0.0),
-        parameter("electric_fade_start", "m/s", 2.0, "Speed below which the electric brake fades", min=0.0, display_unit="km/h"),
-        parameter("electric_fade_end", "m/s", 0.5, "Speed below which it is gone", display_unit="km/h"),
-        parameter("full_brake_force", "N", 164e3, "Air brake force of the whole train at demand 1; 0 for none", min=0.0),
-        parameter("brake_build_up_time", "s", 1.5, "Time constant with which the air brake builds up", min=0.01),
-        parameter("brake_release_time", "s", 8.0, "Time constant with which it is released", min=0.01),
+        *DRIVE_AND_BRAKES,
         parameter("service_deceleration", "m/s2", 0.2, "Deceleration of the reference from which air is used", min=0.0),
         parameter("holding_effort", "N", 60e3, "Brake force that holds the train at standstill", min=0.0),
         parameter("standstill_speed", "m/s", 0.1, "Odometer speed below which it stands", min=0.0, display_unit="km/h"),
     )
-    presets: Mapping[str, Mapping[str, Any]] = {
-        "train": {},
-        "single_mass": {
-            "mass": 90e3, "full_brake_force": 0.0, "electric_brake_limit": 350e3,
-            "electric_fade_start": 0.0, "electric_fade_end": -1.0,
-        },
-    }  # fmt: skip
+    presets: Mapping[str, Mapping[str, Any]] = PRESETS
     default_preset = "train"
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"drive": ("immediate", "ramped")}
 

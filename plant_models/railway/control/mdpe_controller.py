@@ -16,6 +16,7 @@ from plant_models.hybrid.system import Array
 from plant_models.railway.control.available_adhesion import next_available_effort
 from plant_models.railway.control.brake_blending import air_brake_demand, built_up_after, electric_part
 from plant_models.railway.control.coupler_protection import effort_steps
+from plant_models.railway.control.drive_and_brakes import DRIVE_AND_BRAKES, PRESETS
 from plant_models.railway.control.effort_limits import electric_brake_limit, stepped_towards, traction_limit
 from plant_models.railway.control.logic import either, every, holds, some
 from plant_models.railway.control.mode_switch import (
@@ -153,14 +154,7 @@ class MdpeController(HybridSystem):
         parameter("gravity", "m/s2", 9.81, "Acceleration of gravity g", min=0.0),
         parameter("bandwidth_nominal", "rad/s", (0.5, 0.5, 0.2, 0.32), "Bandwidth of the regulators, nominal", min=1e-3, size=4),
         parameter("bandwidth_degraded", "rad/s", (0.25, 0.25, 0.1, 0.16), "Bandwidth, degraded adhesion", min=1e-3, size=4),
-        parameter("effort_limit", "N", 350e3, "Largest traction effort", min=1.0),
-        parameter("power_limit", "W", 4.2e6, "Largest traction power", min=1.0),
-        parameter("electric_brake_limit", "N", 150e3, "Largest electric brake effort", min=0.0),
-        parameter("electric_fade_start", "m/s", 2.0, "Speed below which the electric brake fades", min=0.0, display_unit="km/h"),
-        parameter("electric_fade_end", "m/s", 0.5, "Speed below which it is gone", display_unit="km/h"),
-        parameter("full_brake_force", "N", 164e3, "Air brake force of the whole train at demand 1; 0 for none", min=0.0),
-        parameter("brake_build_up_time", "s", 1.5, "Time constant with which the air brake builds up", min=0.01),
-        parameter("brake_release_time", "s", 8.0, "Time constant with which it is released", min=0.01),
+        *DRIVE_AND_BRAKES,
         parameter("adhesion_margin", "1", 0.85, "Share of the estimated adhesion force that is used in slip", min=0.0, max=1.0),
         parameter("slip_limit", "1", 0.072, "Slip beyond which the effort is cut", min=0.0),
         parameter(
@@ -182,13 +176,7 @@ class MdpeController(HybridSystem):
         parameter("standstill_speed", "m/s", 0.1, "Speed below which the train stands", min=0.0, display_unit="km/h"),
     )
     events = (PeriodicEvent("control", "control_period", description="Decision and control law"),)
-    presets: Mapping[str, Mapping[str, Any]] = {
-        "train": {},
-        "single_mass": {
-            "mass": 90e3, "full_brake_force": 0.0, "electric_brake_limit": 350e3,
-            "electric_fade_start": 0.0, "electric_fade_end": -1.0,
-        },
-    }  # fmt: skip
+    presets: Mapping[str, Mapping[str, Any]] = PRESETS
     default_preset = "train"
 
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:

@@ -1,0 +1,20 @@
+"""Running a shipped scenario from a script of the gallery."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from cosim import Outcome, Scenario
+
+
+def run(name: str, changes: Mapping[str, Any] | None = None) -> Outcome:
+    """Run a shipped scenario.
+
+    Raises:
+        RuntimeError: the run failed.
+    """
+    outcome = Scenario.load(name).run(overrides=changes, warn=lambda _warning: None)
+    if outcome.failure is not None:
+        raise RuntimeError(outcome.failure)
+    return outcome
