@@ -213,7 +213,8 @@ SMALL: dict[str, type[HybridSystem]] = {cls.name: cls for cls in (Oscillator, Sl
 SHIPPED = tuple(RECIPES)
 OF_EACH_KIND = {
     "locomotive", "train", "odometer", "balise_reader", "gps", "driver", "mdpe_controller", "takagi_sugeno_cdo", "multirate_cdo",
-    "discrete_uio", "augmented_high_gain_cdo", "levant_differentiator", "kalman_filter", "exponential_gain", "slip_indicator",
+    "discrete_uio", "differentiator_cdo", "augmented_high_gain_cdo", "levant_differentiator", "kalman_filter",
+    "exponential_gain", "slip_indicator",
 }  # fmt: skip
 """Both faces of FMI stand on one model code, so every shipped system is tested as FMI 3.0, and as FMI 2.0 one of each kind: stiff
 with dry friction, sampled, noisy, with memory, with events of its own and from outside, with a sliding mode, with matrices."""
