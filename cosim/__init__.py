@@ -1,9 +1,76 @@
-"""How plants and observers are stepped together: masters, balises, scenarios, results, reports.
+"""How plants and observers are stepped together: masters, balises, scenarios, results, comparison, reports.
 
-``cosim.Scenario.load("freight_profile_d").run()`` is the whole of it. Importing needs no compiler.
+``cosim.Scenario.load("freight_profile_d").run()`` is the whole of it. Importing this package costs nothing and needs no
+compiler: what does the work is loaded when it is first used.
 """
 
-from cosim.errors import CosimError
-from cosim.scenario import Outcome, Scenario, shipped_scenarios
+from __future__ import annotations
 
-__all__ = ["CosimError", "Outcome", "Scenario", "shipped_scenarios"]
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from cosim.comparison.compare import compare
+    from cosim.comparison.tolerance import Tolerance, Tolerances
+    from cosim.comparison.verdict import Comparison
+    from cosim.errors import CosimError, UnmetError
+    from cosim.provenance import rerun
+    from cosim.results.load import load_result
+    from cosim.results.result import Result
+    from cosim.results.save import save_result
+    from cosim.scenario import Outcome, Scenario, shipped_scenarios
+    from cosim.studies.observers import benchmark_observers
+    from cosim.studies.sampling import log_uniform, uniform, whole
+    from cosim.studies.sweep import Sweep
+    from cosim.studies.sweep_result import SweepResult
+
+__all__ = [
+    "Comparison",
+    "CosimError",
+    "Outcome",
+    "Result",
+    "Scenario",
+    "Sweep",
+    "SweepResult",
+    "Tolerance",
+    "Tolerances",
+    "UnmetError",
+    "benchmark_observers",
+    "compare",
+    "load_result",
+    "log_uniform",
+    "rerun",
+    "save_result",
+    "shipped_scenarios",
+    "uniform",
+    "whole",
+]
+
+_HOMES = {
+    "Comparison": "cosim.comparison.verdict",
+    "CosimError": "cosim.errors",
+    "Outcome": "cosim.scenario",
+    "Result": "cosim.results.result",
+    "Scenario": "cosim.scenario",
+    "Sweep": "cosim.studies.sweep",
+    "SweepResult": "cosim.studies.sweep_result",
+    "Tolerance": "cosim.comparison.tolerance",
+    "Tolerances": "cosim.comparison.tolerance",
+    "UnmetError": "cosim.errors",
+    "benchmark_observers": "cosim.studies.observers",
+    "compare": "cosim.comparison.compare",
+    "load_result": "cosim.results.load",
+    "log_uniform": "cosim.studies.sampling",
+    "rerun": "cosim.provenance",
+    "save_result": "cosim.results.save",
+    "shipped_scenarios": "cosim.scenario",
+    "uniform": "cosim.studies.sampling",
+    "whole": "cosim.studies.sampling",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(_HOMES[name]), name)
+    return value

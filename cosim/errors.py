@@ -26,8 +26,24 @@ class OutputError(CosimError, OSError):
     """Results cannot be written where asked."""
 
 
+class ComparisonError(CosimError, ValueError):
+    """Results cannot be compared as asked: tolerances that cannot be, nothing in common, an empty run."""
+
+
+class BaselineError(CosimError, ValueError):
+    """A baseline is missing, unreadable, or belongs to something else."""
+
+
+class ProvenanceError(CosimError, ValueError):
+    """A results folder does not say how it was made, or its files are not those any more."""
+
+
 class CertificateError(CosimError, ValueError):
     """A scenario requires certificates and an observer's gaps exceed its own."""
+
+
+class UnmetError(CosimError, AssertionError):
+    """A run is not as its scenario expects it to be, or ended early."""
 
 
 class RunError(CosimError, RuntimeError):

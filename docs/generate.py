@@ -19,10 +19,11 @@ from pydantic.fields import FieldInfo
 
 import fmu_observer
 from cosim import Outcome, Scenario
-from cosim.report.main_picture import main_picture
+from cosim.report.figures.main_picture import main_picture
 from cosim.report.metrics import phase_metrics
-from cosim.report.table import text_table
-from cosim.scenario import schema
+from cosim.report.page.table import text_table
+from cosim.scenario import expectation_tables as expectations
+from cosim.scenario import schema, tables
 
 DOCS = Path(__file__).parent
 ROOT = DOCS.parent
@@ -138,7 +139,7 @@ def key_table(table: str) -> str:
     Raises:
         ValueError: the code has a key without words, or there are words without a key.
     """
-    model, words = schema_tables()[table], tomllib.loads(WORDS.read_text(encoding="utf-8"))[table]
+    model, words = (schema_tables() | expectation_tables())[table], tomllib.loads(WORDS.read_text(encoding="utf-8"))[table]
     fields: Mapping[str, FieldInfo] = {info.alias or name: info for name, info in model.model_fields.items()}
     if set(fields) != set(words):
         bare, extra = sorted(set(fields) - set(words)), sorted(set(words) - set(fields))
@@ -154,14 +155,28 @@ def schema_tables() -> dict[str, Any]:
     """The tables of the schema by the name they have on the page."""
     return {
         "scenario": schema.ScenarioTable,
-        "component": schema.ComponentTable,
-        "connection": schema.ConnectionTable,
-        "master": schema.MasterTable,
-        "iteration": schema.IterationTable,
-        "balises": schema.BalisesTable,
-        "false_telegram": schema.FalseTelegramTable,
-        "report": schema.ReportTable,
-        "phase": schema.PhaseTable,
+        "component": tables.ComponentTable,
+        "connection": tables.ConnectionTable,
+        "master": tables.MasterTable,
+        "iteration": tables.IterationTable,
+        "balises": tables.BalisesTable,
+        "false_telegram": tables.FalseTelegramTable,
+        "report": tables.ReportTable,
+        "phase": tables.PhaseTable,
+    }
+
+
+def expectation_tables() -> dict[str, Any]:
+    """The tables of expectations by the name they have on their page."""
+    return {
+        "expect_error": expectations.ErrorExpectation,
+        "expect_difference": expectations.DifferenceExpectation,
+        "expect_signal": expectations.SignalExpectation,
+        "expect_on": expectations.OnExpectation,
+        "expect_off": expectations.OffExpectation,
+        "expect_telegrams": expectations.TelegramsExpectation,
+        "expect_certificate": expectations.CertificateExpectation,
+        "expect_warnings": expectations.WarningsExpectation,
     }
 
 
@@ -220,6 +235,7 @@ PARTS: dict[tuple[str, str], Callable[[], str]] = {
     ("README.md", "observers"): certificate_table,
     ("docs/certificates.md", "observers"): certificate_table,
     **{("docs/scenario_files.md", name): schema_page(name) for name in schema_tables()},
+    **{("docs/expectations.md", name): schema_page(name) for name in expectation_tables()},
 }
 
 if __name__ == "__main__":

@@ -15,8 +15,9 @@ from cosim.balises.layout import InstantLayout, TrackLayout
 from cosim.balises.telegram import Passing
 from cosim.balises.watch import Watch
 
-Method = Literal["early-return", "rollback", "predict", "interpolate"]
+Method = Literal["early-return", "rollback", "predict", "interpolate", "recorded"]
 METHODS: tuple[Method, ...] = ("early-return", "rollback", "predict", "interpolate")
+"""Those that find passings; what was ``recorded`` need not be found."""
 
 ACCELERATION_LIMIT = 5.0
 """No train accelerates or brakes harder [m/s2]; where one does, its passings are found all the same, with a larger bound."""

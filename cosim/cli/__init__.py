@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import os
+import shlex
 import sys
 from collections.abc import Sequence
 
-from cosim.cli import export, info, listing, run, show
+from cosim.cli import baseline, benchmark_observers, compare, convert, export, info, listing, new, report, rerun, run, show, sweep
 from cosim.errors import CosimError
 
 __all__ = ["main"]
@@ -21,9 +22,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         prog="cosim", description="Co-simulate train observers with train plant FMUs, balise events exact."
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for command in (run, show, listing, info, export):
+    for command in (run, rerun, sweep, compare, baseline, benchmark_observers, report, convert, new, show, listing, info, export):
         command.register(commands)
     options = parser.parse_args(arguments)
+    options.command_line = shlex.join(["cosim", *(sys.argv[1:] if arguments is None else arguments)])
     try:
         code = int(options.execute(options))
         sys.stdout.flush()

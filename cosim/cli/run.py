@@ -8,7 +8,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from cosim.cli.scenarios import add_scenario, load_scenario
+from cosim.cli.scenarios import add_scenario, load_scenario, positive
+from cosim.errors import OutputError
 from cosim.scenario import Outcome, Scenario
 
 DONE, NOT_AS_ASKED, ERROR = 0, 1, 2
@@ -18,10 +19,11 @@ CALL_LOG = "calls.log"
 def register(commands: Any) -> None:
     """Add the command to the parser."""
     description = "Run a scenario: shipped, from a TOML file, or from a system structure package (SSP)."
-    parser = commands.add_parser("run", help="run a scenario", description=description)
+    epilog = "Exit codes: 0 done, 1 an expectation of the scenario is not met (or --strict), 2 the run failed or could not begin."
+    parser = commands.add_parser("run", help="run a scenario", description=description, epilog=epilog)
     add_scenario(parser)
     parser.add_argument("--out", metavar="DIR", default=None, help="folder for results and report (default: results/NAME)")
-    parser.add_argument("--seeds", type=_positive, metavar="N", help="also run N balise seeds and report medians and quartiles")
+    parser.add_argument("--seeds", type=positive, metavar="N", help="also run N balise seeds and report medians and quartiles")
     parser.add_argument("--json", action="store_true", help="print the summary as JSON instead of the table")
     parser.add_argument("--no-report", action="store_true", help="write result files only")
     parser.add_argument(
@@ -29,6 +31,8 @@ def register(commands: Any) -> None:
     )
     parser.add_argument("--log-calls", nargs="?", const="", metavar="FILE",
                         help="log every call of every component to FILE (default: calls.log among the results)")  # fmt: skip
+    parser.add_argument("--stream", action="store_true",
+                        help="write results while the run goes on, as table.npy, so that they outlive the program")  # fmt: skip
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
     parser.set_defaults(execute=execute)
 
@@ -38,18 +42,24 @@ def execute(options: argparse.Namespace) -> int:
     from cosim.results.folder import check_writable  # noqa: PLC0415 - scipy is loaded only by those who run
 
     scenario = load_scenario(options)
-    scenario.table()
+    formats = scenario.table().report.tables
     directory = Path(options.out) if options.out is not None else Path("results") / scenario.name
-    check_writable(directory)
+    check_writable(directory, formats)
     call_log = _call_log(options, scenario, directory)
     bar = None if options.quiet or options.json else ProgressBar()
     try:
         building = _ignore if options.quiet else _say
-        outcome = scenario.run(progress=bar, warn=_warn, call_log=call_log, building=building)
+        stream = directory if options.stream else None
+        outcome = scenario.run(progress=bar, warn=_warn, call_log=call_log, building=building, stream=stream)
     finally:
         if bar is not None:
             bar.close()
-    paths = outcome.write(directory, report=not options.no_report)
+    outcome = outcome.asked_by(options.command_line)
+    try:
+        paths = outcome.write(directory, report=not options.no_report)
+    except OutputError:
+        _tell(outcome, None, {}, options)  # what the disk did not take is at least on the screen
+        raise
     study = None
     if options.seeds and outcome.failure is None:
         study = _study(scenario, options)
@@ -58,7 +68,7 @@ def execute(options: argparse.Namespace) -> int:
     _tell(outcome, study, paths | ({"calls": call_log} if call_log is not None else {}), options)
     if outcome.failure is not None:
         return ERROR
-    return NOT_AS_ASKED if options.strict and outcome.warnings else DONE
+    return NOT_AS_ASKED if outcome.unmet or (options.strict and outcome.warnings) else DONE
 
 
 class ProgressBar:
@@ -104,7 +114,7 @@ def _warn(text: str) -> None:
 
 
 def _study(scenario: Scenario, options: argparse.Namespace) -> Any:
-    from cosim.study import seed_study  # noqa: PLC0415 - only for those who ask
+    from cosim.studies.seeds import seed_study  # noqa: PLC0415 - only for those who ask
 
     def tell(done: int, count: int) -> None:
         if not (options.quiet or options.json) and sys.stderr.isatty():
@@ -121,12 +131,12 @@ def _tell(outcome: Outcome, study: Any, paths: dict[str, Path], options: argpars
         data = dict(summary) | {"failure": outcome.failure, "files": {k: str(p) for k, p in paths.items()}}
         print(json.dumps(jsonable(data), indent=2))
         return
-    from cosim.report.cost import cost_text  # noqa: PLC0415 - only here
+    from cosim.report.page.cost import cost_text  # noqa: PLC0415 - only here
 
     print(_headline(summary))
     if outcome.result.table.size:
         from cosim.report.metrics import phase_metrics  # noqa: PLC0415 - only here
-        from cosim.report.table import text_table  # noqa: PLC0415
+        from cosim.report.page.table import text_table  # noqa: PLC0415
 
         metrics = phase_metrics(outcome.result, outcome.spec)
         if metrics:
@@ -134,6 +144,8 @@ def _tell(outcome: Outcome, study: Any, paths: dict[str, Path], options: argpars
     print(cost_text(outcome.result), end="\n\n")
     if study is not None:
         print(study.text())
+    if outcome.expectations:
+        print(outcome.expectations_text(), end="\n\n")
     for kind, path in paths.items():
         print(f"{kind:>10}: {path}")
     if outcome.failure is not None:
@@ -148,13 +160,3 @@ def _headline(summary: Any) -> str:
         f"{summary['title']}: {summary['reached'] - summary['start']:g} s simulated in {summary['wall_seconds']:.2f} s "
         f"({factor:.0f} times real time) at {summary['step']:g} s steps.{how}"
     )
-
-
-def _positive(text: str) -> int:
-    try:
-        value = int(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"expected a whole number (got {text!r})") from None
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"must be at least 1 (got {value})")
-    return value

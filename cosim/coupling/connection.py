@@ -26,6 +26,10 @@ LONG_TYPES = frozenset({"Int64", "UInt64"})
 """Types with values that a double cannot hold."""
 
 
+SOURCES = ("output", "local")
+"""What may be connected to an input. A local variable may be read like an output; what acts on it at once is never declared."""
+
+
 @dataclass(frozen=True)
 class Connection:
     """``target = factor * source + offset``.
@@ -139,8 +143,8 @@ def _exact(
     Raises:
         CouplingError: the types do not fit.
     """
-    sides = [(components[source[0]], "output", source[1]), (components[target[0]], "input", target[1])]
-    output, name = (_connectable(*side) for side in sides)
+    output = _connectable(components[source[0]], source[1], *SOURCES)
+    name = _connectable(components[target[0]], target[1], "input")
     reason = _misfit(output, name)
     if reason:
         types = f"{'.'.join(source)} is a {output.type}, {'.'.join(target)} is a {name.type}"
@@ -167,9 +171,17 @@ def _misfit(source: ModelVariable, target: ModelVariable) -> str:
     return ""
 
 
-def unconnected_inputs(connections: Sequence[Connection], components: Iterable[Component]) -> list[str]:
-    """Names of inputs, and of elements of arrays, without a source; they keep their start values."""
-    taken = {c.target for c in connections}
+def unconnected_inputs(
+    connections: Sequence[Connection], components: Iterable[Component], given: Mapping[str, Iterable[str]] | None = None
+) -> list[str]:
+    """Names of inputs, and of elements of arrays, without a source; they keep their start values.
+
+    Args:
+        connections: checked. components: all of them.
+        given: by component the names whose values were given on purpose; they are not told.
+    """
+    set_by_hand = {(name, signal) for name, signals in (given or {}).items() for signal in signals}
+    taken = {c.target for c in connections} | set_by_hand
     return [f"{c.name}.{name}" for c in components for v in _free_to_connect(c) for name in _without_source(c, v, taken)]
 
 
@@ -182,15 +194,27 @@ def _free_to_connect(component: Component) -> list[ModelVariable]:
 def _without_source(component: Component, variable: ModelVariable, taken: set[tuple[str, str]]) -> list[str]:
     """The elements without a source; the array itself where no element has one."""
     elements = elements_of(variable)
+    if (component.name, variable.name) in taken:
+        return []
     free = [element.name for element in elements if (component.name, element.name) not in taken]
     return [variable.name] if len(free) == len(elements) else free
 
 
-def _connectable(component: Component, causality: str, name: str) -> ModelVariable:
-    variable = component.variable(name, causality)
+def local_sources(connections: Iterable[Connection], components: Mapping[str, Component]) -> dict[str, list[str]]:
+    """Local variables that other components read, element by element, by component: sealed FMUs hide what others need."""
+    found: dict[str, list[str]] = {}
+    for c in connections:
+        name = c.source[0]
+        if components[name].variable(c.source[1]).causality == "local" and c.source[1] not in found.setdefault(name, []):
+            found[name].append(c.source[1])
+    return {name: signals for name, signals in found.items() if signals}
+
+
+def _connectable(component: Component, name: str, *causalities: str) -> ModelVariable:
+    variable = component.variable(name, *causalities)
     if variable.type == "Clock":
         raise CouplingError(f"{component.name}.{name} is a {described(variable)}; it has no value that could be connected.")
-    if causality == "input" and variable.valueReference in component.event_references():
+    if variable.causality == "input" and variable.valueReference in component.event_references():
         raise CouplingError(f"{component.name}.{name} belongs to an event; the master sets it, it cannot be connected.")
     return variable
 

@@ -41,9 +41,15 @@ def declared_feedthrough(component: Component) -> dict[str, list[str]]:
 
 
 def undeclared_outputs(component: Component) -> list[str]:
-    """Outputs of which the description does not say what they depend on; by the standard that may be every input."""
-    declared = declared_feedthrough(component)
-    return [v.name for v in component.description.modelVariables if v.causality == "output" and v.name not in declared]
+    """Outputs and locals of which the description does not say what they depend on; by the standard that may be every input.
+
+    Locals that are continuous states depend on none at once.
+    """
+    declared, variables = declared_feedthrough(component), component.description.modelVariables
+    states = {v.derivative.valueReference for v in variables if v.derivative is not None}
+    hidden = [v for v in variables if v.causality == "local" and v.valueReference not in states]
+    outputs = [v for v in variables if v.causality == "output" and v.name not in declared]
+    return [v.name for v in (*outputs, *hidden)]
 
 
 def undeclared(components: Iterable[Component]) -> list[str]:

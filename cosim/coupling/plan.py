@@ -15,7 +15,7 @@ import numpy as np
 from cosim.components.component import Component
 from cosim.components.described import NUMERIC_TYPES
 from cosim.coupling.clocks import ClockConnection
-from cosim.coupling.connection import Connection
+from cosim.coupling.connection import Connection, local_sources
 from cosim.coupling.inputs import Inputs, connected_inputs
 from cosim.coupling.untouched import untouched_cells, untouched_inputs, with_untouched
 from cosim.errors import CouplingError, nearest
@@ -201,7 +201,8 @@ def make_plan(
         CouplingError: a variable to record does not exist or is not a number.
     """
     cells, places = untouched_cells(connections)
-    read_names = {n: _names_to_read(components[n], (extra or {}).get(n, ())) for n in order}
+    hidden = local_sources(connections, components)
+    read_names = {n: _names_to_read(components[n], (extra or {}).get(n, ()), hidden.get(n, ())) for n in order}
     columns: dict[tuple[str, str], int] = {}
     spans: dict[str, slice] = {}
     signals: list[SignalInfo] = []
@@ -222,8 +223,9 @@ def make_plan(
     return Plan(steps, values, signals, continuous, cells, clocks)
 
 
-def _names_to_read(component: Component, extra: Sequence[str]) -> list[str]:
+def _names_to_read(component: Component, extra: Sequence[str], sources: Sequence[str]) -> list[str]:
     names = component.names("output")
+    names += [name for name in sources if name not in names and component.variable(name).type in NUMERIC_TYPES]
     for name in extra:
         kind = component.variable(name).type
         if kind not in NUMERIC_TYPES:

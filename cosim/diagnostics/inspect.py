@@ -67,7 +67,7 @@ def make_part(
     used |= {c.source[1] for c in clocks if c.source[0] == component.name}
     hidden = component.event_references()
     inputs = [v for v in description.modelVariables if v.causality == "input" and v.valueReference not in hidden]
-    outputs = [v for v in description.modelVariables if v.causality == "output"]
+    outputs = [v for v in description.modelVariables if v.causality == "output" or (v.causality == "local" and v.name in used)]
     silent, table = set(undeclared_outputs(component)), declared_feedthrough(component)
     return Part(
         component.name,

@@ -97,7 +97,8 @@ class Balises:
     """Who finds the balises, and who is told.
 
     Args:
-        plant: the watched component. position, speed: its outputs. receivers: components that are told.
+        plant: the watched component. position, speed: its outputs, empty where telegrams are recorded.
+        receivers: components that are told.
         method: as asked for; ``auto`` is decided by a probe of the plant when the run is set up. timing: ``exact`` or ``stale``.
         odometer: output whose reading the telegrams carry, or None.
     """

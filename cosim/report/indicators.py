@@ -46,6 +46,17 @@ def on_intervals(time: np.ndarray, indicator: np.ndarray) -> list[tuple[float, f
     return [(float(times[i]), float(times[k])) for i, k in zip(starts, ends, strict=True) if times[k] > times[i]]
 
 
+def on_share(time: np.ndarray, indicator: np.ndarray, start: float, end: float) -> float | None:
+    """Share of a stretch of time in which an indicator is on [1], or None where none of the stretch was recorded.
+
+    Args:
+        time: [s], shape (rows,). indicator: 1 nominal, 2 degraded, shape (rows,). start, end: of the stretch [s].
+    """
+    if not len(time) or not (start := max(start, float(time[0]))) < (end := min(end, float(time[-1]))):
+        return None
+    return _overlap(on_intervals(time, indicator), start, end) / (end - start)
+
+
 def _overlap(intervals: Sequence[tuple[float, float]], start: float, end: float) -> float:
     return sum(max(0.0, min(end, b) - max(start, a)) for a, b in intervals)
 

@@ -32,6 +32,18 @@ def estimation_error(result: Result, spec: ReportSpec, observer: str, quantity: 
         return np.asarray(believed - true)
 
 
+def coupler_force(result: Result, signal: str | None) -> np.ndarray | None:
+    """Force in the first coupler beside a signal of the same component [N], shape (rows,), or None where there is none.
+
+    Args:
+        result: the run. signal: any signal of the component, ``component.signal``.
+    """
+    component = "" if signal is None else signal.rpartition(".")[0]
+    name = f"{component}.coupler_force"
+    first = recorded(result, name)
+    return recorded(result, f"{name}[1]") if first is None else first
+
+
 def label(spec: ReportSpec, observer: str) -> str:
     """Text to show for an observer."""
     return spec.labels.get(observer, observer)

@@ -12,32 +12,36 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from cosim.diagnostics.messages import read_messages, write_messages
-from cosim.errors import OutputError, nearest
-from cosim.results.csv_file import read_csv, write_csv
+from cosim.errors import OutputError
 from cosim.results.events_file import read_events, write_events
-from cosim.results.mat_file import read_mat, write_mat
-from cosim.results.npy_file import read_npy, write_npy
+from cosim.results.formats.catalogue import FASTEST_FIRST, FORMATS, check_formats
+from cosim.results.optional import is_installed
 from cosim.results.result import Result, SignalInfo
 from cosim.results.summary_file import read_summary, write_summary
+from cosim.results.unfinished import read_unfinished
 
-TABLES = {"csv": "table.csv", "mat": "table.mat", "npy": "table.npy"}
+TABLES = {name: f"table{item.endings[0]}" for name, item in FORMATS.items()}
 EVENTS, MESSAGES, SUMMARY = "events.csv", "messages.csv", "summary.json"
 LAYOUT = 1  # version of the layout of summary.json
 
 
-def check_writable(directory: str | Path) -> Path:
+def check_writable(directory: str | Path, formats: Sequence[str] = ()) -> Path:
     """Make sure, before a run, that results can be written to a folder; it is created where it does not exist.
 
     Args:
         directory: the folder.
+        formats: formats of the table to be written; the packages they need must be there.
 
     Returns:
         The folder.
 
     Raises:
-        OutputError: it cannot be created or written; the message says why and what to do.
+        OutputError: it cannot be created or written, or a format not be written; the message says why and what to do.
     """
+    check_formats(formats)
     folder = Path(directory)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -55,19 +59,9 @@ def _reason(error: OSError) -> str:
     return f"{error.strerror or error}" + (f" ({error.filename})" if error.filename else "")
 
 
-def _check_formats(formats: Sequence[str]) -> None:
-    for name in formats:
-        if name not in TABLES:
-            raise OutputError(f"Unknown result format {name!r}; {nearest(name, TABLES)}")
-
-
 def _write_all(result: Result, folder: Path, formats: Sequence[str]) -> list[str]:
-    if "csv" in formats:
-        write_csv(folder / TABLES["csv"], result.table)
-    if "mat" in formats:
-        write_mat(folder / TABLES["mat"], result)
-    if "npy" in formats:
-        write_npy(folder / TABLES["npy"], result.table)
+    for name in formats:
+        FORMATS[name].write(folder / TABLES[name], result)
     write_events(folder / EVENTS, result.events)
     write_messages(folder / MESSAGES, result.messages)
     content = {"layout": LAYOUT, "failure": result.failure, "signals": list(result.signals), "summary": result.summary}
@@ -81,16 +75,16 @@ def write_results(result: Result, directory: str | Path, formats: Sequence[str] 
     Args:
         result: what to write.
         directory: the folder; created where it does not exist.
-        formats: formats of the table, any of ``csv``, ``mat`` and ``npy``. A table that an earlier run left in another format is
-            removed, since it would not belong to the other files.
+        formats: formats of the table, any of ``csv``, ``mat``, ``npy``, ``parquet``, ``hdf5`` and ``modelica``. A table that an
+            earlier run left in another format is removed, since it would not belong to the other files.
 
     Returns:
-        Paths by what they hold: ``csv``, ``mat``, ``npy``, ``events``, ``messages``, ``summary``.
+        Paths by what they hold: the formats, ``events``, ``messages``, ``summary``.
 
     Raises:
-        OutputError: a format is unknown, or a file cannot be written; former files are then still whole.
+        OutputError: a format is unknown or lacks a package, or a file cannot be written; former files are then still whole.
     """
-    _check_formats(formats)
+    check_formats(formats)
     folder = check_writable(directory)
     try:
         with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as scratch:
@@ -108,22 +102,33 @@ def write_results(result: Result, directory: str | Path, formats: Sequence[str] 
     }
 
 
-def _read(folder: Path) -> tuple[Result, Mapping[str, Any]]:
+def _table(folder: Path, name: str | None) -> np.ndarray:
+    """The table of a folder, from the file with that name or from the one that is read fastest."""
+    present = [item for item in FASTEST_FIRST if (folder / TABLES[item.name]).exists()]
+    named = [item for item in FASTEST_FIRST if TABLES[item.name] == name]
+    readable = [item for item in present if item.package is None or is_installed(item.package)]
+    chosen = next(iter([*named, *readable, *present]), FORMATS["csv"])
+    return chosen.read(folder / TABLES[chosen.name]).table
+
+
+def _read(folder: Path, table_name: str | None = None) -> tuple[Result, Mapping[str, Any]]:
     content = read_summary(folder / SUMMARY)
     if content.get("layout") != LAYOUT:
         raise ValueError(f"{SUMMARY} has layout {content.get('layout')!r}, this version reads layout {LAYOUT}.")
     signals = [SignalInfo(**signal) for signal in content["signals"]]
-    csv, mat, npy = (folder / TABLES[name] for name in ("csv", "mat", "npy"))
-    table = read_npy(npy) if npy.exists() else read_csv(csv) if csv.exists() else read_mat(mat).table
+    if not content.get("ended", True):  # it was streamed here, and its program died
+        return read_unfinished(folder / TABLES["npy"], folder / EVENTS, folder / MESSAGES, content), content
+    table = _table(folder, table_name)
     messages = read_messages(folder / MESSAGES) if (folder / MESSAGES).exists() else []  # older results have none
     return Result(table, signals, read_events(folder / EVENTS), messages=messages), content
 
 
-def read_results(directory: str | Path) -> Result:
+def read_results(directory: str | Path, table: str | None = None) -> Result:
     """Read the result that `write_results` left in a folder.
 
     Args:
         directory: the folder.
+        table: name of the file to take the table from, where there are several; all hold the same.
 
     Returns:
         The result: table and events bit by bit; in the summary NaN has become None and tuples have become lists.
@@ -133,8 +138,10 @@ def read_results(directory: str | Path) -> Result:
     """
     folder = Path(directory)
     try:
-        result, content = _read(folder)
+        result, content = _read(folder, table)
         return replace(result, summary=content["summary"], failure=content["failure"])
+    except OutputError:
+        raise
     except OSError as error:
         raise OutputError(f"No complete result in {folder}: {_reason(error)}. Run the scenario again.") from error
     except (KeyError, TypeError, ValueError) as error:

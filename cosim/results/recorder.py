@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+from math import inf
 from pathlib import Path
-from typing import Any
+from time import monotonic
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -23,6 +25,16 @@ BLOCK = 4e6  # rows gathered before each writing to the file [bytes]
 FIRST_ROWS = 16
 
 
+class Stream(Protocol):
+    """Where rows go that must outlive the program, see `cosim.results.stream`."""
+
+    seconds: float
+
+    def open(self, dtype: np.dtype[np.void], rows: int) -> RowFile:
+        """The file for rows of this type, with space for so many."""
+        ...
+
+
 class Recorder:
     """Rows ``(time, values...)``.
 
@@ -34,13 +46,15 @@ class Recorder:
             gone with the recorder and its table whatever happens to the program.
         every: keep each `every`-th communication point only, counted from the first. The last point, rows of events, and the
             point that follows an event are always kept.
+        stream: writes rows where others see them while the run goes on, block by block and whenever its `seconds` have passed;
+            in memory is then no more than a block.
 
     `count` is the number of rows that are kept.
     """
 
     def __init__(
         self, signals: Sequence[SignalInfo], expected_rows: int, *, memory: float = MEMORY, folder: str | Path | None = None,
-        every: int = 1,
+        every: int = 1, stream: Stream | None = None,
     ) -> None:  # fmt: skip
         self._dtype = table_dtype(["time", *(s.name for s in signals)])
         self._width = len(signals) + 1
@@ -52,7 +66,13 @@ class Recorder:
         self._skipped = np.empty(self._width)
         self._source: np.ndarray | None = None
         self.count = self._first = 0  # `_first`: first row of the block in memory; all before it are in the file
-        self._use(np.empty((min(max(expected_rows // every + 1, FIRST_ROWS), self._limit), self._width)))
+        self._seconds, self._due = inf, inf  # when rows are to be brought into the file at the latest [s]
+        if stream is not None:
+            self._limit = max(min(int(BLOCK // self._dtype.itemsize), self._limit), FIRST_ROWS)
+            self._file = stream.open(self._dtype, self._limit)
+            self._seconds, self._due = stream.seconds, monotonic() + stream.seconds
+        room = self._limit if stream is not None else min(max(expected_rows // every + 1, FIRST_ROWS), self._limit)
+        self._use(np.empty((room, self._width)))
 
     def add(self, t: float, values: np.ndarray) -> None:
         """Copy the row of a communication point: time [s] and values, shape (n,).
@@ -85,7 +105,7 @@ class Recorder:
         Raises:
             OutputError: as for `add`.
         """
-        if self.count - self._first == len(self._rows):
+        if self.count - self._first == len(self._rows) or (self._due != inf and monotonic() >= self._due):
             self._make_room()
         start = self.count - self._first
         return self._rows[start : start + rows]
@@ -118,7 +138,7 @@ class Recorder:
         try:
             self._flush()
         except OutputError:  # space was reserved, and the disk refuses all the same: the rest must fit into the memory
-            return np.concatenate([np.asarray(self._file.table(self._dtype)), self._in_memory()])
+            return np.concatenate([np.asarray(self._file.table(self._dtype)), self._file.converted(self._in_memory())])
         with suppress(OutputError):  # the next rows start behind these: it matters only if there are any
             self._file.reserve(self.count + len(self._rows))
         return self._file.table(self._dtype)
@@ -137,6 +157,8 @@ class Recorder:
         self._cells[at] = t
         self._cells[at + 1 : at + self._width] = self._view
         self.count += 1
+        if self._due != inf and monotonic() >= self._due:
+            self._make_room()
 
     def _is_due(self) -> bool:
         """Whether the next communication point is to be kept."""
@@ -175,3 +197,5 @@ class Recorder:
         assert self._file is not None
         self._file.write(self._first, self._rows[: self.count - self._first])
         self._first = self.count
+        if self._seconds != inf:
+            self._due = monotonic() + self._seconds

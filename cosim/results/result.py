@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -105,3 +106,27 @@ class Result:
     def info(self, name: str) -> SignalInfo:
         """What a column is."""
         return next(s for s in self.signals if s.name == name)
+
+    def to_pandas(self, signals: Iterable[str] | None = None) -> Any:
+        """A `pandas.DataFrame`; see `cosim.results.frames.to_pandas`."""
+        from cosim.results.frames import to_pandas  # noqa: PLC0415 - pandas is for those who want it
+
+        return to_pandas(self, signals)
+
+    def events_to_pandas(self) -> Any:
+        """The telegrams as a `pandas.DataFrame`; see `cosim.results.frames.events_to_pandas`."""
+        from cosim.results.frames import events_to_pandas  # noqa: PLC0415
+
+        return events_to_pandas(self)
+
+    def to_xarray(self, signals: Iterable[str] | None = None) -> Any:
+        """An `xarray.Dataset`; see `cosim.results.frames.to_xarray`."""
+        from cosim.results.frames import to_xarray  # noqa: PLC0415
+
+        return to_xarray(self, signals)
+
+    def save(self, path: str | Path) -> list[Path]:
+        """Write one file in the format that the ending of its name means; see `cosim.results.save.save_result`."""
+        from cosim.results.save import save_result  # noqa: PLC0415
+
+        return save_result(self, path)

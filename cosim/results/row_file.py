@@ -1,4 +1,4 @@
-"""A file of rows without a name: it vanishes with its last user, however that one ends. Touches only the folder it is given."""
+"""A file of rows; without a name it vanishes with its last user, however that one ends. Touches only the folder it is given."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import os
 import tempfile
 import weakref
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +25,7 @@ class RowFile:
         folder: where the file is; None for the one for large temporary files.
         row_bytes: size of a row [bytes].
         rows: rows to reserve space for.
+        named: a new file to use, in place of one without a name. offset: where its rows begin [bytes].
 
     `count` is the number of rows in the file.
 
@@ -31,11 +33,14 @@ class RowFile:
         OutputError: there is no space, or the folder cannot be written.
     """
 
-    def __init__(self, folder: str | Path | None, row_bytes: int, rows: int) -> None:
-        self._row_bytes, self._folder = row_bytes, Path(folder or _folder_for_large_files())
+    def __init__(
+        self, folder: str | Path | None, row_bytes: int, rows: int, named: Path | None = None, offset: int = 0
+    ) -> None:  # fmt: skip
+        self._row_bytes, self._offset = row_bytes, offset
+        self._folder = named.parent if named is not None else Path(folder or _folder_for_large_files())
         self.count = self._reserved = 0
         try:
-            self._file = tempfile.TemporaryFile(dir=self._folder, buffering=0)  # noqa: SIM115 - open as long as its rows are wanted
+            self._file: Any = _file_without_name(self._folder) if named is None else _new_file(named)
         except OSError as error:
             raise self._explained(error) from error
         weakref.finalize(self, self._file.close)  # the maps of the file live on
@@ -47,7 +52,7 @@ class RowFile:
         Raises:
             OutputError: there is no space for them.
         """
-        size = rows * self._row_bytes
+        size = self._offset + rows * self._row_bytes
         try:
             _allocate(self._file.fileno(), self._reserved, size - self._reserved)
         except OSError as error:
@@ -60,7 +65,7 @@ class RowFile:
         Raises:
             OutputError: the disk refuses.
         """
-        data, at = rows.data.cast("B") if rows.size else memoryview(b""), first * self._row_bytes
+        data, at = rows.data.cast("B") if rows.size else memoryview(b""), self._offset + first * self._row_bytes
         try:
             self._file.seek(at)
             while data:
@@ -68,6 +73,10 @@ class RowFile:
         except OSError as error:
             raise self._explained(error) from error
         self.count = first + len(rows)
+
+    def converted(self, rows: np.ndarray) -> np.ndarray:
+        """Structured rows as they would stand in the file."""
+        return rows
 
     def table(self, dtype: np.dtype[np.void]) -> np.ndarray:
         """All rows as a structured array that is a map of the file, shape (count,)."""
@@ -81,6 +90,16 @@ class RowFile:
             f"The recording outgrew its memory and cannot continue on disk, in {self._folder}: {reason}. What was recorded so "
             "far is kept. Free the disk, choose another folder (the environment variable TMPDIR), or record less (record_every)."
         )
+
+
+def _file_without_name(folder: Path) -> Any:
+    return tempfile.TemporaryFile(dir=folder, buffering=0)
+
+
+def _new_file(path: Path) -> Any:
+    """A new file of that name: whoever has the former one open keeps it as it is."""
+    path.unlink(missing_ok=True)
+    return path.open("x+b", buffering=0)
 
 
 def _folder_for_large_files() -> str:

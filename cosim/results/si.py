@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,11 +17,10 @@ NAMED = {
 }  # fmt: skip
 
 CHUNK = 65536  # rows converted at a time: a table may be larger than the memory
+UnitOf = Callable[[str], Unit | None]
 
 
-def in_si(
-    table: np.ndarray, signals: Sequence[SignalInfo], unit_of: Callable[[str], Unit | None]
-) -> tuple[np.ndarray, list[SignalInfo]]:
+def in_si(table: np.ndarray, signals: Sequence[SignalInfo], unit_of: UnitOf) -> tuple[np.ndarray, list[SignalInfo]]:
     """The table with every column in SI; what was converted keeps its former unit as display unit.
 
     Args:
@@ -31,12 +30,47 @@ def in_si(
     Returns:
         The table and the description of its columns.
     """
-    units = {signal.name: unit for signal in signals if (unit := _to_convert(signal, unit_of)) is not None}
+    units = foreign_units(signals, unit_of)
     for start in range(0, len(table) if units else 0, CHUNK):
-        rows = table[start : start + CHUNK]
-        for name, unit in units.items():
-            rows[name] = unit.factor * rows[name] + unit.offset
-    return table, [_described(signal, units.get(signal.name)) for signal in signals]
+        convert(table[start : start + CHUNK], units)
+    return table, described(signals, units)
+
+
+def foreign_units(signals: Sequence[SignalInfo], unit_of: UnitOf) -> dict[str, Unit]:
+    """The units of the columns that are not in SI, by name; arguments as for `in_si`."""
+    return {signal.name: unit for signal in signals if (unit := _to_convert(signal, unit_of)) is not None}
+
+
+def convert(rows: np.ndarray, units: Mapping[str, Unit]) -> None:
+    """Bring rows, shape (rows,), to SI in place; `units` as from `foreign_units`."""
+    for name, unit in units.items():
+        rows[name] = unit.factor * rows[name] + unit.offset
+
+
+def described(signals: Sequence[SignalInfo], units: Mapping[str, Unit]) -> list[SignalInfo]:
+    """What the columns are once they are in SI; `units` as from `foreign_units`."""
+    return [_described(signal, units.get(signal.name)) for signal in signals]
+
+
+class InFormerUnits:
+    """A table in SI, read as it was recorded: whatever asks for a column gets it in the unit of its FMU.
+
+    Args:
+        table: structured array, shape (rows,). units: as from `foreign_units`.
+    """
+
+    def __init__(self, table: np.ndarray, units: Mapping[str, Unit]) -> None:
+        self._table, self._units = table, units
+        self.dtype = table.dtype
+
+    def __len__(self) -> int:
+        return len(self._table)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Values of a column, shape (rows,)."""
+        unit = self._units.get(name)
+        values = np.asarray(self._table[name])
+        return values if unit is None else (values - unit.offset) / unit.factor
 
 
 def si_name(unit: Unit) -> str:
@@ -46,7 +80,7 @@ def si_name(unit: Unit) -> str:
     return ".".join(f"{s}{'' if e == 1 else e}" for s, e in zip(BASE_SYMBOLS, unit.exponents, strict=True) if e)
 
 
-def _to_convert(signal: SignalInfo, unit_of: Callable[[str], Unit | None]) -> Unit | None:
+def _to_convert(signal: SignalInfo, unit_of: UnitOf) -> Unit | None:
     try:
         unit = unit_of(signal.name)
     except UnitError:

@@ -54,11 +54,12 @@ def _container(value: Any) -> Any:
     return [jsonable(item) for item in value] if isinstance(value, (list, tuple)) else str(value)
 
 
-def _restore(value: Any) -> Any:
+def restored(value: Any) -> Any:
+    """A value of `jsonable` with its infinities; NaN stays None."""
     if isinstance(value, dict):
-        return {key: _restore(item) for key, item in value.items()}
+        return {key: restored(item) for key, item in value.items()}
     if isinstance(value, list):
-        return [_restore(item) for item in value]
+        return [restored(item) for item in value]
     return _INFINITIES.get(value, value) if isinstance(value, str) else value
 
 
@@ -86,4 +87,4 @@ def read_summary(path: str | Path) -> dict[str, Any]:
     content = json.loads(Path(path).read_text(encoding="utf-8"))
     if not isinstance(content, dict):
         raise ValueError(f"{path} is not a summary: expected a JSON object, got {type(content).__name__}.")
-    return {key: _restore(value) for key, value in content.items()}
+    return {key: restored(value) for key, value in content.items()}

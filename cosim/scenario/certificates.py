@@ -9,10 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from cosim.balises.layout import InstantLayout, Layout
+from cosim.balises.layout import InstantLayout
+from cosim.balises.recorded import RecordedLayout
 from cosim.errors import CertificateError
+from cosim.scenario.layouts import Layout
 from cosim.scenario.models import make_system
-from cosim.scenario.schema import BalisesTable, ComponentTable
+from cosim.scenario.tables import BalisesTable, ComponentTable
 from fmu_observer.observers.parameter_values import parameter_values
 
 
@@ -45,6 +47,9 @@ def expected_gap(layout: Layout, table: BalisesTable, start: float) -> ExpectedG
 
     A constant latency does not count: what arrives late is used at its stamp.
     """
+    if isinstance(layout, RecordedLayout):
+        gaps = np.diff([start, *layout.instants[layout.instants > start]])
+        return ExpectedGap(float(gaps.max()), "longest gap between the recorded telegrams") if len(gaps) else NO_BALISES
     if table.missed_fraction > 0.0 or table.missed:
         return ExpectedGap(None, "balises are missed by chance or by name, so a gap may be of any length")
     if isinstance(layout, InstantLayout):

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from cosim.coupling.connection import Link
 from cosim.coupling.transformation import Transformation
 from cosim.errors import ScenarioError
-from cosim.scenario.schema import ConnectionTable
+from cosim.scenario.tables import ConnectionTable
 
 BETWEEN_TARGETS = re.compile(r",(?![^\[\]]*\])")
 """A comma, but not one between the indices of an array element."""

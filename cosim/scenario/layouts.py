@@ -6,9 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from cosim.balises.layout import InstantLayout, Layout, TrackLayout, aperiodic, by_positions, by_spacing, from_csv
+from cosim.balises.layout import InstantLayout, TrackLayout, aperiodic, by_positions, by_spacing, from_csv
+from cosim.balises.recorded import RecordedLayout, read_layout
 from cosim.errors import ScenarioError, nearest
-from cosim.scenario.schema import BalisesTable
+from cosim.scenario.tables import BalisesTable
+
+Layout = TrackLayout | InstantLayout | RecordedLayout
+TOLD_AS_RECORDED = (
+    "latency", "latency_jitter", "missed_fraction", "missed", "position_noise", "false_telegrams", "location_accuracy", "clock",
+)  # fmt: skip
 
 
 def make_layout(table: BalisesTable, start: float, stop: float, folder: Path, where: str) -> Layout:
@@ -31,6 +37,8 @@ def make_layout(table: BalisesTable, start: float, stop: float, folder: Path, wh
             return aperiodic(stop, table.seed, start=start, **gaps)
         if table.layout == "instants":
             return InstantLayout(np.array(table.instants, dtype=float))
+        if table.layout == "recorded":
+            return _recorded(table, start, folder)
         layout = _track_layout(table, folder)
         known = [b.identity for b in layout.balises]
         for identity in table.missed:
@@ -41,6 +49,15 @@ def make_layout(table: BalisesTable, start: float, stop: float, folder: Path, wh
         return layout
     except ScenarioError as error:
         raise ScenarioError(f"{where}: balises: {error}") from error
+
+
+def _recorded(table: BalisesTable, start: float, folder: Path) -> RecordedLayout:
+    """The telegrams of an earlier run; what happens to telegrams has happened to them already."""
+    given = [key for key in TOLD_AS_RECORDED if key in table.model_fields_set]
+    given += ["method"] if table.method != "auto" else []
+    if given:
+        raise ScenarioError(f"layout 'recorded' tells the telegrams as they were told; leave out {', '.join(given)}.")
+    return read_layout((folder / str(table.file)).resolve()).later(start)
 
 
 def _track_layout(table: BalisesTable, folder: Path) -> TrackLayout:

@@ -23,7 +23,8 @@ from cosim.master.control.multirate import set_rates
 from cosim.master.master import Master
 from cosim.master.system import System
 from cosim.results.recorder import Recorder
-from cosim.scenario.schema import MasterTable, ScenarioTable
+from cosim.scenario.schema import ScenarioTable
+from cosim.scenario.tables import MasterTable
 
 
 def make_master(

@@ -12,9 +12,11 @@ import fmus
 import plant_models
 from cosim.components.component import Component
 from cosim.components.loading import load_block, load_fmu
+from cosim.components.recording import RecordingComponent, load_recording
+from cosim.components.recording_data import Recording
 from cosim.errors import ScenarioError, nearest
 from cosim.scenario.realisations import FAULTS, Request, Tell, cannot_build, realise
-from cosim.scenario.schema import ComponentTable, Realisation
+from cosim.scenario.tables import ComponentTable, Realisation
 from plant_models.hybrid import HybridSystem
 
 LATE_PARAMETERS = frozenset({"late_policy", "replay_horizon"})
@@ -28,12 +30,12 @@ def shipped() -> Mapping[str, type[HybridSystem]]:
 
 
 def make_system(table: ComponentTable, where: str) -> HybridSystem | None:
-    """The hybrid system of a component, or None for an FMU by path.
+    """The hybrid system of a component, or None for an FMU by path and for a recording.
 
     Raises:
         ScenarioError: unknown model, option or preset.
     """
-    if table.fmu is not None:
+    if table.fmu is not None or table.recording is not None:
         return None
     registry = plant_models.PLANTS if table.model is not None else fmu_observer.OBSERVERS
     name = table.model or table.observer or ""
@@ -48,13 +50,13 @@ def make_system(table: ComponentTable, where: str) -> HybridSystem | None:
 
 
 def component_factories(
-    tables: Mapping[str, ComponentTable], folder: Path, where: str, tell: Tell
+    tables: Mapping[str, ComponentTable], folder: Path, where: str, tell: Tell, span: tuple[float, float]
 ) -> tuple[dict[str, Callable[[], Component]], list[str]]:
     """For each component a function that makes a fresh one, called once for the run and perhaps once for the probe; and notes.
 
     Args:
         tables: of the components. folder: paths are relative to it. where: place for messages.
-        tell: told of FMUs that are built.
+        tell: told of FMUs that are built. span: start and stop of the run [s], which recordings must cover.
 
     Raises:
         ScenarioError, FmuLoadError: a component cannot be made.
@@ -65,12 +67,38 @@ def component_factories(
     made = realise(requests, tell)
     factories: dict[str, Callable[[], Component]] = {}
     for name, table in tables.items():
-        if name in systems and name not in made.files:
+        if table.recording is not None:
+            recording = open_recording(name, table, folder, places[name], span)
+            factories[name] = partial(RecordingComponent, name, recording)
+            made.notes += left_out_note(name, recording)
+        elif name in systems and name not in made.files:
             factories[name] = partial(load_block, systems[name], name, _version(made.kinds[name]), **_block_arguments(table))
         else:
             path = made.files[name] if name in systems else (folder / str(table.fmu)).resolve()
             factories[name] = partial(load_fmu, path, name)
     return factories, made.notes
+
+
+def open_recording(
+    name: str, table: ComponentTable, folder: Path, where: str, span: tuple[float, float] | None = None
+) -> Recording:  # fmt: skip
+    """What a component plays back.
+
+    Args:
+        name: of the component. table: its table. folder: start of relative paths. where: place for messages.
+        span: start and stop of the run [s], which the recording must cover; None where nothing is run.
+
+    Raises:
+        ScenarioError: the recording cannot be read or played back.
+    """
+    path = (folder / str(table.recording)).resolve()
+    return load_recording(path, name, table.component, table.interpolation, span, where)
+
+
+def left_out_note(name: str, recording: Recording) -> list[str]:
+    """Which columns of a recording are not there, if any."""
+    columns = "; ".join(f"{column}: {why}" for column, why in recording.left_out.items())
+    return [f"{name}: columns that cannot be played back are left out. {columns}."] if columns else []
 
 
 def _version(kind: Realisation) -> Literal[2, 3]:

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from cosim.errors import UnmetError
+from cosim.expectations.judged import Judged, judged_text
 from cosim.report.spec import ReportSpec
 from cosim.results.result import Result
+
+if TYPE_CHECKING:
+    from cosim.scenario.origin import Origin
+
+INTERRUPTED = "The run was interrupted; what was computed so far is kept."
+"""The failure of a run that somebody stopped."""
 
 
 @dataclass(frozen=True)
@@ -20,11 +28,13 @@ class Outcome:
         result: table, events, summary.
         spec: roles of the signals for metrics and report.
         tables: formats in which `write` writes the table, any of ``csv``, ``mat`` and ``npy``.
+        origin: the scenario and the files it uses, for `write`; None where the outcome is not of a scenario.
     """
 
     result: Result
     spec: ReportSpec
     tables: tuple[str, ...] = ("csv", "mat")
+    origin: Origin | None = field(default=None, repr=False, compare=False)
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Values of a recorded signal, shape (rows,)."""
@@ -40,12 +50,48 @@ class Outcome:
         """What the user should know."""
         return list(self.result.summary.get("warnings", []))
 
+    @property
+    def expectations(self) -> list[Judged]:
+        """What became of the expectations of the scenario, in order."""
+        return [Judged.from_data(data) for data in self.result.summary.get("expectations", [])]
+
+    @property
+    def unmet(self) -> list[Judged]:
+        """Expectations that are not met."""
+        return [judged for judged in self.expectations if not judged.passed]
+
+    def expectations_text(self) -> str:
+        """A list of all expectations for people, what is not met first; empty where the scenario has none."""
+        return judged_text(self.expectations)
+
+    def check(self) -> Self:
+        """The outcome itself, where the run reached its end and all its expectations are met: the last line of a test.
+
+        Raises:
+            UnmetError: the run ended early, or something is not met; the message lists it. It is an `AssertionError` too.
+        """
+        faults = [f"The run ended early: {self.failure}"] if self.failure is not None else []
+        faults += [self.expectations_text()] if self.unmet else []
+        if faults:
+            raise UnmetError("\n".join(faults))
+        return self
+
     def with_summary(self, **entries: Any) -> Outcome:
         """The same outcome with more entries in its summary."""
         return replace(self, result=replace(self.result, summary={**self.result.summary, **entries}))
 
-    def write(self, directory: str | Path, *, report: bool = True) -> dict[str, Path]:
-        """Write result files and, where wanted, the report.
+    def asked_by(self, command: str) -> Outcome:
+        """The same outcome, to say that this command line asked for it and no script."""
+        return self if self.origin is None else replace(self, origin=replace(self.origin, command=command))
+
+    def write(self, directory: str | Path, *, report: bool = True, files_up_to: float = 50e6) -> dict[str, Path]:
+        """Write result files, how they were made, and, where wanted, the report.
+
+        Args:
+            directory: the folder; results that an earlier run left there are replaced.
+            report: whether to write the page as well.
+            files_up_to: FMUs, recordings and other files of the scenario up to this size are copied to ``made_from/files``; of
+                larger ones path and hash are noted [bytes].
 
         Returns:
             Paths by kind.
@@ -53,10 +99,15 @@ class Outcome:
         Raises:
             OutputError: the folder cannot be written.
         """
-        from cosim.report.html import write_report  # noqa: PLC0415 - matplotlib is loaded only for a report
+        from cosim.provenance.write import renewed  # noqa: PLC0415 - only for those who write
+        from cosim.report.page.report import write_report  # noqa: PLC0415 - matplotlib is loaded only for a report
         from cosim.results.folder import write_results  # noqa: PLC0415 - and scipy only for MAT files
 
-        paths = dict(write_results(self.result, directory, self.tables))
+        with renewed(directory, self.origin, files_up_to) as seal:
+            paths = dict(write_results(self.result, directory, self.tables))
+            seal(paths, self.result.summary)
+        if self.origin is not None:
+            paths["made_from"] = Path(directory) / "made_from" / "manifest.json"
         if report:
             paths["report"] = write_report(self.result, self.spec, directory)
         else:

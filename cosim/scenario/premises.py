@@ -13,7 +13,7 @@ import numpy as np
 from cosim.coupling.connection import Connection
 from cosim.scenario.certificates import given_parameters
 from cosim.scenario.models import make_system, shipped
-from cosim.scenario.schema import ComponentTable
+from cosim.scenario.tables import ComponentTable
 from fmu_observer.observers.parameter_values import parameter_values
 
 COUNT, TIME = "premise_violations", "premise_outside_time"

@@ -13,7 +13,7 @@ from time import perf_counter
 from typing import Any
 
 from cosim.errors import FmuLoadError
-from cosim.scenario.schema import ComponentTable, Realisation
+from cosim.scenario.tables import ComponentTable, Realisation
 from fmus.toolchain.compile import CompilerMissing, find_compiler
 from plant_models.hybrid import HybridSystem
 

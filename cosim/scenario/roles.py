@@ -20,6 +20,19 @@ ROLES = {
 }
 
 
+def signals_to_record(table: ScenarioTable) -> dict[str, list[str]]:
+    """What is recorded besides the outputs, by component: what its table, balises, report and expectations name."""
+    record = {name: list(component.record) for name, component in table.components.items()}
+    used = [getattr(table.report, role) for role in ROLES]
+    used += [] if table.balises is None else [table.balises.position, table.balises.speed, table.balises.odometer]
+    used += [getattr(item, key, None) for item in table.expect for key in ("signal", "reference")]
+    for name in filter(None, used):
+        component, _, signal = name.partition(".")
+        if component in record and signal not in record[component]:
+            record[component].append(signal)
+    return record
+
+
 def check_roles(table: ScenarioTable, components: Mapping[str, Component], where: str) -> None:
     """Check the report table of a scenario against its components.
 

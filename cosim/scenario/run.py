@@ -3,65 +3,70 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, replace
 from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from cosim.balises.layout import Layout
+import numpy as np
+
 from cosim.balises.service import BaliseService
 from cosim.components.capabilities import tool_warning
 from cosim.components.component import Component
 from cosim.components.fmi3 import FMI3Component
 from cosim.components.start_values import StartValue
 from cosim.coupling.clocks import connect_clocks
-from cosim.coupling.connection import Connection, connect, unconnected_inputs
-from cosim.coupling.graph import execution_groups, undeclared
+from cosim.coupling.connection import Connection, connect
+from cosim.coupling.graph import execution_groups
 from cosim.coupling.plan import Plan, make_plan
 from cosim.diagnostics.call_log import CallLog
 from cosim.diagnostics.logged_slave import log_calls
 from cosim.diagnostics.messages import in_order
 from cosim.errors import CosimError
+from cosim.expectations.check import check_expectations
+from cosim.expectations.judge import judge
 from cosim.master.algorithms.choose import AlgorithmChoice, choose_algorithm
 from cosim.master.axis import TimeAxis
 from cosim.master.lines.draw import draw_lines
 from cosim.master.master import Master, close
 from cosim.report.spec import Phase, ReportSpec
-from cosim.results.result import BaliseRecord, Result
-from cosim.results.si import in_si
+from cosim.results.recorder import Recorder
+from cosim.results.result import BaliseRecord, Result, SignalInfo
+from cosim.results.si import InFormerUnits, in_si
 from cosim.scenario.balise_service import Choice, choose_method, find_receivers, make_service, watched_plant
 from cosim.scenario.certificates import check_certificates, expected_gap
 from cosim.scenario.connections import parse_connections
 from cosim.scenario.instances import check_instances
-from cosim.scenario.layouts import make_layout
+from cosim.scenario.layouts import Layout, make_layout
 from cosim.scenario.master import idle_settings, make_master, slow_last
 from cosim.scenario.models import component_factories, protocol_parameters
-from cosim.scenario.outcome import Outcome
+from cosim.scenario.outcome import INTERRUPTED, Outcome
 from cosim.scenario.premises import premise_findings
-from cosim.scenario.roles import ROLES, check_roles
+from cosim.scenario.remarks import coupling_remarks, late_telegram_doubts, lines_note
+from cosim.scenario.roles import ROLES, check_roles, signals_to_record
 from cosim.scenario.schema import ScenarioTable, step_count
 from cosim.scenario.starts import start_values
-from cosim.scenario.summary import run_summary
+from cosim.scenario.summary import first_summary, run_summary
 from plant_models.hybrid.units import Unit
+
+if TYPE_CHECKING:
+    from cosim.results.stream import Stream
 
 LOG = logging.getLogger("cosim")
 CALL_LOG = Path("calls.log")
 LOGGED_FAULTS = frozenset({"discard", "error", "fatal"})
-CARRIED = {
-    "derivatives": "value and slope to",
-    "intermediate": "set within the step of",
-    "mean": "mean over the step to",
-    "held": "held, because discrete, for",
-}
 Progress = Callable[[float, float], None]
 Warn = Callable[[str], None]
+Streaming = tuple[Path, Callable[[], None]]
+"""The folder to stream to, and whom to tell that this has begun: nothing of a former run is in it then."""
 
 
 def run_scenario(
     table: ScenarioTable, name: str, folder: Path, where: str, progress: Progress | None = None, warn: Warn | None = None,
-    call_log: Path | None = None, building: Warn | None = None,
+    call_log: Path | None = None, building: Warn | None = None, stream: Streaming | None = None,
+    doubts: Sequence[str] = (),
 ) -> Outcome:  # fmt: skip
     """Run a scenario to its end or to its first failure.
 
@@ -71,6 +76,8 @@ def run_scenario(
         warn: told of everything doubtful as soon as it is known, before the run where it can be; by default the log ``cosim``.
         call_log: where calls are logged, where the scenario asks for that; by default `CALL_LOG` in the working folder.
         building: told of FMUs that are built before the run, as they are done; by default the log, as information.
+        stream: the folder that rows are written to as they come; None to keep them in memory.
+        doubts: warnings from before, which have been told already.
 
     Raises:
         CosimError: the scenario cannot be set up; failures on the way are in the outcome.
@@ -78,12 +85,14 @@ def run_scenario(
     setup = _Setup(table, folder, where, warn or LOG.warning, building or LOG.info)
     if table.master.log_calls:
         setup.call_log = CallLog(call_log or CALL_LOG)
+    setup.name, setup.streaming = name, stream
+    setup.warnings += doubts
     try:
         try:
             setup.prepare(progress)
         except CosimError as error:
             raise error if str(error).startswith(where) else type(error)(f"{where}: {error}") from error
-        return setup.execute(name)
+        return setup.execute()
     finally:
         setup.close()
 
@@ -109,6 +118,9 @@ class _Setup:
         self.lines: Mapping[str, str] = {}
         self.setup_seconds = 0.0
         self.call_log: CallLog | None = None
+        self.name = "script"
+        self.streaming: Streaming | None = None
+        self.stream: Stream | None = None
 
     def prepare(self, progress: Progress | None) -> None:
         """Everything up to the first step, cheap checks first."""
@@ -118,18 +130,22 @@ class _Setup:
             self._warn(text)
         layout = None if table.balises is None else make_layout(table.balises, table.start, table.stop, self.folder, self.where)
         pairs = parse_connections(table.connections, self.where)
-        self.factories, notes = component_factories(table.components, self.folder, self.where, self._tell_of_builds)
+        span = table.start, table.stop
+        self.factories, notes = component_factories(table.components, self.folder, self.where, self._tell_of_builds, span)
         self.notes += notes
         files = {name: (self.folder / t.fmu).resolve() for name, t in table.components.items() if t.fmu is not None}
         check_instances(files, self.where)
         for name, factory in self.factories.items():
             self.components[name] = factory()
             self.components[name].configure(table.components[name].parameters)
-            self._warn_of_tool(self.components[name])
+            warning = tool_warning(name, self.components[name].description)
+            if warning is not None:
+                self._warn(warning)
         clocks, pairs = connect_clocks(pairs, self.components)
         connections = self.connections = connect(pairs, self.components)
         receivers, plant = self._balise_roles()
         check_roles(table, self.components, self.where)
+        table = self.table = check_expectations(table, self.components, receivers, self.where)
         groups = execution_groups(slow_last(self.components, table), connections, self._before(plant, receivers))
         self.algorithm = choose_algorithm(table.master.algorithm, groups, self.components)
         order = [name for group in groups for name in group.names]
@@ -137,12 +153,15 @@ class _Setup:
         if layout is not None:
             self._check_certificates(layout, receivers)
         self._instantiate(starts, connections)
-        self.plan = make_plan(self.components, connections, order, {n: t.record for n, t in table.components.items()}, clocks)
-        self._note_unconnected(connections)
+        self.plan = make_plan(self.components, connections, order, signals_to_record(table), clocks)
+        doubts, notes = coupling_remarks(table, self.components, connections)
+        for doubt in doubts:
+            self._warn(doubt)
+        self.notes += notes
         self.notes += self.algorithm.notes
         if table.master.inputs != "hold":
             self.lines = draw_lines(self.plan, table.master.inputs)
-            self._note_lines()
+            self.notes.append(lines_note(self.lines, table.master.inputs))
         if layout is not None:
             self._add_balises(layout, plant, receivers, starts[plant])
         told = None if progress is None else lambda t: progress(t, self.axis.stop)
@@ -150,9 +169,10 @@ class _Setup:
         if self.master.system.events is not None:
             self.notes += self.master.system.events.notes
         self.notes += self.master.stepper.notes
+        self._begin_stream(self.master)
         self.setup_seconds = perf_counter() - begin
 
-    def execute(self, name: str) -> Outcome:
+    def execute(self) -> Outcome:
         """Run the master and gather what came out."""
         assert self.plan is not None
         assert self.master is not None
@@ -163,22 +183,25 @@ class _Setup:
         except CosimError as error:
             failure = str(error)
         except KeyboardInterrupt:
-            failure = "The run was interrupted; what was computed so far is kept."
+            failure = INTERRUPTED
         if master.ended_early is not None:
             self._warn(master.ended_early)
-        premises, left = premise_findings(master.recorder.table(), self.table.components, self.connections)
+        premises, left = premise_findings(self._as_recorded(), self.table.components, self.connections)
         for warning in (*master.control.warnings(), *left):
             self._warn(warning)
-        summary = run_summary(name, self.table, self.plan, master, self.setup_seconds)
+        summary = run_summary(self.name, self.table, self.plan, master, self.setup_seconds)
         events = [] if self.service is None else self._all_telegrams(self.service)
         self._warn_of_rejections()
         self._warn_of_logs()
         summary |= self._balise_summary([e.stamp for e in events if e.kind == "true"])
         summary |= {"certificates": self.certificates, "premises": premises} | {"warnings": self.warnings, "notes": self.notes}
-        table, signals = in_si(master.recorder.table(), self.plan.signals, self._unit)
+        spec = self._report_spec()
+        summary["report"] = asdict(spec)  # so that the folder tells which signal plays which role
+        table, signals = self._in_si()
         messages = in_order(component.messages for component in self.components.values())
         result = Result(table, signals, events, summary, failure, messages)
-        return Outcome(result, self._report_spec(), tuple(self.table.report.tables))
+        outcome = Outcome(result, spec, tuple(self.table.report.tables))
+        return outcome.with_summary(expectations=[judged.to_data() for judged in judge(self.table, outcome)])
 
     def close(self) -> None:
         """Free everything, also after a set-up that failed half-way."""
@@ -199,11 +222,6 @@ class _Setup:
         return self.components[component].unit(signal)
 
     # -- set-up -----------------------------------------------------------------------------------------------------
-
-    def _warn_of_tool(self, component: Component) -> None:
-        warning = tool_warning(component.name, component.description)
-        if warning is not None:
-            self._warn(warning)
 
     def _instantiate(self, starts: dict[str, dict[str, StartValue]], connections: list[Connection]) -> None:
         for name, component in self.components.items():
@@ -249,37 +267,42 @@ class _Setup:
         for warning in self.choice.warnings:
             self._warn(warning)
         self.notes.append(f"Balises localised by '{self.choice.method}': {self.choice.reason}.")
-        self._note_late_telegrams(receivers)
+        for warning in late_telegram_doubts(table, self.components, receivers):
+            self._warn(warning)
         self.service = make_service(table, layout, self.plan, plant, receivers, self.choice.method)
 
-    def _note_late_telegrams(self, receivers: list[str]) -> None:
-        """A block replays what arrives late, and so does an FMU with the parameter `late_policy`; another one may not."""
-        table = self.table.balises
-        assert table is not None
-        sealed = [n for n in receivers if self.components[n].kind == "FMU" and "late_policy" not in self.components[n].variables]
-        if sealed and table.latency + table.latency_jitter > 0.0:
-            delay = table.latency + table.latency_jitter
-            self._warn(
-                f"Telegrams arrive up to {delay:g} s late; {', '.join(sealed)}: a sealed FMU without a parameter "
-                "late_policy does not say what it does with late stamps."
-            )
+    def _begin_stream(self, master: Master) -> None:
+        """From here on what is recorded, told and logged is in the folder as well."""
+        if self.streaming is None:
+            return
+        from cosim.results.stream import Stream  # noqa: PLC0415 - the formats of results only for those who stream
 
-    def _note_lines(self) -> None:
-        by_carrier: dict[str, list[str]] = {}
-        for name, carrier in self.lines.items():
-            by_carrier.setdefault(carrier, []).append(name)
-        said = "; ".join(f"{CARRIED[carrier]}: {', '.join(names)}" for carrier, names in by_carrier.items())
-        self.notes.append(f"Inputs between communication points ({self.table.master.inputs}): {said or 'none are connected'}.")
-
-    def _note_unconnected(self, connections: list[Connection]) -> None:
-        free = unconnected_inputs(connections, self.components.values())
-        if free:
-            self._warn(f"Unconnected inputs keep their start values: {', '.join(free)}.")
-        silent = undeclared(self.components.values())
-        if silent:
-            self.notes.append(f"Declare no dependencies, algebraic loops through them assumed absent: {', '.join(silent)}.")
+        summary = first_summary(self.name, self.table, master.plan) | {"report": asdict(self._report_spec())}
+        summary |= {"certificates": self.certificates, "warnings": self.warnings, "notes": self.notes}
+        events = [] if self.service is None else self.service.mailbox.log
+        logs = [component.messages for component in self.components.values()]
+        folder, begun = self.streaming
+        self.stream = Stream(folder, master.plan.signals, self._unit, summary, lambda: events, logs)
+        master.recorder = Recorder(master.plan.signals, 0, every=self.table.master.record_every, stream=self.stream)
+        begun()
 
     # -- after the run ----------------------------------------------------------------------------------------------
+
+    def _as_recorded(self) -> Any:
+        """The table in the components' own units."""
+        assert self.master is not None
+        table = self.master.recorder.table()
+        return table if self.stream is None else InFormerUnits(table, self.stream.units)
+
+    def _in_si(self) -> tuple[np.ndarray, list[SignalInfo]]:
+        """The table and its columns in SI; that of a stream was written so."""
+        assert self.plan is not None
+        assert self.master is not None
+        table = self.master.recorder.table()
+        if self.stream is None:
+            return in_si(table, self.plan.signals, self._unit)
+        self.stream.finish()
+        return table, self.stream.signals
 
     def _all_telegrams(self, service: BaliseService) -> list[BaliseRecord]:
         """Everything that was passed: told, missed, and still on its way at the end."""

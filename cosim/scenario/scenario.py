@@ -3,24 +3,33 @@
 from __future__ import annotations
 
 import logging
-import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from copy import deepcopy
-from importlib.resources import files
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from cosim.diagnostics.structure import Structure
-from cosim.errors import ScenarioError, nearest
+from cosim.errors import CosimError, ScenarioError
+from cosim.scenario.includes import Key, attribute, find_file, read_tables, shipped_scenarios
+from cosim.scenario.origin import Origin
 from cosim.scenario.outcome import Outcome
+from cosim.scenario.override import override
+from cosim.scenario.paths import COMPONENT_PATHS, absolute
 from cosim.scenario.run import run_scenario
-from cosim.scenario.schema import ComponentTable, ScenarioTable, parse_scenario
+from cosim.scenario.save import plain, save_scenario, scenario_text
+from cosim.scenario.schema import ScenarioTable, parse_scenario
+from cosim.scenario.streaming import finish_stream, streaming_to
 from cosim.ssp.names import is_package, stem
 
+if TYPE_CHECKING:
+    from cosim.studies.sampling import Mode, Range
+    from cosim.studies.sweep import Sweep
+
 LOG = logging.getLogger("cosim")
-SHIPPED = files("cosim") / "scenarios"
-TABLES = ("balises", "master", "report")
-COMPONENT_KEYS = {field.alias or name for name, field in ComponentTable.model_fields.items()}
+
+__all__ = ["Scenario", "shipped_scenarios"]
 
 
 class Scenario:
@@ -44,35 +53,38 @@ class Scenario:
     def __init__(self, *, folder: str | Path = ".", where: str = "script", **tables: Any) -> None:
         self.folder, self.where = Path(folder), where
         self._data: dict[str, Any] = {"components": {}, "connections": [], **deepcopy(tables)}
+        self._places: dict[Key, str] = {}  # in which file a value stands, where one file includes others
         self._doubts: list[str] = []
+        self._name: str | None = None  # where it is not that of the file
         self._files: object = None  # what keeps unpacked files alive
 
     @classmethod
     def load(cls, name_or_path: str | Path) -> Scenario:
         """A shipped scenario by name, or one from a TOML file (paths in it are relative to the file) or from an SSP.
 
+        A file is merged with those it names under ``include``; its ``[overrides]`` are applied last.
+
         Args:
-            name_or_path: ``freight_profile_d``, ``my.toml``, ``system.ssp``, or ``system.ssp#Variant`` for a structure in it.
+            name_or_path: ``freight_profile_d``, ``my.toml``, ``system.ssp``, or ``system.ssp#Variant`` for a structure in it; or
+                a results folder, for the scenario that it was made from.
 
         Raises:
             ScenarioError: there is no such scenario, or it is not TOML, or not SSP.
+            ProvenanceError: the results folder does not say what it was made from.
         """
         if is_package(name_or_path):
             return cls._from_package(str(name_or_path))
-        path = Path(name_or_path)
-        if path.suffix != ".toml" and not path.is_file():
-            shipped = Path(str(SHIPPED)) / f"{name_or_path}.toml"
-            if not shipped.is_file():
-                raise ScenarioError(f"No scenario {str(name_or_path)!r}; {nearest(str(name_or_path), shipped_scenarios())}")
-            path = shipped
-        if not path.is_file():
-            raise ScenarioError(f"Scenario file {path} does not exist.")
-        try:
-            data = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise ScenarioError(f"{path}: not readable as TOML: {error}") from error
+        stored = None
+        if Path(name_or_path).is_dir() and str(name_or_path) not in shipped_scenarios():
+            from cosim.provenance.manifest import read_manifest  # noqa: PLC0415 - only for those who load results
+
+            stored = read_manifest(name_or_path)
+        path = find_file(name_or_path) if stored is None else stored.scenario
+        tables = read_tables(path)
         scenario = cls(folder=path.parent, where=str(path))
-        scenario._data = {"components": {}, "connections": [], **data}
+        scenario._name = None if stored is None else stored.name
+        scenario._data = {"components": {}, "connections": [], **tables.data}
+        scenario._places = tables.places
         return scenario
 
     @classmethod
@@ -83,6 +95,62 @@ class Scenario:
         scenario = cls(where=name, **loaded.tables)
         scenario._doubts, scenario._files = loaded.doubts, loaded.unpacked
         return scenario
+
+    @classmethod
+    def fmu(
+        cls, path: str | Path, *, stop: float | None = None, step: float | None = None, start: float | None = None,
+        inputs: Mapping[str, Any] | str | Path | None = None, parameters: Mapping[str, Any] | None = None,
+        record: Sequence[str] = (), name: str = "fmu",
+    ) -> Scenario:  # fmt: skip
+        """A scenario of one FMU alone: for a look at it, or for a regression test of its outputs.
+
+        Args:
+            path: of the FMU, relative to where the user stands.
+            stop: end of the run [s]. start: its begin [s]. step: communication step [s]. Where not given, those of the FMU's
+                default experiment; without a step there, a thousandth of the run.
+            inputs: values by name, which are held; or a table (CSV, MAT, ...) or results folder whose columns are played back
+                into the inputs of the same names, on lines between its rows.
+            parameters: start values by name.
+            record: variables to record besides the outputs.
+            name: of the component: its outputs are recorded as ``name.output``.
+
+        Raises:
+            FmuLoadError: the FMU cannot be read.
+            ScenarioError: no end is known, or an input does not exist; the nearest are suggested.
+        """
+        from cosim.scenario.single import single_tables  # noqa: PLC0415 - only for those who want it
+
+        tables, doubts = single_tables(Path(path), name, start, stop, step, inputs, parameters or {}, record)
+        scenario = cls(where=Path(path).name, **tables)
+        scenario._doubts = doubts
+        return scenario
+
+    def to_toml(self, folder: str | Path | None = None) -> str:
+        """The text of a scenario file that runs identically; files it included and overrides are in it.
+
+        Args:
+            folder: where the file will stand: paths in the text are relative to it. Where not given they stay as they are,
+                relative to the folder of this scenario.
+
+        Raises:
+            ScenarioError: something in the scenario cannot be; every fault is named.
+        """
+        return scenario_text(self.table(), self.folder, None if folder is None else Path(folder))
+
+    def save(self, path: str | Path) -> Path:
+        """Write a scenario file that runs identically. FMUs that came out of an SSP are copied to ``NAME_files`` beside it.
+
+        Args:
+            path: of the file, ending in ``.toml``; an existing one is replaced. Paths in it become relative to it.
+
+        Returns:
+            The path.
+
+        Raises:
+            ScenarioError: something in the scenario cannot be, or the path does not end in ``.toml``.
+            OutputError: the file cannot be written.
+        """
+        return save_scenario(self.table(), self.folder, Path(path), getattr(self._files, "path", None))
 
     def export_ssp(self, path: str | Path, version: str = "2.0") -> Path:
         """Write the scenario as a system structure package: FMUs, connections and parameters, as other tools read them.
@@ -104,13 +172,13 @@ class Scenario:
     @property
     def name(self) -> str:
         """Name of the file without its ending, or ``script``."""
-        return stem(self.where)
+        return self._name or stem(self.where)
 
     def add(self, name: str, **table: Any) -> Self:
         """Add a component; keys as in a file: `fmu`, `model` or `observer`, `parameters`, `preset`, `options`, ..."""
         if name in self._data["components"]:
             raise ScenarioError(f"{self.where}: there is a component {name!r} already.")
-        self._data["components"][name] = table
+        self._data["components"][name] = plain(table)
         return self
 
     def connect(self, *lines: str) -> Self:
@@ -133,6 +201,16 @@ class Scenario:
         self._data["report"] = {**self._data.get("report", {}), **table}
         return self
 
+    def expect(self, check: str, **table: Any) -> Self:
+        """Add an expectation that the run is held against, see `cosim.expectations`.
+
+        Args:
+            check: what is checked: ``speed_error``, ``signal``, ``on``, ``telegrams``, ...
+            table: its keys as in a file; ``start`` and ``end`` may stand for ``from``, which Python keeps for itself, and ``to``.
+        """
+        self._data["expect"] = [*self._data.get("expect", []), {"check": check, **table}]
+        return self
+
     def set(self, name: str, value: Any) -> Self:
         """Override one value.
 
@@ -141,32 +219,25 @@ class Scenario:
         Raises:
             ScenarioError: there is no such component or table.
         """
-        head, dot, rest = name.partition(".")
-        components = self._data["components"]
-        if not dot:
-            self._data[name] = value
-        elif head in components:
-            table = components[head]
-            if rest == "fmu":
-                table[rest] = str(Path(str(value)).resolve())  # given here, so relative to where the user stands
-            elif rest in COMPONENT_KEYS:
-                table[rest] = value
-            elif rest.startswith("options."):
-                table.setdefault("options", {})[rest.removeprefix("options.")] = value
-            else:
-                table.setdefault("parameters", {})[rest] = value
-        elif head in TABLES:
-            self._data.setdefault(head, {})[rest] = value
-        else:
-            known = [*components, *TABLES]
-            raise ScenarioError(f"{self.where}: cannot set {name!r}: no component {head!r}; {nearest(head, known)}")
+        value = plain(value)
+        if name.rpartition(".")[2] in COMPONENT_PATHS and name.count(".") == 1:
+            value = absolute(str(value), ".")  # given here, so relative to where the user stands
+        try:
+            override(self._data, name, value)
+        except ScenarioError as error:
+            raise ScenarioError(f"{self.where}: {error}") from error
         return self
 
     def copy(self) -> Scenario:
         """An independent copy."""
         scenario = Scenario(folder=self.folder, where=self.where, **self._data)
-        scenario._doubts, scenario._files = list(self._doubts), self._files
+        scenario._doubts, scenario._files, scenario._places = list(self._doubts), self._files, self._places
+        scenario._name = self._name
         return scenario
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For another process: files out of a package are kept by the original, and not removed with a copy."""
+        return self.__dict__ | {"_files": None}
 
     def table(self) -> ScenarioTable:
         """The validated scenario.
@@ -174,12 +245,39 @@ class Scenario:
         Raises:
             ScenarioError: something in it cannot be; every fault is named.
         """
-        return parse_scenario(self._data, self.where)
+        with self._places_named():
+            return parse_scenario(self._data, self.where)
+
+    def vary(
+        self, values: Mapping[str, Iterable[Any] | Range] | Sequence[Mapping[str, Any]], mode: Mode = "grid", *,
+        count: int | None = None, seed: int = 0,
+    ) -> Sweep:  # fmt: skip
+        """A sweep: this scenario with some values changed, many times over.
+
+        ::
+
+            sweep = s.vary({"plant.mass": [70e3, 80e3], "balises.seed": range(5)})
+            result = sweep.run(workers=2, measure={"distance": lambda outcome: outcome["plant.position"][-1]})
+            result.write("results/masses")
+
+        Args:
+            values: names as for `set`, each with the values it takes; or a list of variations, each a mapping of names to values.
+            mode: ``grid``: every combination, the last name changes quickest; ``zip``: first with first, second with second;
+                ``latin`` (Latin hypercube) and ``random``: `count` points of `cosim.studies.sampling.uniform` ranges and lists.
+            count: number of points, for ``latin`` and ``random``. seed: of the points.
+
+        Raises:
+            ScenarioError: a name or a value cannot be; nothing has been run then.
+            CosimError: a component that is varied cannot be described.
+        """
+        from cosim.studies.sweep import make_sweep  # noqa: PLC0415 - only for those who vary
+
+        return make_sweep(self, values, mode, count, seed)
 
     def run(
         self, progress: Callable[[float, float], None] | None = None, overrides: Mapping[str, Any] | None = None,
         warn: Callable[[str], None] | None = None, call_log: str | Path | None = None,
-        building: Callable[[str], None] | None = None,
+        building: Callable[[str], None] | None = None, stream: str | Path | None = None,
     ) -> Outcome:  # fmt: skip
         """Run it.
 
@@ -191,6 +289,9 @@ class Scenario:
             call_log: a file to log every call of every component to, as `master.log_calls` asks for.
             building: told of the FMUs of shipped models that are built for the first time, some seconds each; by default the
                 log ``cosim``, as information.
+            stream: a results folder to which everything is written while the run goes on, so that it outlives the program; what
+                an earlier run left there is removed when the first step is about to be taken. The table is written as
+                ``table.npy``; `Outcome.write` adds other formats only where the scenario asks for them.
 
         Returns:
             The outcome: result, report roles, warnings; also for a run that failed on the way (see `Outcome.failure`).
@@ -207,8 +308,13 @@ class Scenario:
         log = None if call_log is None else Path(call_log)
         for doubt in self._doubts:
             (warn or LOG.warning)(doubt)
-        outcome = run_scenario(table, scenario.name, self.folder, self.where, progress, warn, log, building)
-        return outcome.with_summary(warnings=[*self._doubts, *outcome.warnings]) if self._doubts else outcome
+        with self._places_named():
+            place = scenario.name, self.folder, self.where
+            origin = Origin.of(table, *place, self._files)
+            streaming = None if stream is None else streaming_to(stream, origin)
+            outcome = run_scenario(table, *place, progress, warn, log, building, doubts=self._doubts, stream=streaming)
+        outcome = replace(outcome, origin=origin)
+        return outcome if stream is None else finish_stream(outcome, stream, warn or LOG.warning)
 
     def structure(self) -> Structure:
         """How the components hang together: order, groups, loops, what is held over a step. Nothing is run or built.
@@ -221,9 +327,14 @@ class Scenario:
         """
         from cosim.scenario.structure import scenario_structure  # noqa: PLC0415 - scipy's graphs only for those who ask
 
-        return scenario_structure(self.table(), self.name, self.folder, self.where)
+        with self._places_named():
+            return scenario_structure(self.table(), self.name, self.folder, self.where)
 
-
-def shipped_scenarios() -> list[str]:
-    """Names of the scenarios that come with the package."""
-    return sorted(Path(str(entry)).stem for entry in SHIPPED.iterdir() if str(entry).endswith(".toml"))
+    @contextmanager
+    def _places_named(self) -> Iterator[None]:
+        """Errors name the file in which the fault stands, also where that is an included one."""
+        try:
+            yield
+        except CosimError as error:
+            error.args = (attribute(str(error), self.where, self._places), *error.args[1:])
+            raise

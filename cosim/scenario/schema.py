@@ -6,199 +6,25 @@ Unknown keys, wrong types and values out of range are refused with the place and
 from __future__ import annotations
 
 import json
-import math
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, PlainValidator, Tag, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from cosim.errors import ScenarioError, nearest
-from fmu_observer.block import LatePolicy
-
-Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
-
-
-def _start(value: Any) -> Any:
-    if isinstance(value, list | tuple):
-        return [_start(entry) for entry in value]
-    if isinstance(value, bool | int | str) or (isinstance(value, float) and math.isfinite(value)):
-        return value
-    raise ValueError(f"expected a finite number, true or false, a text, or a list of them (got {value!r})")
-
-
-Start = Annotated[Any, PlainValidator(_start)]
-"""A number, truth value, text or item of an enumeration, bytes in hexadecimal; a list of them for a vector, nested for arrays."""
-Realisation = Literal["fmu3", "fmu2", "block3", "block2"]
-
-
-class Table(BaseModel):
-    """A table of a scenario file."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True, allow_inf_nan=False)
-
-
-class ComponentTable(Table):
-    """One component: an FMU by path, or a shipped plant, sensor, driver or observer by name."""
-
-    fmu: str | None = None
-    model: str | None = None
-    observer: str | None = None
-    realisation: Realisation | None = Field(default=None, alias="as")
-    preset: str | None = None
-    options: dict[str, str | int | float | bool] = {}
-    parameters: dict[str, Start] = {}
-    late_policy: LatePolicy = "replay"
-    replay_horizon: Annotated[float, Field(gt=0.0)] = 10.0
-    record: list[str] = []
-    log: Literal["all", "errors", "none"] | list[str] | None = None
-    label: str | None = None
-    every: Annotated[int, Field(ge=1)] = 1
-    substeps: Annotated[int, Field(ge=1)] = 1
-
-    @model_validator(mode="after")
-    def _one_origin(self) -> ComponentTable:
-        given = [k for k in ("fmu", "model", "observer") if getattr(self, k) is not None]
-        if len(given) != 1:
-            raise ValueError("give exactly one of 'fmu' (a path), 'model' (a shipped plant) or 'observer' (a shipped observer)")
-        if given == ["fmu"] and (self.preset or self.options or self.realisation):
-            raise ValueError("'preset', 'options' and 'as' belong to shipped models; an FMU takes 'parameters' only")
-        return self
-
-
-class FalseTelegramTable(Table):
-    """A telegram without a balise."""
-
-    time: float
-    offset: float
-
-
-class BalisesTable(Table):
-    """Balises: where they are, how the passings are found, what happens to the telegrams."""
-
-    position: str
-    speed: str
-    odometer: str | None = None
-    layout: Literal["spacing", "positions", "csv", "instants", "aperiodic"]
-    spacing: Annotated[float, Field(gt=0.0)] | None = None
-    first: float | None = None
-    positions: list[float] | None = None
-    file: str | None = None
-    instants: list[float] | None = None
-    seed: Annotated[int, Field(ge=0)] = 0
-    min_gap: Annotated[float, Field(gt=0.0)] = 0.1
-    max_gap: Annotated[float, Field(gt=0.0)] = 0.5
-    dropout_after: float = 7.9
-    dropout_fraction: Annotated[float, Field(ge=0.0, le=1.0)] = 0.15
-    dropout_stretch: Annotated[float, Field(ge=1.2)] = 2.5
-    track_start: float = 0.0
-    track_end: float | None = None
-    expected_speed: Annotated[float, Field(gt=0.0)] | None = None
-    location_accuracy: Annotated[float, Field(ge=0.0, le=63.0)] = 0.0
-    method: Literal["auto", "early-return", "rollback", "predict", "interpolate"] = "auto"
-    clock: str | None = None
-    jerk_bound: Annotated[float, Field(gt=0.0)] = 10.0
-    timing: Literal["exact", "stale"] = "exact"
-    receivers: list[Name] | None = None
-    latency: Annotated[float, Field(ge=0.0)] = 0.0
-    latency_jitter: Annotated[float, Field(ge=0.0)] = 0.0
-    missed_fraction: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
-    missed: list[str] = []
-    position_noise: Annotated[float, Field(ge=0.0)] = 0.0
-    false_telegrams: list[FalseTelegramTable] = []
-
-    @model_validator(mode="after")
-    def _layout_complete(self) -> BalisesTable:
-        needed = {"spacing": "spacing", "positions": "positions", "csv": "file", "instants": "instants"}.get(self.layout)
-        if needed is not None and getattr(self, needed) is None:
-            raise ValueError(f"layout '{self.layout}' needs '{needed}'")
-        if self.layout == "spacing" and self.track_end is None:
-            raise ValueError("layout 'spacing' needs 'track_end', the end of the track [m]")
-        return self
-
-
-class IterationTable(Table):
-    """How loops are iterated within a communication step."""
-
-    method: Literal["fixed-point", "aitken", "newton"] = "newton"
-    max_iterations: Annotated[int, Field(ge=1)] = 50
-    relative_tolerance: Annotated[float, Field(gt=0.0)] = 1e-9
-    absolute_tolerance: Annotated[float, Field(gt=0.0)] = 1e-12
-    relaxation: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
-
-
-class MasterTable(Table):
-    """How the components are stepped."""
-
-    algorithm: Literal["auto", "gauss-seidel", "jacobi", "iterate"] = "auto"
-    threads: Annotated[int, Field(ge=1)] = 1
-    iteration: IterationTable = IterationTable()
-    inputs: Literal["hold", "interpolate", "extrapolate"] = "hold"
-    control: Literal["fixed", "doubling"] = "fixed"
-    tolerance: Annotated[float, Field(gt=0.0)] = 1e-6
-    smallest_step: Annotated[float, Field(gt=0.0)] | None = None
-    events: Literal["propagate", "local"] = "propagate"
-    stepper: Literal["auto", "python", "compiled"] = "auto"
-    log_calls: bool = False
-    record_every: Annotated[int, Field(ge=1)] = 1
-    record_memory: Annotated[float, Field(gt=0.0)] = 256.0
-
-
-class ConnectionTable(Table):
-    """A connection that does something to the number on its way."""
-
-    source: str = Field(alias="from")
-    target: str = Field(alias="to")
-    factor: float = 1.0
-    offset: float = 0.0
-    units: Literal["convert", "ignore"] = "convert"
-    values: list[tuple[float, float]] = []
-
-    @model_validator(mode="after")
-    def _one_transformation(self) -> ConnectionTable:
-        if self.values and (self.factor, self.offset) != (1.0, 0.0):
-            raise ValueError("give either 'factor' and 'offset', or 'values', not both")
-        sources = [source for source, _ in self.values]
-        if len(set(sources)) < len(sources):
-            raise ValueError("'values' gives two targets for one source")
-        return self
-
-    def __str__(self) -> str:
-        what = f"{self.factor:g} * {self.source} + {self.offset:g}" if not self.values else f"values of {self.source}"
-        return f"{what} -> {self.target}" + ("" if self.units == "convert" else " (units ignored)")
-
-
-LINE, TABLE = "connection line", "connection table"
-"""Tags of the two forms of a connection; left out of messages."""
-ConnectionItem = Annotated[
-    Annotated[str, Tag(LINE)] | Annotated[ConnectionTable, Tag(TABLE)],
-    Discriminator(lambda given: TABLE if isinstance(given, dict | ConnectionTable) else LINE),
-]
-
-
-class PhaseTable(Table):
-    """A part of the run to be judged on its own."""
-
-    name: str
-    start: float
-    end: float
-
-
-class ReportTable(Table):
-    """Roles of signals in the report, and the numbers to print beside the measured ones."""
-
-    true_position: str | None = None
-    true_speed: str | None = None
-    true_slip: str | None = None
-    true_adhesion_force: str | None = None
-    odometer: str | None = None
-    speed_reference: str | None = None
-    observers: list[Name] | None = None
-    phases: list[PhaseTable] = []
-    zones: list[tuple[float, float]] = []
-    evaluate_after: float = 0.0
-    published: dict[str, dict[str, float]] = {}
-    independent: dict[str, dict[str, float]] = {}
-    notes: list[str] = []
-    tables: list[Literal["csv", "mat", "npy"]] = ["csv", "mat"]
+from cosim.scenario.expectation_tables import EXPECTATIONS, ExpectationItem
+from cosim.scenario.tables import (
+    LINE,
+    TABLE,
+    BalisesTable,
+    ComponentTable,
+    ConnectionItem,
+    ConnectionTable,
+    IterationTable,
+    MasterTable,
+    Name,
+    ReportTable,
+    Table,
+)
 
 
 class ScenarioTable(Table):
@@ -212,10 +38,11 @@ class ScenarioTable(Table):
     step: float
     certificates: Literal["warn", "require", "ignore"] = "warn"
     components: dict[Name, ComponentTable]
-    connections: list[ConnectionItem] = []
+    connections: list[ConnectionItem] = Field(default_factory=list)
     balises: BalisesTable | None = None
     master: MasterTable = MasterTable()
     report: ReportTable = ReportTable()
+    expect: list[ExpectationItem] = Field(default_factory=list)
 
     @model_validator(mode="after")
     def _times(self) -> ScenarioTable:
@@ -267,11 +94,13 @@ def parse_scenario(data: dict[str, Any], where: str) -> ScenarioTable:
 
 
 def _explain(item: dict[str, Any]) -> str:
-    place = ".".join(str(p) for p in item["loc"] if not _is_form(str(p))) or "scenario"
+    place = _place(item["loc"])
     message = str(item["msg"]).removeprefix("Value error, ")
     if item["type"] == "extra_forbidden":
         key = str(item["loc"][-1])
         return f"{place}: unknown key; {nearest(key, _known_keys(item['loc']))}"
+    if item["type"].startswith("union_tag_"):
+        return f"{place}: {_wrong_check(item.get('input'))}"
     given = item.get("input")
     if item["type"] == "value_error" or isinstance(given, dict):
         return f"{place}: {message}"
@@ -280,6 +109,21 @@ def _explain(item: dict[str, Any]) -> str:
     if item["loc"][-2:-1] == ("log",) and str(item["loc"][-1]).startswith("literal["):
         message = "expected 'all', 'errors', 'none', or a list of log categories"
     return f"{place}: {message} (got {json.dumps(given, default=str)})"
+
+
+def _place(location: tuple[Any, ...]) -> str:
+    """Where in the scenario; expectations are counted from 1 and named by what they check."""
+    if location[0:1] == ("expect",) and len(location) > 1:
+        check = f", '{location[2]}'" if len(location) > 2 else ""
+        return f"expect, number {location[1] + 1}{check}" + "".join(f", {part}" for part in location[3:4])
+    return ".".join(str(p) for p in location if not _is_form(str(p))) or "scenario"
+
+
+def _wrong_check(given: Any) -> str:
+    """What to say of an expectation whose kind is not known."""
+    if not isinstance(given, dict) or "check" not in given:
+        return f"expected a table with the key 'check', which is one of: {', '.join(EXPECTATIONS)}"
+    return f"unknown check {given['check']!r}; {nearest(str(given['check']), EXPECTATIONS)}"
 
 
 def _is_form(place: str) -> bool:
@@ -300,4 +144,6 @@ def _known_keys(location: tuple[Any, ...]) -> list[str]:
         table = tables.get(str(location[0]), ScenarioTable)
     if location[:2] == ("master", "iteration"):
         table = IterationTable
+    if location[0] == "expect" and len(location) > 3:
+        return [field.alias or name for name, field in EXPECTATIONS[str(location[2])].model_fields.items()]
     return [field.alias or name for name, field in table.model_fields.items()]

@@ -12,6 +12,12 @@ from cosim.components.described import NUMERIC_TYPES
 from cosim.components.start_values import StartValue, refusal, typed_value, typed_values
 from cosim.components.structure import STRUCTURAL
 from cosim.errors import CouplingError
+from cosim.scenario.schema import ScenarioTable
+
+
+def given_values(table: ScenarioTable) -> dict[str, list[str]]:
+    """Names of the variables whose start values the scenario gives, by component."""
+    return {name: list(component.parameters) for name, component in table.components.items()}
 
 
 def start_values(component: Component, parameters: Mapping[str, Any]) -> dict[str, StartValue]:

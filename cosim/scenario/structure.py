@@ -9,6 +9,7 @@ from typing import Any
 
 from cosim.components.component import Component
 from cosim.components.loading import describe_fmu, load_block
+from cosim.components.recording import RecordingComponent
 from cosim.coupling.clocks import connect_clocks
 from cosim.coupling.connection import Connection, connect, unconnected_inputs
 from cosim.coupling.graph import Group, execution_groups, undeclared
@@ -19,9 +20,11 @@ from cosim.master.algorithms.choose import AlgorithmChoice, choose_algorithm
 from cosim.scenario.balise_service import find_receivers, watched_plant
 from cosim.scenario.connections import parse_connections
 from cosim.scenario.master import slow_last
-from cosim.scenario.models import make_system
+from cosim.scenario.models import make_system, open_recording
 from cosim.scenario.realisations import intended
-from cosim.scenario.schema import ComponentTable, ScenarioTable
+from cosim.scenario.schema import ScenarioTable
+from cosim.scenario.starts import given_values
+from cosim.scenario.tables import ComponentTable
 
 
 def scenario_structure(table: ScenarioTable, name: str, folder: Path, where: str) -> Structure:
@@ -40,7 +43,9 @@ def scenario_structure(table: ScenarioTable, name: str, folder: Path, where: str
 
 
 def _structure(table: ScenarioTable, name: str, folder: Path, where: str) -> Structure:
-    components = {n: describe_component(n, t, folder, f"{where}: components.{n}") for n, t in table.components.items()}
+    span = table.start, table.stop
+    places = {n: f"{where}: components.{n}" for n in table.components}
+    components = {n: describe_component(n, t, folder, places[n], span) for n, t in table.components.items()}
     clocks, pairs = connect_clocks(parse_connections(table.connections, where), components)
     connections = connect(pairs, components)
     balises = _balises(table, components, where)
@@ -64,21 +69,27 @@ def _structure(table: ScenarioTable, name: str, folder: Path, where: str) -> Str
         algorithm=choice.algorithm,
         reason=choice.reason,
         balises=balises,
-        warnings=(*_warnings(components, connections), *choice.notes, *refusal),
+        warnings=(*_warnings(table, components, connections), *choice.notes, *refusal),
     )
 
 
-def describe_component(name: str, table: ComponentTable, folder: Path, where: str) -> Component:
+def describe_component(
+    name: str, table: ComponentTable, folder: Path, where: str, span: tuple[float, float] | None = None
+) -> Component:  # fmt: skip
     """A component that can be asked and not stepped.
 
     Args:
         name: of the component. table: its table. folder: start of relative paths. where: place for messages.
+        span: start and stop of the run [s], which a recording must cover; None where it does not matter.
 
     Raises:
         ScenarioError, FmuLoadError: the component cannot be made.
     """
     system = make_system(table, where)
-    if system is None:
+    component: Component
+    if table.recording is not None:
+        component = RecordingComponent(name, open_recording(name, table, folder, where, span))
+    elif system is None:
         component = describe_fmu((folder / str(table.fmu)).resolve(), name)
     else:
         realisation = intended(table, system)
@@ -107,7 +118,8 @@ def _balises(table: ScenarioTable, components: Mapping[str, Component], where: s
         return None
     plant = watched_plant(balises, components, where)
     told = find_receivers(balises, components, plant, where)
-    return Balises(plant, balises.position, balises.speed, tuple(told), balises.method, balises.timing, balises.odometer)
+    watched = balises.position or "", balises.speed or ""
+    return Balises(plant, *watched, tuple(told), balises.method, balises.timing, balises.odometer)
 
 
 def _before(balises: Balises | None) -> list[tuple[str, str]]:
@@ -118,8 +130,8 @@ def _before(balises: Balises | None) -> list[tuple[str, str]]:
     return [(source, name) for source in sorted(sources) for name in balises.receivers if source != name]
 
 
-def _warnings(components: Mapping[str, Component], connections: list[Connection]) -> list[str]:
-    free = unconnected_inputs(connections, components.values())
+def _warnings(table: ScenarioTable, components: Mapping[str, Component], connections: list[Connection]) -> list[str]:
+    free = unconnected_inputs(connections, components.values(), given_values(table))
     silent = undeclared(components.values())
     texts = [f"Unconnected inputs keep their start values: {', '.join(free)}."] if free else []
     return texts + ([f"Declare no dependencies, direct feedthrough assumed absent: {', '.join(silent)}."] if silent else [])

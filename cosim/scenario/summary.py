@@ -11,9 +11,28 @@ from cosim.components.component import Component
 from cosim.coupling.plan import Plan
 from cosim.diagnostics.tally import tally_table
 from cosim.master.master import Master
-from cosim.scenario.schema import ComponentTable, ScenarioTable
+from cosim.scenario.schema import ScenarioTable
+from cosim.scenario.tables import ComponentTable
 
 MESSAGES_SHOWN = 20
+
+
+def first_summary(name: str, table: ScenarioTable, plan: Plan) -> dict[str, Any]:
+    """What is known before the first step; arguments as for `run_summary`."""
+    return {
+        "scenario": name,
+        "title": table.title,
+        "description": " ".join(table.description.split()),
+        "source": table.source,
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "start": table.start,
+        "stop": table.stop,
+        "step": table.step,
+        "order": [s.component.name for s in plan.steps],
+        "components": [_component(s.component, table.components[s.component.name]) for s in plan.steps],
+        "connections": [str(item) for item in table.connections],
+        "versions": versions(),
+    }
 
 
 def run_summary(name: str, table: ScenarioTable, plan: Plan, master: Master, setup_seconds: float) -> dict[str, Any]:
@@ -27,12 +46,7 @@ def run_summary(name: str, table: ScenarioTable, plan: Plan, master: Master, set
     wall = timing.initialisation + timing.stepping + timing.recording
     in_components = {s.component.name: s.component.seconds_in_all for s in plan.steps}
     rest = max(wall - sum(in_components.values()) - timing.recording, 0.0)  # reading and writing are estimated
-    return {
-        "scenario": name,
-        "title": table.title,
-        "description": " ".join(table.description.split()),
-        "source": table.source,
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+    return first_summary(name, table, plan) | {
         "start": axis.start,
         "stop": axis.stop,
         "reached": reached,
@@ -49,10 +63,6 @@ def run_summary(name: str, table: ScenarioTable, plan: Plan, master: Master, set
             "stepper": master.stepper.summary(),
             "events": None if master.system.events is None else master.system.events.summary(),
         },
-        "order": [s.component.name for s in plan.steps],
-        "components": [_component(s.component, table.components[s.component.name]) for s in plan.steps],
-        "connections": [str(item) for item in table.connections],
-        "versions": versions(),
     }
 
 

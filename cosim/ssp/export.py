@@ -15,8 +15,9 @@ from cosim.errors import CosimError, CouplingError, OutputError, ScenarioError, 
 from cosim.scenario.connections import parse_connections
 from cosim.scenario.models import LATE_PARAMETERS, make_system, native_fmu
 from cosim.scenario.realisations import NATIVE
-from cosim.scenario.schema import ComponentTable, ScenarioTable
+from cosim.scenario.schema import ScenarioTable
 from cosim.scenario.starts import start_values
+from cosim.scenario.tables import ComponentTable
 from cosim.ssp.annotation import DIGEST, digest, write_extras
 from cosim.ssp.common import FAMILIES, INTEGER, REAL
 from cosim.ssp.document import VERSIONS, Node
@@ -82,6 +83,10 @@ class _Exporter:
 
     def build(self) -> None:
         """All files."""
+        if self.table.balises is not None and self.table.balises.layout == "recorded":
+            raise ScenarioError(
+                f"{self.where}: balises: recorded telegrams cannot be exported; lay the balises by 'positions' or 'instants'."
+            )
         for name, component in self.table.components.items():
             self.parts[name] = self.part(name, component)
         root = root_of(
@@ -101,6 +106,11 @@ class _Exporter:
     def part(self, name: str, component: ComponentTable) -> Part:
         """A component with its FMU, which is built where it is a model of this package."""
         place = f"{self.where}: components.{name}"
+        if component.recording is not None:
+            raise ScenarioError(
+                f"{place}: a recording is no FMU, and a system structure package holds FMUs; export the scenario with the plant "
+                "that was recorded, or leave the recording out and connect its signals in the other tool."
+            )
         system = make_system(component, place)
         if system is None:
             fmu = (self.folder / str(component.fmu)).resolve()

@@ -16,7 +16,7 @@ from cosim.master.axis import TimeAxis
 from cosim.master.lines.draw import draw_lines
 from cosim.master.master import Master, close
 from cosim.scenario.master import make_algorithm
-from cosim.scenario.schema import MasterTable
+from cosim.scenario.tables import MasterTable
 
 
 def prepare(

@@ -1,4 +1,4 @@
-"""The pages a reader sees, README.md and docs/*.md, and their fenced blocks. Reads files only."""
+"""The pages a reader sees, README.md, docs/*.md and docs/tutorials/*.md, and their fenced blocks. Reads files only."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from types import ModuleType
 ROOT = Path(__file__).resolve().parents[2]
 README = ROOT / "README.md"
 PACKAGES = ("plant_models", "fmu_observer", "fmus", "cosim")
-PAGES = [README, *sorted((ROOT / "docs").glob("*.md"))]
+TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
+PAGES = [README, *sorted((ROOT / "docs").glob("*.md")), *TUTORIALS]
 
 MARK, FENCED = r"(?:^<!-- command: (?P<command>\w+) -->\n)?", r"^```(?P<language>\w+)\n(?P<code>.*?)^```$"
 FENCE = re.compile(MARK + FENCED, re.MULTILINE | re.DOTALL)

@@ -9,7 +9,7 @@ from pkgutil import resolve_name
 from typing import Any
 
 import pytest
-from pages import PAGES, Block, blocks
+from pages import PAGES, TUTORIALS, Block, blocks
 
 import cosim.cli
 import fmus.cli
@@ -17,7 +17,11 @@ import plant_models
 from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
 
 PROGRAMS = {"cosim": cosim.cli.main, "fmus": fmus.cli.main}
-WITH_CODE = [page for page in PAGES if any(b.language in ("python", "toml", "sh") and b.command is None for b in blocks(page))]
+WITH_CODE = [
+    page
+    for page in PAGES
+    if page not in TUTORIALS and any(b.language in ("python", "toml", "sh") and b.command is None for b in blocks(page))
+]
 
 
 class Engine(HybridSystem):

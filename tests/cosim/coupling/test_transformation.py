@@ -17,7 +17,7 @@ from cosim.coupling.inputs import Inputs
 from cosim.coupling.transformation import Transformation, as_affine
 from cosim.errors import ScenarioError
 from cosim.scenario.connections import parse_connections
-from cosim.scenario.schema import ConnectionTable
+from cosim.scenario.tables import ConnectionTable
 
 NUMBERS = st.integers(-20, 20).map(float)
 

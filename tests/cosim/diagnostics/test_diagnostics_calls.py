@@ -27,8 +27,8 @@ from cosim.diagnostics.logged_slave import log_calls
 from cosim.diagnostics.tally import EARLY, EVERY, Tally
 from cosim.errors import OutputError
 from cosim.master.master import close
-from cosim.report.cost import cost_rows, cost_text
-from cosim.report.html import report_page
+from cosim.report.page.cost import cost_rows, cost_text
+from cosim.report.page.report import report_page
 
 LINE = re.compile(
     r"(?P<time>\S+) (?P<who>\S+) (?P<what>\w+)\((?P<arguments>.*)\) -> (?P<status>[\w ]+), (?P<us>[\d.]+) us(, (?P<out>.*))?"

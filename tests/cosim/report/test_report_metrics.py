@@ -10,10 +10,10 @@ from numpy.testing import assert_allclose
 from synthetic_run import OBSERVERS, synthetic_result, synthetic_spec
 
 from cosim.report.event_counts import accepted_stamps, count_events
+from cosim.report.figures.scales import error_scale, running_maximum, value_limits
 from cosim.report.indicators import indicator_statistics, on_intervals
 from cosim.report.metrics import error_size, phase_metrics
 from cosim.report.numbers import error_number, number
-from cosim.report.scales import error_scale, running_maximum, value_limits
 from cosim.report.spec import Phase, ReportSpec
 from cosim.results.result import BaliseRecord, Result
 

@@ -16,15 +16,16 @@ from matplotlib.colors import to_hex
 from synthetic_run import OBSERVERS, ZONES, synthetic_result, synthetic_spec
 
 from cosim.errors import OutputError
-from cosim.report.drawing import thin
-from cosim.report.gallery import PANELS, Panel, draw_all, png
-from cosim.report.gap_figure import certified_gaps, sampling_gaps
-from cosim.report.html import write_report
-from cosim.report.main_picture import main_picture
+from cosim.report.figures.drawing import thin
+from cosim.report.figures.gap_figure import certified_gaps, sampling_gaps
+from cosim.report.figures.main_picture import main_picture
+from cosim.report.figures.panels import PANELS, Panel, draw_all, png
+from cosim.report.figures.style import new_figure, observer_line
+from cosim.report.figures.zooms import ZOOM_KEYS
 from cosim.report.metrics import phase_metrics
+from cosim.report.page.report import report_page, write_report
+from cosim.report.page.table import text_table
 from cosim.report.spec import ReportSpec
-from cosim.report.style import new_figure, observer_line
-from cosim.report.table import text_table
 from cosim.results.folder import read_results, write_results
 from cosim.results.result import Result
 
@@ -210,16 +211,16 @@ def test_page_needs_nothing_from_outside(result: Result, tmp_path: Path) -> None
     text = path.read_text(encoding="utf-8")
     assert not re.search(r"https?:|//[a-z]|url\(|<script|<link|@import", re.sub(r"base64,[^\"]*", "", text))
     images = Page(text).all("img")
-    assert len(images) == len(PANELS)
-    for image, panel in zip(images, PANELS, strict=True):
+    keys = [*ZOOM_KEYS, *(panel.key for panel in PANELS)]
+    for image, key in zip(images, keys, strict=True):
         head, _, data = (image["src"] or "").partition(",")
         assert head == "data:image/png;base64"
-        assert b64decode(data) == (path.parent / "figures" / f"{panel.key}.png").read_bytes()
+        assert b64decode(data) == (path.parent / "figures" / f"{key}.png").read_bytes()
         assert image["alt"]
 
 
-def test_page_is_well_formed_and_says_what_was_run(result: Result, tmp_path: Path) -> None:
-    page = Page(write_report(result, synthetic_spec(), tmp_path).read_text(encoding="utf-8"))
+def test_page_is_well_formed_and_says_what_was_run(result: Result) -> None:
+    page = Page(report_page(result, synthetic_spec(), {}))
     assert len(page.all("h1")) == 1
     assert all(attrs.get("scope") for attrs in page.all("th"))
     for words in (
@@ -237,7 +238,7 @@ def test_page_is_well_formed_and_says_what_was_run(result: Result, tmp_path: Pat
     assert "The run ended early" not in page.text
 
 
-def test_every_text_is_escaped(result: Result, tmp_path: Path) -> None:
+def test_every_text_is_escaped(result: Result) -> None:
     evil = '<img src=x onerror="1">&\'"'
     spec = replace(synthetic_spec(), title=evil, labels=dict.fromkeys(OBSERVERS, evil), notes=[evil])
     phases = [replace(p, name=evil) for p in spec.phases]
@@ -246,15 +247,14 @@ def test_every_text_is_escaped(result: Result, tmp_path: Path) -> None:
         "warnings": [evil], "notes": evil, "versions": {evil: evil},
         "components": [{"name": evil, "kind": evil}], "certificates": {evil: {"explanation": evil}},
     }  # fmt: skip
-    text = write_report(replace(result, summary=summary, failure=evil), replace(spec, phases=phases), tmp_path).read_text("utf-8")
-    page = Page(text)
+    page = Page(report_page(replace(result, summary=summary, failure=evil), replace(spec, phases=phases), {}))
     assert "onerror" not in {name for _, attrs in page.tags for name in attrs}
     assert page.text.count(evil) >= 10
 
 
-def test_failure_stands_at_the_top_in_a_red_box(result: Result, tmp_path: Path) -> None:
+def test_failure_stands_at_the_top_in_a_red_box(result: Result) -> None:
     failed = replace(rows_of(result, 300), failure="Component 'locomotive' at t = 10 s: stopped.")
-    page = Page(write_report(failed, synthetic_spec(), tmp_path).read_text(encoding="utf-8"))
+    page = Page(report_page(failed, synthetic_spec(), {}))
     first = page.all("section")[0]
     assert (first["class"], first["role"]) == ("box failure", "alert")
     assert "Component 'locomotive' at t = 10 s: stopped." in page.text
@@ -276,7 +276,7 @@ def test_report_without_roles(spec: ReportSpec, result: Result, tmp_path: Path) 
     png(main_picture(result, spec))
 
 
-def test_report_of_an_unusual_summary(result: Result, tmp_path: Path) -> None:
+def test_report_of_an_unusual_summary(result: Result) -> None:
     summary = {
         "scenario": 3,
         "wall_seconds": 0,
@@ -286,13 +286,13 @@ def test_report_of_an_unusual_summary(result: Result, tmp_path: Path) -> None:
         "components": [1],
         "versions": 2,
     }
-    Page(write_report(replace(result, summary=summary), synthetic_spec(), tmp_path).read_text(encoding="utf-8"))
+    Page(report_page(replace(result, summary=summary), synthetic_spec(), {}))
 
 
 def test_report_of_a_result_read_back_is_the_same(result: Result, tmp_path: Path) -> None:
     write_results(result, tmp_path / "a", ("csv",))
-    first = write_report(result, synthetic_spec(), tmp_path / "a").read_text(encoding="utf-8")
-    second = write_report(read_results(tmp_path / "a"), synthetic_spec(), tmp_path / "b").read_text(encoding="utf-8")
+    first = report_page(result, synthetic_spec(), {})
+    second = report_page(read_results(tmp_path / "a"), synthetic_spec(), {})
     assert _without_order(first) == _without_order(second)
 
 

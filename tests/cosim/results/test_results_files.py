@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from scipy.io import loadmat
 
 from cosim.errors import OutputError
-from cosim.results.csv_file import read_csv, write_csv
 from cosim.results.events_file import outcomes_text, parse_outcomes, read_events, write_events
 from cosim.results.folder import check_writable, read_results, write_results
-from cosim.results.mat_file import read_mat, write_mat
-from cosim.results.matlab_names import matlab_names
+from cosim.results.formats.csv_file import read_csv, write_csv
+from cosim.results.formats.mat_file import read_mat, write_mat
+from cosim.results.formats.matlab_names import matlab_names
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 from cosim.results.summary_file import read_summary, write_summary
 

@@ -236,7 +236,7 @@ def test_a_setting_without_effect_is_told(key: str, value: float, needed: str) -
         ("report.phases", [{"name": "p", "start": 1.0, "end": 1.0}], r"report.phases, 'p'"),
         ("balises.false_telegrams", [{"time": 500.0, "offset": 1.0}], r"false_telegrams: 500 s lies outside the run"),
         ("balises.missed", ["B33"], r"missed: no balise 'B33'.*'B3'"),
-        ("observer.parameters.mass", "heavy", r"parameters"),
+        ("observer.parameters.mass", "heavy", r"observer.mass: expected a number"),
         ("observer.mass", "heavy", r"mass: expected a number, or a list of numbers for a vector \(got .heavy.\)"),
     ],
 )

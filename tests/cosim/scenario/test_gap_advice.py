@@ -11,7 +11,7 @@ from small_scenarios import small
 from cosim import CosimError, Scenario
 from cosim.balises.layout import InstantLayout, by_positions
 from cosim.scenario.certificates import check_certificates, expected_gap
-from cosim.scenario.schema import BalisesTable, ComponentTable
+from cosim.scenario.tables import BalisesTable, ComponentTable
 from fmu_observer import OBSERVERS
 
 POSITIONS = [50.0, 150.0, 250.0]

@@ -1,0 +1,90 @@
+"""One regression test: what was run, and the baseline it belongs to. Used by the pytest plugin and the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cosim.baselines.check import Regression, check, regression, tolerances_of
+from cosim.baselines.files import read_baseline
+from cosim.baselines.subject import Subject, make_subject
+from cosim.baselines.update import Update, plan_update
+from cosim.comparison.tolerance import Tolerances
+from cosim.comparison.verdict import Comparison
+
+WORST = 20
+"""Lines told of a difference."""
+
+
+@dataclass(frozen=True)
+class Call:
+    """A run and its baseline.
+
+    Args:
+        subject: the run. path: of the baseline. tolerances: None for those in the baseline.
+        signals, every: what the baseline is to keep.
+    """
+
+    subject: Subject
+    path: Path
+    tolerances: Tolerances | None
+    signals: Sequence[str] | None
+    every: float | None
+
+    @classmethod
+    def run(
+        cls, what: Any, folder: Path, path: Path, *, signals: Iterable[str] | None = None, every: float | None = None,
+        tolerance: Any = None, tolerances: Mapping[str, Any] | None = None, ignore: Iterable[str] = (), **arguments: Any,
+    ) -> Call:  # fmt: skip
+        """Run what a test names.
+
+        Args:
+            what, folder: as for `make_subject`, as are the further arguments. path: of the baseline.
+            signals, every: as for `make_draft`. tolerance, tolerances, ignore: as for `tolerances_of`.
+
+        Raises:
+            CosimError: tolerances, names or the run itself are not as they should be.
+        """
+        ignored = tuple(ignore)
+        given = tolerance is not None or tolerances or ignored
+        wanted = tolerances_of(Tolerances(), tolerance, tolerances, ignored) if given else None  # before the run: it may be long
+        chosen = None if signals is None else tuple(signals)
+        return cls(make_subject(what, folder, **arguments), path, wanted, chosen, every)
+
+    @property
+    def _given(self) -> Any:
+        return self.subject.outcome or self.subject.result
+
+    def check(self) -> Regression:
+        """Compare with the baseline.
+
+        Raises:
+            BaselineError: it is missing, unreadable or of another model. ComparisonError: nothing can be compared.
+        """
+        return check(self._given, read_baseline(self.path), self.tolerances)
+
+    def update(self) -> Update:
+        """What updating the baseline would do."""
+        return plan_update(
+            self._given, self.path, self.tolerances, recipe=self.subject.recipe, signals=self.signals, every=self.every
+        )
+
+    def without_baseline(self) -> Regression:
+        """The run alone, nothing compared."""
+        return regression(Comparison(self.path.name, "result", ()), self.subject.outcome, self.subject.result, None)
+
+    @staticmethod
+    def worst(found: Comparison) -> list[str]:
+        """What differs, the worst first, in lines."""
+        lines = [_line(signal) for signal in found.failed]
+        lines += [difference.text for difference in found.events.differences]
+        return [*lines[:WORST], *found.notes]
+
+
+def _line(signal: Any) -> str:
+    if signal.findings:
+        return str(signal.findings[0].text)
+    near = f"; nearest: {', '.join(signal.nearest)}" if signal.nearest else ""
+    return f"{signal.name}: {signal.status}{near}"

@@ -1,0 +1,161 @@
+"""A baseline as text, before it is written: the header, and the tables as they stand in their files. Touches no file."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import platform
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from cosim.baselines.baseline import Header
+from cosim.baselines.data import VERSION
+from cosim.baselines.identity import identities
+from cosim.baselines.numbers import SHARE, column_text, decimals_for, time_text
+from cosim.baselines.recipe import Recipe
+from cosim.baselines.selection import kept_rows, resolve, select_signals
+from cosim.comparison.telegrams import TIMES, telegram_limits
+from cosim.comparison.tolerance import Tolerance, Tolerances
+from cosim.errors import BaselineError
+from cosim.results.events_file import COLUMNS, record_row
+from cosim.results.result import Result
+
+EVENT_DIGITS = 12
+"""Significant digits of the numbers of a telegram, where they need not be exact."""
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A baseline before it is written.
+
+    Args:
+        header: all but numbers. table: the CSV of the rows. events: the CSV of the telegrams; empty where there are none.
+    """
+
+    header: Header
+    table: str
+    events: str
+
+
+def make_draft(
+    result: Result, tolerances: Tolerances | None = None, *, recipe: Recipe | None = None,
+    signals: Iterable[str] | None = None, every: float | None = None,
+) -> Draft:  # fmt: skip
+    """A baseline of a result.
+
+    Args:
+        result: of a run that was found right.
+        tolerances: how far later results may be from it; they also say how many digits are kept.
+        recipe: what was run. signals: names or patterns of those to keep; None for all.
+        every: least spacing of the rows [s]; None for at most about 2000 rows. Rows of events are kept always.
+
+    Raises:
+        BaselineError: the run failed or is empty, or a pattern fits no signal.
+    """
+    if result.failure is not None:
+        raise BaselineError(f"No baseline is made of a run that failed: {result.failure}")
+    if not len(result.table):
+        raise BaselineError("No baseline is made of an empty run: it has no rows.")
+    selection = None if signals is None else tuple(signals)
+    chosen = select_signals(result, selection)
+    names = [info.name for info in chosen.signals]
+    tolerances = resolved(tolerances or Tolerances(), names)
+    table = _table_text(chosen, kept_rows(chosen, every), tolerances)
+    events = events_text(result, tolerances.default) if result.events else ""
+    header = Header(
+        title=_title(result),
+        recipe=recipe or Recipe(),
+        span=_span(result),
+        components=identities(result),
+        signals=chosen.signals,
+        tolerances=tolerances,
+        selection=selection,
+        every=every,
+        rows=table.count("\n") - 1,
+        events=len(result.events) if result.events or "components" in result.summary else None,
+        digest=text_digest(table, events),
+        versions=versions_of(result),
+        version=VERSION,
+    )
+    return Draft(header, table, events)
+
+
+def resolved(tolerances: Tolerances, names: Sequence[str]) -> Tolerances:
+    """Tolerances with the component put in front of names that stand without, where there is one component only."""
+    by_signal = {resolve(pattern, names): given for pattern, given in tolerances.by_signal.items()}
+    return replace(tolerances, by_signal=by_signal, ignore=tuple(resolve(pattern, names) for pattern in tolerances.ignore))
+
+
+def _title(result: Result) -> str:
+    return str(result.summary.get("title") or result.summary.get("scenario") or "")
+
+
+def _span(result: Result) -> dict[str, float]:
+    time = result.time
+    step = result.summary.get("step")
+    steps = np.diff(time)
+    smallest = float(np.min(steps[steps > 0.0], initial=np.inf)) if step is None else float(step)
+    start, stop = (float(result.summary.get(key, value)) for key, value in (("start", time[0]), ("stop", time[-1])))
+    return {"start": start, "stop": stop, "step": smallest if np.isfinite(smallest) else 0.0}
+
+
+def versions_of(result: Result) -> dict[str, str]:
+    """Versions as the run tells them, without what differs between two machines of one kind."""
+    told: Mapping[str, Any] = result.summary.get("versions") or {}
+    kept = {name: str(value) for name, value in told.items() if name != "platform"}
+    return kept | {"platform": f"{sys.platform} {platform.machine()}"}
+
+
+def _table_text(result: Result, rows: np.ndarray, tolerances: Tolerances) -> str:
+    length = float(result.time[-1] - result.time[0])
+    entries = [tolerances.default, *tolerances.by_signal.values()]
+    decimals = decimals_for(min(entry.time_for(length) for entry in entries))
+    columns = [time_text(result.time[rows].tolist(), decimals)]
+    for info in result.signals:
+        values = result.table[info.name]
+        decimals = decimals_for(tolerances.for_signal(info.name).value_for(value_range(values)))
+        columns.append(column_text(values[rows].tolist(), decimals))
+    lines = io.StringIO()
+    csv.writer(lines, lineterminator="\n").writerow(["time", *(info.name for info in result.signals)])
+    lines.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
+    return lines.getvalue()
+
+
+def value_range(values: np.ndarray) -> float:
+    """Largest minus smallest finite value of a signal; its size where it is constant; 0 where nothing is finite."""
+    finite = values[np.isfinite(values)]
+    if not finite.size:
+        return 0.0
+    spread = float(finite.max() - finite.min())
+    return spread if spread > 0.0 else float(np.abs(finite).max())
+
+
+def events_text(result: Result, tolerance: Tolerance) -> str:
+    """Telegrams as CSV, one a line."""
+    allowed = telegram_limits(result.events, tolerance, float(result.time[-1] - result.time[0]))
+    room = {**dict.fromkeys(TIMES, allowed.time), **allowed.payload}
+    lines = io.StringIO()
+    writer = csv.writer(lines, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for record in result.events:
+        writer.writerow([_event_cell(value, room.get(name, inf)) for name, value in record_row(record).items()])
+    return lines.getvalue()
+
+
+def _event_cell(value: float | str, allowed: float) -> str:
+    """A cell; a number is rounded where that takes next to nothing from the difference allowed."""
+    if isinstance(value, str):
+        return value
+    short = float(f"{value:.{EVENT_DIGITS}g}")
+    return repr(value if abs(short - value) > SHARE * allowed else short).removesuffix(".0")
+
+
+def text_digest(table: str, events: str) -> str:
+    """Digest of the tables, the same whatever line endings they were given on the way."""
+    return hashlib.sha256((table + "\0" + events).replace("\r\n", "\n").encode()).hexdigest()

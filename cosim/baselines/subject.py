@@ -1,0 +1,162 @@
+"""What a user wants a baseline of: an FMU, a scenario, an outcome or a result; run here where it is not one already."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from cosim.baselines.baseline import Baseline
+from cosim.baselines.recipe import Recipe
+from cosim.errors import BaselineError, ScenarioError
+from cosim.results.result import Result
+from cosim.scenario import Outcome, Scenario
+
+Progress = Callable[[float, float], None]
+
+
+@dataclass(frozen=True)
+class Subject:
+    """Something with a result.
+
+    Args:
+        recipe: how to run it again. outcome: of the run; None where only a result was given. result: of the run.
+    """
+
+    recipe: Recipe
+    result: Result
+    outcome: Outcome | None = None
+
+
+def run_recipe(recipe: Recipe, progress: Progress | None = None, warn: Callable[[str], None] | None = None) -> Subject:
+    """Run what a recipe says.
+
+    Args:
+        recipe: of an FMU alone or of a scenario. progress, warn: as for `Scenario.run`.
+
+    Raises:
+        BaselineError: it cannot be run again.
+        CosimError: it cannot be set up.
+    """
+    if recipe.kind == "result":
+        raise BaselineError(
+            "This baseline was made from a result, not from an FMU or a scenario file, so it cannot be run again from here; "
+            "give the result to be checked: --against DIR."
+        )
+    if recipe.kind == "fmu":
+        scenario = Scenario.fmu(
+            recipe.source, start=recipe.start, stop=recipe.stop, step=recipe.step,
+            inputs=recipe.inputs, parameters=recipe.parameters, record=recipe.record,
+        )  # fmt: skip
+        outcome = scenario.run(progress=progress, warn=_about_inputs(recipe, warn))
+    else:
+        outcome = Scenario.load(recipe.source).run(progress=progress, overrides=recipe.overrides, warn=warn)
+    return Subject(recipe, outcome.result, outcome)
+
+
+def run_again(
+    baseline: Baseline, fmu: str | Path | None = None, progress: Progress | None = None, warn: Callable[[str], None] | None = None
+) -> Subject:
+    """Run what a baseline was made of.
+
+    Args:
+        baseline: the baseline; inputs that came with it out of an FMU are played back.
+        fmu: another FMU in place of its own, a new delivery, say. progress, warn: as for `Scenario.run`.
+
+    Raises:
+        BaselineError: it cannot be run again.
+        CosimError: it cannot be set up.
+    """
+    recipe = baseline.header.recipe if fmu is None else baseline.header.recipe.of(fmu)
+    stimuli = baseline.more.get("stimuli")
+    if stimuli is None or recipe.inputs:
+        return run_recipe(recipe, progress, warn)
+    with TemporaryDirectory(prefix="fmu-reference-") as folder:
+        table = Path(folder) / "inputs.csv"
+        table.write_bytes(stimuli)
+        return run_recipe(replace(recipe, inputs=str(table)), progress, warn)
+
+
+def make_subject(
+    what: Any, folder: Path, *, start: float | None = None, stop: float | None = None, step: float | None = None,
+    inputs: Mapping[str, Any] | str | Path | None = None, parameters: Mapping[str, Any] | None = None,
+    record: Sequence[str] = (), overrides: Mapping[str, Any] | None = None,
+    progress: Progress | None = None, warn: Callable[[str], None] | None = None,
+) -> Subject:  # fmt: skip
+    """Run what a user named.
+
+    Args:
+        what: path of an FMU; name or path of a scenario; a `Scenario`; an `Outcome` or `Result` of a run made already.
+        folder: where relative paths start.
+        start, stop, step: of the run [s].
+        inputs: of an FMU alone: constants by name, or a table with a column for each.
+        parameters: start values of an FMU alone, by name.
+        record: variables of an FMU alone to record besides its outputs.
+        overrides: of a scenario, as for `Scenario.set`.
+        progress, warn: as for `Scenario.run`.
+
+    Raises:
+        BaselineError: what was given does not go together.
+        CosimError: it cannot be set up.
+    """
+    times = {key: value for key, value in (("start", start), ("stop", stop), ("step", step)) if value is not None}
+    if isinstance(what, Outcome | Result):
+        _refuse(
+            "a result of a run made already",
+            times | _given(inputs=inputs, parameters=parameters, record=record, overrides=overrides),
+        )
+        outcome = what if isinstance(what, Outcome) else None
+        return Subject(Recipe(), what if isinstance(what, Result) else what.result, outcome)
+    if isinstance(what, str | Path) and Path(what).suffix.lower() == ".fmu":
+        _refuse("an FMU alone", _given(overrides=overrides))
+        table = str((folder / inputs).resolve()) if isinstance(inputs, str | Path) else dict(inputs or {})
+        recipe = Recipe("fmu", str((folder / what).resolve()), start, stop, step, table, dict(parameters or {}), tuple(record))
+        return run_recipe(recipe, progress, warn)
+    _refuse("a scenario", _given(inputs=inputs, parameters=parameters, record=record))
+    changes = {**times, **(overrides or {})}
+    if isinstance(what, Scenario):
+        outcome = what.run(progress=progress, overrides=changes, warn=warn)
+        return Subject(Recipe(), outcome.result, outcome)
+    if isinstance(what, str | Path):
+        return run_recipe(Recipe("scenario", scenario_source(what, folder), overrides=changes), progress, warn)
+    raise BaselineError(
+        "Expected the path of an FMU, the name or path of a scenario, a Scenario, an Outcome or a Result; "
+        f"got {type(what).__name__}."
+    )
+
+
+def scenario_source(what: str | Path, folder: Path) -> str:
+    """A scenario file beside the user's own as an absolute path, or the name of a shipped scenario.
+
+    Raises:
+        ScenarioError: there is neither.
+    """
+    file, _, variant = str(what).partition("#")
+    path = folder / file
+    if path.is_file():
+        return str(path.resolve()) + (f"#{variant}" if variant else "")
+    if path.suffix in (".toml", ".ssp"):
+        raise ScenarioError(f"Scenario file {path} does not exist.")
+    return str(what)
+
+
+def _given(**arguments: Any) -> dict[str, Any]:
+    return {name: value for name, value in arguments.items() if value}
+
+
+def _refuse(what: str, given: Mapping[str, Any]) -> None:
+    if given:
+        hint = "set values with overrides={'component.parameter': value}" if what == "a scenario" else "leave them out"
+        raise BaselineError(f"{what} takes no {', '.join(given)}; {hint}.")
+
+
+def _about_inputs(recipe: Recipe, warn: Callable[[str], None] | None) -> Callable[[str], None]:
+    """Warnings of an FMU alone: that inputs keep their start values is no news where constants were given for them."""
+
+    def tell(text: str) -> None:
+        if warn is not None and not (recipe.inputs and text.startswith("Unconnected inputs")):
+            warn(text)
+
+    return tell

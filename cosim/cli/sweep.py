@@ -1,0 +1,126 @@
+"""``cosim sweep``: one scenario run many times with some values changed; a folder for each run, a table of all."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from cosim.cli.scenarios import add_scenario, load_scenario, parse_setting
+from cosim.errors import ScenarioError
+
+DONE, SOME_FAILED = 0, 1
+RANGE = re.compile(r"(-?\d+):(-?\d+)(?::(-?\d+))?")
+NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+SPAN = re.compile(rf"({NUMBER})\.\.({NUMBER})")
+VARY = """values to vary, may be repeated: NAME=70e3,80e3 a list; NAME=0:10 the whole numbers from 0 to 9; NAME=70e3..90e3 a
+range, with --samples"""
+
+
+def register(commands: Any) -> None:
+    """Add the command to the parser."""
+    description = "Run a scenario once for each combination of some values. A run that fails does not stop the others."
+    epilog = "Exit codes: 0 all runs done, 1 a run failed, 2 error or interrupted; runs that were done are in the folder."
+    parser = commands.add_parser("sweep", help="run a scenario with varied values", description=description, epilog=epilog)
+    add_scenario(parser, default=None)
+    parser.add_argument("--vary", action="append", required=True, metavar="NAME=VALUES", help=VARY)
+    parser.add_argument(
+        "--zip", action="store_true", help="first values together, then second ones, ... instead of all combinations"
+    )
+    parser.add_argument("--samples", type=int, metavar="N", help="N points of a Latin hypercube over ranges and lists")
+    parser.add_argument("--seed", type=int, default=0, help="of the points (default: 0)")
+    parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes at a time (default: 1, this one)")
+    parser.add_argument("--out", metavar="DIR", help="folder for the results (default: results/NAME_sweep)")
+    parser.add_argument("--json", action="store_true", help="print the table as JSON")
+    parser.add_argument("--quiet", action="store_true", help="no progress bar")
+    parser.set_defaults(execute=execute)
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Run, write each run as soon as it is done, and print the table."""
+    from cosim.results.folder import check_writable  # noqa: PLC0415 - only for those who run
+    from cosim.studies.sampling import Range  # noqa: PLC0415
+
+    scenario = load_scenario(options)
+    if options.zip and options.samples is not None:
+        raise ScenarioError("--zip and --samples exclude each other.")
+    mode: Any = "latin" if options.samples is not None else "zip" if options.zip else "grid"
+    values = _values(options.vary)
+    if options.samples is None and (ranges := [name for name, given in values.items() if isinstance(given, Range)]):
+        raise ScenarioError(
+            f"--vary {ranges[0]}: a range is sampled; say with --samples N at how many points, or list values: a,b."
+        )
+    sweep = scenario.vary(values, mode, count=options.samples, seed=options.seed)
+    directory = check_writable(Path(options.out) if options.out is not None else Path("results") / f"{scenario.name}_sweep")
+    with _Bar(len(sweep), visible=not (options.quiet or options.json)) as bar:
+        result = sweep.run(options.workers, progress=bar.move, keep=False, directory=directory)
+    if options.json:
+        print((directory / "index.json").read_text(encoding="utf-8"), end="")
+    else:
+        print(result.text())
+        print(f"\n{len(result) - len(result.failed)} of {len(result)} runs done: {directory}")
+    return SOME_FAILED if result.failed else DONE
+
+
+def _values(given: list[str]) -> dict[str, Any]:
+    """Names and values of all ``--vary``.
+
+    Raises:
+        ScenarioError: one is not ``NAME=VALUES``, or a name is given twice.
+    """
+    values: dict[str, Any] = {}
+    for text in given:
+        name, sign, listed = (part.strip() for part in text.partition("="))
+        if not (name and sign and listed):
+            raise ScenarioError(f"--vary {text!r}: expected NAME=VALUES, for instance --vary locomotive.mass=70e3,80e3.")
+        if name in values:
+            raise ScenarioError(f"--vary {name} is given twice; write all values in one list.")
+        values[name] = parse_values(listed)
+    return values
+
+
+def parse_values(text: str) -> Any:
+    """``70e3,80e3``, ``0:10``, ``0:10:2`` or ``70e3..90e3`` as a list or a range; each value TOML where it is that, else text.
+
+    Raises:
+        ScenarioError: a range without numbers in it.
+    """
+    from cosim.studies.sampling import MOST, uniform  # noqa: PLC0415 - only here
+
+    if (match := RANGE.fullmatch(text)) is not None:
+        numbers = range(int(match[1]), int(match[2]), int(match[3] or 1) or 1)
+        if not numbers:
+            raise ScenarioError(f"--vary: {text} holds no numbers; 0:10 are those from 0 to 9.")
+        return list(numbers) if len(numbers) <= MOST else numbers  # too many are refused by their number, not listed
+    if (match := SPAN.fullmatch(text)) is not None:
+        try:
+            return uniform(float(match[1]), float(match[2]))
+        except ScenarioError as error:
+            raise ScenarioError(f"--vary: {text}: {error}") from error
+    try:
+        return list(tomllib.loads(f"value = [{text}]")["value"])
+    except tomllib.TOMLDecodeError:
+        return [parse_setting(f"value={part}")[1] for part in text.split(",")]
+
+
+class _Bar:
+    """A progress bar over runs; appears only where somebody can see it."""
+
+    def __init__(self, count: int, visible: bool) -> None:
+        from tqdm import tqdm  # noqa: PLC0415 - only for those who watch
+
+        hidden = not (visible and sys.stderr.isatty())
+        self._bar = tqdm(total=count, unit="run", disable=hidden, leave=False, file=sys.stderr)
+
+    def move(self, done: int, _count: int) -> None:
+        """To a number of runs."""
+        self._bar.update(done - self._bar.n)
+
+    def __enter__(self) -> _Bar:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.close()

@@ -1,0 +1,176 @@
+"""Compare a result with a reference: signals in tolerance tubes, telegrams as events."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from cosim.comparison.curve import Curve, check_time, looks_held, rows_to_keep
+from cosim.comparison.notes import notes, tells_no_units
+from cosim.comparison.signal import Task, compare_signal
+from cosim.comparison.telegrams import compare_telegrams
+from cosim.comparison.tolerance import Tolerance, Tolerances
+from cosim.comparison.verdict import Comparison, Finding, SignalComparison
+from cosim.errors import ComparisonError
+from cosim.results.load import load_result
+from cosim.results.result import Result, SignalInfo
+from plant_models.hybrid.units import UnitError, conversion, parse_unit
+
+Given = Tolerance | Mapping[str, Any] | float
+"""A tolerance as users write it, see `cosim.comparison.tolerance.tolerance`."""
+
+
+def compare_results(
+    reference: Result, result: Result, tolerances: Tolerances | None = None, *,
+    labels: tuple[str, str] = ("reference", "result"), extra_fails: bool = False, curves: bool = True,
+) -> Comparison:  # fmt: skip
+    """Compare two results.
+
+    Args:
+        reference: what is right. result: what is compared with it.
+        tolerances: the default ones if left out.
+        labels: what the two are called in messages.
+        extra_fails: whether signals that only the result has count as a difference.
+        curves: whether to keep what pictures need; False saves time and memory.
+
+    Returns:
+        One entry for each signal, the telegrams, and notes.
+
+    Raises:
+        ComparisonError: a run is empty, its times fall, or the two have no signal or no time in common.
+    """
+    tolerances = tolerances or Tolerances()
+    for side, label in zip((reference, result), labels, strict=True):
+        check_time(side.time, label)
+    ours, theirs = _names(reference), _names(result)
+    _check_common(reference, result, tolerances, labels)
+    extra = [name for name in theirs if name not in set(ours)]
+    pair = _Pair(reference, result, tolerances, curves, extra)
+    with np.errstate(over="ignore", invalid="ignore"):  # infinities, and numbers so large that their differences are
+        signals = [pair.compare(name) for name in ours] + [pair.lone(name, "extra") for name in extra]
+    return Comparison(
+        *labels, signals,
+        compare_telegrams(reference, result, tolerances.default, pair.length),
+        notes(reference, result, tolerances, labels),
+        extra_fails,
+    )  # fmt: skip
+
+
+def compare(
+    reference: Any, result: Any, tolerance: Given | None = None, *, tolerances: Mapping[str, Given] | None = None,
+    ignore: Iterable[str] = (), extra_fails: bool = False,
+) -> Comparison:  # fmt: skip
+    """Compare two results, outcomes, or files and folders that hold results.
+
+    Args:
+        reference, result: `Result`, `Outcome`, or the path of a results folder or of a table.
+        tolerance: for all signals: a `Tolerance`, some of its keys, or a number, the share of the range of the signal.
+        tolerances: by name or pattern (``train.*``) of the signal, in its SI unit.
+        ignore: names or patterns of signals that are not compared.
+        extra_fails: whether signals that only the result has count as a difference.
+
+    Raises:
+        ComparisonError: see `compare_results`; or not a result, or an impossible tolerance.
+        OutputError: a file cannot be read.
+    """
+    allowed = Tolerances.of(tolerance, tolerances, ignore)
+    labels = label_of(reference, "reference"), label_of(result, "result")
+    return compare_results(_result_of(reference), _result_of(result), allowed, labels=labels, extra_fails=extra_fails)
+
+
+def label_of(given: Result | str | Path | Any, otherwise: str) -> str:
+    """What a result is called in messages."""
+    return str(given) if isinstance(given, str | Path) else otherwise
+
+
+def _result_of(given: Any) -> Result:
+    if isinstance(given, str | Path):
+        return load_result(given)
+    held = getattr(given, "result", given)
+    if not isinstance(held, Result):
+        what = f"{type(given).__module__}.{type(given).__qualname__}"
+        raise ComparisonError(f"Cannot compare a {what}; expected a Result, an Outcome, or the path of a result.")
+    return held
+
+
+def _names(side: Result) -> list[str]:
+    return list(side.table.dtype.names or ())[1:]
+
+
+def _check_common(reference: Result, result: Result, tolerances: Tolerances, labels: tuple[str, str]) -> None:
+    ours, theirs = _names(reference), _names(result)
+    common = [name for name in ours if name in set(theirs)]
+    if not common:
+        near = _nearest(ours[0], theirs) if ours else []
+        hint = f" {labels[0]} has {ours[0]!r}, nearest in {labels[1]}: {', '.join(map(repr, near))}." if near else ""
+        raise ComparisonError(
+            f"Nothing to compare: none of the {len(ours)} signals of {labels[0]} is among the {len(theirs)} of {labels[1]}.{hint}"
+        )
+    if all(tolerances.ignores(name) for name in common):
+        raise ComparisonError(f"Nothing to compare: all {len(common)} common signals are ignored.")
+    first, last = max(reference.time[0], result.time[0]), min(reference.time[-1], result.time[-1])
+    if first > last + tolerances.default.time_for(float(np.ptp(reference.time))):
+        spans = [f"{label} {s.time[0]:.9g} to {s.time[-1]:.9g} s" for label, s in zip(labels, (reference, result), strict=True)]
+        raise ComparisonError(f"Nothing to compare: no time in common ({', '.join(spans)}).")
+
+
+def _nearest(name: str, known: Iterable[str]) -> list[str]:
+    """Names that look like it as a whole, or whose last part does."""
+    names = list(known)
+    last = name.rpartition(".")[2]
+    whole = get_close_matches(name, names, 3, 0.6)
+    parts = [n for n in names if get_close_matches(last, [n.rpartition(".")[2]], 1, 0.8)]
+    return list(dict.fromkeys(whole + parts))[:3]
+
+
+class _Pair:
+    """Two results whose signals are compared one by one."""
+
+    def __init__(self, reference: Result, result: Result, tolerances: Tolerances, curves: bool, extra: list[str]) -> None:
+        self.sides = (reference, result)
+        self.tolerances, self.curves, self.extra = tolerances, curves, extra
+        self.length = float(reference.time[-1] - reference.time[0])
+        self.rows = [rows_to_keep(side.time) for side in self.sides]
+        self.times = [np.asarray(s.time[k], dtype=float) for s, k in zip(self.sides, self.rows, strict=True)]
+        self.infos = [{info.name: info for info in side.signals} for side in self.sides]
+        self.has = set(_names(result))
+        self.bare = [tells_no_units(side) for side in self.sides]
+
+    def compare(self, name: str) -> SignalComparison:
+        """The comparison of a signal of the reference."""
+        if self.tolerances.ignores(name) or name not in self.has:
+            return self.lone(name, "missing")
+        one, two = (infos.get(name, SignalInfo(name)) for infos in self.infos)
+        if any(self.bare):
+            one, two = (replace(info, unit=(two if self.bare[0] else one).unit) for info in (one, two))
+        try:
+            factor, offset = (1.0, 0.0) if one.unit == two.unit else conversion(parse_unit(two.unit), parse_unit(one.unit))
+        except UnitError as error:
+            return self._other_unit(name, one.unit, two.unit, str(error))
+        values = [np.asarray(side[name][rows], dtype=float) for side, rows in zip(self.sides, self.rows, strict=True)]
+        if (factor, offset) != (1.0, 0.0):
+            values[1] = factor * values[1] + offset
+        held = "discrete" in (one.variability, two.variability) or all(map(looks_held, values))
+        reference, result = (Curve(time, v, held) for time, v in zip(self.times, values, strict=True))
+        tolerance = self.tolerances.for_signal(name)
+        return compare_signal(Task(name, one.unit, reference, result, tolerance, self.length, self.curves))
+
+    def lone(self, name: str, status: Literal["missing", "extra"]) -> SignalComparison:
+        """The entry of a signal that only one side has, or that is ignored."""
+        info = self.infos[0 if status == "missing" else 1].get(name, SignalInfo(name))
+        tolerance = self.tolerances.for_signal(name)
+        if self.tolerances.ignores(name):
+            return SignalComparison(name, info.unit, "ignored", tolerance)
+        near = [*_nearest(name, self.extra), *_nearest(name, self.has)] if status == "missing" else []
+        return SignalComparison(name, info.unit, status, tolerance, nearest=list(dict.fromkeys(near))[:3])
+
+    def _other_unit(self, name: str, one: str, two: str, why: str) -> SignalComparison:
+        text = f"{name}: the result is in {two or '1'}, the reference in {one or '1'}; not compared: {why}"
+        begin, end, nan = float(self.times[0][0]), float(self.times[0][-1]), float("nan")
+        finding = Finding("unit", begin, end, nan, nan, float("inf"), 0.0, text)
+        return SignalComparison(name, one, "differs", self.tolerances.for_signal(name), findings=[finding])

@@ -1,0 +1,131 @@
+"""A comparison as text for a terminal and for the output of pytest: a table of signals, and what was found below it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from math import isnan
+
+from cosim.comparison.verdict import Comparison, Finding, SignalComparison
+
+HEAD = ("signal", "unit", "max error", "at [s]", "allowed", "shift [s]", "outside", "verdict")
+SPAN = ("starts_early", "starts_late", "ends_early", "ends_late", "gap")
+LONGEST_NAME = 48
+FINDINGS_SHOWN, TELEGRAMS_SHOWN, FAILED_SHOWN = 4, 10, 40
+
+
+def comparison_text(comparison: Comparison, verbose: bool = False) -> str:
+    """A comparison for people.
+
+    Args:
+        comparison: what was found.
+        verbose: all signals, findings and telegrams; else those that fail, a few findings each.
+    """
+    shared = _shared(comparison)
+    shown = _shown(comparison, verbose, shared)
+    limit = len(shown) if verbose else FAILED_SHOWN
+    lines = [_headline(comparison)]
+    if shown:
+        lines += ["", *_table(shown[:limit])]
+    if len(shown) > limit:
+        lines.append(f"... and {len(shown) - limit} more signals that differ")
+    for text, count in shared.items():
+        lines += ["", f"  all {count} signals: {text}"]
+    for signal in shown[:limit]:
+        lines += _details(signal, verbose, shared)
+    lines += _telegrams(comparison, verbose)
+    if comparison.notes:
+        lines += ["", *(f"note: {note}" for note in comparison.notes)]
+    return "\n".join(lines)
+
+
+def _shown(comparison: Comparison, verbose: bool, shared: Mapping[str, int]) -> list[SignalComparison]:
+    failed = comparison.failed
+    bad = {id(signal) for signal in failed}
+    if verbose:
+        return [*failed, *(s for s in comparison.signals if id(s) not in bad)]
+    return [s for s in failed if s.status != "differs" or _own(s, shared)]
+
+
+def _shared(comparison: Comparison) -> dict[str, int]:
+    """What is so with all signals, such as a sample less at the end: text without the name of the signal, how many have it."""
+    both = [signal for signal in comparison.signals if signal.status in ("equal", "within", "differs")]
+    counts = Counter(f.text.removeprefix(s.name + ": ") for s in both for f in s.findings if f.kind in SPAN)
+    return {text: count for text, count in counts.items() if count == len(both) > 1}
+
+
+def _own(signal: SignalComparison, shared: Mapping[str, int]) -> list[Finding]:
+    return [finding for finding in signal.findings if finding.text.removeprefix(signal.name + ": ") not in shared]
+
+
+def _headline(comparison: Comparison) -> str:
+    statuses = [signal.status for signal in comparison.signals]
+    words = {
+        "equal": "equal", "within": "within tolerance", "differs": "differ", "missing": "missing", "extra": "extra",
+        "ignored": "ignored",
+    }  # fmt: skip
+    counts = [f"{statuses.count(s)} {word}" for s, word in words.items() if s in statuses]
+    events = comparison.events
+    told = f"{events.matched} telegrams match" if events.compared else "telegrams not compared: one side keeps none"
+    if events.differences:
+        told = f"{events.matched} telegrams paired, {len(events.differences)} differences"
+    verdict = "agrees with" if comparison.equal else "DIFFERS from"
+    return f"{comparison.result} {verdict} {comparison.reference}: {', '.join(counts)}; {told}."
+
+
+def _table(signals: Sequence[SignalComparison]) -> list[str]:
+    rows = [HEAD, *(_row(signal) for signal in signals)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = []
+    for row in rows:
+        cells = [cell.ljust(w) if k in (0, 1, 7) else cell.rjust(w) for k, (cell, w) in enumerate(zip(row, widths, strict=True))]
+        lines.append("  ".join(cells).rstrip())
+    return [lines[0], "-" * max(map(len, lines)), *lines[1:]]
+
+
+def _row(signal: SignalComparison) -> tuple[str, ...]:
+    name = signal.name if len(signal.name) <= LONGEST_NAME else f"...{signal.name[3 - LONGEST_NAME :]}"
+    share = "" if isnan(signal.max_error) else f"{100.0 * signal.share_outside:.3g} %"
+    shift = f"{signal.max_shift:.3g}" if signal.max_shift else ""
+    numbers = [
+        _number(signal.max_error, "3"),
+        _number(signal.max_error_at, "7") if signal.max_error else "",
+        _number(signal.allowed, "3"),
+    ]
+    return (name, signal.unit or "1", *numbers, shift, share, _verdict(signal))
+
+
+def _verdict(signal: SignalComparison) -> str:
+    if signal.status != "differs":
+        return signal.status
+    return "differs: " + ", ".join(dict.fromkeys(finding.kind.replace("_", " ") for finding in signal.findings))
+
+
+def _number(value: float, digits: str) -> str:
+    return "" if isnan(value) else f"{value:.{digits}g}"
+
+
+def _details(signal: SignalComparison, verbose: bool, shared: Mapping[str, int]) -> list[str]:
+    if signal.status == "missing":
+        near = f"; nearest: {', '.join(signal.nearest)}" if signal.nearest else ""
+        return ["", f"  {signal.name}: missing in the result{near}"]
+    findings = _own(signal, shared)
+    if not findings:
+        return []
+    limit = len(findings) if verbose else FINDINGS_SHOWN
+    lines = ["", *(f"  {finding.text}" for finding in findings[:limit])]
+    if len(findings) > limit:
+        lines.append(f"  {signal.name}: ... and {len(findings) - limit} more findings")
+    if any(finding.kind == "value" for finding in findings):
+        lines.append("    worst points:      time [s]       reference          result           error")
+        lines += [f"                  {t:14.9g} {a:15.8g} {b:15.8g} {e:+15.4g}" for t, a, b, e in signal.worst]
+    return lines
+
+
+def _telegrams(comparison: Comparison, verbose: bool) -> list[str]:
+    differences = comparison.events.differences
+    if not differences:
+        return []
+    limit = len(differences) if verbose else TELEGRAMS_SHOWN
+    lines = ["", "telegrams:", *(f"  {difference.text}" for difference in differences[:limit])]
+    return [*lines, f"  ... and {len(differences) - limit} more"] if len(differences) > limit else lines

@@ -1,0 +1,139 @@
+"""The tube: what values a curve takes within the allowed time around given instants. NumPy only, O(n log n)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosim.comparison.curve import Curve
+
+
+@dataclass(frozen=True)
+class Band:
+    """Values a curve takes around instants; arrays of shape (instants,).
+
+    Args:
+        low, high: smallest and largest value [unit].
+        judged: False where the curve has no value within the allowed time: beyond its end, or in another piece.
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+    judged: np.ndarray
+
+
+def band_of(
+    curve: Curve, at: np.ndarray, tolerance: float | np.ndarray, first: np.ndarray | int = 0, last: np.ndarray | int | None = None
+) -> Band:  # fmt: skip
+    """Smallest and largest value of the curve in [at - tolerance, at + tolerance], within one piece.
+
+    Args:
+        curve: the finer curve. at: instants [s], shape (m,). tolerance: [s].
+        first, last: rows first <= row < last of the piece that belongs to each instant; the whole curve if left out.
+    """
+    time, values = curve.time, curve.filled
+    first = np.broadcast_to(np.asarray(first), at.shape)
+    last = np.broadcast_to(np.asarray(len(time) if last is None else last), at.shape)
+    begin, end = time[first], time[np.minimum(last, len(time) - 1) if curve.held else last - 1]
+    low, high = np.maximum(at - tolerance, begin), np.minimum(at + tolerance, end)
+    judged = low <= high
+    low = np.where(judged, low, np.clip(at, begin, end))
+    high = np.where(judged, high, low)
+    ends = [_value(curve, low, first, last), _value(curve, high, first, last)]
+    a = np.maximum(np.searchsorted(time, low), first)
+    b = np.minimum(np.searchsorted(time, high, side="right"), last)
+    smallest, largest = _range_extremes(values, a, b)
+    return Band(np.minimum.reduce([*ends, smallest]), np.maximum.reduce([*ends, largest]), judged)
+
+
+def widen_at_ends(band: Band, curve: Curve, at: np.ndarray, tolerance: float, first: np.ndarray, last: np.ndarray) -> Band:
+    """The band with what the curve may have been within the allowed time before its first row and after its last one.
+
+    Nobody knows, so the curve is continued by its own reflection in its end point: a ramp as the same ramp. Without this a
+    smooth signal that is late by less than allowed would be wrong in its first rows.
+
+    Args:
+        band: of `curve` at the instants. The others as in `band_of`.
+    """
+    low, high = band.low.copy(), band.high.copy()
+    ends = [(0, at - tolerance < curve.time[0], first == 0), (-1, at + tolerance > curve.time[-1], last == len(curve.time))]
+    for row, beyond, in_piece in ends:
+        near = np.flatnonzero(beyond & in_piece & band.judged)
+        if len(near):
+            end, value = np.full(len(near), curve.time[row]), curve.filled[row]
+            reach = tolerance - (at[near] - end if row == 0 else end - at[near])
+            inner = band_of(curve, end, reach, first[near], last[near])
+            low[near] = np.minimum(low[near], 2.0 * value - inner.high)
+            high[near] = np.maximum(high[near], 2.0 * value - inner.low)
+    return Band(low, high, band.judged)
+
+
+def held_band(curve: Curve, tolerance: float, first: np.ndarray, last: np.ndarray) -> Band:
+    """Values of a held curve that are allowed for another on the same rows, all the time that a row holds.
+
+    A row holds from its own time until that of the next. A value that comes one row late is right at the begin of the row,
+    within the allowed time, and wrong at its end; so the begin, the middle and the end are looked at.
+
+    Args:
+        curve: the curve, on the rows of the other. tolerance: [s]. first, last: as in `band_of`, for each row.
+    """
+    time = curve.time
+    until = np.append(time[1:], time[-1])
+    begin, middle = (band_of(curve, at, tolerance, first, last) for at in (time, 0.5 * (time + until)))
+    end = _band_before(curve, until, tolerance, first, last)
+    holds = until > time
+    judged = np.stack([begin.judged, middle.judged & holds, end.judged & holds])
+    low = np.max(np.where(judged, [begin.low, middle.low, end.low], -np.inf), axis=0)
+    high = np.min(np.where(judged, [begin.high, middle.high, end.high], np.inf), axis=0)
+    return Band(np.minimum(low, high), high, np.asarray(judged.any(axis=0)))
+
+
+def _band_before(curve: Curve, until: np.ndarray, tolerance: float, first: np.ndarray, last: np.ndarray) -> Band:
+    """As `band_of`, of a held curve just before the instants."""
+    time = curve.time
+    begin, end = time[first], time[np.minimum(last, len(time) - 1)]
+    judged = (until + tolerance > begin) & (until - tolerance <= end)
+    low = np.clip(until - tolerance, begin, end)
+    a = np.clip(np.searchsorted(time, low) - 1, first, last - 1)
+    b = np.clip(np.searchsorted(time, until + tolerance), a + 1, last)
+    return Band(*_range_extremes(curve.filled, a, b), judged)
+
+
+def project(curve: Curve, onto: Curve, tolerance: float) -> Curve:
+    """A held curve at the rows of another: of the values within the allowed time the nearest one.
+
+    Args:
+        curve: the finer one. onto: the coarser one. tolerance: [s].
+    """
+    band = band_of(curve, onto.time, tolerance)
+    values = np.where(onto.finite & band.judged, np.clip(onto.filled, band.low, band.high), band.low)
+    return Curve(onto.time, values, held=True)
+
+
+def _value(curve: Curve, at: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+    time, values = curve.time, curve.filled
+    row = np.clip(np.searchsorted(time, at, side="right") - 1, first, last - 1)
+    if curve.held:
+        return np.asarray(values[row])
+    following = np.minimum(row + 1, last - 1)
+    duration = time[following] - time[row]
+    share = np.divide(at - time[row], duration, out=np.zeros(at.shape), where=duration > 0.0)
+    return np.asarray(values[row] + np.clip(share, 0.0, 1.0) * (values[following] - values[row]))
+
+
+def _range_extremes(values: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Smallest and largest of values[a:b] for each range; +inf and -inf for an empty one."""
+    low, high = np.full(a.shape, np.inf), np.full(a.shape, -np.inf)
+    length = b - a
+    smallest = largest = values
+    power = 1
+    while power <= np.max(length, initial=0):  # smallest[k] is that of values[k : k + power]
+        chosen = (length >= power) & (length < 2 * power)
+        head, tail = a[chosen], b[chosen] - power
+        low[chosen] = np.minimum(smallest[head], smallest[tail])
+        high[chosen] = np.maximum(largest[head], largest[tail])
+        smallest = np.minimum(smallest[:-power], smallest[power:])
+        largest = np.maximum(largest[:-power], largest[power:])
+        power *= 2
+    return low, high

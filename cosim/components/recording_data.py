@@ -1,0 +1,189 @@
+"""Recordings: columns over time, from a result or a measured table, and what they were at any instant. NumPy and results only."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from cosim.components.component import NEVER, TIME_TOLERANCE
+from cosim.errors import ScenarioError, nearest
+from cosim.results.result import Result, SignalInfo
+
+Interpolation = Literal["linear", "hold"]
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Columns over time, as they are played back.
+
+    Args:
+        source: where they come from, for people.
+        time: of the rows [s], not decreasing, shape (rows,). Of rows with the same time the first one is before an event, the
+            last one after it.
+        signals: what each column is; names without a component.
+        values: shape (rows, n), finite.
+        held: mask of the columns that keep their value until the next row, shape (n,); the others run on lines.
+        events: times at which something may have jumped [s], increasing.
+        left_out: columns that cannot be played back, by name, and why.
+    """
+
+    source: str
+    time: np.ndarray
+    signals: tuple[SignalInfo, ...]
+    values: np.ndarray
+    held: np.ndarray
+    events: np.ndarray
+    left_out: Mapping[str, str] = field(default_factory=dict)
+
+    @cached_property
+    def digest(self) -> str:
+        """What tells this recording from others: a hash of times, names and values."""
+        names = "\0".join(s.name for s in self.signals).encode()
+        return hashlib.sha256(names + self.time.tobytes() + self.values.tobytes()).hexdigest()[:32]
+
+    def next_event(self, t: float) -> float:
+        """The first event later than `t` [s]; infinite where there is none."""
+        at = int(np.searchsorted(self.events, t + TIME_TOLERANCE, side="right"))
+        return float(self.events[at]) if at < len(self.events) else NEVER
+
+    def at(self, t: float, *, before: bool = False) -> np.ndarray:
+        """All columns at `t` [s], shape (n,): where there is a row of this time exactly what it says.
+
+        Args:
+            t: within the recording. before: of several rows of this time the first one instead of the last one.
+        """
+        row = int(np.searchsorted(self.time, t + TIME_TOLERANCE, side="right")) - 1
+        if row < 0 or (row == len(self.time) - 1 and t > self.time[row] + TIME_TOLERANCE):
+            raise ValueError(f"t = {t:g} s is outside of the recording, {self.time[0]:g} s to {self.time[-1]:g} s")
+        if self.time[row] >= t - TIME_TOLERANCE:
+            return np.asarray(self.values[np.searchsorted(self.time, t - TIME_TOLERANCE)] if before else self.values[row])
+        here, following = self.values[row], self.values[row + 1]
+        share = (t - self.time[row]) / (self.time[row + 1] - self.time[row])
+        return np.asarray(np.where(self.held, here, here + share * (following - here)))
+
+
+def make_recording(
+    result: Result, source: str, component: str | None, name: str, interpolation: Interpolation, span: tuple[float, float] | None
+) -> Recording:  # fmt: skip
+    """The recording of one component of a result, or of a whole table.
+
+    Args:
+        result: what was recorded. source: where it comes from, for messages.
+        component: whose columns are taken. None: those of `name` where it was recorded, else all under their full names.
+        name: of the component that plays it back.
+        interpolation: between the rows; what was recorded as discrete is always held.
+        span: start and stop of the run [s], which the recording must cover; None where nobody steps it.
+
+    Raises:
+        ScenarioError: nothing was recorded, the component is not in it, times do not increase, or it does not cover the run.
+    """
+    chosen = _chosen(result, source, component, name)
+    time = np.array(result.time, dtype=float)
+    _check_time(time, source, span)
+    rows = _rows(time, span)
+    signals, columns, left_out = [], [], {}
+    for column, signal in chosen.items():
+        values, fault = _without_gaps(np.array(result.table[column][rows], dtype=float), time[rows], interpolation)
+        if fault:
+            left_out[signal.name] = fault
+        else:
+            signals.append(signal)
+            columns.append(values)
+    if not signals:
+        raise ScenarioError(f"{source}: no column can be played back; " + "; ".join(f"{n}: {w}" for n, w in left_out.items()))
+    held = np.array([interpolation == "hold" or s.variability == "discrete" for s in signals])
+    values = np.column_stack(columns)
+    events = _events(time[rows], values, np.array([e.delivered_at for e in result.events]))
+    return Recording(source, time[rows], tuple(signals), values, held, events, left_out)
+
+
+def _chosen(result: Result, source: str, component: str | None, name: str) -> dict[str, SignalInfo]:
+    """Columns to play back, with what they are, under their new names."""
+    recorded = dict.fromkeys(s.name.partition(".")[0] for s in result.signals if "." in s.name)
+    if component is not None and component not in recorded:
+        hint = nearest(component, recorded) if recorded else "its columns belong to no component, leave 'component' out."
+        raise ScenarioError(f"{source}: component {component!r} was not recorded there; {hint}")
+    own = component or (name if name in recorded else None)
+    prefix = "" if own is None else f"{own}."
+    found = {s.name: replace(s, name=s.name.removeprefix(prefix)) for s in result.signals if s.name.startswith(prefix)}
+    if not found:
+        raise ScenarioError(f"{source}: there are no columns besides the time, so nothing can be played back.")
+    return found
+
+
+def _check_time(time: np.ndarray, source: str, span: tuple[float, float] | None) -> None:
+    if not len(time):
+        raise ScenarioError(f"{source}: there are no rows, so nothing can be played back.")
+    if not np.all(np.isfinite(time)):
+        raise ScenarioError(f"{source}: row {int(np.argmin(np.isfinite(time))) + 1}: the time is not a finite number.")
+    back = np.flatnonzero(np.diff(time) < 0.0)
+    if back.size:
+        i = int(back[0])
+        raise ScenarioError(
+            f"{source}: time goes back from {time[i]:g} s to {time[i + 1]:g} s in row {i + 2}; sort the rows, or cut the file."
+        )
+    if span is None:
+        return
+    start, stop = span
+    if time[0] > start + TIME_TOLERANCE or time[-1] < stop - TIME_TOLERANCE:
+        late = time[-1] < stop - TIME_TOLERANCE
+        what = f"ends at {time[-1]:g} s, the run at {stop:g} s" if late else f"begins at {time[0]:g} s, the run at {start:g} s"
+        raise ScenarioError(
+            f"{source}: the recording {what}; set start and stop of the run within {time[0]:g} s to {time[-1]:g} s."
+        )
+
+
+def _rows(time: np.ndarray, span: tuple[float, float] | None) -> slice:
+    """The rows that a run needs: from the last one before its start to the first one after its end."""
+    if span is None:
+        return slice(None)
+    first = int(np.searchsorted(time, np.float64(span[0]) - TIME_TOLERANCE))
+    if time[first] > span[0] + TIME_TOLERANCE:
+        first = int(np.searchsorted(time, time[first - 1]))
+    last = int(np.searchsorted(time, span[1] - TIME_TOLERANCE))
+    return slice(first, int(np.searchsorted(time, max(time[last], span[1] + TIME_TOLERANCE), side="right")))
+
+
+def _events(time: np.ndarray, values: np.ndarray, telegrams: np.ndarray) -> np.ndarray:
+    """Times of events: there are rows before and after, of other values, or not for the sake of a telegram to somebody.
+
+    A plant that returns early at an event may show its new values before the event already: others jump there all the same.
+
+    Args:
+        time: of the rows [s], shape (rows,). values: shape (rows, n). telegrams: when telegrams were delivered [s].
+    """
+    first = np.flatnonzero(np.diff(time, prepend=-np.inf))
+    last = np.append(first[1:], len(time)) - 1
+    several = first < last
+    first, last = first[several], last[several]
+    differ = np.any(values[first] != values[last], axis=1)
+    known = np.append(np.sort(telegrams[np.isfinite(telegrams)]), np.inf)  # NaN are those that were missed
+    told = known[np.searchsorted(known, time[first] - TIME_TOLERANCE)] <= time[first] + TIME_TOLERANCE
+    return np.asarray(time[first][differ | ~told])
+
+
+def _without_gaps(values: np.ndarray, time: np.ndarray, interpolation: Interpolation) -> tuple[np.ndarray, str]:
+    """The column, gaps filled where they may be, and why it cannot be played back, empty where it can."""
+    good = np.isfinite(values)
+    if good.all():
+        return values, ""
+    bad = int(np.argmin(good))
+    if interpolation == "hold" and good[0]:
+        return values[np.maximum.accumulate(np.where(good, np.arange(len(values)), 0))], ""
+    fault = f"its value at {time[bad]:g} s is {values[bad]} ({int((~good).sum())} such of {len(values)})"
+    hint = {"hold": "there is nothing before it to hold", "linear": "interpolation = 'hold' keeps the last value over gaps"}
+    return values, f"{fault}; {hint[interpolation]}"
+
+
+def whole_number_columns(recording: Recording) -> Sequence[bool]:
+    """For each column whether it is a discrete pure number that was whole throughout: a mode, a count, a truth value."""
+    largest = 2.0**31 - 1.0
+    return [
+        s.variability == "discrete" and s.unit == "1" and bool(np.all((column == np.rint(column)) & (np.abs(column) <= largest)))
+        for s, column in zip(recording.signals, recording.values.T, strict=True)
+    ]

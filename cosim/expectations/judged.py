@@ -1,0 +1,80 @@
+"""What became of an expectation: plain data and its text. Standard library only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from math import isfinite, nan
+from typing import Any
+
+from cosim.report.numbers import number
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """One thing that was expected, and what was measured.
+
+    Args:
+        name: what was expected, in words. check: kind of the expectation, as in the scenario.
+        passed: whether it is met.
+        measured: what was measured; NaN where nothing was.
+        limit: what it was held against.
+        unit: SI unit of both; ``s`` for instants, ``1`` for counts.
+        when: when the worst was measured, or when what is not allowed began [s]; NaN where no instant says anything.
+        text: one line: measured, limit, when, or why nothing was decided.
+        number: which expectation of the scenario, from 1; one may be judged in several parts.
+    """
+
+    name: str
+    check: str
+    passed: bool
+    measured: float = nan
+    limit: float = nan
+    unit: str = "1"
+    when: float = nan
+    text: str = ""
+    number: int = 1
+
+    @property
+    def line(self) -> str:
+        """Verdict, name and text on one line."""
+        return f"{'met' if self.passed else 'UNMET':5}  {self.name}: {self.text}"
+
+    def to_data(self) -> dict[str, Any]:
+        """Plain data for the summary of a run."""
+        return asdict(self)
+
+    @classmethod
+    def from_data(cls, data: Mapping[str, Any]) -> Judged:
+        """From the summary of a run, also from a file, where NaN has become None."""
+        values: dict[str, Any] = {field.name: data[field.name] for field in fields(cls) if field.name in data}
+        return cls(**(values | {key: nan for key, value in values.items() if value is None}))
+
+
+def judged_text(judged: Sequence[Judged]) -> str:
+    """A list for people, what is not met first; empty without expectations; ends without a line break."""
+    if not judged:
+        return ""
+    unmet = [j for j in judged if not j.passed]
+    everything = "The expectation is met:" if len(judged) == 1 else f"All {len(judged)} expectations met:"
+    head = f"{len(unmet)} of {len(judged)} expectations not met:" if unmet else everything
+    return "\n".join([head, *(f"  {j.line}" for j in [*unmet, *(j for j in judged if j.passed)])])
+
+
+def with_unit(value: float, unit: str, digits: int = 4) -> str:
+    """A measured number with its unit, without one for pure numbers."""
+    return _unit_behind(number(value, digits), unit)
+
+
+def given(value: float, unit: str = "") -> str:
+    """A number as it was given, a limit or an instant, with its unit."""
+    return _unit_behind(f"{value:.6g}", unit)
+
+
+def at(when: float, what: str = "at") -> str:
+    """When, in brackets; empty where no instant is known."""
+    return f" ({what} {given(when)} s)" if isfinite(when) else ""
+
+
+def _unit_behind(text: str, unit: str) -> str:
+    return text if unit in ("", "1") else f"{text} {unit}"

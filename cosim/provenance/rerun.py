@@ -1,0 +1,189 @@
+"""Rerun: results are made again from what their folder holds, and compared with those that are there. Changes nothing in it."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from cosim.comparison.verdict import Comparison
+from cosim.errors import OutputError, ProvenanceError
+from cosim.provenance.manifest import Manifest, read_manifest
+from cosim.provenance.same import same_result
+
+if TYPE_CHECKING:
+    from cosim.comparison.compare import Given
+    from cosim.results.result import Result
+    from cosim.scenario import Outcome, Scenario
+
+LOG = logging.getLogger("cosim")
+Verdict = Literal["bit-identical", "within tolerance", "differs"]
+LOUDEST = 5  # signals named in the text
+
+
+@dataclass(frozen=True)
+class Rerun:
+    """What came out of running results again.
+
+    Args:
+        directory: the results folder. manifest: what it says of itself.
+        outcome: of the new run. comparison: of the new run with the stored results.
+        verdict: ``bit-identical`` where every number and every telegram is the same.
+        changes: what is not as it was: versions, files, models, settings; one line each.
+        paths: where the new results were written, by kind; empty where they were not.
+        stored_failure: why the stored run ended early, or None.
+    """
+
+    directory: Path
+    manifest: Manifest
+    outcome: Outcome
+    comparison: Comparison
+    verdict: Verdict
+    changes: tuple[str, ...]
+    paths: Mapping[str, Path]
+    stored_failure: str | None = None
+
+    @property
+    def equal(self) -> bool:
+        """Whether the results are the same, to the last bit or within the tolerance."""
+        return self.verdict != "differs"
+
+    def text(self) -> str:
+        """Verdict, what differs, and what changed since, for people."""
+        rows, telegrams = len(self.outcome.result.table), len(self.outcome.result.events)
+        counts = f"{rows} rows, {len(self.comparison.signals)} signals, {telegrams} telegrams"
+        lines = [f"{self.directory}: {self.verdict} ({counts})."]
+        failed = self.comparison.failed
+        lines += [f"  {signal.name}: {_worst(signal)}" for signal in failed[:LOUDEST]]
+        lines += [f"  and {len(failed) - LOUDEST} signals more"] if len(failed) > LOUDEST else []
+        lines += [f"  {difference.text}" for difference in self.comparison.events.differences[:LOUDEST]]
+        if self.verdict == "within tolerance":
+            largest = max((s.max_error for s in self.comparison.signals if s.status == "within"), default=0.0)
+            lines.append(f"  the largest difference is {largest:.3g} in the unit of its signal")
+        lines += [f"  note: {note}" for note in self.comparison.notes]
+        lines += ["Changed since:", *(f"  {change}" for change in self.changes)] if self.changes else ["Nothing changed since."]
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for a JSON file."""
+        return {
+            "directory": str(self.directory), "verdict": self.verdict, "equal": self.equal, "changes": list(self.changes),
+            "failure": self.outcome.failure, "comparison": self.comparison.to_dict(),
+            "files": {kind: str(path) for kind, path in self.paths.items()},
+        }  # fmt: skip
+
+
+def rerun(
+    directory: str | Path, *, out: str | Path | None = None, overrides: Mapping[str, Any] | None = None,
+    tolerance: Given | None = None, trust: bool = False, progress: Callable[[float, float], None] | None = None,
+    warn: Callable[[str], None] | None = None, building: Callable[[str], None] | None = None,
+) -> Rerun:  # fmt: skip
+    """Run again what a results folder holds, and compare.
+
+    Args:
+        directory: a results folder; it may have been moved, and the files it was made from may be gone.
+        out: where to write the new results; by default nothing is written.
+        overrides: values to change, as for `Scenario.set`.
+        tolerance: how far signals may differ, see `cosim.compare`.
+        trust: go on where files of the folder were edited since; by default that is an error.
+        progress, warn, building: as for `Scenario.run`; warnings that the stored results have are not given again.
+
+    Raises:
+        ProvenanceError: the folder does not say how it was made, a file was edited, or one that was not kept is gone.
+        CosimError: the scenario cannot be set up any more.
+    """
+    from cosim.comparison.compare import compare  # noqa: PLC0415 - loaded when there is something to compare
+    from cosim.results.load import load_result  # noqa: PLC0415
+
+    manifest = read_manifest(directory)
+    _check_out(manifest, out)
+    edited = manifest.edited()
+    if edited and not trust:
+        raise ProvenanceError("\n".join([*edited, "Undo that, or say that you trust what is there now (--trust)."]))
+    scenario = stored_scenario(manifest)
+    settings = dict(overrides or {})
+    for name, value in settings.items():
+        scenario.set(name, value)
+    gone = manifest.missing({f"components.{name}" for name in settings} | set(settings))
+    if gone:
+        raise ProvenanceError("\n".join(gone))
+    stored = load_result(directory)
+    outcome = scenario.run(progress, warn=_new_ones(warn, stored), building=building)
+    paths = {} if out is None else outcome.write(out)  # before anything can be wrong with the comparison
+    result = _as_far_as(stored, outcome.result)
+    comparison = compare(stored, result, tolerance, extra_fails=True)
+    identical = same_result(stored, result)
+    verdict: Verdict = "bit-identical" if identical else "within tolerance" if comparison.equal else "differs"
+    changes = [*edited, *_changes(manifest, outcome), *(f"set: {name} = {value}" for name, value in settings.items())]
+    return Rerun(Path(directory), manifest, outcome, comparison, verdict, tuple(changes), paths, stored.failure)
+
+
+def stored_scenario(manifest: Manifest) -> Scenario:
+    """The scenario that a results folder holds; the log of all calls, which belongs to its folder, is not written again."""
+    from cosim.scenario import Scenario  # noqa: PLC0415 - a scenario loads results folders, and these make scenarios
+
+    scenario = Scenario.load(manifest.directory)
+    if scenario.table().master.log_calls:
+        scenario.master(log_calls=False)
+    return scenario
+
+
+def _new_ones(warn: Callable[[str], None] | None, stored: Result) -> Callable[[str], None]:
+    """Tells only of what was not warned of before."""
+    known = set(stored.summary.get("warnings", ()))
+
+    def tell(text: str) -> None:
+        if text not in known:
+            (warn or LOG.warning)(text)
+
+    return tell
+
+
+def _check_out(manifest: Manifest, out: str | Path | None) -> None:
+    if out is not None and Path(out).resolve() == manifest.directory.resolve():
+        raise OutputError(f"{out} holds the results to be compared with; choose another folder for the new ones.")
+
+
+def _as_far_as(stored: Result, result: Result) -> Result:
+    """The new result; cut where the stored run was taken along by its program and the new one went on."""
+    from cosim.results.unfinished import DID_NOT_END  # noqa: PLC0415
+
+    if stored.failure is None or not stored.failure.startswith(DID_NOT_END) or not len(stored.table):
+        return result
+    end = float(stored.time[-1])
+    events = [event for event in result.events if not event.delivered_at > end][: len(stored.events)]
+    return replace(result, table=result.table[: len(stored.table)], events=events)
+
+
+def _changes(manifest: Manifest, outcome: Outcome) -> list[str]:
+    """Versions, models and originals that are not those of the stored results."""
+    summary = outcome.result.summary
+    before, now = manifest.versions, dict(summary["versions"])
+    lines = [
+        f"{name}: {before.get(name, 'not known')} then, {now.get(name, 'not known')} now"
+        for name in sorted({*before, *now})
+        if before.get(name) != now.get(name)
+    ]
+    models = {c["name"]: c for c in manifest.data.get("components", ())}
+    for component in summary["components"]:
+        former = models.get(component["name"], {}).get("guid")
+        if former != component["guid"]:
+            lines.append(f"{component['name']}: model {former} then, {component['guid']} now")
+    notes = [
+        f"{part['path']}: {part['note']}" for foreign in manifest.data["files"] for part in foreign["parts"] if part.get("note")
+    ]
+    return lines + notes + manifest.moved_on()
+
+
+def _worst(signal: Any) -> str:
+    if signal.findings:
+        return str(signal.findings[0].text)
+    if signal.status in ("missing", "extra"):
+        return "not in the new results" if signal.status == "missing" else "only in the new results"
+    if np.isnan(signal.max_error):
+        return "differs"
+    return f"differs by {signal.max_error:.3g} {signal.unit} at t = {signal.max_error_at:g} s"

@@ -1,0 +1,156 @@
+"""The fixture `fmu_regression`: run, compare with the baseline of the test, fail with a table and a picture.
+
+What runs and compares is imported inside the calls, so that pytest starts as fast as without this plugin.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from cosim.pytest_plugin import options
+from cosim.pytest_plugin.names import baseline_name
+from cosim.pytest_plugin.records import Record, Records, Status
+
+if TYPE_CHECKING:
+    from cosim.baselines import Regression
+    from cosim.baselines.call import Call
+
+UPDATE = "If the new outputs are right, accept them with: pytest --fmu-baseline=update"
+
+
+class FmuRegression:
+    """Runs an FMU or a scenario and compares its outputs with the baseline of the test.
+
+    A test may call it more than once; the baselines are then numbered, or named with `name`.
+
+    Args:
+        request: of the test.
+    """
+
+    def __init__(self, request: pytest.FixtureRequest) -> None:
+        self._node = request.node
+        self._config = request.config
+        self._file = Path(request.node.path)
+        self._calls: list[str] = []
+
+    def __call__(
+        self, what: Any, *, stop: float | None = None, step: float | None = None, start: float | None = None,
+        inputs: Mapping[str, Any] | str | Path | None = None, parameters: Mapping[str, Any] | None = None,
+        record: Sequence[str] = (), overrides: Mapping[str, Any] | None = None,
+        signals: Sequence[str] | None = None, every: float | None = None,
+        tolerance: Any = None, tolerances: Mapping[str, Any] | None = None, ignore: Iterable[str] = (),
+        name: str | None = None,
+    ) -> Regression:  # fmt: skip
+        """Run and compare.
+
+        Args:
+            what: path of an FMU; name or path of a scenario; a `Scenario`; an `Outcome` or a `Result` of a run made already.
+                Relative paths start at the test file.
+            start, stop, step: of the run [s]; of an FMU alone those of its default experiment where not given.
+            inputs: of an FMU alone: constants by name, or a table (CSV) with a column for each.
+            parameters: start values of an FMU alone. record: its variables to record besides the outputs.
+            overrides: of a scenario: ``{"locomotive.mass": 70e3}``.
+            signals: names or patterns of the signals to keep and compare; None for all.
+            every: least spacing of the rows kept [s]; None for at most about 2000 rows.
+            tolerance: for all signals: a number (share of the range), a `Tolerance` or a mapping with its keys.
+            tolerances: for single signals, by name or pattern. ignore: names or patterns of signals not to compare.
+            name: of this call, where a test makes several.
+
+        Returns:
+            The comparison, with `outcome` and `actual`: what ran.
+        """
+        from cosim.baselines.call import Call  # noqa: PLC0415 - pytest must start fast
+        from cosim.errors import CosimError  # noqa: PLC0415
+
+        path, reason = self._path(name), ""
+        try:
+            call = Call.run(
+                what, self._file.parent, path,
+                signals=signals, every=every, tolerance=tolerance, tolerances=tolerances, ignore=ignore,
+                start=start, stop=stop, step=step, inputs=inputs, parameters=parameters, record=record, overrides=overrides,
+            )  # fmt: skip
+            return self._update(call) if options.mode(self._config) == "update" else self._check(call)
+        except CosimError as error:
+            reason = str(error)
+            self._keep(path, *(("error", [reason]) if path.exists() else ("missing", [])))
+        pytest.fail(f"fmu_regression: {reason}", pytrace=False)  # outside of the handler: no traceback of ours
+
+    def _path(self, name: str | None) -> Path:
+        """Path of this call's baseline."""
+        call = name or (str(len(self._calls) + 1) if self._calls else "")
+        if call in self._calls:
+            pytest.fail(f"fmu_regression: this test has a baseline named {call!r} already; give another name=...", pytrace=False)
+        self._calls.append(call)
+        node = self._node.nodeid.partition("::")[2] or self._node.name
+        return options.baseline_folder(self._config, self._file) / f"{baseline_name(node, call)}.json"
+
+    def _check(self, call: Call) -> Regression:
+        """Compare; a missing baseline or a difference fails the test, unless all differences were asked for."""
+        tolerant = options.mode(self._config) == "diff"
+        if tolerant and not call.path.exists():
+            self._keep(call.path, "missing")
+            return call.without_baseline()
+        found = call.check()
+        if found.equal:
+            self._keep(call.path, "equal", list(found.notes))
+            shutil.rmtree(self._artifacts(call.path), ignore_errors=True)  # of an earlier run: it would not speak of this one
+            return found
+        files = self._draw(found, call.path)
+        self._keep(call.path, "differs", call.worst(found), files)
+        if not tolerant:
+            pytest.fail(self._explanation(call, found, files), pytrace=False)
+        return found
+
+    def _update(self, call: Call) -> Regression:
+        """Leave what is to be written for the end of the session."""
+        update = call.update()
+        staged = ""
+        if update.texts:
+            folder = Records.of(self._config).stage()
+            for kind, text in update.texts.items():
+                (folder / kind).write_text(text, encoding="utf-8", newline="\n")
+            staged = str(folder)
+        lines = [] if update.before is None else call.worst(update.before)
+        self._keep(call.path, update.change, [*update.notes, *lines], staged=staged)
+        return update.after
+
+    def _explanation(self, call: Call, found: Regression, files: Mapping[str, str]) -> str:
+        from cosim.comparison.text import comparison_text  # noqa: PLC0415 - only for what differs
+
+        names = [signal.name for signal in found.failed] or ["telegrams"]
+        what = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
+        head = f"{what}: not as in the baseline {self._shown(call.path)}."
+        where = [f"{kind:>8}: {path}" for kind, path in files.items()]
+        return "\n".join([head, "", comparison_text(found).rstrip(), "", *where, UPDATE])
+
+    def _draw(self, found: Regression, path: Path) -> dict[str, str]:
+        """Page and pictures of a difference; where they cannot be made, why."""
+        folder = self._artifacts(path)
+        try:
+            from cosim.report.page.comparison import write_comparison  # noqa: PLC0415 - plotting only for what differs
+
+            root = options.artifacts_folder(self._config)
+            root.mkdir(parents=True, exist_ok=True)
+            (root / ".gitignore").write_text("*\n", encoding="utf-8")
+            return {kind: self._shown(file) for kind, file in write_comparison(found, folder).items()}
+        except Exception as error:  # the difference must be told, whatever happens to its picture
+            return {"picture": f"could not be made: {error}"}
+
+    def _artifacts(self, path: Path) -> Path:
+        return options.artifacts_folder(self._config) / self._file.stem / path.stem
+
+    def _keep(
+        self, path: Path, status: Status, lines: Sequence[str] = (), files: Mapping[str, str] | None = None, staged: str = ""
+    ) -> None:
+        record = Record(self._node.nodeid, str(path), status, list(lines), dict(files or {}), staged)
+        Records.of(self._config).add(record)
+
+    def _shown(self, path: Path) -> str:
+        """A path as people see it: from the root, where it is inside."""
+        root = self._config.rootpath
+        return str(path.relative_to(root)) if path.is_relative_to(root) else str(path)

@@ -1,0 +1,1 @@
+"""Figures of a report: what each shows, drawn on the axes it is given."""

@@ -1,0 +1,131 @@
+"""Strokes the figures share: curves, low-adhesion zones, balise ticks, legends. Draws on the axes it is given."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from cosim.report.event_counts import accepted_stamps
+from cosim.report.figures.scales import curve_size
+from cosim.report.figures.style import ALARM_COLOUR, ZONE_COLOUR
+from cosim.report.spec import ReportSpec
+from cosim.results.result import Result
+
+BUCKETS = 1500  # more points than a picture has columns add nothing but time and bytes
+MARGINS = 1.0  # width of a figure beside its axes [inch]
+LETTER_WIDTH, HANDLE_WIDTH = 0.069, 0.66  # of a letter and of a line with the space around it in a legend [inch]
+FAR = 50.0  # values are cut this many axis heights away, so that a line to 1e300 can still be drawn
+
+
+def thin(time: np.ndarray, values: np.ndarray, buckets: int = BUCKETS) -> tuple[np.ndarray, np.ndarray]:
+    """Fewer points that draw the same picture: the first, lowest, highest and last of each bucket of rows.
+
+    Args:
+        time: [s], shape (rows,). values: shape (rows,). buckets: about one for each column of pixels.
+
+    Returns:
+        Time and values, at most four for each bucket.
+    """
+    if len(time) <= 4 * buckets:
+        return time, values
+    edges = np.linspace(0, len(time), buckets + 1).astype(int)
+    low, high = np.where(np.isfinite(values), values, np.inf), np.where(np.isfinite(values), values, -np.inf)
+    keep: set[int] = set()
+    for a, b in pairwise(edges):
+        keep |= {a, a + int(np.argmin(low[a:b])), a + int(np.argmax(high[a:b])), b - 1}
+    rows = np.array(sorted(keep))
+    return time[rows], values[rows]
+
+
+def curve(ax: Axes, time: np.ndarray, values: np.ndarray, limits: tuple[float, float] | None, **line: Any) -> None:
+    """Draw a curve; values that are not finite leave a gap, values far outside `limits` are cut."""
+    shown = np.where(np.isfinite(values), values, np.nan)
+    if limits is not None:
+        reach = FAR * (limits[1] - limits[0])
+        shown = np.clip(shown, limits[0] - reach, limits[1] + reach)
+    ax.plot(*thin(time, shown), **line)
+
+
+def is_wild(values: np.ndarray, limits: tuple[float, float] | None) -> bool:
+    """Whether a curve has left the axis by more than its height, for more than a spike."""
+    return limits is not None and curve_size(values - sum(limits) / 2) > 1.5 * (limits[1] - limits[0])
+
+
+def is_noisy(values: np.ndarray) -> bool:
+    """Whether a curve turns round at more than a quarter of its rows: drawn in full width it would hide all others."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        steps = np.diff(values)
+        turns = steps[1:] * steps[:-1] < 0
+    return bool(np.count_nonzero(turns) > 0.25 * max(len(turns), 100))
+
+
+def shade_zones(ax: Axes, spec: ReportSpec) -> None:
+    """Shade the low-adhesion zones behind the curves."""
+    for i, (start, end) in enumerate(spec.zones):
+        ax.axvspan(start, end, color=ZONE_COLOUR, linewidth=0, zorder=0, label="low adhesion" if i == 0 else None)
+
+
+def balise_ticks(ax: Axes, result: Result) -> None:
+    """Ticks along the bottom where balises were passed and used; false telegrams stand taller."""
+    used = accepted_stamps(result.events)
+    false = [event.stamp for event in result.events if event.kind == "false"]
+    across = ax.get_xaxis_transform()
+    if used:
+        ax.vlines(used, 0.0, 0.035, transform=across, color="#000000", linewidth=0.6)
+        ax.plot([], [], "|", color="#000000", label="balises")
+    if false:
+        ax.vlines(false, 0.0, 0.09, transform=across, color=ALARM_COLOUR, linewidth=1.6)
+        ax.plot([], [], "|", color=ALARM_COLOUR, markersize=10, markeredgewidth=1.6, label="false telegrams")
+
+
+def mark_evaluation(ax: Axes, result: Result, spec: ReportSpec) -> None:
+    """Mark where the evaluation starts, if start-up is left out of it."""
+    if len(result.time) and result.time[0] < spec.evaluate_after < result.time[-1]:
+        ax.axvline(spec.evaluate_after, color="#777777", linewidth=0.9, linestyle=(0, (1, 2)), label="evaluated from here on")
+
+
+def time_axis(ax: Axes, result: Result) -> None:
+    """Label the time axis and give it the length of the run."""
+    ax.set_xlabel("Time [s]")
+    if len(result.time) and result.time[-1] > result.time[0]:
+        ax.set_xlim(float(result.time[0]), float(result.time[-1]))
+
+
+def legend_above(ax: Axes, leave_out: Sequence[str] = ()) -> None:
+    """Put the legend above the axes, where it hides nothing, in as many columns as the figure is wide.
+
+    Args:
+        ax: the axes. leave_out: labels explained elsewhere.
+    """
+    handles, labels = ax.get_legend_handles_labels()
+    entries = [(h, text) for h, text in zip(handles, labels, strict=True) if text not in leave_out]
+    legend, figure = ax.get_legend(), ax.get_figure(root=True)
+    if legend is not None:
+        legend.remove()
+    if entries and figure is not None:
+        width = figure.get_figwidth() - MARGINS
+        legend = ax.legend(
+            *zip(*entries, strict=True),
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+            ncols=_columns([text for _, text in entries], width),
+            frameon=False,
+            borderaxespad=0.3,
+            handlelength=3.2,
+            columnspacing=1.4,
+        )
+        for line in legend.get_lines():  # thin and faint lines are hard to recognise when they are short
+            line.set(alpha=1.0, linewidth=max(line.get_linewidth(), 1.3))
+
+
+def _columns(labels: Sequence[str], width: float) -> int:
+    """Most columns of a legend that fit into `width` [inch]; matplotlib fills it column by column."""
+    for count in range(len(labels), 1, -1):
+        columns = np.array_split(np.array([len(text) for text in labels]), count)
+        if sum(HANDLE_WIDTH + LETTER_WIDTH * max(c, default=0) for c in columns) <= width:
+            return count
+    return 1

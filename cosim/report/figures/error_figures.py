@@ -1,0 +1,133 @@
+"""Figures of the speed error and the position error. Draws on the axes it is given, or on a figure of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter, NullLocator
+
+from cosim.report.figures.drawing import balise_ticks, curve, legend_above, mark_evaluation, shade_zones, time_axis
+from cosim.report.figures.scales import ErrorScale, error_scale, running_maximum
+from cosim.report.figures.style import WILD_LINE, axes_or_new, observer_line, styled
+from cosim.report.metrics import error_size
+from cosim.report.numbers import error_number, number
+from cosim.report.roles import Quantity, estimation_error, label
+from cosim.report.spec import ReportSpec
+from cosim.results.result import Result
+
+WINDOWS = 180  # of the logarithmic figure in a run
+SPIKE = 3.0  # a curve that leaves the scale by this factor is named
+FAR = 1e3  # sizes are cut this many times beyond a logarithmic axis
+
+
+@styled
+def speed_error_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
+    """Estimated minus true speed in m/s, against time, with low-adhesion zones and balises.
+
+    Args:
+        result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
+
+    Returns:
+        The axes. An observer that leaves the scale is named in the legend with its largest error.
+    """
+    return _error_figure(result, spec, axes_or_new(ax), "speed", "m/s")
+
+
+@styled
+def position_error_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
+    """Estimated minus true position in m, against time, with low-adhesion zones and balises.
+
+    Args:
+        result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
+
+    Returns:
+        The axes. An observer that leaves the scale is named in the legend with its largest error.
+    """
+    return _error_figure(result, spec, axes_or_new(ax), "position", "m")
+
+
+@dataclass(frozen=True)
+class ErrorCurve:
+    """An error against time, and how it is drawn.
+
+    Args:
+        time: [s], shape (rows,). error: shape (rows,). settled: rows after the start-up, which set the scale, shape (rows,).
+        line: colour, dashes, width. text: for the legend.
+    """
+
+    time: np.ndarray
+    error: np.ndarray
+    settled: np.ndarray
+    line: dict[str, Any]
+    text: str
+
+
+def draw_errors(ax: Axes, curves: Sequence[ErrorCurve], quantity: Quantity, unit: str) -> None:
+    """Draw errors on a scale that none of them can squash, linear with sign or logarithmic without, and label the axis.
+
+    Args:
+        ax: the axes. curves: what to draw. quantity, unit: of the error.
+    """
+    scale = error_scale([c.error[c.settled] for c in curves])
+    window = _window([c.time for c in curves])
+    for c in curves:
+        largest = error_size(c.time[c.settled], c.error[c.settled]).max_abs
+        wild = largest > SPIKE * scale.limit
+        line = c.line | (WILD_LINE if wild else {}) | {"label": f"{c.text} ({_off_scale(largest, unit)})" if wild else c.text}
+        if scale.floor is None:
+            curve(ax, c.time, c.error, (-scale.limit, scale.limit), **line)
+        else:
+            _absolute(ax, c, scale, line, window)
+    _apply(ax, scale, quantity, unit, window)
+
+
+def _error_figure(result: Result, spec: ReportSpec, ax: Axes, quantity: Quantity, unit: str) -> Axes:
+    found = ((observer, estimation_error(result, spec, observer, quantity)) for observer in spec.observers)
+    settled = result.time >= spec.evaluate_after
+    shade_zones(ax, spec)
+    curves = [
+        ErrorCurve(result.time, error, settled, observer_line(spec.observers, observer), label(spec, observer))
+        for observer, error in found
+        if error is not None
+    ]
+    draw_errors(ax, curves, quantity, unit)
+    balise_ticks(ax, result)
+    mark_evaluation(ax, result, spec)
+    time_axis(ax, result)
+    legend_above(ax)
+    return ax
+
+
+def _off_scale(largest: float, unit: str) -> str:
+    size = error_number(largest, 2)
+    return size if size == "diverged" else f"off scale: {size} {unit}"
+
+
+def _window(times: Sequence[np.ndarray]) -> float:
+    """Length of a window of the logarithmic figure: a round time [s], some hundred in a run."""
+    duration = max((float(time[-1] - time[0]) for time in times if len(time)), default=0.0)
+    return float(f"{max(duration / WINDOWS, 1e-6):.0e}")
+
+
+def _absolute(ax: Axes, c: ErrorCurve, scale: ErrorScale, line: dict[str, Any], window: float) -> None:
+    assert scale.floor is not None
+    time, size = running_maximum(c.time, c.error, window)
+    ax.plot(time, np.clip(size, scale.floor / FAR, scale.limit * FAR), **line)
+
+
+def _apply(ax: Axes, scale: ErrorScale, quantity: Quantity, unit: str, window: float) -> None:
+    """Set the scale and say what it shows."""
+    if scale.floor is None:
+        ax.axhline(0.0, color="#888888", linewidth=0.7, zorder=1)
+        ax.set_ylim(-scale.limit, scale.limit)
+        ax.set_ylabel(f"{quantity.capitalize()} error [{unit}]")
+        return
+    ax.set_yscale("log")
+    ax.set_ylim(scale.floor, scale.limit)
+    ax.yaxis.set_minor_locator(NullLocator())
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 1)))
+    ax.set_ylabel(f"|{quantity} error| [{unit}]\nlargest in {number(window, 1)} s")

@@ -1,0 +1,80 @@
+"""Figure of the sampling gaps beside the gaps the observers are certified for. Draws on axes given, or on its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from cosim.report.event_counts import accepted_stamps
+from cosim.report.facts import mapping_entry, number_entry
+from cosim.report.figures.drawing import legend_above, shade_zones, time_axis
+from cosim.report.figures.style import axes_or_new, observer_line, styled
+from cosim.report.numbers import number
+from cosim.report.roles import label
+from cosim.report.spec import ReportSpec
+from cosim.results.result import Result
+
+SHOWN = 3.0  # limits above this many largest gaps are named, not drawn
+
+
+def sampling_gaps(result: Result) -> tuple[np.ndarray, np.ndarray]:
+    """Time between consecutive balises that were used.
+
+    Args:
+        result: the run.
+
+    Returns:
+        Times of the balises [s], shape (n,), and the gaps between them [s], shape (n - 1,), or empty without two balises.
+    """
+    stamps = np.array(accepted_stamps(result.events))
+    return stamps, np.diff(stamps)
+
+
+def certified_gaps(result: Result, spec: ReportSpec) -> dict[str, float]:
+    """Largest gap each observer is certified for when the gaps vary [s]; observers without a finite limit are left out."""
+    certificates = mapping_entry(result, "certificates")
+    limits = {}
+    for observer in spec.observers:
+        entry = certificates.get(observer)
+        limit = number_entry(entry, "aperiodic_limit") if isinstance(entry, Mapping) else None
+        if limit is not None:
+            limits[observer] = limit
+    return limits
+
+
+@styled
+def gap_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
+    """Time between consecutive balises in s, each gap over the time it lasts, and the certified gaps as levels.
+
+    Args:
+        result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
+
+    Returns:
+        The axes.
+    """
+    ax = axes_or_new(ax, (8.2, 3.0))
+    stamps, gaps = sampling_gaps(result)
+    limits = certified_gaps(result, spec)
+    shade_zones(ax, spec)
+    top = float(np.max(gaps)) if len(gaps) else max(limits.values(), default=1.0)
+    if len(gaps):
+        ax.stairs(gaps, stamps, fill=True, color="#A9A9A9", label="gap between balises")
+    largest = top
+    for limit in sorted(set(limits.values())):
+        observers = [observer for observer in limits if limits[observer] == limit]
+        line = observer_line(spec.observers, observers[0])
+        text = f"certified to {number(limit)} s: {', '.join(label(spec, observer) for observer in observers)}"
+        if len(gaps) and largest > limit:
+            text += " (exceeded)"
+        if limit <= SHOWN * largest:
+            ax.axhline(limit, label=text, **line)
+            top = max(top, limit)
+        else:
+            ax.plot([], [], label=f"{text} (above the scale)", **line)
+    ax.set_ylim(0.0, 1.12 * top)
+    ax.set_ylabel("Sampling gap [s]")
+    time_axis(ax, result)
+    legend_above(ax)
+    return ax

@@ -1,0 +1,40 @@
+"""The picture that shows a whole run at a glance: speed, speed error, slip and gaps over one time axis."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+
+from cosim.report.figures.drawing import legend_above
+from cosim.report.figures.panels import PANELS, Panel
+from cosim.report.figures.style import new_figure, styled
+from cosim.report.spec import ReportSpec
+from cosim.results.result import Result
+
+MAIN_PANELS = ("speed", "speed_error", "slip", "gaps")
+WIDTH, HEIGHT = 8.4, 2.55  # inches; the height of one panel
+
+
+@styled
+def main_picture(result: Result, spec: ReportSpec) -> Figure:
+    """Speed, speed error, slip and sampling gaps below each other, as far as they were recorded.
+
+    Args:
+        result: the run. spec: roles.
+
+    Returns:
+        The figure; save it with ``figure.savefig(path)``.
+    """
+    panels: list[Panel] = [p for p in PANELS if p.key in MAIN_PANELS and p.available(result, spec)]
+    figure = new_figure((WIDTH, HEIGHT * max(len(panels), 1)))
+    figure.suptitle(spec.title, fontsize=11.5, fontweight="bold", x=0.01, ha="left")
+    if not panels:
+        return figure
+    rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    repeated: set[str] = set()
+    for ax, panel in zip(rows, panels, strict=True):
+        panel.draw(result, spec, ax)
+        legend_above(ax, sorted(repeated))
+        repeated |= set(ax.get_legend_handles_labels()[1])
+        if ax is not rows[-1]:
+            ax.set_xlabel("")
+    return figure

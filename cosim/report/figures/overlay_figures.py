@@ -1,0 +1,191 @@
+"""Figures of several runs laid over each other: one line a run, one panel an observer. Draws on figures of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from cosim.report.figures.drawing import curve, legend_above, mark_evaluation, shade_zones, thin
+from cosim.report.figures.error_figures import ErrorCurve, draw_errors
+from cosim.report.figures.panels import png
+from cosim.report.figures.scales import bounded, value_limits
+from cosim.report.figures.style import TRUE_LINE, new_figure, run_line, styled
+from cosim.report.overlay.runs import Run, observers_of, one_each
+from cosim.report.roles import Quantity, estimate, estimation_error, label, recorded
+from cosim.results.result import Result
+
+WIDTH, FIRST_PANEL, NEXT_PANEL = 8.2, 3.3, 2.2  # inches
+KMH = 3.6  # km/h in a m/s
+Panel = tuple[str, dict[int, str]]
+"""Title of a panel, and the observer of each run in it by index of the run."""
+
+
+@dataclass(frozen=True, slots=True)
+class OverlayPicture:
+    """A drawn figure.
+
+    Args:
+        key: stem of its file name. title: short. caption: what to see in it. png: the picture.
+    """
+
+    key: str
+    title: str
+    caption: str
+    png: bytes
+
+
+def draw_overlays(runs: Sequence[Run], signals: Sequence[str] = ()) -> list[OverlayPicture]:
+    """All figures that the runs have something for.
+
+    Args:
+        runs: from `make_runs`. signals: names of recorded signals to draw besides those that have a role.
+    """
+    made = [
+        ("speed", "Speed", "True speed of each run.", true_speed_figure(runs)),
+        ("speed_error", "Speed error", "Estimated minus true speed.", error_overlay(runs, "speed")),
+        ("position_error", "Position error", "Estimated minus true position.", error_overlay(runs, "position")),
+        ("slip", "Slip", "Estimated slip, and the true slip of the first run.", estimate_overlay(runs, "slip")),
+        ("adhesion", "Adhesion force", "Estimated adhesion force, and the true one of the first run.",
+         estimate_overlay(runs, "adhesion_force")),
+        *((f"signal_{i}", name, "As recorded.", signal_figure(runs, name)) for i, name in enumerate(signals, 1)),
+    ]  # fmt: skip
+    return [OverlayPicture(f"overlay_{key}", title, text, png(figure)) for key, title, text, figure in made if figure is not None]
+
+
+@styled
+def true_speed_figure(runs: Sequence[Run]) -> Figure | None:
+    """True speed of all runs in km/h, or None without any."""
+    found = [(i, run, speed) for i, run in enumerate(runs) if (speed := recorded(run.result, run.spec.true_speed)) is not None]
+    if not found:
+        return None
+    ax = _axes(runs, [("", {})])[0]
+    limits = value_limits([KMH * bounded(speed) for _, _, speed in found], [])
+    for i, run, speed in found:
+        curve(ax, run.result.time, KMH * bounded(speed), limits, label=run.label, **run_line(i))
+    return _finished([ax], "Speed [km/h]", limits)
+
+
+@styled
+def error_overlay(runs: Sequence[Run], quantity: Literal["speed", "position"]) -> Figure | None:
+    """Errors of speed [m/s] or position [m], a panel for each observer, or None without any."""
+    unit = "m/s" if quantity == "speed" else "m"
+    panels = _panels(runs, lambda run, observer: estimation_error(run.result, run.spec, observer, quantity) is not None)
+    if not panels:
+        return None
+    axes = _axes(runs, panels)
+    for ax, (_, members) in zip(axes, panels, strict=True):
+        draw_errors(ax, [_error_curve(runs[i], i, observer, quantity) for i, observer in members.items()], quantity, unit)
+        mark_evaluation(ax, runs[0].result, runs[0].spec)
+    return _finished(axes)
+
+
+@styled
+def estimate_overlay(runs: Sequence[Run], signal: Literal["slip", "adhesion_force"]) -> Figure | None:
+    """Estimates of the slip [%] or the adhesion force [kN], a panel for each observer, or None without any."""
+    factor, text = (100.0, "Slip [%]") if signal == "slip" else (1e-3, "Adhesion force [kN]")
+    panels = _panels(runs, lambda run, observer: estimate(run.result, observer, signal) is not None)
+    if not panels:
+        return None
+    axes = _axes(runs, panels)
+    true = recorded(runs[0].result, runs[0].spec.true_slip if signal == "slip" else runs[0].spec.true_adhesion_force)
+    anchors = [] if true is None else [factor * bounded(true)]
+    for ax, (_, members) in zip(axes, panels, strict=True):
+        values = {i: factor * bounded(runs[i].result[f"{observer}.{signal}"]) for i, observer in members.items()}
+        limits = value_limits(anchors, [v[runs[i].result.time >= runs[i].spec.evaluate_after] for i, v in values.items()])
+        for band in anchors:
+            curve(ax, runs[0].result.time, band, limits, label="true", **TRUE_LINE)
+        for i, drawn in values.items():
+            curve(ax, runs[i].result.time, drawn, limits, label=runs[i].label, **run_line(i))
+        ax.set_ylabel(text)
+        if limits is not None:
+            ax.set_ylim(*limits)
+    return _finished(axes)
+
+
+@styled
+def signal_figure(runs: Sequence[Run], name: str) -> Figure | None:
+    """One recorded signal of all runs in its SI unit, or None where no run has it."""
+    found = [(i, run) for i, run in enumerate(runs) if recorded(run.result, name) is not None]
+    if not found:
+        return None
+    ax = _axes(runs, [("", {})])[0]
+    unit = next((s.unit for _, run in found for s in run.result.signals if s.name == name), "")
+    for i, run in found:
+        values = bounded(run.result[name])
+        ax.plot(*thin(run.result.time, np.where(np.isfinite(values), values, np.nan)), label=run.label, **run_line(i))
+    return _finished([ax], f"{name} [{unit or 'unit unknown'}]")
+
+
+def changing_signals(runs: Sequence[Run], most: int) -> list[str]:
+    """Common signals that differ most between the first run and the others, relative to their range, in column order.
+
+    Args:
+        runs: from `make_runs`. most: how many names at most.
+    """
+    first = runs[0].result
+    common = [n for n in (first.table.dtype.names or ())[1:] if all(recorded(run.result, n) is not None for run in runs)]
+    changes = {name: max((_change(first, run, name) for run in runs[1:]), default=0.0) for name in common}
+    chosen = sorted(common, key=lambda name: -changes[name])[:most]
+    return [name for name in common if name in chosen]
+
+
+def _change(first: Result, run: Run, name: str) -> float:
+    """Largest difference to the first run, in ranges of its values."""
+    values, other = (bounded(np.nan_to_num(result[name])) for result in (first, run.result))
+    if not np.array_equal(first.time, run.result.time):  # rows of events are met by those of the same time only
+        other = np.interp(first.time, run.result.time, other)
+    reach = float(np.ptp(values)) or max(float(np.max(np.abs(values))), 1e-300)
+    return float(np.max(np.abs(other - values))) / reach
+
+
+def _panels(runs: Sequence[Run], has: Callable[[Run, str], bool]) -> list[Panel]:
+    if one_each(runs):
+        members = {i: run.spec.observers[0] for i, run in enumerate(runs) if has(run, run.spec.observers[0])}
+        return [("", members)] if members else []
+    found = []
+    for observer in observers_of(runs):
+        members = {i: observer for i, run in enumerate(runs) if observer in run.spec.observers and has(run, observer)}
+        if members:
+            found.append((label(runs[min(members)].spec, observer), members))
+    return found
+
+
+def _error_curve(run: Run, index: int, observer: str, quantity: Quantity) -> ErrorCurve:
+    error = estimation_error(run.result, run.spec, observer, quantity)
+    assert error is not None  # by the choice of the panels
+    return ErrorCurve(run.result.time, error, run.result.time >= run.spec.evaluate_after, run_line(index), run.label)
+
+
+def _axes(runs: Sequence[Run], panels: Sequence[Panel]) -> list[Axes]:
+    """Panels below each other over one time axis that holds all runs."""
+    figure = new_figure((WIDTH, FIRST_PANEL + NEXT_PANEL * (len(panels) - 1)))
+    axes: list[Axes] = list(figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0])
+    start, end = min(float(r.result.time[0]) for r in runs), max(float(r.result.time[-1]) for r in runs)
+    for ax, (title, _) in zip(axes, panels, strict=True):
+        shade_zones(ax, runs[0].spec)
+        if title:
+            ax.text(0.995, 0.97, title, transform=ax.transAxes, ha="right", va="top", fontweight="bold", zorder=5)
+    if end > start:
+        axes[0].set_xlim(start, end)
+    axes[-1].set_xlabel("Time [s]")
+    return axes
+
+
+def _finished(axes: Sequence[Axes], text: str | None = None, limits: tuple[float, float] | None = None) -> Figure:
+    """Labels, limits and legends: each panel names what its first one does not."""
+    named: set[str] = set()
+    for ax in axes:
+        if text is not None:
+            ax.set_ylabel(text)
+        if limits is not None:
+            ax.set_ylim(*limits)
+        legend_above(ax, sorted(named))
+        named |= set(ax.get_legend_handles_labels()[1])
+    figure = axes[0].get_figure(root=True)
+    assert figure is not None
+    return figure

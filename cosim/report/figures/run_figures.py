@@ -1,0 +1,151 @@
+"""Figures of speed, slip and adhesion force. Draws on the axes it is given, or on a figure of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Rectangle
+
+from cosim.report.figures.drawing import curve, is_noisy, is_wild, legend_above, shade_zones, time_axis
+from cosim.report.figures.scales import bounded, value_limits
+from cosim.report.figures.style import (
+    NOISY_LINE,
+    ODOMETER_LINE,
+    REFERENCE_LINE,
+    TRUE_LINE,
+    TRUE_LINE_ABOVE,
+    WILD_LINE,
+    axes_or_new,
+    observer_line,
+    styled,
+)
+from cosim.report.indicators import on_intervals
+from cosim.report.roles import estimate, label, recorded
+from cosim.report.spec import ReportSpec
+from cosim.results.result import Result
+
+KMH = 3.6  # km/h in a m/s
+STRIP = 0.055  # height of an indicator's strip as a share of the axes
+
+
+def _estimates(result: Result, spec: ReportSpec, signal: str, factor: float) -> dict[str, np.ndarray]:
+    found = {observer: estimate(result, observer, signal) for observer in spec.observers}
+    return {observer: factor * bounded(values) for observer, values in found.items() if values is not None}
+
+
+def _scaled(result: Result, name: str | None, factor: float) -> list[np.ndarray]:
+    values = recorded(result, name)
+    return [] if values is None else [factor * bounded(values)]
+
+
+def _draw_estimates(
+    ax: Axes, result: Result, spec: ReportSpec, estimates: Mapping[str, np.ndarray], limits: tuple[float, float] | None
+) -> None:
+    settled = result.time >= spec.evaluate_after
+    for observer, values in estimates.items():
+        line, text = observer_line(spec.observers, observer), label(spec, observer)
+        if is_wild(values[settled], limits):
+            line, text = line | WILD_LINE, f"{text} (off scale)"
+        elif is_noisy(values[settled]):
+            line = line | NOISY_LINE
+        curve(ax, result.time, values, limits, label=text, **line)
+
+
+@styled
+def speed_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
+    """True speed, odometer, reference and estimates in km/h, against time.
+
+    Args:
+        result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
+
+    Returns:
+        The axes.
+    """
+    ax = axes_or_new(ax)
+    true, odometer = _scaled(result, spec.true_speed, KMH), _scaled(result, spec.odometer, KMH)
+    reference, estimates = _scaled(result, spec.speed_reference, KMH), _estimates(result, spec, "speed", KMH)
+    limits = value_limits(true + reference, odometer + list(estimates.values()))
+    shade_zones(ax, spec)
+    for values in true:
+        curve(ax, result.time, values, limits, label="true", **TRUE_LINE)
+    for values in odometer:
+        curve(ax, result.time, values, limits, label="odometer", **ODOMETER_LINE)
+    for values in reference:
+        curve(ax, result.time, values, limits, label="reference", **REFERENCE_LINE)
+    _draw_estimates(ax, result, spec, estimates, limits)
+    if limits is not None:
+        ax.set_ylim(*limits)
+    ax.set_ylabel("Speed [km/h]")
+    time_axis(ax, result)
+    legend_above(ax)
+    return ax
+
+
+@styled
+def adhesion_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
+    """True and estimated adhesion force in kN, against time; the estimates' spikes may leave the axis.
+
+    Args:
+        result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
+
+    Returns:
+        The axes.
+    """
+    ax = axes_or_new(ax)
+    true, estimates = _scaled(result, spec.true_adhesion_force, 1e-3), _estimates(result, spec, "adhesion_force", 1e-3)
+    limits = value_limits(true, list(estimates.values()))
+    shade_zones(ax, spec)
+    true_line = TRUE_LINE_ABOVE if any(map(is_noisy, estimates.values())) else TRUE_LINE
+    for values in true:
+        curve(ax, result.time, values, limits, label="true", **true_line)
+    _draw_estimates(ax, result, spec, estimates, limits)
+    if limits is not None:
+        ax.set_ylim(*limits)
+    ax.set_ylabel("Adhesion force [kN]")
+    time_axis(ax, result)
+    legend_above(ax)
+    return ax
+
+
+@styled
+def slip_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
+    """True and estimated slip in percent, and bars below them where the slip indicators were on, against time.
+
+    Args:
+        result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
+
+    Returns:
+        The axes.
+    """
+    ax = axes_or_new(ax, (8.2, 3.8))
+    true, estimates = _scaled(result, spec.true_slip, 100.0), _estimates(result, spec, "slip", 100.0)
+    settled = result.time >= spec.evaluate_after
+    limits = value_limits([v[settled] for v in true], [v[settled] for v in estimates.values()])
+    shade_zones(ax, spec)
+    for values in true:
+        curve(ax, result.time, values, limits, label="true", **TRUE_LINE)
+    _draw_estimates(ax, result, spec, estimates, limits)
+    _indicator_strips(ax, result, spec, limits)
+    ax.set_ylabel("Slip [%]")
+    time_axis(ax, result)
+    legend_above(ax)
+    return ax
+
+
+def _indicator_strips(ax: Axes, result: Result, spec: ReportSpec, limits: tuple[float, float] | None) -> None:
+    """One strip for each indicator at the bottom, in the observer's colour where it is on, in the order of the observers."""
+    low, high = limits or (0.0, 1.0)
+    found = [(o, v) for o in spec.observers if (v := estimate(result, o, "slip_indicator")) is not None]
+    share = STRIP * len(found)
+    if found:
+        ax.add_patch(Rectangle((0.0, 0.0), 1.0, share, transform=ax.transAxes, color="#F1F1F1", linewidth=0, zorder=3.0))
+    for i, (observer, values) in enumerate(found):
+        bars = [(a, b - a) for a, b in on_intervals(result.time, values)]
+        place = (share - (i + 0.9) * STRIP, 0.8 * STRIP)
+        colour = observer_line(spec.observers, observer)["color"]
+        text = "indicator on" if i == 0 else None
+        ax.broken_barh(bars, place, transform=ax.get_xaxis_transform(), facecolor=colour, label=text, zorder=3.1)
+    ax.set_ylim(low - (high - low) * share / (1 - share), high)
+    ax.set_yticks([tick for tick in ax.get_yticks() if low <= tick <= high])

@@ -1,0 +1,140 @@
+"""Zoom on one moment of a run: errors row by row, jumps at telegrams, stamp and delivery. Draws on a figure of its own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from cosim.report.figures.drawing import FAR, legend_above
+from cosim.report.figures.scales import bounded, error_scale
+from cosim.report.figures.style import ALARM_COLOUR, ZONE_COLOUR, new_figure, observer_line, styled
+from cosim.report.moments import Moment
+from cosim.report.roles import estimate, estimation_error, label, recorded
+from cosim.report.spec import ReportSpec
+from cosim.results.result import BaliseRecord, Result
+
+SIZE, ONE_PANEL = (5.6, 4.3), (5.6, 2.8)  # inches
+TRUE: dict[str, Any] = {"color": "#B4B4B4", "linewidth": 4.0, "zorder": 1.5}  # a band, on which the estimates lie
+STAMP: dict[str, Any] = {"color": "#000000", "linewidth": 0.9, "zorder": 1.4}
+DELIVERY: dict[str, Any] = {"color": "#000000", "linewidth": 0.9, "linestyle": (0, (2, 2)), "zorder": 1.4}
+MISSED: dict[str, Any] = {"color": "#6E6E6E", "linewidth": 0.9, "linestyle": (0, (1, 2)), "zorder": 1.4}
+MOST_TELEGRAMS = 60  # in a window; more would be a hatching
+
+
+Curves = dict[str, np.ndarray]
+"""Values by observer, shape (rows,)."""
+
+
+@styled
+def zoom_figure(result: Result, spec: ReportSpec, moment: Moment) -> Figure:
+    """One or two panels over a window of time: speed error, and position error or slip.
+
+    Args:
+        result: the run. spec: roles. moment: the window, and what to show.
+
+    Returns:
+        The figure. Rows before and after an event are joined upright, with a hollow and a filled mark.
+    """
+    panels = [panel for panel in _panels(result, spec, moment) if panel[1]]
+    figure = new_figure(SIZE if len(panels) > 1 else ONE_PANEL)
+    if not panels:
+        return figure
+    axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    rows = _rows(result.time, moment)
+    for ax, (text, curves, true) in zip(axes, panels, strict=True):
+        _background(ax, result, spec, moment)
+        if true is not None:
+            ax.plot(result.time[rows], true[rows], **TRUE)
+            axes[0].plot([], [], label="true", **TRUE)  # for the legend
+        _draw(ax, result.time[rows], {o: values[rows] for o, values in curves.items()}, spec)
+        _limits(ax, [*(v[rows] for v in curves.values()), *([] if true is None else [true[rows]])], zero=true is None)
+        ax.set_ylabel(text)
+    axes[-1].set_xlabel("Time [s]")
+    axes[-1].set_xlim(moment.start, moment.end)
+    axes[-1].ticklabel_format(axis="x", useOffset=False)
+    legend_above(axes[0])
+    return figure
+
+
+def _panels(result: Result, spec: ReportSpec, moment: Moment) -> list[tuple[str, Curves, np.ndarray | None]]:
+    """Label, curves and true curve of each panel."""
+    speed = ("Speed error [m/s]", _errors(result, spec, "speed"), None)
+    slip = {o: 100.0 * bounded(v) for o in spec.observers if (v := estimate(result, o, "slip")) is not None}
+    true_slip = recorded(result, spec.true_slip)
+    if moment.view == "slip" and slip:
+        return [speed, ("Slip [%]", slip, None if true_slip is None else 100.0 * bounded(true_slip))]
+    return [speed, ("Position error [m]", _errors(result, spec, "position"), None)]
+
+
+def _errors(result: Result, spec: ReportSpec, quantity: Any) -> Curves:
+    found = {o: estimation_error(result, spec, o, quantity) for o in spec.observers}
+    return {o: bounded(e) for o, e in found.items() if e is not None}
+
+
+def _rows(time: np.ndarray, moment: Moment) -> np.ndarray:
+    """Indices of the rows in a window, and one more on either side, so that curves reach its edges."""
+    first, beyond = np.searchsorted(time, moment.start, "left") - 1, np.searchsorted(time, moment.end, "right") + 1
+    return np.arange(max(int(first), 0), min(int(beyond), len(time)))
+
+
+def _draw(ax: Axes, time: np.ndarray, curves: Curves, spec: ReportSpec) -> None:
+    pairs = np.flatnonzero(np.diff(time) == 0.0)
+    for observer, values in curves.items():
+        line = observer_line(spec.observers, observer)
+        shown = _cut(values, curves)
+        ax.plot(time, shown, label=label(spec, observer), **line)
+        moved = pairs[shown[pairs] != shown[pairs + 1]]
+        mark: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 3.2, "color": line["color"], "zorder": 3.0}
+        ax.plot(time[moved], shown[moved], markerfacecolor="#FFFFFF", **mark)
+        ax.plot(time[moved], shown[moved + 1], **mark)
+
+
+def _cut(values: np.ndarray, curves: Curves) -> np.ndarray:
+    """Values without those that are not finite, and without heights no picture can hold."""
+    reach = FAR * error_scale(list(curves.values())).limit
+    return np.clip(np.where(np.isfinite(values), values, np.nan), -reach, reach)
+
+
+def _limits(ax: Axes, curves: list[np.ndarray], zero: bool) -> None:
+    """Limits that hold all curves but those which left the scale."""
+    reach = error_scale(curves).limit
+    finite = [c[np.isfinite(c) & (np.abs(c) <= reach)] for c in curves]
+    ends = [(float(np.min(c)), float(np.max(c))) for c in finite if len(c)]
+    if zero:
+        ax.axhline(0.0, color="#888888", linewidth=0.7, zorder=1)
+        ends.append((0.0, 0.0))
+    low, high = min((e[0] for e in ends), default=0.0), max((e[1] for e in ends), default=0.0)
+    room = 0.08 * (high - low) or 0.1 * max(abs(low), 1e-9)
+    ax.set_ylim(low - room, high + room)
+
+
+def _background(ax: Axes, result: Result, spec: ReportSpec, moment: Moment) -> None:
+    """Low-adhesion zones, stamps and deliveries."""
+    inside = [z for z in spec.zones if z[1] > moment.start and z[0] < moment.end]
+    for start, end in inside:
+        text = "low adhesion" if (start, end) == inside[0] else "_"
+        ax.axvspan(start, end, color=ZONE_COLOUR, linewidth=0, zorder=0, label=text)
+    seen: set[str] = set()
+    for event in _in_window(result, moment):
+        for instant, text, line in _instants(event):
+            ax.axvline(instant, label="_" if text in seen else text, **line)
+            seen.add(text)
+
+
+def _in_window(result: Result, moment: Moment) -> list[BaliseRecord]:
+    near = [e for e in result.events if e.stamp <= moment.end and max(e.stamp, e.delivered_at) >= moment.start]
+    return sorted(near, key=lambda e: abs(e.stamp - moment.time))[:MOST_TELEGRAMS]
+
+
+def _instants(event: BaliseRecord) -> list[tuple[float, str, dict[str, Any]]]:
+    """Instants of a telegram: time [s], text for the legend, line."""
+    if event.kind == "missed":
+        return [(event.stamp, "missed balise", MISSED)]
+    false = {"color": ALARM_COLOUR, "linewidth": 1.4} if event.kind == "false" else {}
+    kind = "false telegram" if false else "balise"
+    if not event.delivered_at > event.stamp:
+        return [(event.stamp, kind, STAMP | false)]
+    return [(event.stamp, f"{kind}, passed", STAMP | false), (event.delivered_at, f"{kind}, told", DELIVERY | false)]

@@ -1,0 +1,45 @@
+"""The zoom figures of a report as PNG, with their texts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cosim.report.figures.panels import png
+from cosim.report.figures.zoom_figure import zoom_figure
+from cosim.report.moments import MOST, Moment, notable_moments
+from cosim.report.numbers import number
+from cosim.report.spec import ReportSpec
+from cosim.results.result import Result
+
+ZOOM_KEYS = tuple(f"zoom_{i}" for i in range(1, MOST + 1))
+"""Stems of the file names, in order of time."""
+VIEWS = {"errors": "Speed error and position error", "slip": "Speed error and slip"}
+
+
+@dataclass(frozen=True, slots=True)
+class Zoom:
+    """A drawn zoom.
+
+    Args:
+        key: stem of its file name. title: what it is about. caption: what else is in it. png: the picture.
+    """
+
+    key: str
+    title: str
+    caption: str
+    png: bytes
+
+
+def draw_zooms(result: Result, spec: ReportSpec) -> list[Zoom]:
+    """All zoom figures of a run in order of time; none where it has no errors."""
+    moments = notable_moments(result, spec)
+    pictures = [png(zoom_figure(result, spec, moment)) for moment in moments]
+    return [
+        Zoom(key, moment.reasons[0], _caption(moment), picture)
+        for key, moment, picture in zip(ZOOM_KEYS, moments, pictures, strict=False)
+    ]
+
+
+def _caption(moment: Moment) -> str:
+    span = f"{VIEWS[moment.view]}, {number(moment.start, 4)} s to {number(moment.end, 4)} s."
+    return " ".join([span, *(f"{reason}." for reason in moment.reasons[1:])])

@@ -1,0 +1,226 @@
+"""The page of several runs laid over each other, and its figures as files. Touches only the folder or file it is given."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from math import isfinite
+from pathlib import Path
+
+from cosim.errors import OutputError
+from cosim.report.facts import number_entry
+from cosim.report.figures.overlay_figures import OverlayPicture, changing_signals, draw_overlays
+from cosim.report.numbers import DASH, error_number, number
+from cosim.report.overlay.differences import differences, layout_note
+from cosim.report.overlay.measures import DETAIL_HEADINGS, ERROR_HEADINGS, Measured, cell, detailed, headings, measured
+from cosim.report.overlay.runs import Run, make_runs
+from cosim.report.page.files import write_file
+from cosim.report.page.parts import (
+    box,
+    bullets,
+    chapters,
+    details,
+    facts,
+    grouped_table,
+    page,
+    paragraph,
+    picture,
+    simple_table,
+)
+from cosim.report.page.verdict import Fact
+from cosim.report.spec import ReportSpec
+from cosim.results.result import Result
+
+PAGE, FIGURES = "overlay.html", "figures"
+SIGNALS_SHOWN = 8  # where no signal has a role
+DIFFERENCES_SHOWN = 25  # the rest unfolds
+RMS_SPEED = 1  # column of the rms speed error
+
+
+def write_overlay(
+    results: Sequence[Result], specs: Sequence[ReportSpec], labels: Sequence[str], directory: str | Path,
+    signals: Sequence[str] = (),
+) -> Path:  # fmt: skip
+    """Lay several runs over each other: ``overlay.html`` with the figures inside, and these as files in ``figures/``.
+
+    Args:
+        results: the runs; the first is what the others are compared with. specs: roles of the signals of each.
+        labels: text for each. directory: the folder; created where it does not exist.
+        signals: names of recorded signals to draw besides those that have a role.
+
+    Returns:
+        Path of the page.
+
+    Raises:
+        ComparisonError: the runs cannot be laid over each other. OutputError: the folder cannot be written.
+    """
+    folder = Path(directory)
+    runs = make_runs(results, specs, labels)
+    try:
+        (folder / FIGURES).mkdir(parents=True, exist_ok=True)  # before much is drawn
+        pictures = _pictures(runs, signals)
+        for stale in (folder / FIGURES).glob("overlay_*.png"):
+            stale.unlink()
+        for drawn in pictures:
+            write_file(folder / FIGURES / f"{drawn.key}.png", drawn.png)
+    except OSError as error:
+        raise OutputError(f"Figures cannot be written to {folder}: {error.strerror or error}. Choose another folder.") from error
+    return write_overlay_page(runs, folder / PAGE, pictures)
+
+
+def write_overlay_page(
+    runs: Sequence[Run], path: str | Path, pictures: Sequence[OverlayPicture] | None = None, signals: Sequence[str] = ()
+) -> Path:
+    """Write the page alone; it needs no other file.
+
+    Args:
+        runs: from `make_runs`. path: the file; its folder is created. pictures: from `draw_overlays`, drawn where None.
+        signals: as for `write_overlay`.
+    """
+    file = Path(path)
+    text = overlay_page(runs, _pictures(runs, signals) if pictures is None else pictures)
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write_file(file, text.encode("utf-8", "backslashreplace"))
+    except OSError as error:
+        raise OutputError(f"{file} cannot be written: {error.strerror or error}. Choose another place with --out.") from error
+    return file
+
+
+def _pictures(runs: Sequence[Run], signals: Sequence[str]) -> list[OverlayPicture]:
+    """Figures of the roles and of `signals`; where neither gives one, those of the signals that differ most."""
+    return draw_overlays(runs, signals) or draw_overlays(runs, changing_signals(runs, SIGNALS_SHOWN))
+
+
+def overlay_page(runs: Sequence[Run], pictures: Sequence[OverlayPicture]) -> str:
+    """The page as text.
+
+    Args:
+        runs: from `make_runs`. pictures: from `draw_overlays`.
+    """
+    errors = measured(runs)
+    title = _title(runs)
+    failures = [f"{run.label}: {run.result.failure}" for run in runs if run.result.failure]
+    return page(
+        title,
+        [
+            f"<header>\n<h1>{escape(title)}</h1>\n{paragraph(_lead(runs))}{facts(_facts(runs, errors))}\n</header>",
+            box("failure", "Not all runs came to their end", bullets(failures)) if failures else "",
+            chapters(
+                {
+                    "Runs": [_runs_table(runs)],
+                    "Errors, phase by phase": _numbers(runs, errors, ERROR_HEADINGS, "Estimate minus true value."),
+                    "Figures": [picture(p.png, p.title, p.caption) for p in pictures],
+                    "More, phase by phase": _details(runs),
+                    "What differs between the runs": _differences(runs),
+                    "Notes": [bullets(_notes(runs))],
+                }
+            ),
+        ],
+    )
+
+
+def _title(runs: Sequence[Run]) -> str:
+    titles = list(dict.fromkeys(run.spec.title for run in runs))
+    return f"{titles[0]}: {len(runs)} runs" if len(titles) == 1 else f"{len(runs)} runs over each other"
+
+
+def _lead(runs: Sequence[Run]) -> str:
+    others = ", ".join(run.label for run in runs[1:])
+    return f"{runs[0].label} is what the others are compared with: {others}." if others else ""
+
+
+def _facts(runs: Sequence[Run], errors: Sequence[Measured]) -> list[Fact]:
+    ended = sum(run.result.failure is None for run in runs)
+    complete: Fact = ("Runs", f"{ended} of {len(runs)} complete", "", "good" if ended == len(runs) else "bad")
+    different = differences(runs)
+    settings: Fact = ("Settings that differ", str(len(different)), "see below" if different else "none is known", "")
+    return [complete, settings, *_largest_changes(runs, errors)]
+
+
+def _largest_changes(runs: Sequence[Run], errors: Sequence[Measured]) -> list[Fact]:
+    """Where the rms speed error rose most and fell most, relative to the first run."""
+    changes = []
+    for row in errors:
+        first = row.values.get(runs[0].label, (None,) * len(ERROR_HEADINGS))[RMS_SPEED]
+        for run in runs[1:]:
+            now = row.values.get(run.label, (None,) * len(ERROR_HEADINGS))[RMS_SPEED]
+            if first and now is not None and isfinite(first):
+                changes.append((now / first - 1, now, f"{row.observer}, {row.phase}, {run.label}"))
+    found: list[Fact] = []
+    for name, mood, worst in (
+        ("Largest rise of rms speed error", "doubt", max),
+        ("Largest fall of rms speed error", "good", min),
+    ):
+        change, now, where = worst(changes, default=(0.0, 0.0, ""))
+        if change != 0 and (change > 0) == (worst is max):
+            size = f"{'+' if change > 0 else '−'}{number(100 * abs(change))} %" if isfinite(change) else "diverged"
+            found.append((name, size, f"to {error_number(now)} m/s: {where}", mood))
+    return found
+
+
+def _runs_table(runs: Sequence[Run]) -> str:
+    head = ["Run", "Scenario", "From [s]", "To [s]", "Step [ms]", "Rows", "Wall time [s]", "Made"]
+    rows = []
+    for run in runs:
+        summary, time = run.result.summary, run.result.time
+        step = number_entry(summary, "step")
+        rows.append(
+            [
+                run.label, str(summary.get("scenario") or DASH), number(float(time[0])), number(float(time[-1])),
+                DASH if step is None else number(1000 * step), str(len(time)), number(number_entry(summary, "wall_seconds")),
+                str(summary.get("created") or DASH),
+            ]
+        )  # fmt: skip
+    return simple_table(head, rows, range(2, 7))
+
+
+def _numbers(runs: Sequence[Run], rows: Sequence[Measured], names: Sequence[str], text: str) -> list[str]:
+    """A group of rows for each observer and phase, in it one row for each run."""
+    shown, kept = headings(rows, names)
+    if not shown:
+        return []
+    reference = runs[0].label
+    groups = []
+    for row in rows:
+        first = row.values.get(reference)
+        lines = [[name, *(_cell(values[i], first, i, name == reference) for i in kept)] for name, values in row.values.items()]
+        groups.append((f"{row.observer}, {row.phase}", lines))
+    said = f"{text} Below each number: the difference to {reference}.".strip()
+    return [paragraph(said), grouped_table(["Observer and phase", "Run", *shown], groups)]
+
+
+def _details(runs: Sequence[Run]) -> list[str]:
+    content = "\n".join(_numbers(runs, detailed(runs), DETAIL_HEADINGS, ""))
+    return [details("Slip, forces, errors around telegrams, indicators", content)] if content else []
+
+
+def _cell(value: float | None, first: Sequence[float | None] | None, index: int, is_first: bool) -> str:
+    return cell(value, None if is_first or first is None else first[index])
+
+
+def _differences(runs: Sequence[Run]) -> list[str]:
+    rows = differences(runs)
+    head = ["What", *(run.label for run in runs)]
+    rest = rows[DIFFERENCES_SHOWN:]
+    more = details(f"{len(rest)} more", simple_table(head, rest))
+    said = (
+        "" if rows else "Nothing the summaries tell of differs: settings, parameters, FMUs, telegrams and versions are the same."
+    )
+    return [paragraph(said), paragraph(layout_note(runs)), simple_table(head, rows[:DIFFERENCES_SHOWN]), more]
+
+
+def _notes(runs: Sequence[Run]) -> list[str]:
+    """What the reader must know before comparing."""
+    notes = []
+    first = runs[0]
+    judged = [run.label for run in runs[1:] if list(run.own_spec.phases) != list(first.own_spec.phases)]
+    if judged:
+        notes.append(f"{', '.join(judged)} named other phases; all are judged over those of {first.label}.")
+    late = [run.label for run in runs[1:] if run.own_spec.evaluate_after != first.own_spec.evaluate_after]
+    if late:
+        notes.append(f"{', '.join(late)} were to be evaluated from another instant on; that of {first.label} is used.")
+    short = [run.label for run in runs if abs(float(run.result.time[-1] - first.result.time[-1])) > 0.0]
+    if short:
+        notes.append(f"{', '.join(short)} end at another time than {first.label}: phases beyond the end hold less, or nothing.")
+    return [*notes, *dict.fromkeys(f"{run.label}: {note}" for run in runs for note in run.own_spec.notes if run is first)]

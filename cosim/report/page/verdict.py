@@ -1,0 +1,87 @@
+"""What a report says first: how the run ended and the few numbers that matter. Imports NumPy only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from cosim.report.event_counts import count_events
+from cosim.report.facts import list_entry, mapping_entry, number_entry
+from cosim.report.metrics import error_size
+from cosim.report.numbers import error_number, number
+from cosim.report.roles import Quantity, estimation_error, label
+from cosim.report.spec import ReportSpec
+from cosim.results.result import Result
+
+Fact = tuple[str, str, str, str]
+"""Name, value, remark, mood."""
+
+
+def verdict_facts(result: Result, spec: ReportSpec) -> list[Fact]:
+    """The facts at the head of a report, the most important first.
+
+    Args:
+        result: the run. spec: roles.
+    """
+    facts: list[Fact | None] = [_ending(result), _expectations(result)]
+    facts += [_error(result, spec, "speed", "m/s"), _error(result, spec, "position", "m")]
+    facts += [_telegrams(result), _certificates(result), _warnings(result)]
+    return [fact for fact in facts if fact is not None]
+
+
+def _ending(result: Result) -> Fact:
+    reached = number(float(result.time[-1])) if len(result.time) else "0"
+    if result.failure:
+        stop = number_entry(result.summary, "stop")
+        return "Run", "ended early", f"at {reached} s" + (f" of {number(stop)} s" if stop is not None else ""), "bad"
+    return "Run", "complete", f"to {reached} s", "good"
+
+
+def _expectations(result: Result) -> Fact | None:
+    judged = [entry for entry in list_entry(result, "expectations") if isinstance(entry, Mapping)]
+    if not judged:
+        return None
+    met = sum(entry.get("passed") is True for entry in judged)
+    return "Expectations", f"{met} of {len(judged)} met", "", "good" if met == len(judged) else "bad"
+
+
+def _error(result: Result, spec: ReportSpec, quantity: Quantity, unit: str) -> Fact | None:
+    """The largest error of the best observer, which says what is possible here."""
+    settled = result.time >= spec.evaluate_after
+    found = {o: e for o in spec.observers if (e := estimation_error(result, spec, o, quantity)) is not None}
+    sizes = {o: error_size(result.time[settled], e[settled]).max_abs for o, e in found.items()} if settled.any() else {}
+    if not sizes:
+        return None
+    best = min(sizes, key=lambda o: sizes[o])
+    among = f", the best of {len(sizes)}" if len(sizes) > 1 else ""
+    value = f"{error_number(sizes[best])} {unit}" if np.isfinite(sizes[best]) else error_number(sizes[best])
+    return f"Largest {quantity} error", value, label(spec, best) + among, ""
+
+
+def _telegrams(result: Result) -> Fact | None:
+    if not result.events:
+        return None
+    counts = count_events(result.events)
+    wrong = counts.false + counts.missed
+    remark = f"{counts.false} false, {counts.missed} missed"
+    return "Balise telegrams", f"{counts.told} told", remark, "doubt" if wrong else ""
+
+
+def _certificates(result: Result) -> Fact | None:
+    known = [entry.get("holds") for entry in mapping_entry(result, "certificates").values() if isinstance(entry, Mapping)]
+    judged = [str(holds) for holds in known if holds is not None]
+    if not judged:
+        return None
+    holding = judged.count("True")
+    return (
+        "Certificates",
+        f"{holding} of {len(judged)} hold",
+        "for the gaps expected",
+        "good" if holding == len(judged) else "doubt",
+    )
+
+
+def _warnings(result: Result) -> Fact | None:
+    count = len(list_entry(result, "warnings"))
+    return ("Warnings", str(count), "see below", "doubt") if count else None

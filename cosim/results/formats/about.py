@@ -1,0 +1,57 @@
+"""What a result is beside its table, as plain data for the formats that have room for it. Touches no file."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from cosim.results.events_file import NUMBERS, record_from_row, record_row
+from cosim.results.result import BaliseRecord, Result, SignalInfo
+from cosim.results.summary_file import jsonable, restored
+from cosim.results.table_layout import column_names
+
+BLOCK = 1 << 25  # bytes of a table that are turned over at a time: it may be larger than the memory
+_FROM_JSON = {None: math.nan, "inf": math.inf, "-inf": -math.inf}
+
+
+def signals_of(result: Result) -> list[SignalInfo]:
+    """What each column but ``time`` is, in the order of the table.
+
+    Raises:
+        ValueError: the table is not a result table.
+    """
+    known = {signal.name: signal for signal in result.signals}
+    return [known.get(name, SignalInfo(name)) for name in column_names(result.table)[1:]]
+
+
+def blocks(table: np.ndarray, size: int = BLOCK) -> Iterator[tuple[int, np.ndarray]]:
+    """Number of the first row and rows of a table, piece by piece; at least one piece, which may be empty."""
+    rows = max(size // table.dtype.itemsize, 1)
+    for start in range(0, max(len(table), 1), rows):
+        yield start, np.asarray(table[start : start + rows])
+
+
+def about_text(result: Result) -> str:
+    """Telegrams, summary and failure as JSON."""
+    content = {"events": [record_row(e) for e in result.events], "summary": result.summary, "failure": result.failure}
+    return json.dumps(jsonable(content), ensure_ascii=False, allow_nan=False)
+
+
+def with_about(table: np.ndarray, signals: list[SignalInfo], text: str) -> Result:
+    """The result of a table and what `about_text` told; NaN in the summary has become None.
+
+    Raises:
+        KeyError, TypeError, ValueError: the text is none of ours.
+    """
+    content = json.loads(text)
+    events = [_record(row) for row in content["events"]]
+    summary = {"events_recorded": True, **restored(content["summary"])}
+    return Result(table, signals, events, summary, content["failure"])
+
+
+def _record(row: Mapping[str, Any]) -> BaliseRecord:
+    return record_from_row({n: _FROM_JSON.get(v, v) if n in NUMBERS else v for n, v in row.items()})

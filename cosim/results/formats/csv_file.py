@@ -1,0 +1,68 @@
+"""Tables as CSV, to the last bit and readable by ``fmpy.util.read_csv``. Touches only the file it is given.
+
+The first line holds the quoted names. Numbers are the shortest decimals that read back as the same float64, so nothing
+is lost; rows with the same time (before and after an event) stay as they are. Only the payload bits of a NaN are not
+kept. FMPy splits lines at every comma, so names such as ``a[1,2]`` are read by `read_csv` but not by FMPy.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+
+from cosim.results.table_layout import column_names, table_dtype
+
+CHUNK = 4096  # rows turned into Python floats at a time, so that memory stays flat
+
+
+def write_csv(path: str | Path, table: np.ndarray, headings: Sequence[str] | None = None) -> None:
+    """Write a result table as CSV.
+
+    Args:
+        path: file to write.
+        table: structured array, shape (rows,), float64 fields, ``time`` first.
+        headings: what to write above the columns instead of their names, e.g. names with units.
+
+    Raises:
+        ValueError: `table` is not a result table.
+        OSError: the file cannot be written.
+    """
+    names = column_names(table)
+    with Path(path).open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file, quoting=csv.QUOTE_ALL, lineterminator="\n").writerow(headings or names)
+        for start in range(0, len(table), CHUNK):
+            rows = table[start : start + CHUNK].tolist()
+            file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
+
+
+def read_csv(path: str | Path) -> np.ndarray:
+    """Read a table written by `write_csv`.
+
+    Args:
+        path: file to read.
+
+    Returns:
+        The structured array that was written, bit by bit.
+
+    Raises:
+        ValueError: the file is not such a table; the message says where.
+        OSError: the file cannot be read.
+    """
+    with Path(path).open(encoding="utf-8", newline="") as file:
+        names = next(csv.reader(file), [])
+        if not names or names[0] != "time":
+            raise ValueError(f"{path} is not a result table: its first column must be 'time', got {names[:1]}.")
+        first = file.readline()
+        if not first:
+            return np.empty(0, table_dtype(names))
+        try:
+            values = np.loadtxt(chain([first], file), delimiter=",", ndmin=2, comments=None)
+        except ValueError as error:
+            raise ValueError(f"{path} is not a result table: {error}") from error
+    if values.shape[1] != len(names):
+        raise ValueError(f"{path} is not a result table: {len(names)} names but {values.shape[1]} numbers in a row.")
+    return values.view(table_dtype(names))[:, 0]

@@ -1,0 +1,171 @@
+"""Results as HDF5, to the last bit: for MATLAB's ``h5read``, xarray, Julia. Touches only the file it is given.
+
+A dataset each for ``time`` and every signal with the attributes ``unit``, ``units`` (the name xarray knows), ``variability``,
+``description`` and, where there is one, ``display_unit``; ``time`` is the dimension scale of all. The group ``events`` holds the
+telegrams, a dataset each column. Summary and failure are attributes of the file, the summary as JSON.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim.errors import OutputError
+from cosim.results.events_file import COLUMNS, NUMBERS, record_from_row, record_row
+from cosim.results.formats.about import BLOCK, blocks, signals_of
+from cosim.results.formats.columns import result_of_columns
+from cosim.results.formats.guarded_file import GuardedFile
+from cosim.results.optional import optional_module
+from cosim.results.result import BaliseRecord, Result, SignalInfo
+from cosim.results.summary_file import jsonable, restored
+from cosim.results.table_layout import table_dtype
+
+LAYOUT = "fmu-observer result 1"
+TIME, EVENTS = "time", "events"
+CHUNK = 16384  # rows compressed together at most
+FEW = 256  # rows that are not worth it
+
+
+def _h5py() -> Any:
+    return optional_module("h5py", "hdf5", "HDF5 files")
+
+
+def write_hdf5(path: str | Path, result: Result) -> None:
+    """Write a result; a table larger than the memory is written block by block.
+
+    Args:
+        path: file to write. result: what to write; its messages are not part of the file.
+
+    Raises:
+        ValueError: the table is not a result table.
+        OutputError: h5py is not installed. OSError: the file cannot be written.
+    """
+    signals = signals_of(result)
+    chunk = min(CHUNK, max(BLOCK // result.table.dtype.itemsize, 1))
+    options = {"libver": ("v108", "latest"), "rdcc_nbytes": 8 * chunk}  # it keeps so much of each column
+    h5py = _h5py()
+    with GuardedFile(path) as target, h5py.File(target, "w", **options) as file:
+        file.attrs["layout"] = LAYOUT
+        file.attrs["summary"] = json.dumps(jsonable(result.summary), ensure_ascii=False, allow_nan=False)
+        if result.failure is not None:
+            file.attrs["failure"] = result.failure
+        datasets = _columns(file, len(result.table), chunk, signals)
+        for start, rows in blocks(result.table):
+            for field, dataset in zip(result.table.dtype.names or (), datasets, strict=True):
+                dataset[start : start + len(rows)] = rows[field]
+        _write_events(file.create_group(EVENTS), result.events)
+
+
+def _columns(file: Any, rows: int, chunk: int, signals: Sequence[SignalInfo]) -> list[Any]:
+    """Empty datasets of time and signals, `chunk` rows compressed together."""
+    storage = {"chunks": (min(rows, chunk),), "compression": "gzip", "compression_opts": 1, "shuffle": True} if rows > FEW else {}
+    time = file.create_dataset(TIME, (rows,), "f8", **storage)
+    time.make_scale(TIME)
+    time.attrs.update({"unit": "s", "units": "s", "description": "time"})
+    datasets, taken = [time], {TIME, EVENTS}
+    for place, signal in enumerate(signals):
+        name = _dataset_name(signal.name, taken)
+        dataset = file.create_dataset(name, (rows,), "f8", **storage)
+        dataset.dims[0].attach_scale(time)
+        dataset.attrs.update({"column": place, "unit": signal.unit, "units": signal.unit, "variability": signal.variability})
+        dataset.attrs["description"] = signal.description
+        if signal.description:
+            dataset.attrs["long_name"] = signal.description  # as xarray calls it
+        if signal.display_unit is not None:
+            dataset.attrs["display_unit"] = signal.display_unit
+        if name != signal.name:
+            dataset.attrs["name"] = signal.name
+        datasets.append(dataset)
+    return datasets
+
+
+def _dataset_name(name: str, taken: set[str]) -> str:
+    """A name that HDF5 takes: a slash would make a group, and ``.`` is the group itself."""
+    plain = name.replace("/", "|") if name.strip(".") else f"signal {name}".rstrip()
+    while plain in taken:
+        plain += "_"
+    taken.add(plain)
+    return plain
+
+
+def _write_events(group: Any, events: Sequence[BaliseRecord]) -> None:
+    text = _h5py().string_dtype()
+    rows = [record_row(event) for event in events]
+    for name in COLUMNS:
+        group.create_dataset(name, data=[row[name] for row in rows], dtype="f8" if name in NUMBERS else text, shape=(len(rows),))
+
+
+def read_hdf5(path: str | Path) -> Result:
+    """Read a file of `write_hdf5`, bit by bit, or of another tool: vectors of numbers, one of them ``time``; groups become names.
+
+    Raises:
+        OutputError: there is nothing of that kind in it, or h5py is not installed.
+        ValueError: the file is broken. OSError: it cannot be read.
+    """
+    h5py = _h5py()
+    try:
+        with h5py.File(path, "r") as file:
+            return _ours(file) if _text(file.attrs.get("layout")) == LAYOUT else _foreign(str(path), file)
+    except OSError as error:
+        if Path(path).is_file():
+            raise ValueError(f"{path} is not an HDF5 file that can be read: {error}") from error
+        raise
+
+
+def _ours(file: Any) -> Result:
+    found = [dataset for name, dataset in file.items() if name not in (TIME, EVENTS)]
+    datasets = sorted(found, key=lambda dataset: int(dataset.attrs["column"]))
+    signals = [_signal(dataset) for dataset in datasets]
+    table = np.empty(len(file[TIME]), table_dtype([TIME, *(s.name for s in signals)]))
+    for name, dataset in zip(table.dtype.names or (), [file[TIME], *datasets], strict=True):
+        table[name] = dataset[:]
+    columns = {n: file[EVENTS][n][:].tolist() if n in NUMBERS else file[EVENTS][n].asstr()[:].tolist() for n in COLUMNS}
+    events = [record_from_row(dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)]
+    summary = {"events_recorded": True, **restored(json.loads(file.attrs["summary"]))}
+    return Result(table, signals, events, summary, _text(file.attrs.get("failure")))
+
+
+def _signal(dataset: Any) -> SignalInfo:
+    known = {key: _text(dataset.attrs[key]) for key in dataset.attrs if key not in ("DIMENSION_LIST", "column")}
+    return SignalInfo(
+        known.get("name") or dataset.name.removeprefix("/"), known["unit"] or "1", known.get("display_unit"),
+        "discrete" if known["variability"] == "discrete" else "continuous", known["description"] or "",
+    )  # fmt: skip
+
+
+def _text(value: Any) -> str | None:
+    """An attribute as text: other tools write bytes, or arrays of one text."""
+    if isinstance(value, np.ndarray):
+        value = value.ravel()[0] if value.size == 1 else None
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else None if value is None else str(value)
+
+
+def _foreign(source: str, file: Any) -> Result:
+    """Vectors as long as that of time, wherever they are; text and matrices are left out."""
+    vectors: dict[str, Any] = {}
+
+    def collect(name: str, item: Any) -> None:
+        shape = getattr(item, "shape", None)
+        if shape and math.prod(shape) == max(shape) and item.dtype.kind in "biuf":
+            vectors[name.replace("/", ".")] = item
+
+    file.visititems(collect)
+    named = [name for name in vectors if name.rpartition(".")[2].lower() in ("time", "t")]
+    time = min(named, key=lambda name: (name.count("."), len(name) == 1), default="")
+    if not time:
+        held = ", ".join(list(vectors)[:8]) or "no vectors of numbers"
+        raise OutputError(f"{source}: there is no vector 'time'; it holds: {held}.")
+    kept = {name: item for name, item in vectors.items() if item.size == vectors[time].size}
+    names = ["time" if name == time else name for name in kept]
+    units = {name: _unit(item.attrs) for name, item in zip(names, kept.values(), strict=True)}
+    columns = [np.asarray(item[()], np.float64).ravel() for item in kept.values()]
+    return result_of_columns(source, names, columns, units)
+
+
+def _unit(attributes: Any) -> str | None:
+    return next((_text(attributes[key]) for key in ("units", "unit", "UNIT") if key in attributes), None)

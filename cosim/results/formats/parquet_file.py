@@ -1,0 +1,113 @@
+"""Results as Apache Parquet, to the last bit: for pandas, Polars, MATLAB's ``parquetread``. Touches only the file it is given.
+
+A column each for ``time`` and every signal; ``unit``, ``display_unit``, ``variability`` and ``description`` are the metadata of
+its field. The metadata of the file holds telegrams, summary and failure as JSON under ``fmu-observer``, and units by name where
+pandas looks for ``DataFrame.attrs``.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim.errors import OutputError
+from cosim.results.formats.about import about_text, blocks, signals_of, with_about
+from cosim.results.formats.columns import result_of_columns
+from cosim.results.optional import optional_module
+from cosim.results.result import Result, SignalInfo
+from cosim.results.table_layout import table_dtype
+
+ABOUT = b"fmu-observer"
+
+
+def _modules() -> tuple[Any, Any]:
+    arrow, parquet = (optional_module(name, "parquet", "Parquet files") for name in ("pyarrow", "pyarrow.parquet"))
+    return arrow, parquet
+
+
+def write_parquet(path: str | Path, result: Result) -> None:
+    """Write a result; a table larger than the memory is written block by block.
+
+    Args:
+        path: file to write. result: what to write; its messages are not part of the file.
+
+    Raises:
+        ValueError: the table is not a result table.
+        OutputError: pyarrow is not installed. OSError: the file cannot be written.
+    """
+    arrow, parquet = _modules()
+    signals = signals_of(result)
+    fields = [arrow.field("time", arrow.float64(), nullable=False, metadata={"unit": "s", "description": "time"})]
+    fields += [arrow.field(s.name, arrow.float64(), nullable=False, metadata=_metadata(s)) for s in signals]
+    units = {"units": {"time": "s"} | {s.name: s.unit for s in signals}}
+    schema = arrow.schema(fields, metadata={ABOUT: about_text(result), "PANDAS_ATTRS": json.dumps(units, ensure_ascii=False)})
+    names = result.table.dtype.names or ()
+    with Path(path).open("wb") as file, parquet.ParquetWriter(file, schema, use_dictionary=False, compression="snappy") as writer:
+        for _, rows in blocks(result.table):
+            columns = [arrow.array(np.ascontiguousarray(rows[name])) for name in names]
+            writer.write_table(arrow.Table.from_arrays(columns, schema=schema))
+
+
+def _metadata(signal: SignalInfo) -> dict[str, str]:
+    known = {"unit": signal.unit, "variability": signal.variability, "description": signal.description}
+    return known | ({} if signal.display_unit is None else {"display_unit": signal.display_unit})
+
+
+def read_parquet(path: str | Path) -> Result:
+    """Read a file of `write_parquet`, bit by bit, or of another tool: columns of numbers, one of them ``time``.
+
+    Raises:
+        OutputError: a column holds no numbers, or pyarrow is not installed; the message names the column.
+        ValueError: the file is broken. OSError: it cannot be read.
+    """
+    arrow, parquet = _modules()
+    with Path(path).open("rb") as source:
+        try:
+            file = parquet.ParquetFile(source)
+            about = (file.schema_arrow.metadata or {}).get(ABOUT)
+            return _foreign(str(path), file.read()) if about is None else _ours(file, about.decode())
+        except arrow.ArrowException as error:
+            raise ValueError(f"{path} is not a Parquet file that can be read: {error}") from error
+
+
+def _ours(file: Any, about: str) -> Result:
+    schema = file.schema_arrow
+    table = np.empty(file.metadata.num_rows, table_dtype(schema.names))
+    start = 0
+    for batch in file.iter_batches():
+        for name, column in zip(schema.names, batch.columns, strict=True):
+            table[name][start : start + len(batch)] = column.to_numpy(zero_copy_only=False)
+        start += len(batch)
+    return with_about(table, [_signal(field) for field in schema][1:], about)
+
+
+def _signal(field: Any) -> SignalInfo:
+    known = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
+    kept = {key: known[key] for key in ("display_unit", "variability", "description") if key in known}
+    return SignalInfo(field.name, known.get("unit") or known.get("units") or "1", **kept)
+
+
+def _foreign(source: str, table: Any) -> Result:
+    described = {field.name: _signal(field) for field in table.schema}
+    columns = [_column(source, name, table.column(place)) for place, name in enumerate(table.column_names)]
+    attributes = json.loads((table.schema.metadata or {}).get(b"PANDAS_ATTRS", b"{}"))
+    units = attributes.get("units", {}) if isinstance(attributes, dict) else {}
+    known = {n: units.get(n) or (described[n].unit if described[n].unit != "1" else None) for n in table.column_names}
+    return result_of_columns(source, table.column_names, columns, known, lambda name: described[name])
+
+
+def _column(source: str, name: str, column: Any) -> np.ndarray:
+    """A column as float64: missing values are NaN, durations seconds."""
+    arrow, _ = _modules()
+    kind = column.type
+    if arrow.types.is_duration(kind):
+        column = column.cast(arrow.duration("ns"), safe=False).cast(arrow.int64())
+        return np.asarray(column.to_numpy(), np.float64) / 1e9
+    if arrow.types.is_boolean(kind):
+        column = column.cast(arrow.uint8())
+    elif not (arrow.types.is_integer(kind) or arrow.types.is_floating(kind) or arrow.types.is_decimal(kind)):
+        raise OutputError(f"{source}: column {name!r} must hold numbers, got {kind}. Leave it out.")
+    return np.asarray(column.cast(arrow.float64(), safe=False).to_numpy())

@@ -1,0 +1,174 @@
+"""The stream: the results folder of a run that is still going on, so that what was computed outlives the program.
+
+``table.npy`` is a whole NumPy file after every flush: rows are written first, their number in its header afterwards. Rows are
+in SI. Telegrams are appended, messages are few and written anew. Until the run ends ``summary.json`` says that it has not.
+Touches only the folder it is given.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+import numpy as np
+
+from cosim.diagnostics.messages import MessageLog, in_order, write_messages
+from cosim.errors import OutputError
+from cosim.results.events_file import record_row, write_events
+from cosim.results.folder import EVENTS, LAYOUT, MESSAGES, SUMMARY, TABLES, check_writable
+from cosim.results.formats.growing_npy import growing_header
+from cosim.results.result import BaliseRecord, SignalInfo
+from cosim.results.row_file import RowFile
+from cosim.results.si import UnitOf, convert, described, foreign_units
+from cosim.results.summary_file import write_summary
+from cosim.results.unfinished import EXPLAINED
+
+SECONDS = 1.0
+"""What was recorded is in the folder after so long at the latest [s]."""
+
+SYNC_SECONDS = 10.0
+"""What is in the folder is on the disk itself after so long at the latest [s], should the power fail."""
+
+
+class Stream:
+    """A results folder that grows with its run.
+
+    Args:
+        directory: the folder; results that a former run left there are removed.
+        signals: what is recorded, in the components' own units. unit_of: the unit of a column, None where there is none.
+        summary: what is known before the run.
+        events: the telegrams so far, which only grow. logs: what the components have logged so far.
+
+    `signals` describes the columns as they are in the file, in SI; `units` are those of the columns that are converted.
+
+    Raises:
+        OutputError: the folder cannot be written.
+    """
+
+    def __init__(
+        self, directory: str | Path, signals: Sequence[SignalInfo], unit_of: UnitOf, summary: Mapping[str, Any],
+        events: Callable[[], Sequence[BaliseRecord]], logs: Sequence[MessageLog],
+    ) -> None:  # fmt: skip
+        self.seconds = SECONDS
+        self.directory = check_writable(directory)
+        self.units = foreign_units(signals, unit_of)
+        self.signals = described(signals, self.units)
+        self._events, self._logs = events, logs
+        self._told = self._logged = 0
+        self._file: _StreamFile | None = None
+        self._begin(summary)
+
+    def open(self, dtype: np.dtype[np.void], rows: int) -> RowFile:
+        """The file of the table, with space for so many rows.
+
+        Raises:
+            OutputError: there is no space.
+        """
+        self._file = _StreamFile(self.directory / TABLES["npy"], dtype, rows, self)
+        return self._file
+
+    def append(self) -> None:
+        """Bring the telegrams and messages into the folder that are not there yet.
+
+        Raises:
+            OSError: the disk refuses.
+        """
+        events = self._events()
+        if len(events) > self._told:
+            text = io.StringIO()
+            csv.writer(text, lineterminator="\n").writerows(_cells(event) for event in events[self._told :])
+            with (self.directory / EVENTS).open("a", encoding="utf-8", newline="") as file:
+                file.write(text.getvalue())
+            self._told = len(events)
+        total = sum(log.total for log in self._logs)
+        if total > self._logged:
+            draft = self.directory / f".{MESSAGES}"
+            write_messages(draft, in_order(self._logs))
+            draft.replace(self.directory / MESSAGES)
+            self._logged = total
+
+    def finish(self) -> None:
+        """Give back the space that was reserved and not used; what is in the folder stays."""
+        if self._file is not None:
+            self._file.finish()
+
+    def _begin(self, summary: Mapping[str, Any]) -> None:
+        """An empty result that says it has not ended; while its parts are brought together the folder has no summary."""
+        folder = self.directory
+        try:
+            for name in (SUMMARY, "report.html", *TABLES.values()):
+                (folder / name).unlink(missing_ok=True)
+            write_events(folder / EVENTS, ())
+            write_messages(folder / MESSAGES, ())
+            content = {"layout": LAYOUT, "ended": False, "failure": EXPLAINED, "signals": self.signals, "summary": dict(summary)}
+            write_summary(folder / SUMMARY, content)
+        except OSError as error:
+            raise OutputError(f"Results cannot be streamed to {folder}: {error.strerror or error}.") from error
+
+
+class _StreamFile(RowFile):
+    """The table of a stream: a NumPy file with its number of rows kept true."""
+
+    def __init__(self, path: Path, dtype: np.dtype[np.void], rows: int, stream: Stream) -> None:
+        self._dtype, self._stream, self._path = dtype, stream, path
+        self._synced = monotonic()
+        self._broken: OSError | None = None
+        super().__init__(None, dtype.itemsize, rows, path, len(growing_header(dtype, 0)))
+        self._make_whole()
+
+    def reserve(self, rows: int) -> None:
+        """As for any file of rows."""
+        if self._broken is not None:
+            raise self._explained(self._broken) from self._broken
+        super().reserve(rows)
+
+    def write(self, first: int, rows: np.ndarray) -> None:
+        """As for any file of rows; afterwards the folder holds a whole result."""
+        own = rows.copy()
+        convert(own.view(self._dtype)[:, 0], self._stream.units)
+        super().write(first, own)
+        self._make_whole()
+
+    def converted(self, rows: np.ndarray) -> np.ndarray:
+        """Structured rows as they would stand in the file."""
+        own = rows.copy()
+        convert(own, self._stream.units)
+        return own
+
+    def table(self, dtype: np.dtype[np.void]) -> np.ndarray:
+        """All rows as a structured array that is a map of the file and cannot be changed, shape (count,)."""
+        if not self.count:
+            return np.empty(0, dtype)
+        return np.memmap(self._path, dtype=dtype, mode="r", offset=self._offset, shape=(self.count,))
+
+    def finish(self) -> None:
+        """Cut off what is reserved."""
+        self._file.truncate(self._offset + self.count * self._row_bytes)
+        self._reserved = 0
+
+    def _make_whole(self) -> None:
+        """What goes with the rows. The rows are safe by now: what the disk refuses here ends the run before it takes more."""
+        try:
+            if monotonic() - self._synced > SYNC_SECONDS:
+                os.fsync(self._file.fileno())
+                self._synced = monotonic()
+            self._file.seek(0)
+            self._file.write(growing_header(self._dtype, self.count))
+            self._stream.append()
+        except OSError as error:
+            self._broken = error
+
+    def _explained(self, error: OSError) -> OutputError:
+        return OutputError(
+            f"The run cannot be streamed to {self._folder} any further: {error.strerror or error}. What was recorded so far is "
+            "kept. Free the disk, choose another folder, or record less (record_every)."
+        )
+
+
+def _cells(event: BaliseRecord) -> list[str]:
+    return [repr(value) if isinstance(value, float) else value for value in record_row(event).values()]

@@ -1,0 +1,47 @@
+"""Reading what is left of a run that was streamed and did not end. Touches only the files it is given."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from cosim.diagnostics.messages import read_messages
+from cosim.results.events_file import read_events
+from cosim.results.formats.growing_npy import read_grown
+from cosim.results.result import BaliseRecord, Result, SignalInfo
+
+DID_NOT_END = "the run did not end"
+EXPLAINED = (
+    f"{DID_NOT_END}: it is still going on, or its program was stopped from outside or taken along by an FMU. The rows are those "
+    "written until then."
+)
+
+
+def read_unfinished(table: Path, events: Path, messages: Path, content: dict[str, Any]) -> Result:
+    """Everything that was whole when the program died.
+
+    Args:
+        table, events, messages: the files. content: of ``summary.json``; how far the run came is added to it.
+
+    Raises:
+        ValueError: a file is not what a stream writes. OSError: it cannot be read.
+    """
+    rows = read_grown(table)
+    reached = float(rows["time"][-1]) if len(rows) else None
+    content["summary"] |= {"reached": reached, "rows": len(rows)}
+    content["failure"] = f"{content['failure']} They " + ("are none." if reached is None else f"end at t = {reached:g} s.")
+    signals = [SignalInfo(**signal) for signal in content["signals"]]
+    logged = read_messages(messages) if messages.exists() else []
+    return Result(rows, signals, _whole_lines(events), messages=logged)
+
+
+def _whole_lines(path: Path) -> list[BaliseRecord]:
+    """The telegrams but for a last line that was not written to its end."""
+    content = path.read_bytes()
+    if content.endswith(b"\n") or b"\n" not in content:
+        return read_events(path)
+    with tempfile.TemporaryDirectory() as scratch:
+        whole = Path(scratch) / path.name
+        whole.write_bytes(content[: content.rindex(b"\n") + 1])
+        return read_events(whole)

@@ -1,0 +1,65 @@
+"""Overrides: one value of a scenario's tables set by its name, as ``--set``, ``[overrides]`` and `Scenario.set` do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from cosim.errors import ScenarioError, nearest
+from cosim.scenario.tables import ComponentTable
+
+TABLES = ("balises", "master", "report")
+COMPONENT_KEYS = {field.alias or name for name, field in ComponentTable.model_fields.items()}
+INNER = ("options", "parameters")
+
+
+def override(tables: dict[str, Any], name: str, value: Any) -> tuple[str, ...]:
+    """Set one value.
+
+    Args:
+        tables: keys of a scenario, changed in place.
+        name: ``component.parameter``, ``component.key``, ``component.options.name``, ``balises.key``, ``master.key``,
+            ``report.key``, or a top-level key such as ``stop``. value: what it becomes.
+
+    Returns:
+        The path of keys to the value.
+
+    Raises:
+        ScenarioError: there is no such component or table.
+    """
+    head, dot, rest = name.partition(".")
+    if not dot:
+        tables[name] = value
+        return (name,)
+    components = tables.get("components")
+    if isinstance(components, dict) and head in components:
+        keys = ("components", head, *_component_key(rest))
+    elif head in TABLES:
+        keys = (head, *rest.split("."))
+    else:
+        known = [*(components or ()), *TABLES]
+        raise ScenarioError(f"cannot set {name!r}: no component {head!r}; {nearest(head, known)}")
+    node = tables
+    for key in keys[:-1]:
+        node = node.setdefault(key, {})
+        if not isinstance(node, dict):
+            raise ScenarioError(f"cannot set {name!r}: {key!r} is no table.")
+    node[keys[-1]] = value
+    return keys
+
+
+def _component_key(rest: str) -> tuple[str, ...]:
+    """Where a name below a component leads: to a key of its table, or to a parameter, whose name may have dots."""
+    if rest in COMPONENT_KEYS:
+        return (rest,)
+    table, dot, name = rest.partition(".")
+    return (table, name) if dot and table in INNER else ("parameters", rest)
+
+
+def flat(tables: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    """Names and values of nested tables: ``[overrides]`` takes ``"plant.mass" = 1.0`` and ``plant.mass = 1.0`` alike."""
+    for name, value in tables.items():
+        if isinstance(value, Mapping):
+            yield from flat(value, f"{before}{name}.")
+        else:
+            yield before + name, value

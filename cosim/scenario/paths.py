@@ -1,0 +1,50 @@
+"""Paths in the tables of a scenario: which keys hold one, and how all of them move to another folder. Touches no files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+COMPONENT_PATHS = ("fmu", "recording")
+BALISE_PATHS = ("file",)
+
+
+def map_paths(tables: Mapping[str, Any], move: Callable[[str], str]) -> dict[str, Any]:
+    """A copy of the tables in which every path has been replaced.
+
+    Args:
+        tables: the keys of a scenario, checked or not: what is not as it should be is left as it is.
+        move: from a path as it is written to the one to write.
+    """
+    moved: dict[str, Any] = deepcopy(dict(tables))
+    components = moved.get("components")
+    for table in components.values() if isinstance(components, dict) else ():
+        _map_keys(table, COMPONENT_PATHS, move)
+    _map_keys(moved.get("balises"), BALISE_PATHS, move)
+    return moved
+
+
+def _map_keys(table: Any, keys: tuple[str, ...], move: Callable[[str], str]) -> None:
+    if not isinstance(table, dict):
+        return
+    for key in keys:
+        if isinstance(table.get(key), str | os.PathLike):
+            table[key] = move(os.fspath(table[key]))
+
+
+def absolute(path: str | Path, folder: str | Path) -> str:
+    """The absolute path of one that is relative to `folder`."""
+    return str((Path(folder) / path).resolve())
+
+
+def relative(path: str | Path, folder: str | Path) -> str:
+    """The path as seen from `folder`, with ``/`` on every system; the absolute one where there is none (another drive)."""
+    place = Path(path)
+    target = place.parent.resolve() / place.name  # a link to a file stays a link
+    try:
+        return Path(os.path.relpath(target, Path(folder).resolve())).as_posix()
+    except ValueError:
+        return target.as_posix()

@@ -1,0 +1,106 @@
+"""An FMU alone as a scenario: its inputs held, or played back from a table. Reads the description, loads nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from fmpy.model_description import DefaultExperiment, ModelDescription
+
+from cosim.components.component import Component
+from cosim.components.loading import describe_fmu
+from cosim.errors import ScenarioError, nearest
+from cosim.scenario.schema import step_count
+
+STEPS = 1000
+"""Communication steps of a run where the FMU does not say how long one should be."""
+SOURCE = "inputs"
+"""Name of the component that plays back the inputs."""
+
+
+def single_tables(
+    path: Path, name: str, start: float | None, stop: float | None, step: float | None,
+    inputs: Mapping[str, Any] | str | Path | None, parameters: Mapping[str, Any], record: Sequence[str],
+) -> tuple[dict[str, Any], list[str]]:  # fmt: skip
+    """The tables of a scenario of one FMU, and what is doubtful about it; arguments as for `Scenario.fmu`.
+
+    Raises:
+        FmuLoadError: the FMU cannot be read.
+        ScenarioError: no end is known, or an input does not exist.
+    """
+    where = path.name
+    component = describe_fmu(path, name)
+    begin, end, length = run_times(component.description, start, stop, step, where)
+    table: dict[str, Any] = {"fmu": str(path.resolve())}
+    tables: dict[str, Any] = {"title": where, "start": begin, "stop": end, "step": length, "components": {name: table}}
+    values = dict(parameters)
+    doubts: list[str] = []
+    if isinstance(inputs, Mapping):
+        _check_inputs(inputs, component, where)
+        values |= inputs
+    elif inputs is not None:
+        source = Path(inputs).resolve()
+        tables["connections"], doubts = _matches(source, component, where)
+        tables["components"] = {SOURCE: {"recording": str(source)}, **tables["components"]}
+        tables["master"] = {"inputs": "interpolate"}  # else the FMU would be told at each step what comes at its end
+    if values:
+        table["parameters"] = values
+    if record:
+        table["record"] = list(record)
+    return tables, doubts
+
+
+def run_times(
+    description: ModelDescription, start: float | None, stop: float | None, step: float | None, where: str
+) -> tuple[float, float, float]:
+    """Start, stop and step [s]: as given, else of the FMU's default experiment; without its step, a thousandth of the run.
+
+    Raises:
+        ScenarioError: there is no stop, or the step does not divide the run.
+    """
+    advised = description.defaultExperiment or DefaultExperiment()
+    begin = _number(advised.startTime) or 0.0 if start is None else start
+    end = _number(advised.stopTime) if stop is None else stop
+    if end is None:
+        raise ScenarioError(f"{where} has no default experiment that says when a run ends; give 'stop' [s].")
+    if step is not None:
+        return begin, end, step
+    length = _number(advised.stepSize)
+    try:
+        step_count(begin, end, length or 0.0)
+    except ValueError:
+        length = None
+    return begin, end, length or (end - begin) / STEPS
+
+
+def _number(value: Any) -> float | None:
+    return None if value in (None, "") else float(value)
+
+
+def _check_inputs(inputs: Mapping[str, Any], component: Component, where: str) -> None:
+    known = [name for name, variable in component.variables.items() if variable.causality == "input"]
+    for name in inputs:
+        if name.partition("[")[0] not in {k.partition("[")[0] for k in known}:
+            raise ScenarioError(f"{where} has no input {name!r}; {nearest(name, known)}")
+
+
+def _matches(source: Path, component: Component, where: str) -> tuple[list[str], list[str]]:
+    """Connections of the columns that are named as inputs are, and a word about the others.
+
+    Raises:
+        ScenarioError: no column is.
+    """
+    from cosim.results.load import load_result  # noqa: PLC0415 - only for those who play back
+
+    columns = [signal.name for signal in load_result(source).signals]
+    inputs = set(component.names("input"))
+    used = [name for name in columns if name in inputs]
+    unused = [name for name in columns if name not in inputs]
+    if not used:
+        raise ScenarioError(
+            f"{source.name}: no column is named as an input of {where}. Columns: {', '.join(columns) or 'none'}; "
+            f"inputs: {', '.join(sorted(inputs)) or 'none'}."
+        )
+    doubts = [f"{source.name}: columns that are no inputs of {where} are not used: {', '.join(unused)}."] if unused else []
+    return [f"{SOURCE}.{name} -> {component.name}.{name}" for name in used], doubts

@@ -1,0 +1,52 @@
+"""Streaming a run of a scenario to a results folder: how the folder says from the first step on what it is made from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cosim.errors import OutputError
+
+if TYPE_CHECKING:
+    from cosim.scenario.origin import Origin
+    from cosim.scenario.outcome import Outcome
+    from cosim.scenario.run import Streaming
+
+
+def streaming_to(directory: str | Path, origin: Origin) -> Streaming:
+    """What a run needs to stream; the folder is made and nothing in it changed yet.
+
+    Args:
+        directory: the results folder. origin: of the run.
+
+    Raises:
+        OutputError: the folder cannot be written.
+    """
+    from cosim.provenance.write import renewed  # noqa: PLC0415 - only for those who stream
+    from cosim.results.folder import check_writable  # noqa: PLC0415 - it loads the formats of results
+
+    def begun() -> None:
+        with renewed(directory, origin) as seal:
+            seal({}, {})
+
+    return check_writable(directory), begun
+
+
+def finish_stream(outcome: Outcome, directory: str | Path, warn: Callable[[str], None]) -> Outcome:
+    """Write what only the end of a run tells. Where the disk refuses, the folder keeps what was streamed, and a warning says so.
+
+    Returns:
+        The outcome, whose table is written as ``npy``, and in other formats only where the scenario asks for them.
+    """
+    assert outcome.origin is not None
+    asked = outcome.tables if "tables" in outcome.origin.table.report.model_fields_set else ()
+    streamed = replace(outcome, tables=("npy",))
+    try:
+        streamed.write(directory, report=False)
+    except OutputError as error:
+        text = f"The folder of the stream could not be brought to an end: {error}"
+        warn(text)
+        streamed = streamed.with_summary(warnings=[*outcome.warnings, text])
+    return replace(streamed, tables=tuple(dict.fromkeys(("npy", *asked))))

@@ -1,0 +1,213 @@
+"""The tables of a scenario file but for the whole one: types, ranges and defaults of every key."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, PlainValidator, Tag, model_validator
+
+from fmu_observer.block import LatePolicy
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
+
+
+def _start(value: Any) -> Any:
+    if isinstance(value, list | tuple):
+        return [_start(entry) for entry in value]
+    if isinstance(value, bool | int | str) or (isinstance(value, float) and math.isfinite(value)):
+        return value
+    raise ValueError(f"expected a finite number, true or false, a text, or a list of them (got {value!r})")
+
+
+Start = Annotated[Any, PlainValidator(_start)]
+"""A number, truth value, text or item of an enumeration, bytes in hexadecimal; a list of them for a vector, nested for arrays."""
+Realisation = Literal["fmu3", "fmu2", "block3", "block2"]
+
+
+class Table(BaseModel):
+    """A table of a scenario file."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True, allow_inf_nan=False)
+
+
+class ComponentTable(Table):
+    """One component: an FMU by path, or a shipped plant, sensor, driver or observer by name."""
+
+    fmu: str | None = None
+    model: str | None = None
+    observer: str | None = None
+    recording: str | None = None
+    component: str | None = None
+    interpolation: Literal["linear", "hold"] = "linear"
+    realisation: Realisation | None = Field(default=None, alias="as")
+    preset: str | None = None
+    options: dict[str, str | int | float | bool] = {}
+    parameters: dict[str, Start] = {}
+    late_policy: LatePolicy = "replay"
+    replay_horizon: Annotated[float, Field(gt=0.0)] = 10.0
+    record: list[str] = []
+    log: Literal["all", "errors", "none"] | list[str] | None = None
+    label: str | None = None
+    every: Annotated[int, Field(ge=1)] = 1
+    substeps: Annotated[int, Field(ge=1)] = 1
+
+    @model_validator(mode="after")
+    def _one_origin(self) -> ComponentTable:
+        given = [k for k in ("fmu", "model", "observer", "recording") if getattr(self, k) is not None]
+        if len(given) != 1:
+            raise ValueError(
+                "give exactly one of 'fmu' (a path), 'model' (a shipped plant), 'observer' (a shipped observer) or 'recording' "
+                "(a results folder or a table)"
+            )
+        if given == ["fmu"] and (self.preset or self.options or self.realisation):
+            raise ValueError("'preset', 'options' and 'as' belong to shipped models; an FMU takes 'parameters' only")
+        if given != ["recording"] and {"component", "interpolation"} & self.model_fields_set:
+            raise ValueError("'component' and 'interpolation' belong to a recording")
+        if given == ["recording"] and (self.preset or self.options or self.realisation or self.parameters):
+            raise ValueError("a recording takes 'component' and 'interpolation', no 'parameters', 'preset', 'options' or 'as'")
+        return self
+
+
+class FalseTelegramTable(Table):
+    """A telegram without a balise."""
+
+    time: float
+    offset: float
+
+
+class BalisesTable(Table):
+    """Balises: where they are, how the passings are found, what happens to the telegrams."""
+
+    position: str | None = None
+    speed: str | None = None
+    odometer: str | None = None
+    layout: Literal["spacing", "positions", "csv", "instants", "aperiodic", "recorded"]
+    spacing: Annotated[float, Field(gt=0.0)] | None = None
+    first: float | None = None
+    positions: list[float] | None = None
+    file: str | None = None
+    instants: list[float] | None = None
+    seed: Annotated[int, Field(ge=0)] = 0
+    min_gap: Annotated[float, Field(gt=0.0)] = 0.1
+    max_gap: Annotated[float, Field(gt=0.0)] = 0.5
+    dropout_after: float = 7.9
+    dropout_fraction: Annotated[float, Field(ge=0.0, le=1.0)] = 0.15
+    dropout_stretch: Annotated[float, Field(ge=1.2)] = 2.5
+    track_start: float = 0.0
+    track_end: float | None = None
+    expected_speed: Annotated[float, Field(gt=0.0)] | None = None
+    location_accuracy: Annotated[float, Field(ge=0.0, le=63.0)] = 0.0
+    method: Literal["auto", "early-return", "rollback", "predict", "interpolate"] = "auto"
+    clock: str | None = None
+    jerk_bound: Annotated[float, Field(gt=0.0)] = 10.0
+    timing: Literal["exact", "stale"] = "exact"
+    receivers: list[Name] | None = None
+    latency: Annotated[float, Field(ge=0.0)] = 0.0
+    latency_jitter: Annotated[float, Field(ge=0.0)] = 0.0
+    missed_fraction: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    missed: list[str] = []
+    position_noise: Annotated[float, Field(ge=0.0)] = 0.0
+    false_telegrams: list[FalseTelegramTable] = []
+
+    @model_validator(mode="after")
+    def _layout_complete(self) -> BalisesTable:
+        needed = {"spacing": "spacing", "positions": "positions", "csv": "file", "recorded": "file", "instants": "instants"}.get(
+            self.layout
+        )
+        if needed is not None and getattr(self, needed) is None:
+            raise ValueError(f"layout '{self.layout}' needs '{needed}'")
+        if self.layout == "spacing" and self.track_end is None:
+            raise ValueError("layout 'spacing' needs 'track_end', the end of the track [m]")
+        lacking = [key for key in ("position", "speed") if getattr(self, key) is None]
+        if self.layout != "recorded" and lacking:
+            raise ValueError(f"layout '{self.layout}' needs {' and '.join(map(repr, lacking))}, outputs of the plant")
+        if len(lacking) == 1:
+            raise ValueError(f"give both 'position' and 'speed', or with layout 'recorded' neither; {lacking[0]!r} is missing")
+        return self
+
+
+class IterationTable(Table):
+    """How loops are iterated within a communication step."""
+
+    method: Literal["fixed-point", "aitken", "newton"] = "newton"
+    max_iterations: Annotated[int, Field(ge=1)] = 50
+    relative_tolerance: Annotated[float, Field(gt=0.0)] = 1e-9
+    absolute_tolerance: Annotated[float, Field(gt=0.0)] = 1e-12
+    relaxation: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
+
+
+class MasterTable(Table):
+    """How the components are stepped."""
+
+    algorithm: Literal["auto", "gauss-seidel", "jacobi", "iterate"] = "auto"
+    threads: Annotated[int, Field(ge=1)] = 1
+    iteration: IterationTable = IterationTable()
+    inputs: Literal["hold", "interpolate", "extrapolate"] = "hold"
+    control: Literal["fixed", "doubling"] = "fixed"
+    tolerance: Annotated[float, Field(gt=0.0)] = 1e-6
+    smallest_step: Annotated[float, Field(gt=0.0)] | None = None
+    events: Literal["propagate", "local"] = "propagate"
+    stepper: Literal["auto", "python", "compiled"] = "auto"
+    log_calls: bool = False
+    record_every: Annotated[int, Field(ge=1)] = 1
+    record_memory: Annotated[float, Field(gt=0.0)] = 256.0
+
+
+class ConnectionTable(Table):
+    """A connection that does something to the number on its way."""
+
+    source: str = Field(alias="from")
+    target: str = Field(alias="to")
+    factor: float = 1.0
+    offset: float = 0.0
+    units: Literal["convert", "ignore"] = "convert"
+    values: list[tuple[float, float]] = []
+
+    @model_validator(mode="after")
+    def _one_transformation(self) -> ConnectionTable:
+        if self.values and (self.factor, self.offset) != (1.0, 0.0):
+            raise ValueError("give either 'factor' and 'offset', or 'values', not both")
+        sources = [source for source, _ in self.values]
+        if len(set(sources)) < len(sources):
+            raise ValueError("'values' gives two targets for one source")
+        return self
+
+    def __str__(self) -> str:
+        what = f"{self.factor:g} * {self.source} + {self.offset:g}" if not self.values else f"values of {self.source}"
+        return f"{what} -> {self.target}" + ("" if self.units == "convert" else " (units ignored)")
+
+
+LINE, TABLE = "connection line", "connection table"
+"""Tags of the two forms of a connection; left out of messages."""
+ConnectionItem = Annotated[
+    Annotated[str, Tag(LINE)] | Annotated[ConnectionTable, Tag(TABLE)],
+    Discriminator(lambda given: TABLE if isinstance(given, dict | ConnectionTable) else LINE),
+]
+
+
+class PhaseTable(Table):
+    """A part of the run to be judged on its own."""
+
+    name: str
+    start: float
+    end: float
+
+
+class ReportTable(Table):
+    """Roles of signals in the report, and the numbers to print beside the measured ones."""
+
+    true_position: str | None = None
+    true_speed: str | None = None
+    true_slip: str | None = None
+    true_adhesion_force: str | None = None
+    odometer: str | None = None
+    speed_reference: str | None = None
+    observers: list[Name] | None = None
+    phases: list[PhaseTable] = []
+    zones: list[tuple[float, float]] = []
+    evaluate_after: float = 0.0
+    published: dict[str, dict[str, float]] = {}
+    independent: dict[str, dict[str, float]] = {}
+    notes: list[str] = []
+    tables: list[Literal["csv", "mat", "npy", "parquet", "hdf5", "modelica"]] = ["csv", "mat"]

@@ -1,0 +1,163 @@
+"""Guesses: which signals of an FMU are its position, speed, wheel speed and effort, and how sure that is. Knows no files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import dataclass
+from typing import Literal
+
+from cosim.starter.words import BRAKING, DRIVING, FOREIGN, LETTERS, WORDS, words_of
+from plant_models.hybrid.units import Unit, UnitError, conversion, parse_unit
+
+Quantity = Literal["position", "speed", "wheel_speed", "effort", "slip", "adhesion_force", "mass"]
+Sureness = Literal["sure", "likely", "a guess"]
+
+UNITS: dict[Quantity, tuple[str, ...]] = {
+    "position": ("m",),
+    "speed": ("m/s",),
+    "wheel_speed": ("m/s", "rad/s"),
+    "effort": ("N",),
+    "slip": ("1",),
+    "adhesion_force": ("N",),
+    "mass": ("kg",),
+}
+BY_NAME_ONLY: frozenset[Quantity] = frozenset(("wheel_speed", "slip", "adhesion_force", "mass"))
+"""Quantities for which a fitting unit says too little."""
+SENSORS = frozenset({"odometer", "odo", "tacho", "tachometer", "encoder"})
+TURNING = frozenset({"omega", "w", "rpm", "drehzahl"})
+NOT_THIS: Mapping[Quantity, Set[str]] = {
+    "position": WORDS["wheel"] | {"rel", "relative", "nominal"},
+    "speed": WORDS["wheel"] | {"rel", "relative", "nominal"},
+    "effort": WORDS["adhesion"] | WORDS["slip"],
+}
+"""Words that speak of another quantity of the same unit."""
+STRONG, WEAK, SAID, MEASURED, DENIED = 4, 3, 2, 3, -99
+SURE, LIKELY = 7, 4
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A numeric scalar variable, or an element of an array, as the description has it.
+
+    Args:
+        name: its name. unit: name of its unit, or None. meaning: of the unit; None without one, or where nobody understands it.
+        description: one line. start: its start value as a number, or None. type: of FMI.
+    """
+
+    name: str
+    unit: str | None = None
+    meaning: Unit | None = None
+    description: str = ""
+    start: float | None = None
+    type: str = "Float64"
+
+    @property
+    def readable(self) -> bool:
+        """Whether its unit, where it has one, can be understood."""
+        return self.unit is None or self.meaning is not None
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A signal that may be what is looked for.
+
+    Args:
+        signal: the signal. sureness: how sure this is. reason: why, for people. others: the next best, best first.
+    """
+
+    signal: Signal
+    sureness: Sureness
+    reason: str
+    others: Sequence[str] = ()
+
+
+def guess(quantity: Quantity, signals: Sequence[Signal], taken: Sequence[str] = (), part: str = "") -> Guess | None:
+    """The signal that is most likely a quantity; the first of equals.
+
+    Args:
+        quantity: what is looked for. signals: to choose from. taken: names that are something else already.
+        part: of the model; among equals its signals come first (``mass`` for ``mass.s``).
+
+    Returns:
+        The best with its alternatives, or None where nothing fits.
+    """
+    rated = [(_rate(quantity, signal), signal) for signal in signals if signal.name not in taken]
+    fitting = sorted(
+        ((rate, s) for rate, s in rated if rate[0] > 0), key=lambda pair: (-pair[0][0], not pair[1].name.startswith(f"{part}."))
+    )
+    if not fitting:
+        return None
+    (score, reason), best = fitting[0]
+    rivals = [s.name for (other, _), s in fitting[1:4]]
+    tied = len(fitting) > 1 and fitting[1][0][0] == score
+    sureness: Sureness = "sure" if score >= SURE and not tied else "likely" if score >= LIKELY else "a guess"
+    return Guess(best, sureness, reason + (", as others are" if tied else ""), rivals)
+
+
+def fits(signal: Signal, unit: str) -> bool:
+    """Whether the unit of a signal can be converted to this one; rad counts, unlike in SI."""
+    if signal.meaning is None:
+        return False
+    wanted = parse_unit(unit)
+    try:
+        conversion(signal.meaning, wanted)
+    except UnitError:
+        return False
+    return signal.meaning.exponents[-1] == wanted.exponents[-1]
+
+
+def _rate(quantity: Quantity, signal: Signal) -> tuple[int, str]:
+    """How much speaks for a signal, 0 and less is nothing; and what."""
+    has_unit = any(fits(signal, unit) for unit in UNITS[quantity]) or (quantity == "slip" and signal.unit is None)
+    if signal.meaning is not None and not has_unit:
+        return 0, ""
+    named, said = _named(quantity, signal.name, has_unit), _described(quantity, signal.description)
+    if not named and not said and (not has_unit or quantity in BY_NAME_ONLY):
+        return 0, ""
+    if signal.meaning is None and not named:
+        return 0, ""  # a sentence alone is too little
+    reasons = (
+        ["its name"] * (named > 0)
+        + [f"its unit {signal.unit or 'of a pure number'}"] * has_unit
+        + ["its description"] * (said > 0)
+    )
+    text = ", ".join(reasons[:-1]) + " and " * (len(reasons) > 1) + reasons[-1]
+    return named + said + MEASURED * has_unit + _denied(quantity, signal), f"by {text}"
+
+
+def _key(quantity: Quantity) -> str:
+    return {"wheel_speed": "wheel", "adhesion_force": "adhesion"}.get(quantity, quantity)
+
+
+def _named(quantity: Quantity, name: str, has_unit: bool) -> int:
+    last = words_of(name.rpartition(".")[2])
+    words, key = words_of(name), _key(quantity)
+    if quantity == "wheel_speed" and not (WORDS["speed"] | SENSORS | TURNING) & set(words):
+        return WEAK if has_unit and WORDS[key] & set(words) else 0
+    if WORDS[key] & set(last):
+        return STRONG
+    if WORDS[key] & set(words):
+        return WEAK
+    return WEAK if last and last[0] in LETTERS[key] else 0
+
+
+def _described(quantity: Quantity, description: str) -> int:
+    words = set(words_of(description))
+    if quantity == "wheel_speed":
+        return SAID if words & WORDS["wheel"] and words & WORDS["speed"] else 0
+    if quantity in ("speed", "position") and words & WORDS["wheel"]:
+        return 0
+    return SAID if words & WORDS[_key(quantity)] else 0
+
+
+def _denied(quantity: Quantity, signal: Signal) -> int:
+    """What speaks against it: it is named as a reference, a limit, an error, or as another force."""
+    name = set(words_of(signal.name))
+    against = (FOREIGN | NOT_THIS.get(quantity, frozenset())) - WORDS[_key(quantity)]
+    if quantity == "effort" and name & DRIVING:
+        against -= BRAKING  # one signal for both
+    if name & against:
+        return DENIED
+    if WORDS[_key(quantity)] & name or quantity == "effort":
+        return 0  # what is named plainly may be described beside other things
+    return DENIED if set(words_of(signal.description)) & against else 0

@@ -1,0 +1,114 @@
+"""A look into an FMU: its variables as signals to guess from. Reads the model description; nothing is unpacked or executed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import fmpy
+from fmpy.model_description import ModelDescription, ModelVariable
+
+from cosim.components.component import Component
+from cosim.components.described import NUMERIC_TYPES
+from cosim.components.elements import elements_of
+from cosim.components.loading import describe_fmu, read_description
+from cosim.errors import FmuLoadError
+from cosim.starter.guess import Signal
+from plant_models.hybrid.units import UnitError
+
+NAME = "fmu"
+LARGEST_ARRAY = 16
+"""Elements of longer arrays are not looked at one by one."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """What an FMU says of itself.
+
+    Args:
+        path: of the file. component: to be asked for variables and units; it cannot be stepped.
+        inputs, outputs, parameters, hidden: numeric scalars, and the elements of short arrays; hidden ones are local variables,
+            which may be read like outputs.
+        unread: inputs and outputs that no connection of numbers can reach (texts, clocks, long arrays), a line each.
+        runs_here: whether it has a library for this platform.
+    """
+
+    path: Path
+    component: Component
+    inputs: Sequence[Signal]
+    outputs: Sequence[Signal]
+    parameters: Sequence[Signal]
+    hidden: Sequence[Signal]
+    unread: Sequence[str]
+    runs_here: bool
+
+    @property
+    def description(self) -> ModelDescription:
+        """The model description."""
+        return self.component.description
+
+
+def look_into(path: Path) -> Look:
+    """Look into an FMU.
+
+    Raises:
+        FmuLoadError: it is missing, broken, or not made for co-simulation.
+    """
+    _demand_co_simulation(path, read_description(path, path.name))
+    component = describe_fmu(path, NAME)
+    found: dict[str, list[Signal]] = {"input": [], "output": [], "parameter": [], "local": []}
+    unread: list[str] = []
+    hidden = component.event_references()
+    for variable in component.description.modelVariables:
+        if variable.causality not in found or variable.valueReference in hidden:
+            continue
+        signals = _signals(component, variable)
+        found[variable.causality] += signals
+        if not signals and variable.causality in ("input", "output"):
+            unread.append(_unread(variable))
+    platforms = set(fmpy.supported_platforms(str(path)))
+    here = bool({fmpy.platform, fmpy.platform_tuple} & platforms)
+    return Look(path, component, found["input"], found["output"], found["parameter"], found["local"], unread, here)
+
+
+def _demand_co_simulation(path: Path, description: ModelDescription) -> None:
+    if description.coSimulation is not None:
+        return
+    kinds = {"modelExchange": "model exchange", "scheduledExecution": "scheduled execution"}
+    offered = " and ".join(text for key, text in kinds.items() if getattr(description, key, None) is not None)
+    raise FmuLoadError(
+        f"{path} offers {offered or 'no interface'} only; this master steps co-simulation FMUs. Ask its maker for an export for "
+        "co-simulation (most tools offer both)."
+    )
+
+
+def _signals(component: Component, variable: ModelVariable) -> list[Signal]:
+    if variable.type not in NUMERIC_TYPES:
+        return []
+    elements = elements_of(variable) if variable.shape else [None]
+    if len(elements) > LARGEST_ARRAY:
+        return []
+    unit = component.unit_name(variable.name)
+    try:
+        meaning = component.unit(variable.name)
+    except UnitError:
+        meaning = None
+    start = None if variable.shape else number(variable.start)
+    names = [variable.name if element is None else element.name for element in elements]
+    description = variable.description or ""
+    return [Signal(name, unit, meaning if unit else None, description, start, str(variable.type)) for name in names]
+
+
+def number(text: Any) -> float | None:
+    """A start value as a number, where it is one."""
+    try:
+        return float(text)
+    except (TypeError, ValueError):
+        return None
+
+
+def _unread(variable: ModelVariable) -> str:
+    shape = "" if not variable.shape else "[" + ", ".join(map(str, variable.shape)) + "]"
+    return f"{variable.causality} {variable.name}{shape}: {variable.type}"

@@ -1,0 +1,131 @@
+"""Writing a starter scenario: look into an FMU, guess, write a file that loads. Touches the file it is given."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from cosim.errors import CosimError, OutputError, ScenarioError, nearest
+from cosim.scenario.paths import relative
+from cosim.scenario.scenario import Scenario
+from cosim.starter.alone import alone
+from cosim.starter.look import Look, look_into
+from cosim.starter.observer import observer_beside
+from cosim.starter.roles import PlantRoles, is_observer, observer_roles, plant_roles
+from cosim.starter.toml_lines import LISTED, comment, listing, one_line
+from cosim.starter.train import DEFAULT_OBSERVER, train
+from fmu_observer import OBSERVERS
+
+WANTED = frozenset({"effort", "odometer"})
+"""Inputs of the observers that a starter can connect."""
+
+
+@dataclass(frozen=True)
+class Starter:
+    """A starter scenario.
+
+    Args:
+        text: of the file. kind: ``train``, ``observer`` or ``alone``. remarks: what the user should be told, a line each.
+    """
+
+    text: str
+    kind: str
+    remarks: list[str]
+
+
+def starter(fmu: str | Path, target: str | Path, observer: str | None = None) -> Starter:
+    """A starter scenario for an FMU; nothing is written and nothing of the FMU is executed.
+
+    Args:
+        fmu: path of the FMU. target: the scenario file to be; paths in the text are relative to it.
+        observer: name of a shipped observer to put beside a plant; by default the Takagi-Sugeno observer.
+
+    Raises:
+        FmuLoadError: the FMU cannot be read, or offers no co-simulation.
+        ScenarioError: there is no such observer, or it does not listen to an effort and an odometer.
+    """
+    _check_observer(observer)
+    path, target = Path(fmu), Path(target)
+    look = look_into(path)
+    place = relative(path, target.parent)
+    roles = plant_roles(look)
+    if is_observer(look):
+        kind, body = "observer", observer_beside(look, place, observer_roles(look))
+    elif roles.is_train:
+        kind, body = "train", train(look, place, roles, observer or DEFAULT_OBSERVER)
+    else:
+        kind, body = "alone", alone(look, place, target.name)
+    text = "\n".join([*_head(look, target.name, kind), "", *body]) + "\n"
+    return Starter(text, kind, list(_remarks(look, kind, roles, observer)))
+
+
+def write_starter(fmu: str | Path, target: str | Path, observer: str | None = None, *, force: bool = False) -> Starter:
+    """Write a starter scenario for an FMU; arguments as for `starter`.
+
+    Args:
+        force: replace a file that exists.
+
+    Raises:
+        OutputError: the file exists, or cannot be written.
+    """
+    target = Path(target)
+    if target.suffix != ".toml":
+        raise OutputError(f"{target}: a scenario file ends in .toml.")
+    if target.exists() and not force:
+        raise OutputError(f"{target} exists already; choose another name with -o, or replace it with --force.")
+    made = starter(fmu, target, observer)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_text(made.text, encoding="utf-8")
+    except OSError as error:
+        raise OutputError(f"The scenario cannot be written to {target}: {error.strerror or error}.") from error
+    try:
+        structure = Scenario.load(target).structure()
+    except CosimError as error:
+        made.remarks.append(f"As written it would be refused; edit it first: {error}")
+    else:
+        made.remarks.extend(structure.warnings)
+    return made
+
+
+def _check_observer(observer: str | None) -> None:
+    if observer is None:
+        return
+    able = [name for name, system in OBSERVERS.items() if {s.name for s in system().inputs} >= WANTED]
+    if observer not in able:
+        raise ScenarioError(f"No observer {observer!r} that listens to an effort and an odometer; {nearest(observer, able)}")
+
+
+def _head(look: Look, target: str, kind: str) -> list[str]:
+    description = look.description
+    about = f"{one_line(look.path.name)}: {one_line(str(description.modelName))}, FMI {description.fmiVersion}"
+    about += f", made with {one_line(description.generationTool)}" if description.generationTool else ""
+    lines = comment(f"A starter scenario for {about}.")
+    if kind != "alone":
+        lines += comment("What stands here was guessed from the FMU's description; nothing of it was executed. "
+                         "Behind each guess is said how sure it is: confirm it by editing. Then:")  # fmt: skip
+    lines += [
+        "#",
+        f"#   cosim show {target}    # how it hangs together",
+        f"#   cosim run {target}     # results, plots and a table",
+        "#",
+    ]
+    lines += listing("Inputs", look.inputs) + listing("Outputs", look.outputs)
+    if look.unread:
+        lines += ["# Not for numbers, or too long; a connection of a like variable reaches them:"]
+        lines += [f"#   {one_line(text)}" for text in look.unread[:LISTED]]
+    return lines
+
+
+def _remarks(look: Look, kind: str, roles: PlantRoles, observer: str | None) -> Iterator[str]:
+    if not look.runs_here:
+        yield f"{look.path.name} has no library for this platform: the scenario will not run here."
+    if kind == "alone":
+        yield "Nothing in the FMU looks like the position or speed of a train: the scenario runs it alone."
+    if kind != "train" and observer is not None:
+        yield f"{observer} was not used."
+    if kind == "train":
+        found = {"position": roles.position, "speed": roles.speed, "wheel speed": roles.wheel_speed, "effort": roles.effort}
+        for what, role in found.items():
+            yield f"{what}: " + ("not found" if role is None else f"{role.signal.name} ({role.sureness}, {role.reason})")

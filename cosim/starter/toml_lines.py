@@ -1,0 +1,84 @@
+"""Lines of a starter scenario: values, keys, comments and connections as TOML. Texts of vendors cannot leave their line."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from textwrap import wrap
+from typing import Any
+
+import tomli_w
+
+from cosim.starter.guess import Guess, Signal
+
+WIDTH = 118
+PLAIN_NAME = re.compile(r"[A-Za-z_][\w.]*(\[\d+(,\d+)*\])?", re.ASCII)
+LISTED = 40
+"""Variables of a kind that are listed; `cosim info` shows all."""
+
+
+def entry(key: str, value: Any) -> str:
+    """``key = value`` as TOML on one line."""
+    name, _, _ = tomli_w.dumps({key: 0}).rpartition(" = ")
+    return f"{name} = {inline(value)}"
+
+
+def inline(value: Any) -> str:
+    """A value as TOML on one line."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(entry(str(k), v) for k, v in value.items()) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(inline, value)) + "]"
+    return tomli_w.dumps({"x": value}).removeprefix("x = ").rstrip("\n")
+
+
+def one_line(text: str, length: int = 90) -> str:
+    """A vendor's text fit for a comment: on one line, without control characters, not too long."""
+    clean = " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    return clean if len(clean) <= length else clean[: length - 3] + "..."
+
+
+def comment(text: str) -> list[str]:
+    """A paragraph as lines of comment."""
+    return [f"# {line}" for line in wrap(text, WIDTH)] if text else ["#"]
+
+
+def guessed(guess: Guess) -> str:
+    """What is to be said behind a line that was guessed."""
+    others = f"; else {', '.join(map(one_line, guess.others))}" if guess.others else ""
+    mark = "" if guess.sureness == "sure" else "PLEASE CHECK, "
+    return f"  # {mark}{guess.sureness}: {one_line(guess.reason)}{others}"
+
+
+def listing(title: str, signals: Sequence[Signal]) -> list[str]:
+    """Variables with unit and description, as comment."""
+    width = max((len(one_line(s.name)) for s in signals[:LISTED]), default=0)
+    lines = [f"# {title} ({len(signals)}):"]
+    for s in signals[:LISTED]:
+        lines.append(f"#   {one_line(s.name):<{width}}  [{one_line(s.unit or '-')}]  {one_line(s.description)}".rstrip())
+    more = len(signals) - LISTED
+    return lines + ([f"#   ... and {more} more, see: cosim info"] if more > 0 else [])
+
+
+@dataclass(frozen=True)
+class Link:
+    """A connection to be written.
+
+    Args:
+        source, targets: as ``component.signal``. remark: behind it. factor: where the number changes on its way.
+    """
+
+    source: str
+    targets: Sequence[str]
+    remark: str = ""
+    factor: float | None = None
+
+    def lines(self) -> list[str]:
+        """Lines within the list of connections."""
+        names = (self.source, *self.targets)
+        if self.factor is None and all(PLAIN_NAME.fullmatch(name.partition(".")[2]) for name in names):
+            text = f"{self.source} -> {', '.join(self.targets)}"
+            return [f"    {inline(text)},{self.remark}"]
+        changed = {} if self.factor is None else {"factor": self.factor, "units": "ignore"}
+        return [f"    {inline({'from': self.source, 'to': to} | changed)},{self.remark}" for to in self.targets]

@@ -1,0 +1,73 @@
+"""Measures: what a run of a sweep is reduced to, one number each. Imports NumPy only."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import nan
+from typing import Any
+
+import numpy as np
+
+from cosim.report.metrics import error_size, within
+from cosim.report.roles import Quantity, estimation_error
+from cosim.report.spec import Phase
+from cosim.scenario.outcome import Outcome
+
+Measure = Callable[[Outcome], float]
+ERROR_UNITS: Mapping[Quantity, str] = {"speed": "m/s", "position": "m"}
+
+
+def error_measures(outcome: Outcome) -> dict[str, float]:
+    """Largest and root-mean-square errors of every observer over the evaluated part of the run.
+
+    Returns:
+        ``observer.speed_error_max``, ``observer.speed_error_rms`` [m/s] and the same of the position [m], where recorded;
+        NaN for a run that failed, whose errors are those of another stretch of time.
+    """
+    result, spec = outcome.result, outcome.spec
+    measures: dict[str, float] = {}
+    if not len(result.time):
+        return measures
+    whole = Phase("whole run", float(result.time[0]), float(result.time[-1]))
+    rows = within(result.time, whole, spec.evaluate_after)
+    for observer in spec.observers:
+        for quantity in ERROR_UNITS:
+            error = estimation_error(result, spec, observer, quantity)
+            if error is None:
+                continue
+            size = error_size(result.time[rows], error[rows])
+            failed = outcome.failure is not None
+            measures[f"{observer}.{quantity}_error_max"] = nan if failed else size.max_abs
+            measures[f"{observer}.{quantity}_error_rms"] = nan if failed else size.rms
+    return measures
+
+
+def own_measures(outcome: Outcome, measure: Mapping[str, Measure]) -> tuple[dict[str, float], list[str]]:
+    """The user's measures, and what went wrong in computing them: one that fails is NaN, and the sweep goes on."""
+    measures: dict[str, float] = {}
+    faults: list[str] = []
+    for name, function in measure.items():
+        try:
+            measures[name] = float(np.asarray(function(outcome)).item()) if outcome.failure is None else nan
+        except Exception as error:  # the user's own function, whatever it raises
+            measures[name] = nan
+            faults.append(f"measure {name!r}: {type(error).__name__}: {error}")
+    return measures, faults
+
+
+def setting_text(value: Any) -> str:
+    """A value that was varied, as people write it."""
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def with_unit(name: str, unit: str | None) -> str:
+    """The name with its unit, where it has one."""
+    return name if unit is None else f"{name} [{unit}]"
+
+
+def measure_unit(name: str) -> str | None:
+    """SI unit of a measure of `error_measures`; None for the user's own."""
+    for quantity, unit in ERROR_UNITS.items():
+        if name.endswith((f".{quantity}_error_max", f".{quantity}_error_rms")):
+            return unit
+    return None

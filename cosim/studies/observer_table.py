@@ -1,0 +1,55 @@
+"""The main table of a comparison of observers: rows of numbers, cells as text, lines of equal width. Touches no file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from cosim.report.metrics import PhaseMetrics
+from cosim.report.numbers import DASH, error_number, number
+from cosim.studies.observer_scores import CertifiedGap, ObserverScore
+
+
+def main_row(score: ObserverScore) -> dict[str, Any]:
+    """One row of the main table; headings with units."""
+    whole: PhaseMetrics | None = score.whole
+    speed, position = (whole.speed, whole.position) if whole is not None else (None, None)
+    at_v, at_p = score.speed_at_balises, score.position_at_balises
+    delays = score.indicator.delays if score.indicator is not None else ()
+    return {
+        "observer": score.label,
+        "rms v [m/s]": speed and speed.rms, "max |v| [m/s]": speed and speed.max_abs,
+        "rms p [m]": position and position.rms, "max |p| [m]": position and position.max_abs,
+        "at balises rms v [m/s]": at_v and at_v.rms, "at balises rms p [m]": at_p and at_p.rms,
+        "slip seen after [s]": "/".join("-" if d is None else number(d) for d in delays) or None,
+        "false alarms": score.false_alarms,
+        "certified [s]": None if score.certificate is None else score.certificate.limit,
+        "holds": certified(score.certificate),
+        "cost [us/step]": score.cost,
+    }  # fmt: skip
+
+
+def certified(certificate: CertifiedGap | None) -> str | None:
+    """Whether a certificate holds for the gaps expected and seen, in words."""
+    if certificate is None:
+        return None
+    words = {True: "yes", False: "NO", None: "?"}
+    return f"{words[certificate.holds_expected]}/{words[certificate.holds_seen]}"
+
+
+def cell(value: Any) -> str:
+    """A cell of a table as text."""
+    if isinstance(value, str | int):
+        return str(value)
+    return DASH if value is None else error_number(value)
+
+
+def aligned(rows: Sequence[Mapping[str, str]]) -> str:
+    """Rows as lines of equal width; the first column to the left, the others to the right."""
+    if not rows:
+        return ""
+    table = [list(rows[0]), *(list(row.values()) for row in rows)]
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    lines = ["  ".join(text.rjust(w) if i else text.ljust(w) for i, (text, w) in enumerate(zip(row, widths, strict=True)))
+             for row in table]  # fmt: skip
+    return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])

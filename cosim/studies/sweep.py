@@ -1,0 +1,176 @@
+"""A sweep: one scenario run many times with some values changed, here or in several processes. Touches the folder it is given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from cosim.errors import CosimError, ScenarioError
+from cosim.scenario.outcome import INTERRUPTED, Outcome
+from cosim.scenario.scenario import Scenario
+from cosim.scenario.starts import start_values
+from cosim.scenario.structure import describe_component
+from cosim.studies.measures import Measure, error_measures, own_measures
+from cosim.studies.sampling import Mode, Range, Variation, variations
+from cosim.studies.sweep_files import run_folder, write_index, write_run
+from cosim.studies.sweep_result import SweepResult, SweepRun
+from cosim.studies.workers import Died, Raised, attempt, in_processes
+
+Progress = Callable[[int, int], None]
+
+
+class _Job(NamedTuple):
+    scenario: Scenario
+    settings: Variation
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A scenario and its variations, ready to run; made by `Scenario.vary`.
+
+    Args:
+        scenario: what is varied. variations: for each run the values that are changed, by name.
+    """
+
+    scenario: Scenario
+    variations: Sequence[Variation]
+
+    def __len__(self) -> int:
+        return len(self.variations)
+
+    @property
+    def names(self) -> list[str]:
+        """Names of what is varied, in order of appearance."""
+        return list(dict.fromkeys(name for variation in self.variations for name in variation))
+
+    def each(self, workers: int = 1, progress: Progress | None = None) -> Iterator[SweepRun]:
+        """Run all variations and hand each over as soon as it is done, so that none needs to be kept.
+
+        Args:
+            workers: processes at a time; 1 runs in this process. In processes of their own, a run that crashes fails alone;
+                results do not depend on their number.
+            progress: called with the number done and the number in all.
+
+        Yields:
+            The runs, in order with one worker, as they come with several.
+
+        Raises:
+            ScenarioError: `workers` is less than 1. KeyboardInterrupt: a run was interrupted; it has been handed over.
+        """
+        if workers < 1:
+            raise ScenarioError(f"A sweep needs at least one worker (got workers={workers}).")
+        jobs = [_Job(self.scenario, settings) for settings in self.variations]
+        one_by_one = ((number, attempt(_run, job)) for number, job in enumerate(jobs))
+        for done, (number, answer) in enumerate(one_by_one if workers == 1 else in_processes(_run, jobs, workers), start=1):
+            if progress is not None:
+                progress(done, len(jobs))
+            run = _entry(number, self.variations[number], answer)
+            yield run
+            if run.failure == INTERRUPTED:  # who interrupts a run of a sweep means the sweep
+                raise KeyboardInterrupt
+
+    def run(
+        self, workers: int = 1, *, progress: Progress | None = None, measure: Mapping[str, Measure] | None = None,
+        units: Mapping[str, str] | None = None, keep: bool = True, directory: str | Path | None = None,
+    ) -> SweepResult:  # fmt: skip
+        """Run all variations; one that fails does not stop the others.
+
+        Args:
+            workers: processes at a time; 1 runs in this process. A script that uses more needs ``if __name__ == "__main__":``.
+            progress: called with the number done and the number in all.
+            measure: own numbers to take of each outcome, ``{"name": function}``; called in this process.
+            units: of these numbers, by name, for pictures.
+            keep: keep the outcomes in memory; without them only measures are left, and what is in `directory`.
+            directory: where each run is written as soon as it is done, ``run_000``, ``run_001``, ..., with an index at the end,
+                also where the sweep is interrupted.
+
+        Returns:
+            The runs in order of the variations, with settings, measures, outcome or failure.
+
+        Raises:
+            ScenarioError: `workers` is less than 1.
+            OutputError: results cannot be written.
+        """
+        done: dict[int, SweepRun] = {}
+        result = SweepResult(self.scenario, self.names, [], dict(units or {}))
+        try:
+            for run in self.each(workers, progress):
+                measured = _measured(run, measure or {})
+                folder = None if directory is None else write_run(measured, Path(directory) / run_folder(run.number))
+                done[run.number] = replace(measured, folder=folder, outcome=measured.outcome if keep else None)
+        finally:
+            result = replace(result, runs=[done[number] for number in sorted(done)])
+            if directory is not None and done:
+                write_index(result, Path(directory))
+        return result
+
+
+def make_sweep(
+    scenario: Scenario, values: Mapping[str, Iterable[Any] | Range] | Sequence[Mapping[str, Any]], mode: Mode,
+    count: int | None, seed: int,
+) -> Sweep:  # fmt: skip
+    """A sweep whose every variation is a valid scenario; arguments as for `Scenario.vary`.
+
+    Raises:
+        CosimError: a name or a value cannot be.
+    """
+    sweep = Sweep(scenario.copy(), variations(values, mode, count, seed))
+    for number, settings in enumerate(sweep.variations):
+        try:
+            varied = _varied(sweep.scenario, settings)
+            varied.table()
+            if number == 0:
+                _check_parameters(varied, sweep.names)
+        except CosimError as error:
+            error.args = (f"vary: run {number} ({settings_text(settings)}): {error}", *error.args[1:])
+            raise
+    return sweep
+
+
+def settings_text(settings: Mapping[str, Any]) -> str:
+    """Settings in one line."""
+    return ", ".join(f"{name} = {value!r}" for name, value in settings.items())
+
+
+def _varied(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
+    varied = scenario.copy()
+    for name, value in settings.items():
+        varied.set(name, value)
+    return varied
+
+
+def _check_parameters(scenario: Scenario, names: Iterable[str]) -> None:
+    """Parameters that are varied exist: found here, and not in every run."""
+    tables = scenario.table().components
+    for name in dict.fromkeys(n.partition(".")[0] for n in names if n.partition(".")[0] in tables):
+        table = tables[name]
+        if table.recording is None:
+            component = describe_component(name, table, scenario.folder, f"{scenario.where}: components.{name}")
+            start_values(component, table.parameters)
+
+
+def _run(job: _Job) -> Outcome | str:
+    """One run, or why it could not begin. What is doubtful is in the outcome, and not said for every run."""
+    try:
+        return job.scenario.run(overrides=job.settings, warn=_silent)
+    except CosimError as error:
+        return str(error)
+
+
+def _silent(_text: str) -> None: ...
+
+
+def _entry(number: int, settings: Variation, answer: Any) -> SweepRun:
+    if isinstance(answer, Outcome):
+        return SweepRun(number, settings, answer, answer.failure)
+    reason = answer.reason if isinstance(answer, Died | Raised) else str(answer)
+    return SweepRun(number, settings, None, reason)
+
+
+def _measured(run: SweepRun, measure: Mapping[str, Measure]) -> SweepRun:
+    if run.outcome is None:
+        return run
+    own, faults = own_measures(run.outcome, measure)
+    return replace(run, measures=error_measures(run.outcome) | own, faults=faults)

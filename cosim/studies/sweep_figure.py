@@ -1,0 +1,106 @@
+"""Picture of a sweep: a measure over a varied value. Draws on axes given, or on its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from cosim.components.described import Described
+from cosim.errors import CosimError, OutputError, nearest
+from cosim.report.figures.style import OBSERVER_LINES, axes_or_new, styled
+from cosim.scenario.structure import describe_component
+from cosim.studies.measures import setting_text, with_unit
+from plant_models.hybrid.units import UnitError
+
+if TYPE_CHECKING:
+    from cosim.studies.sweep_result import SweepResult, SweepRun
+
+SETTING_UNITS = {
+    "start": "s", "stop": "s", "step": "s", "balises.spacing": "m", "balises.first": "m", "balises.min_gap": "s",
+    "balises.max_gap": "s", "balises.dropout_after": "s", "balises.expected_speed": "m/s", "balises.location_accuracy": "m",
+    "balises.latency": "s", "balises.latency_jitter": "s", "balises.track_start": "m", "balises.track_end": "m",
+    "report.evaluate_after": "s",
+}  # fmt: skip
+LINES_NAMED = 8
+"""More lines than these are drawn, but not named in a legend."""
+
+
+@styled
+def sweep_figure(result: SweepResult, measure: str | None, against: str | None, ax: Axes | None) -> Axes:
+    """A measure over a varied value, units on the axes; arguments as for `SweepResult.plot`.
+
+    Raises:
+        OutputError: there is no such measure, or this was not varied.
+    """
+    measure = _chosen("measure", measure, result.measures)
+    varied = [name for name in result.names if len({repr(run.settings.get(name)) for run in result.runs}) > 1]
+    against = _chosen("varied value", against, result.names if against is not None else varied or result.names)
+    ax = axes_or_new(ax, (7.0, 3.6))
+    ticks = _categories(run.settings.get(against) for run in result.runs)
+    others = [name for name in varied if name != against]
+    groups = _groups(result.runs, others)
+    for place, (label, runs) in enumerate(groups.items()):
+        x, y = _points(runs, against, measure, ticks)
+        style = OBSERVER_LINES[place % len(OBSERVER_LINES)]
+        style = style | {"linestyle": ""} if others and len(groups) == 1 else style  # neighbours differ in more than this value
+        ax.plot(x, y, marker="o", markersize=4, label=label or None, **style)
+    if ticks is not None:
+        ax.set_xticks(range(len(ticks)), ticks)
+    ax.set_xlabel(with_unit(against, setting_unit(result, against)))
+    ax.set_ylabel(with_unit(measure, result.unit(measure)))
+    if result.failed:
+        ax.set_title(f"{len(result.failed)} of {len(result.runs)} runs failed", fontsize="medium", loc="left")
+    if 1 < len(groups) <= LINES_NAMED:
+        ax.legend()
+    return ax
+
+
+def setting_unit(result: SweepResult, name: str) -> str | None:
+    """Unit of what is varied: of the parameter as its component declares it, or of a key; None where there is none."""
+    component, _, variable = name.partition(".")
+    table = result.scenario.table().components.get(component)
+    if table is None:
+        return SETTING_UNITS.get(name)
+    try:
+        described: Described = describe_component(component, table, result.scenario.folder, result.scenario.where)
+        return described.unit_name(variable if variable in described.variables else f"{variable}[1]")
+    except (CosimError, KeyError, UnitError):
+        return None
+
+
+def _chosen(what: str, name: str | None, known: Sequence[str]) -> str:
+    if not known:
+        raise OutputError(f"There is nothing to draw: this sweep has no {what}.")
+    if name is not None and name not in known:
+        raise OutputError(f"This sweep has no {what} {name!r}; {nearest(name, known)}")
+    return name or known[0]
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _categories(values: Iterable[Any]) -> list[str] | None:
+    """The values as texts in order of appearance where they are no numbers; None where they are."""
+    listed = list(values)
+    return None if all(map(_is_number, listed)) else list(dict.fromkeys(map(str, listed)))
+
+
+def _groups(runs: Sequence[SweepRun], others: Sequence[str]) -> dict[str, list[SweepRun]]:
+    """Runs by what else was varied; all in one where that would be a line for each run."""
+    groups: dict[str, list[SweepRun]] = {}
+    for run in runs:
+        groups.setdefault(", ".join(f"{name} = {setting_text(run.settings.get(name))}" for name in others), []).append(run)
+    return {"": list(runs)} if len(groups) == len(runs) else groups
+
+
+def _points(runs: Sequence[SweepRun], against: str, measure: str, ticks: Sequence[str] | None) -> tuple[np.ndarray, np.ndarray]:
+    """Places on the axes, in order of the varied value."""
+    values = [run.settings.get(against) for run in runs]
+    x = np.array([float(v) for v in values] if ticks is None else [float(ticks.index(str(v))) for v in values])  # type: ignore[arg-type]
+    y = np.array([run.measures.get(measure, np.nan) for run in runs])
+    order = np.argsort(x, kind="stable")
+    return x[order], y[order]

@@ -1,0 +1,104 @@
+"""A sweep as files: a results folder for each run, and an index of all. Touches only the folder it is given."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cosim.errors import OutputError
+from cosim.results.summary_file import jsonable
+
+if TYPE_CHECKING:
+    from cosim.studies.sweep_result import SweepResult, SweepRun
+
+INDEX_CSV, INDEX_JSON, PICTURE = "index.csv", "index.json", "sweep.png"
+
+
+def run_folder(number: int) -> str:
+    """Name of a run's folder."""
+    return f"run_{number:03d}"
+
+
+def write_run(run: SweepRun, folder: Path) -> Path | None:
+    """Write the results of a run; None where it has none.
+
+    Raises:
+        OutputError: the folder cannot be written.
+    """
+    if run.outcome is None:
+        return None
+    run.outcome.with_summary(sweep_settings=dict(run.settings)).write(folder, report=False)
+    return folder
+
+
+def write_sweep(result: SweepResult, directory: Path) -> dict[str, Path]:
+    """Write all runs that are in memory, the index and a picture; paths by kind.
+
+    Raises:
+        OutputError: the folder cannot be written.
+    """
+    runs = [
+        run if run.outcome is None else replace(run, folder=write_run(run, directory / run_folder(run.number)))
+        for run in result.runs
+    ]
+    return write_index(replace(result, runs=runs), directory)
+
+
+def write_index(result: SweepResult, directory: Path) -> dict[str, Path]:
+    """Write the table as CSV and JSON, and a picture where there is something to draw; paths by kind.
+
+    Raises:
+        OutputError: the folder cannot be written.
+    """
+    paths = {"csv": directory / INDEX_CSV, "json": directory / INDEX_JSON}
+    rows = [row | {"folder": _folder(run, directory)} for row, run in zip(result.table(), result.runs, strict=True)]
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        _write_csv(paths["csv"], rows)
+        data = {
+            "scenario": result.scenario.name,
+            "varied": list(result.names),
+            "runs": [_entry(r, directory) for r in result.runs],
+        }
+        paths["json"].write_text(json.dumps(jsonable(data), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        if _worth_drawing(result):
+            figure: Any = result.plot().figure
+            paths["picture"] = directory / PICTURE
+            figure.savefig(paths["picture"], dpi=120)
+        else:
+            (directory / PICTURE).unlink(missing_ok=True)  # of an earlier sweep
+    except OSError as error:
+        raise OutputError(f"The sweep cannot be written to {directory}: {error.strerror or error}.") from error
+    return paths
+
+
+def _write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(rows[0]) if rows else ["run"], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows({key: "" if value is None else value for key, value in row.items()} for row in rows)
+
+
+def _entry(run: SweepRun, directory: Path) -> dict[str, Any]:
+    return {
+        "run": run.number,
+        "folder": _folder(run, directory),
+        "settings": dict(run.settings),
+        "measures": dict(run.measures),
+        "failure": run.failure,
+        "faults": list(run.faults),
+    }
+
+
+def _folder(run: SweepRun, directory: Path) -> str | None:
+    """Its folder as seen from the index."""
+    if run.folder is None:
+        return None
+    return run.folder.name if run.folder.parent == directory else str(run.folder)
+
+
+def _worth_drawing(result: SweepResult) -> bool:
+    return bool(result.measures) and len({json.dumps(jsonable(run.settings), sort_keys=True) for run in result.runs}) > 1

@@ -1,0 +1,173 @@
+"""What a sweep leaves: its runs with settings, measures and outcomes, as a table, a comparison and a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from math import nan
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cosim.errors import ComparisonError, OutputError
+from cosim.report.numbers import number as number_text
+from cosim.results.load import load_result
+from cosim.results.result import Result
+from cosim.scenario.outcome import Outcome
+from cosim.scenario.scenario import Scenario
+from cosim.studies.measures import measure_unit, setting_text, with_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from cosim.comparison.verdict import Comparison
+
+
+@dataclass(frozen=True)
+class SweepRun:
+    """One run of a sweep.
+
+    Args:
+        number: of the variation, from 0. settings: the values that were changed, by name.
+        outcome: what the run left; None where it could not begin, crashed, or was not kept.
+        failure: why it did not reach its end, or None.
+        measures: numbers by name; see `cosim.studies.measures.error_measures`.
+        faults: what went wrong in taking own measures.
+        folder: where its results were written, or None.
+    """
+
+    number: int
+    settings: Mapping[str, Any]
+    outcome: Outcome | None = None
+    failure: str | None = None
+    measures: Mapping[str, float] = field(default_factory=dict)
+    faults: Sequence[str] = ()
+    folder: Path | None = None
+
+    @property
+    def result(self) -> Result | None:
+        """The result, from memory or from its folder; None where there is none."""
+        if self.outcome is not None:
+            return self.outcome.result
+        return None if self.folder is None else load_result(self.folder)
+
+
+@dataclass(frozen=True)
+class SweepResult:
+    """The runs of a sweep, in order of its variations.
+
+    Args:
+        scenario: what was varied. names: of what was varied. runs: that were done. units: of own measures, by name.
+    """
+
+    scenario: Scenario
+    names: Sequence[str]
+    runs: Sequence[SweepRun]
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+    def __getitem__(self, number: int) -> SweepRun:
+        return self.runs[number]
+
+    @property
+    def failed(self) -> list[SweepRun]:
+        """The runs that did not reach their end."""
+        return [run for run in self.runs if run.failure is not None]
+
+    @property
+    def measures(self) -> list[str]:
+        """Names of all measures, in order of appearance."""
+        return list(dict.fromkeys(name for run in self.runs for name in run.measures))
+
+    def unit(self, measure: str) -> str | None:
+        """Unit of a measure; None where nobody has said it."""
+        return self.units.get(measure) or measure_unit(measure)
+
+    def table(self) -> list[dict[str, Any]]:
+        """One row for each run: ``run``, the settings, the measures (NaN where a run has none) and ``failure``."""
+        return [
+            {"run": run.number}
+            | {name: run.settings.get(name) for name in self.names}
+            | {name: run.measures.get(name, nan) for name in self.measures}
+            | {"failure": run.failure}
+            for run in self.runs
+        ]
+
+    def to_pandas(self) -> Any:
+        """The table as a pandas data frame, indexed by the number of the run.
+
+        Raises:
+            OutputError: pandas is not installed.
+        """
+        try:
+            import pandas as pd  # noqa: PLC0415 - optional
+        except ImportError as error:
+            raise OutputError("This needs pandas: pip install 'fmu-observer[frames]'") from error
+        return pd.DataFrame(self.table()).set_index("run")
+
+    def text(self) -> str:
+        """The table as plain text, failures in words below it."""
+        rows = self.table()
+        names = ["run", *self.names, *self.measures]
+        shown = [setting_text] * (1 + len(self.names)) + [partial(number_text, digits=4)] * len(self.measures)
+        heads = ["run", *self.names, *(with_unit(name, self.unit(name)) for name in self.measures)]
+        cells = [heads, *([show(row[name]) for name, show in zip(names, shown, strict=True)] for row in rows)]
+        widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+        lines = ["  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True)) for line in cells]
+        lines += [f"run {run.number} failed: {run.failure}" for run in self.failed]
+        lines += [f"run {run.number}: {fault}" for run in self.runs for fault in run.faults]
+        return "\n".join(lines)
+
+    def compare(self, reference: int = 0, tolerance: Any = None, **options: Any) -> dict[int, Comparison]:
+        """Compare every other run with one of them.
+
+        Args:
+            reference: number of the run to compare with.
+            tolerance: and further options, as for `cosim.compare`.
+
+        Returns:
+            A comparison for each other run that has results, by its number.
+
+        Raises:
+            ComparisonError: the reference has no results.
+        """
+        from cosim.comparison.compare import compare  # noqa: PLC0415 - only for those who compare
+
+        results = {run.number: result for run in self.runs if (result := run.result) is not None}
+        if reference not in results:
+            known = ", ".join(map(str, results)) or "none"
+            raise ComparisonError(f"Run {reference} has no results to compare with; these have: {known}.")
+        base = results[reference]
+        return {n: compare(base, other, tolerance, **options) for n, other in results.items() if n != reference}
+
+    def plot(self, measure: str | None = None, against: str | None = None, ax: Axes | None = None) -> Axes:
+        """Draw a measure over a varied value, a line for each combination of the others.
+
+        Args:
+            measure: its name; the first where not given. against: what was varied; the first that takes several values.
+            ax: axes to draw on; None for a figure of its own.
+
+        Returns:
+            The axes.
+
+        Raises:
+            OutputError: there is no such measure, or this was not varied.
+        """
+        from cosim.studies.sweep_figure import sweep_figure  # noqa: PLC0415 - matplotlib only for those who draw
+
+        return sweep_figure(self, measure, against, ax)
+
+    def write(self, directory: str | Path) -> dict[str, Path]:
+        """Write a results folder for each run (``run_000``, ...), the table as ``index.csv`` and ``index.json``, and a picture.
+
+        Returns:
+            Paths by kind.
+
+        Raises:
+            OutputError: the folder cannot be written.
+        """
+        from cosim.studies.sweep_files import write_sweep  # noqa: PLC0415 - which knows this class
+
+        return write_sweep(self, Path(directory))

@@ -1,0 +1,134 @@
+"""Workers: tasks done in processes of their own, so that one that crashes takes nothing else with it. Knows no scenarios.
+
+Processes are started afresh (spawn): FMUs are not safe in threads, and a copied process would share their libraries' state.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from multiprocessing.connection import Connection, wait
+from pickle import PicklingError
+from typing import Any, NamedTuple
+
+STOP_SECONDS = 5.0
+
+
+class Died(NamedTuple):
+    """In place of an answer: the process died. `reason` says how."""
+
+    reason: str
+
+
+class Raised(NamedTuple):
+    """In place of an answer: the task raised what it should not have. `reason` names it."""
+
+    reason: str
+
+
+def attempt(task: Callable[[Any], Any], argument: Any) -> Any:
+    """The answer of a task, or what it raised: one that fails must not stop the others."""
+    try:
+        return task(argument)
+    except Exception as error:  # whatever it is, it is told
+        return Raised(f"{type(error).__name__}: {error}")
+
+
+def in_processes(task: Callable[[Any], Any], arguments: Sequence[Any], workers: int) -> Iterator[tuple[int, Any]]:
+    """Do a task for each argument, a few at a time.
+
+    Args:
+        task: a function of a module; it and its arguments and answers are pickled. arguments: one for each call.
+        workers: processes at a time.
+
+    Yields:
+        Number of the argument and the answer, `Died` or `Raised`, as they come.
+    """
+    waiting = list(enumerate(arguments))[::-1]
+    team = [_Worker(task) for _ in range(min(workers, len(waiting)))]
+    try:
+        for worker in team:
+            worker.give(*waiting.pop())
+        while team:
+            ready = wait([worker.pipe for worker in team])
+            for worker in [w for w in team if w.pipe in ready]:
+                number, answer = worker.number, worker.answer()
+                team.remove(worker)
+                if waiting:
+                    if isinstance(answer, Died):
+                        worker.stop()
+                        worker = _Worker(task)  # noqa: PLW2901 - in the place of the one that died
+                    worker.give(*waiting.pop())
+                    team.append(worker)
+                else:
+                    worker.stop()
+                yield number, answer
+    finally:
+        for worker in team:
+            worker.kill()
+
+
+class _Worker:
+    """One process and the pipe to it."""
+
+    def __init__(self, task: Callable[[Any], Any]) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.pipe, theirs = context.Pipe()
+        self.number = -1
+        self.process = context.Process(target=_serve, args=(task, theirs), daemon=True)
+        self.process.start()
+        theirs.close()  # so that the pipe ends when the process does
+
+    def give(self, number: int, argument: Any) -> None:
+        """Hand it a task; where it has died already, that is found when the answer is read."""
+        self.number = number
+        with suppress(BrokenPipeError, ConnectionResetError):
+            self.pipe.send(argument)
+
+    def answer(self) -> Any:
+        """What it answered."""
+        try:
+            return self.pipe.recv()
+        except (EOFError, ConnectionResetError):
+            self.process.join(STOP_SECONDS)
+            return Died(_how_it_ended(self.process.exitcode))
+
+    def stop(self) -> None:
+        """Let it end; it has nothing to do."""
+        self.pipe.close()
+        self.process.join(STOP_SECONDS)
+        self.kill()
+
+    def kill(self) -> None:
+        """End it, whatever it does."""
+        if self.process.is_alive():
+            self.process.kill()
+        self.process.join()
+        self.pipe.close()
+
+
+def _serve(task: Callable[[Any], Any], pipe: Connection) -> None:
+    """In the process: answer until nobody asks any more."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one who asks is interrupted, and ends this process
+    while True:
+        try:
+            argument = pipe.recv()
+        except (EOFError, ConnectionResetError):
+            return
+        answer = attempt(task, argument)
+        try:
+            pipe.send(answer)
+        except (TypeError, AttributeError, ValueError, PicklingError) as error:
+            pipe.send(Raised(f"its answer cannot be passed between processes: {error}"))
+
+
+def _how_it_ended(code: int | None) -> str:
+    if code is not None and code < 0:
+        try:
+            return f"its process was ended by the signal {signal.Signals(-code).name}"
+        except ValueError:
+            return f"its process was ended by signal {-code}"
+    hint = "; a script that uses workers needs the line if __name__ == '__main__':" if code == 1 else ""
+    return f"its process ended with exit code {code}{hint}"

@@ -1,0 +1,57 @@
+"""Comparisons made by hand: one signal that is too high for two seconds, one that is as it should be, one that is missing."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cosim.comparison.tolerance import Tolerance
+from cosim.comparison.verdict import Comparison, Curves, EventComparison, EventDifference, Finding, SignalComparison
+
+ALLOWED = 0.01
+
+
+def curves(rows: int = 601, excess: float = 0.05) -> Curves:
+    """A ramp with a jump at 30 s in 60 s; the result is `excess` too high from 20 to 22 s."""
+    time = np.linspace(0.0, 60.0, rows)
+    reference = 0.1 * time + np.where(time > 30.0, 2.0, 0.0)
+    error = np.where((time >= 20.0) & (time <= 22.0), excess, 0.0)
+    gap = int(np.searchsorted(time, 30.0, "right"))
+    tube_time, centre = np.insert(time, gap, np.nan), np.insert(reference, gap, np.nan)
+    return Curves(time, reference, time, reference + error, tube_time, centre - ALLOWED, centre + ALLOWED, time, error, ALLOWED)
+
+
+def differing(name: str = "train.speed", drawn: Curves | None = None, excess: float = 0.05) -> SignalComparison:
+    """A signal that differs."""
+    text = f"{name}: from 20 to 22 s outside the tube, at worst {excess:g} m/s too high at 21 s (allowed 0.01 m/s)"
+    finding = Finding("value", 20.0, 22.0, 2.1, 2.1 + excess, excess, ALLOWED, text)
+    return SignalComparison(
+        name, "m/s", "differs", Tolerance(), ALLOWED, 1e-6, excess, 21.0, 0.0, 0.009, 0.03, [(21.0, 2.1, 2.15, excess)],
+        [finding], (), curves(excess=excess) if drawn is None else drawn,
+    )  # fmt: skip
+
+
+def passing(name: str = "train.position", share: float = 0.4) -> SignalComparison:
+    """A signal that uses a share of its tolerance."""
+    return SignalComparison(name, "m", "within", Tolerance(), ALLOWED, 1e-6, share * ALLOWED, 3.0, 0.0, 0.001)
+
+
+def missing(name: str = "train.slip") -> SignalComparison:
+    """A signal that only the reference has."""
+    return SignalComparison(name, "1", "missing", Tolerance(), nearest=("train.slip_ratio",))
+
+
+def different() -> Comparison:
+    """All of it, with a telegram that is missing."""
+    lost = EventDifference("missing", None, None, "telegram 'B7' (true) of 12 s: missing")
+    return Comparison(
+        "reference <1>",
+        "result",
+        [passing(), differing(), missing()],
+        EventComparison(5, [lost], 1e-7),
+        ["Other versions of fmpy."],
+    )
+
+
+def equal() -> Comparison:
+    """Nothing differs."""
+    return Comparison("reference", "result", [passing(), passing("train.speed", 0.25)], EventComparison(5))

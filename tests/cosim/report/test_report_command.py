@@ -1,0 +1,105 @@
+"""``cosim report``: a page made again, several results over each other, and what is said of mistakes."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import pytest
+from small_scenarios import small
+
+from cosim.cli import main
+from cosim.cli.report import _labels as default_labels
+from cosim.report.spec import ReportSpec
+from cosim.report.stored_spec import spec_of
+from cosim.results.load import load_result
+from cosim.results.summary_file import jsonable
+
+
+def plain(spec: ReportSpec) -> Any:
+    return jsonable(asdict(spec))
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two results folders, ``one`` with a report."""
+    folder = tmp_path_factory.mktemp("runs")
+    outcome = small(title="A run").run()
+    outcome.write(folder / "one")
+    assert plain(spec_of(load_result(folder / "one"))) == plain(outcome.spec)  # a folder tells its roles
+    small(title="A run").set("odometer.sample_period", 0.05).run().write(folder / "two", report=False)
+    return folder
+
+
+def test_a_report_is_made_again(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    page = runs / "one" / "report.html"
+    before = page.read_bytes()
+    page.unlink()
+    assert main(["report", str(runs / "one")]) == 0
+    assert sorted(page.read_bytes().splitlines()) == sorted(before.splitlines())  # the summary's keys are sorted in its file
+    assert capsys.readouterr().out == f"report: {page}\n"
+
+
+def test_several_over_each_other(runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    arguments = [str(runs / "one"), str(runs / "two"), "--labels", "10 ms, 50 ms", "--signals", "driver.*"]
+    assert main(["report", *arguments]) == 0
+    text = (tmp_path / "overlay.html").read_text("utf-8")
+    for words in (
+        "A run: 2 runs",
+        "10 ms is what the others are compared with: 50 ms.",
+        "odometer.sample_period",
+        "driver.effort.",
+    ):
+        assert words in text
+
+
+def test_folders_of_one_name_are_told_apart() -> None:
+    assert default_labels(None, [Path("/a/one"), Path("/b/two")]) == ["one", "two"]
+    assert default_labels(None, [Path("/a/one"), Path("/b/one"), Path("/b/two")]) == ["a/one", "b/one", "b/two"]
+    assert len(set(default_labels(None, [Path("/a/one"), Path("/a/one")]))) == 2
+
+
+def test_an_older_folder_is_read_and_the_guess_is_told(runs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("table.csv", "events.csv", "messages.csv"):
+        (tmp_path / name).write_bytes((runs / "two" / name).read_bytes())
+    content = json.loads((runs / "two" / "summary.json").read_text("utf-8"))
+    del content["summary"]["report"]
+    (tmp_path / "summary.json").write_text(json.dumps(content), "utf-8")
+    page = tmp_path / "elsewhere" / "page.html"
+    assert main(["report", str(tmp_path), "--out", str(page)]) == 0
+    assert "guessed from their names: true_position = locomotive.position" in capsys.readouterr().err
+    assert "Speed error" in page.read_text("utf-8")
+    assert not (tmp_path / "report.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["{0}/none"], "There is no"),
+        (["{0}"], "is not a results folder"),
+        (["{0}/one/table.csv"], "say with --out FILE.html"),
+        (["{0}/one", "--signals", "driver.*"], "--signals is for several runs"),
+        (["{0}/one", "{0}/two", "--labels", "a"], "expected 2 texts"),
+        (["{0}/one", "{0}/two", "--labels", "a,a"], "Two runs have the label 'a'"),
+        (["{0}/one", "{0}/two", "--signals", "driver.efort"], "did you mean 'driver.effort'"),
+        (["{0}/one", "{0}/two", "--signals", "*"], "a page holds 16 figures"),
+        (["{0}/one", "{0}/two", "--out", "{0}/one/table.csv/x.html"], "cannot be written"),
+    ],
+)
+def test_mistakes_are_explained(
+    arguments: list[str],
+    message: str,
+    runs: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["report", *(a.format(runs) for a in arguments)]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert "Traceback" not in error
+    assert list(tmp_path.iterdir()) == []

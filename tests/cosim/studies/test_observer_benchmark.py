@@ -1,0 +1,273 @@
+"""Comparison of observers on one recorded run: the numbers of the run itself, whoever takes part, and failures in words."""
+
+from __future__ import annotations
+
+import json
+import math
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from small_scenarios import small
+
+from cosim import Scenario
+from cosim.errors import RunError, ScenarioError
+from cosim.master.master import Master
+from cosim.report.metrics import phase_metrics
+from cosim.report.spec import ReportSpec
+from cosim.results.load import load_result
+from cosim.results.result import BaliseRecord, Result, SignalInfo
+from cosim.studies.observer_scores import CertifiedGap, error_at_balises, false_alarms, longest_gap
+from cosim.studies.observers import ObserverBenchmark, benchmark_observers
+from cosim.studies.playback import find_sides, known_facts
+
+
+def quietly(scenario: Scenario) -> Any:
+    return scenario.run(warn=lambda _: None)
+
+
+def two() -> Scenario:
+    """`small` with a second observer and what a report needs."""
+    scenario = small().add("uio", observer="discrete_uio", **{"as": "block3"}, label="UIO", parameters={"mass": 80e3})
+    scenario.connect("driver.effort -> uio.effort", "odometer.reading -> uio.odometer")
+    return scenario.report(evaluate_after=0.1, phases=[{"name": "late", "start": 0.2, "end": 0.5}], zones=[(0.2, 0.3)])
+
+
+@pytest.fixture(scope="module")
+def benchmark() -> ObserverBenchmark:
+    return benchmark_observers(two(), ["observer", "uio"], repeat=2)
+
+
+# -- the numbers of the run -------------------------------------------------------------------------------------------------
+
+
+def test_on_profile_d_every_observer_gives_the_numbers_of_the_joint_run() -> None:
+    """Four observers, 264 telegrams, 90 s: bit for bit; S1 in the traction zone is the 0.00474 m/s of its page."""
+    scenario = Scenario.load("freight_profile_d")
+    together = quietly(scenario)
+    names = list(together.spec.observers)
+    alone = benchmark_observers(scenario, names)
+    assert alone.failed == []
+    for name in names:
+        result = alone.outcomes[name].result
+        for column in (c for c in result.table.dtype.names or () if c == "time" or c.startswith(f"{name}.")):
+            assert result[column].tobytes() == together[column].tobytes(), column
+    scored = [phase for score in alone.scores for phase in score.phases]
+    expected = phase_metrics(together.result, together.spec)
+    assert [(m.observer, m.phase, m.speed, m.position) for m in scored] == [
+        (m.observer, m.phase, m.speed, m.position) for m in expected
+    ]
+    assert f"{scored[0].speed.max_abs:.5f}" == "0.00474"  # type: ignore[union-attr]
+    seen = {n: c["largest_gap_seen"] for n, c in together.result.summary["certificates"].items()}
+    assert {s.name: s.certificate.seen for s in alone.scores if s.certificate is not None} == seen
+
+
+def test_an_observer_in_the_loop_is_recorded_in_it_and_said_to_be() -> None:
+    scenario = two()
+    data = scenario.table().model_dump(by_alias=True, exclude_unset=True)
+    data["connections"] = [c for c in data["connections"] if "driver.odometer" not in c]
+    data["connections"] += ["observer.speed -> driver.odometer", "odometer.reading -> observer.odometer"]
+    looped = Scenario(**data)
+    assert find_sides(looped).in_loop == ("observer",)
+    together = quietly(looped)
+    found = benchmark_observers(looped, ["observer", "uio"])
+    assert any("observer acts on the train" in note for note in found.notes)
+    assert [s.in_loop for s in found.scores] == [True, False]
+    assert found.outcomes["uio"]["uio.speed"].tobytes() == together["uio.speed"].tobytes()
+
+
+def test_a_recording_is_kept_and_can_be_played_back_later(tmp_path: Path, benchmark: ObserverBenchmark) -> None:
+    first = benchmark_observers(two(), ["uio"], record=tmp_path / "run")
+    assert "locomotive.speed" in (load_result(tmp_path / "run").table.dtype.names or ())
+    again = benchmark_observers(two(), ["uio"], recorded=tmp_path / "run")
+    sizes = [b.scores[-1].whole for b in (first, again, benchmark)]
+    assert sizes[0] == sizes[1] == sizes[2]
+    quietly(two().set("locomotive.train_speed", 9.0)).write(tmp_path / "other", report=False)
+    other = benchmark_observers(two(), ["uio"], recorded=tmp_path / "other")
+    assert other.outcomes["uio"]["locomotive.speed"][0] == 9.0
+    assert other.scores[0].whole != sizes[0]
+
+
+def test_each_repetition_has_its_cost(benchmark: ObserverBenchmark) -> None:
+    for score in benchmark.scores:
+        assert len(score.costs) == 2
+        assert min(score.costs) <= score.cost <= max(score.costs)  # type: ignore[operator]
+        assert all(cost > 0.0 for cost in score.costs)
+
+
+# -- scores -----------------------------------------------------------------------------------------------------------------
+
+
+def test_errors_at_balises_are_those_of_a_naive_search(benchmark: ObserverBenchmark) -> None:
+    """The first row at the time of delivery, which is the one before the telegram."""
+    for score in benchmark.scores:
+        result = benchmark.outcomes[score.name].result
+        errors = []
+        for event in result.events:
+            row = next(i for i, t in enumerate(result.time) if abs(t - event.delivered_at) < 1e-9)
+            errors.append(float(result[f"{score.name}.speed"][row] - result["locomotive.speed"][row]))
+        assert score.speed_at_balises is not None
+        assert len(errors) == 3  # all of them after evaluate_after = 0.1 s
+        assert score.speed_at_balises.mean == pytest.approx(sum(errors) / 3, rel=1e-12)
+        assert score.speed_at_balises.rms == pytest.approx(math.sqrt(sum(e * e for e in errors) / 3), rel=1e-12)
+        assert score.speed_at_balises.max_abs == max(map(abs, errors))
+
+
+def result_of(**columns: Any) -> Result:
+    table = np.empty(len(columns["time"]), dtype=[(key.replace("__", "."), float) for key in columns])
+    for key, values in columns.items():
+        table[key.replace("__", ".")] = values
+    return Result(table, [SignalInfo(name) for name in table.dtype.names or () if name != "time"])
+
+
+def test_false_alarms_are_indications_that_begin_outside_the_zones() -> None:
+    """On at 1, 4 and 7 s; the zone is 3 to 5 s; before 0.5 s nothing counts."""
+    result = result_of(time=np.arange(10.0), o__slip_indicator=[2, 2, 1, 1, 2, 2, 2, 1, 2, 1])
+    spec = ReportSpec(observers=["o"], zones=[(3.0, 5.0)], evaluate_after=0.5)
+    assert false_alarms(result, spec, "o") == 1
+    assert false_alarms(result, ReportSpec(observers=["o"]), "o") is None
+
+
+def test_telegrams_that_were_not_used_do_not_count() -> None:
+    result = result_of(time=[0.0, 1.0, 2.0, 3.0], p__speed=[0.0] * 4, o__speed=[1.0, 2.0, 3.0, 4.0])
+    told = {"accepted": 1.0, "rejected": 2.0, "replayed": 3.0}
+    events = [BaliseRecord(t, t, f"B{t:g}", 0.0, 0.0, outcomes={"o": outcome}) for outcome, t in told.items()]
+    spec = ReportSpec(true_speed="p.speed", observers=["o"])
+    found = error_at_balises(Result(result.table, result.signals, events), spec, "o", "speed")
+    assert found is not None
+    assert (found.count, found.mean, found.max_abs) == (2, 3.0, 4.0)
+    assert longest_gap(events, 0.0) == 1.0
+
+
+def test_a_certificate_is_held_against_both_gaps() -> None:
+    gap = CertifiedGap(limit=0.5, expected=0.4, seen=0.6)
+    assert (gap.holds_expected, gap.holds_seen) == (True, False)
+    assert CertifiedGap(0.5, None, None).holds_expected is None
+
+
+# -- who takes part -----------------------------------------------------------------------------------------------------------
+
+
+def test_by_default_all_take_part_that_fit_and_the_others_are_named() -> None:
+    from cosim.studies.observers import find_candidates
+
+    scenario = two()
+    found, notes = find_candidates(scenario, find_sides(scenario), None)
+    names = [candidate.name for candidate in found]
+    assert names == ["observer", "uio", "differentiator_cdo", "multirate_cdo", "adaptive_gain_cdo"]
+    assert any("gradient" in note and "augmented_high_gain_cdo" in note for note in notes)
+    fits = {c.name: {signal: link[0] for signal, link in c.sources.items()} for c in found}
+    assert fits["adaptive_gain_cdo"] == {"effort": "driver.effort", "odometer": "odometer.reading"}
+
+
+def test_facts_come_from_the_observers_where_they_agree_else_from_the_plant() -> None:
+    scenario = two().set("observer.mass", 80e3).set("locomotive.davis_b", 30.0).set("locomotive.mass", 95e3)
+    facts = known_facts(find_sides(scenario))
+    assert facts["mass"] == (80e3, "as for the observers of the scenario")
+    assert facts["davis_b"] == (30.0, "as for locomotive")
+    assert "wheel_radius" not in facts
+    assert known_facts(find_sides(scenario.set("uio.mass", 70e3)))["mass"] == (95e3, "as for locomotive")
+
+
+def test_a_scenario_without_observers_serves_shipped_ones() -> None:
+    data = small().table().model_dump(by_alias=True, exclude_unset=True)
+    del data["components"]["observer"]
+    data["connections"] = ["driver.effort -> locomotive.effort", "locomotive.wheel_speed -> odometer.wheel_speed"]
+    sides = find_sides(Scenario(**data))
+    assert {signal: link[0] for signal, link in sides.template().items()} == {
+        "effort": "driver.effort", "wheel_speed": "locomotive.wheel_speed", "odometer": "odometer.reading",
+    }  # fmt: skip
+
+
+# -- failures -----------------------------------------------------------------------------------------------------------------
+
+
+def test_an_unknown_observer_is_refused_with_the_nearest_name() -> None:
+    with pytest.raises(ScenarioError, match="unknown observer 'discrete_uoi'; did you mean 'discrete_uio'"):
+        benchmark_observers(two(), ["discrete_uoi"])
+
+
+def test_one_that_cannot_be_coupled_or_diverges_keeps_its_row_with_the_reason() -> None:
+    scenario = two().set("observer.estimated_speed", 1e200)
+    found = benchmark_observers(scenario, ["luenberger", "observer", "uio"])
+    assert found.failed == ["luenberger", "observer"]
+    reasons = {score.name: str(score.failure) for score in found.scores}
+    assert reasons["luenberger"] == "cannot be coupled: nothing in this scenario gives its inputs torque, measured_angle"
+    assert reasons["observer"].startswith("diverged: its speed error reached 1e+200 m/s")
+    assert found.scores[2].failure is None
+    assert found.scores[2].whole is not None
+    assert "luenberger: cannot be coupled" in found.text()
+
+
+def test_a_plant_that_fails_is_said() -> None:
+    with pytest.raises(RunError, match="run of the plant side failed"):
+        benchmark_observers(two().set("locomotive.train_speed", 1e308).balises(method="interpolate"), ["uio"])
+
+
+# -- what is written ------------------------------------------------------------------------------------------------------------
+
+
+class Texts(HTMLParser):
+    """Headings and cells of a page."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.found: list[str] = []
+        self.feed(text)
+
+    def handle_data(self, data: str) -> None:
+        self.found.append(data)
+
+
+def test_page_picture_and_data_say_the_same(benchmark: ObserverBenchmark, tmp_path: Path) -> None:
+    paths = benchmark.write(tmp_path / "out")
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["observers.html", "observers.json", "observers.png"]
+    data = json.loads(paths["data"].read_text(encoding="utf-8"))
+    assert [entry["label"] for entry in data["observers"]] == ["observer", "UIO"]
+    assert data["observers"][1]["whole"]["speed"]["rms"] == benchmark.scores[1].speed_rms
+    page = paths["page"].read_text(encoding="utf-8")
+    assert {"Overview", "Errors by phase", "Speed error against time", "Certificates", "Telegrams"} <= set(Texts(page).found)
+    assert page.count("data:image/png;base64,") == 2
+    assert paths["picture"].read_bytes().startswith(b"\x89PNG")
+    assert "http" not in page
+
+
+def test_the_picture_has_units_and_a_point_for_each_observer(benchmark: ObserverBenchmark) -> None:
+    from cosim.report.figures.observers_figure import cost_figure, errors_figure
+
+    errors, cost = errors_figure(benchmark.scores), cost_figure(benchmark.scores)
+    assert errors.get_xlabel() == "Speed error [m/s]"
+    assert [label.get_text() for label in errors.get_yticklabels()] == ["observer", "UIO"]
+    points = [(line.get_xdata()[0], line.get_ydata()[0]) for line in cost.get_lines()]  # type: ignore[index]
+    assert points == [(score.speed_rms, score.cost) for score in benchmark.scores]
+    assert "[m/s]" in cost.get_xlabel()
+    assert "[µs]" in cost.get_ylabel()
+
+
+# -- interrupted ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("at", [1, 2, 3])
+def test_what_was_computed_before_an_interruption_is_kept(at: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first run is the plant's, the others one observer each."""
+    step, begun = Master.run, []
+
+    def interrupted(master: Master) -> None:
+        step(master)
+        begun.append(master)
+        if len(begun) == at:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Master, "run", interrupted)
+    if at < 3:
+        with pytest.raises(KeyboardInterrupt):
+            benchmark_observers(two(), ["observer", "uio"], record=tmp_path)
+    else:
+        found = benchmark_observers(two(), ["observer", "uio"], record=tmp_path)
+        assert found.interrupted
+        assert [score.name for score in found.scores] == ["observer"]
+        assert "Interrupted; not judged: uio." in found.notes
+    assert len(begun) == at
+    assert len(load_result(tmp_path).time) > 50

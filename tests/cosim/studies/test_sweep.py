@@ -1,0 +1,215 @@
+"""Sweeps: every variation is run as it would be alone, whatever happens to the others, and nothing computed is lost."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from small_scenarios import small
+
+from cosim import Scenario
+from cosim.errors import ComparisonError, CosimError, OutputError, ScenarioError
+from cosim.master.master import Master
+from cosim.results.folder import read_results
+from cosim.scenario.outcome import Outcome
+from cosim.studies.sampling import uniform
+from cosim.studies.seeds import seed_study
+from cosim.studies.sweep_result import SweepResult
+
+MASSES = [70e3, 110e3]
+
+
+def plant() -> Scenario:
+    """The small scenario without driver and observer, so that a run takes a few milliseconds."""
+    scenario = Scenario(stop=0.2, step=0.01)
+    scenario.add("train", model="locomotive", **{"as": "block3"}, parameters={"train_speed": 10.0, "effort": 5e4})
+    return scenario
+
+
+def travelled(outcome: Outcome) -> float:
+    return float(outcome["train.position"][-1])
+
+
+@pytest.fixture(scope="module")
+def swept() -> SweepResult:
+    """Two masses and two latencies of the small scenario."""
+    sweep = small(title="Swept").vary({"locomotive.mass": MASSES, "balises.latency": [0.0, 0.02]})
+    return sweep.run(measure={"last speed": lambda outcome: outcome["locomotive.speed"][-1]}, units={"last speed": "m/s"})
+
+
+def test_each_run_is_the_one_with_these_overrides(swept: SweepResult) -> None:
+    assert [dict(run.settings) for run in swept.runs] == [
+        {"locomotive.mass": mass, "balises.latency": latency} for mass in MASSES for latency in (0.0, 0.02)
+    ]
+    alone = small().run(overrides={"locomotive.mass": 110e3, "balises.latency": 0.02})
+    outcome = swept[3].outcome
+    assert outcome is not None
+    np.testing.assert_array_equal(outcome.result.table, alone.result.table)
+
+
+def test_measures_are_the_errors_of_the_table_and_the_users_own(swept: SweepResult) -> None:
+    row, outcome = swept.table()[1], swept[1].outcome
+    assert outcome is not None
+    error = outcome["observer.speed"] - outcome["locomotive.speed"]
+    assert row["observer.speed_error_max"] == np.max(np.abs(error))
+    # Uniform steps but for three events: the plain mean of squares is the integral to a few per cent.
+    assert row["observer.speed_error_rms"] == pytest.approx(np.sqrt(np.mean(error**2)), rel=0.05)
+    assert row["last speed"] == outcome["locomotive.speed"][-1]
+    assert (row["run"], row["failure"], row["balises.latency"]) == (1, None, 0.02)
+    frame = swept.to_pandas()
+    assert list(frame["last speed"]) == [r["last speed"] for r in swept.table()]
+    assert frame.index.name == "run"
+
+
+def test_results_do_not_depend_on_the_number_of_workers() -> None:
+    sweep = plant().vary([{"train.mass": 70e3}, {"stop": 0.1}, {"train.effort": -5e4}])
+    done: list[tuple[int, int]] = []
+    here, there = sweep.run(), sweep.run(workers=2, progress=lambda *told: done.append(told))
+    for a, b in zip(here.runs, there.runs, strict=True):
+        assert a.outcome is not None
+        assert b.outcome is not None
+        np.testing.assert_array_equal(a.outcome.result.table, b.outcome.result.table)
+        assert (a.number, a.settings, a.measures, a.failure) == (b.number, b.settings, b.measures, b.failure)
+    assert done == [(1, 3), (2, 3), (3, 3)]
+
+
+def test_runs_that_fail_do_not_stop_the_others(tmp_path: Path) -> None:
+    """The first and the last cannot begin; a measure of the user's fails in one of the others."""
+
+    def touchy(outcome: Outcome) -> float:
+        return 1.0 / (travelled(outcome) < 2.5)
+
+    sweep = plant().balises(position="train.position", speed="train.speed", layout="csv", file="balises.csv").vary(
+        {"balises.file": ["none.csv", str(tmp_path / "some.csv"), "missing.csv"], "train.train_speed": [10.0, 20.0]}
+    )  # fmt: skip
+    (tmp_path / "some.csv").write_text("position\n1.0\n")
+    result = sweep.run(measure={"touchy": touchy, "travelled": travelled})
+    assert [run.number for run in result.failed] == [0, 1, 4, 5]
+    assert "none.csv does not exist" in str(result[0].failure)
+    table = result.table()
+    assert table[2]["touchy"] == 1.0
+    assert np.isnan(table[3]["touchy"])
+    assert table[3]["travelled"] > 3.9
+    text = result.text()
+    assert "run 3: measure 'touchy': ZeroDivisionError: float division by zero" in text
+    assert "run 5 failed" in text
+    with pytest.raises(ComparisonError, match="Run 0 has no results to compare with; these have: 2, 3"):
+        result.compare()
+    assert result.plot("travelled", "train.train_speed").get_title(loc="left") == "4 of 6 runs failed"
+
+
+def test_a_sweep_in_a_folder_can_be_read_without_it(swept: SweepResult, tmp_path: Path) -> None:
+    paths = swept.write(tmp_path)
+    np.testing.assert_array_equal(read_results(tmp_path / "run_002").table, swept[2].outcome.result.table)  # type: ignore[union-attr]
+    with paths["csv"].open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["last speed"]) for row in rows] == [row["last speed"] for row in swept.table()]
+    assert [row["folder"] for row in rows] == [f"run_{n:03d}" for n in range(4)]
+    data = json.loads(paths["json"].read_text())
+    assert data["varied"] == ["locomotive.mass", "balises.latency"]
+    assert data["runs"][3]["settings"] == {"locomotive.mass": 110e3, "balises.latency": 0.02}
+    assert paths["picture"].read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_is_computed_stays_when_the_sweep_is_interrupted(tmp_path: Path) -> None:
+    def interrupt(done: int, _count: int) -> None:
+        if done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        plant().vary({"train.mass": [70e3, 80e3, 90e3, 100e3]}).run(progress=interrupt, directory=tmp_path)
+    assert sorted(p.name for p in tmp_path.glob("run_*")) == ["run_000", "run_001"]
+    assert [run["settings"] for run in json.loads((tmp_path / "index.json").read_text())["runs"]] == [
+        {"train.mass": 70e3}, {"train.mass": 80e3},
+    ]  # fmt: skip
+
+
+def test_outcomes_that_are_not_kept_are_read_from_their_folders(tmp_path: Path) -> None:
+    sweep = plant().vary({"train.mass": [70e3, 70e3, 90e3]})
+    thin = sweep.run(keep=False, directory=tmp_path)
+    assert [run.outcome for run in thin.runs] == [None] * 3
+    compared = thin.compare(reference=1)
+    assert [(number, found.equal) for number, found in compared.items()] == [(0, True), (2, False)]
+    assert {s.name for s in compared[2].failed} >= {"train.speed", "train.position"}
+
+
+def test_the_picture_has_units_and_a_line_for_each_other_value(swept: SweepResult) -> None:
+    ax = swept.plot()
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("locomotive.mass [kg]", "observer.speed_error_max [m/s]")
+    lines = {str(line.get_label()): line for line in ax.get_lines()}
+    assert set(lines) == {"balises.latency = 0", "balises.latency = 0.02"}
+    np.testing.assert_array_equal(np.asarray(lines["balises.latency = 0"].get_xdata()), MASSES)
+    expected = [swept.table()[n]["observer.speed_error_max"] for n in (0, 2)]
+    np.testing.assert_array_equal(np.asarray(lines["balises.latency = 0"].get_ydata()), expected)
+    assert swept.plot("last speed", "balises.latency").get_xlabel() == "balises.latency [s]"
+    assert swept.plot("last speed").get_ylabel() == "last speed [m/s]"
+    with pytest.raises(OutputError, match="no measure 'last sped'; did you mean 'last speed'"):
+        swept.plot("last sped")
+
+
+def test_points_of_a_hypercube_are_no_line_and_words_are_categories() -> None:
+    ranges = {"train.mass": uniform(7e4, 9e4), "train.effort": uniform(0.0, 1e4)}
+    result = plant().vary(ranges, "latin", count=3).run(measure={"x": travelled})
+    (line,) = result.plot().get_lines()
+    assert line.get_linestyle() == "None"
+    assert list(np.asarray(line.get_xdata())) == sorted(row["train.mass"] for row in result.table())
+    ax = plant().vary({"train.as": ["block3", "block2"]}).run(measure={"x": travelled}).plot()
+    assert [tick.get_text() for tick in ax.get_xticklabels()] == ["block3", "block2"]
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"trian.mass": [1.0]}, r"run 0 \(trian\.mass = 1\.0\): .*no component 'trian'; did you mean 'train'"),
+        ({"train.mas": [1.0]}, r"run 0 .*no variable 'mas'; did you mean 'mass'"),
+        ({"train.mass": [-1.0]}, r"run 0 .*train\.mass = -1 lies outside"),
+        ({"stop": [0.2, 0.205]}, r"run 1 \(stop = 0\.205\): .*does not divide"),
+        ({"master.steper": ["python"]}, r"master\.steper: unknown key"),
+    ],
+)
+def test_a_variation_that_cannot_be_is_refused_before_anything_runs(values: dict[str, Any], message: str) -> None:
+    with pytest.raises(CosimError, match=message):
+        plant().vary(values)
+
+
+def test_a_sweep_needs_a_worker() -> None:
+    with pytest.raises(ScenarioError, match="at least one worker"):
+        plant().vary({"stop": [0.1]}).run(workers=0)
+
+
+def test_the_scenario_is_left_as_it_was() -> None:
+    scenario = plant()
+    sweep = scenario.vary({"train.mass": [70e3]})
+    scenario.set("train.mass", 50e3)
+    outcome = sweep.run()[0].outcome
+    assert outcome is not None
+    assert outcome.result.summary["components"][0]["parameters"]["mass"] == 70e3
+    assert scenario.table().components["train"].parameters["mass"] == 50e3
+
+
+def test_a_study_over_seeds_is_the_sweep_over_them() -> None:
+    scenario = small().set("balises.layout", "aperiodic").set("balises.max_gap", 0.2)
+    study = seed_study(scenario, [3, 5])
+    table = scenario.vary({"balises.seed": [3, 5]}).run().table()
+    assert study.errors["observer", "whole run"] == [row["observer.speed_error_max"] for row in table]
+
+
+def test_who_interrupts_a_run_stops_the_sweep_and_keeps_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    step, begun = Master.run, []
+
+    def interrupted(master: Master) -> None:
+        begun.append(master)
+        if len(begun) == 2:
+            raise KeyboardInterrupt
+        step(master)
+
+    monkeypatch.setattr(Master, "run", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        plant().vary({"train.mass": [70e3, 80e3, 90e3]}).run(directory=tmp_path)
+    assert len(begun) == 2
+    assert len(json.loads((tmp_path / "index.json").read_text())["runs"]) == 2
+    assert read_results(tmp_path / "run_000").failure is None

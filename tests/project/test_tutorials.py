@@ -1,0 +1,96 @@
+"""The tutorials do what they say, from the first line to the last, as a newcomer would type it: every command is a real one."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+
+import pytest
+from foreign_fmu import foreign_fmu
+from pages import TUTORIALS, Block, blocks
+
+import fmus
+
+FILE = re.compile(r"# (?P<name>[\w.-]+\.(?:py|toml|csv))\n")
+"""The first line of a block that is a file."""
+SEALED = "2_your_own_train.md"
+
+
+def exits(page: Path, block: Block) -> int:
+    """The exit code a page promises in ``<!-- exits: 1 -->`` above a block; 0 where it promises none."""
+    above = page.read_text(encoding="utf-8").splitlines()[: block.line - 2]
+    found = re.fullmatch(r"<!-- exits: (\d) -->", above[-1]) if above else None
+    return int(found[1]) if found else 0
+
+
+def environment(folder: Path) -> dict[str, str]:
+    """That of a reader who has activated the virtual environment; pytest in pytest must not know of the outer one."""
+    inherited = {k: v for k, v in os.environ.items() if not k.startswith(("PYTEST_", "COV_")) and k != "CI"}
+    path = os.pathsep.join((sysconfig.get_path("scripts"), str(Path(sys.executable).parent), os.environ.get("PATH", "")))
+    own = {"PATH": path, "HOME": str(folder), "FMU_OBSERVER_CACHE": str(fmus.cache_folder())}  # builds are kept as a reader's are
+    return inherited | own | {"MPLBACKEND": "Agg", "PYTHONDONTWRITEBYTECODE": "1"}
+
+
+def run_line(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        ["bash", "-euo", "pipefail", "-c", line], cwd=folder, env=environment(folder), capture_output=True, text=True, check=False
+    )
+
+
+def follow(page: Path, folder: Path) -> None:
+    """Do everything the page says."""
+    for block in blocks(page):
+        named = FILE.match(block.code)
+        place = f"{page.name}, line {block.line}"
+        if named is not None:
+            (folder / named["name"]).write_text(block.code[named.end() :], encoding="utf-8")
+        elif block.language == "python":
+            done = subprocess.run(
+                [sys.executable, "-c", block.code],
+                cwd=folder,
+                env=environment(folder),
+                capture_output=True,
+                text=True,
+                check=False,
+            )
+            assert done.returncode == 0, f"{place}:\n{done.stdout}\n{done.stderr}"
+        elif block.language == "sh":
+            for line in block.code.splitlines():
+                done = run_line(line, folder)
+                assert done.returncode == exits(page, block), f"{place}: {line}\n{done.stdout}\n{done.stderr}"
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("page", TUTORIALS, ids=lambda p: p.stem)
+def test_a_tutorial_from_start_to_end(page: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "reader"
+    folder.mkdir()
+    if page.name == SEALED:
+        foreign_fmu("Mass_Damper", tmp_path / "foreign").rename(folder / "vendor.fmu")
+    follow(page, folder)
+
+
+def test_there_are_tutorials_and_the_sealed_one_is_among_them() -> None:
+    assert len(TUTORIALS) >= 5
+    assert SEALED in {page.name for page in TUTORIALS}
+
+
+@pytest.mark.parametrize("command", ["false", "cosim run no_such_scenario", "no_such_program"])
+def test_a_command_that_fails_is_noticed(command: str, tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(f"text\n\n```sh\n{command}\n```\n", encoding="utf-8")
+    with pytest.raises(AssertionError, match=r"page.md, line 4"):
+        follow(page, tmp_path)
+
+
+def test_a_promised_exit_code_is_demanded(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("text\n\n<!-- exits: 1 -->\n```sh\nfalse\n```\n", encoding="utf-8")
+    follow(page, tmp_path)
+    page.write_text("text\n\n<!-- exits: 1 -->\n```sh\ntrue\n```\n", encoding="utf-8")
+    with pytest.raises(AssertionError):
+        follow(page, tmp_path)
