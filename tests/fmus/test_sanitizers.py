@@ -4,6 +4,7 @@ in co-simulation and model exchange, and states with damaged bytes."""
 from __future__ import annotations
 
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ from fmus import cached_fmu, recipe
 from fmus.toolchain.compile import find_compiler, header_folder
 
 pytestmark = pytest.mark.compiler
+Sanitized = Callable[[Unpacked], Path]
 
 
 @pytest.fixture(scope="module")
@@ -29,37 +31,49 @@ def exchange(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return compile_host("exchange", tmp_path_factory.mktemp("sanitized"), SANITIZE)
 
 
-def sanitized_library(fmu: Unpacked) -> Path:
-    """The library of an FMU, compiled from the sources it carries."""
-    target = fmu.folder / "sanitized.so"
-    flags = ["-std=c11", "-O1", "-g", "-fPIC", "-shared", *SANITIZE, f"-I{header_folder()}"]
-    run([*find_compiler().command, *flags, str(fmu.folder / "sources" / "all.c"), "-o", str(target), "-lm"])
-    return target
+@pytest.fixture(scope="module")
+def sanitized(tmp_path_factory: pytest.TempPathFactory) -> Sanitized:
+    """The library of an FMU, compiled from the sources it carries; once, however many tests load it."""
+    compiled: dict[bytes, Path] = {}
+
+    def library(fmu: Unpacked) -> Path:
+        sources = (fmu.folder / "sources" / "all.c").parent
+        key = b"".join(path.name.encode() + path.read_bytes() for path in sorted(sources.iterdir()) if path.is_file())
+        if key not in compiled:
+            target = tmp_path_factory.mktemp("library") / "sanitized.so"
+            flags = ["-std=c11", "-O1", "-g", "-fPIC", "-shared", *SANITIZE, f"-I{header_folder()}"]
+            run([*find_compiler().command, *flags, str(sources / "all.c"), "-o", str(target), "-lm"])
+            compiled[key] = target
+        return compiled[key]
+
+    return library
 
 
 @pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.parametrize("name", [name for name in MODELS if name != "multirate_cdo"])  # like the other observer
-def test_a_whole_life_is_clean(name: str, version: int, life: Path, tmp_path: Path) -> None:
+def test_a_whole_life_is_clean(name: str, version: int, life: Path, sanitized: Sanitized, tmp_path: Path) -> None:
     fmu = Unpacked.of(cached_fmu(recipe(name), version), tmp_path / name)  # type: ignore[arg-type]
-    run([str(life), "cover", str(life_wiring(fmu, tmp_path / "wiring.txt", sanitized_library(fmu)))])
+    run([str(life), "cover", str(life_wiring(fmu, tmp_path / "wiring.txt", sanitized(fmu)))])
 
 
 @pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.parametrize("name", ["takagi_sugeno_cdo", "balise_reader", "odometer"])
-def test_damaged_states_are_refused_or_harmless(name: str, version: int, life: Path, tmp_path: Path) -> None:
+def test_damaged_states_are_refused_or_harmless(
+    name: str, version: int, life: Path, sanitized: Sanitized, tmp_path: Path
+) -> None:
     """A state is accepted where a damaged word only changes a value; then steps come to an end and touch nothing else."""
     fmu = Unpacked.of(cached_fmu(recipe(name), version), tmp_path / name)  # type: ignore[arg-type]
-    printed = run([str(life), "damage", str(life_wiring(fmu, tmp_path / "wiring.txt", sanitized_library(fmu)))])
+    printed = run([str(life), "damage", str(life_wiring(fmu, tmp_path / "wiring.txt", sanitized(fmu)))])
     tried, accepted = map(int, printed.split())
     assert 0 < accepted < tried
 
 
 @pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.parametrize("name", [name for name in MODELS if can_exchange(recipe(name)) and name != "multirate_cdo"])
-def test_model_exchange_is_clean(name: str, version: int, exchange: Path, tmp_path: Path) -> None:
+def test_model_exchange_is_clean(name: str, version: int, exchange: Path, sanitized: Sanitized, tmp_path: Path) -> None:
     """A run with events and directional derivatives, then damaged states."""
     fmu = Unpacked.of(cached_fmu(recipe(name), version), tmp_path / name)  # type: ignore[arg-type]
-    wiring = life_wiring(fmu, tmp_path / "wiring.txt", sanitized_library(fmu))
+    wiring = life_wiring(fmu, tmp_path / "wiring.txt", sanitized(fmu))
     states, indicators = (
         str(n or 0) for n in (fmu.description.numberOfContinuousStates, fmu.description.numberOfEventIndicators)
     )
@@ -69,11 +83,11 @@ def test_model_exchange_is_clean(name: str, version: int, exchange: Path, tmp_pa
 
 
 @pytest.mark.parametrize("version", [2, 3])
-def test_reading_a_resource_is_clean(version: int, life: Path, tmp_path: Path) -> None:
+def test_reading_a_resource_is_clean(version: int, life: Path, sanitized: Sanitized, tmp_path: Path) -> None:
     """Files right and wrong; a refusal leaves nothing open and nothing allocated."""
     system = recipe("balise_reader", layout="positions", balise_capacity=4)
     fmu = Unpacked.of(cached_fmu(system, version), tmp_path / "reader")  # type: ignore[arg-type]
-    wiring = life_wiring(fmu, tmp_path / "wiring.txt", sanitized_library(fmu))
+    wiring = life_wiring(fmu, tmp_path / "wiring.txt", sanitized(fmu))
     table = fmu.folder / "resources" / "balises.csv"
     run([str(life), "cover", str(wiring)])
     rows = ["x\n", "2\n1\n", "1\n2\n3\n4\n5\n", "1" * 2000 + "\n"]
