@@ -164,6 +164,8 @@ def _verdict(comparison: Comparison) -> str:
     if comparison.equal:
         return box("success", "Equal within tolerance", content)
     worst = [f"{s.name}: {_in_words(s)}" for s in comparison.failed[:FINDINGS_SHOWN]]
+    if len(comparison.failed) > FINDINGS_SHOWN:
+        worst.append(f"... and {len(comparison.failed) - FINDINGS_SHOWN} more, listed below")
     return box("failure", "Different", content + bullets(worst))
 
 

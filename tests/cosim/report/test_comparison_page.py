@@ -190,6 +190,12 @@ def test_pictures_are_those_of_the_worst_signals_and_not_too_many() -> None:
     assert [b64decode(data) for data in images] == list(pictures.values())
 
 
+def test_the_verdict_says_how_many_it_does_not_list() -> None:
+    six, eight = (comparison_page(Comparison("x", "y", [differing(f"signal_{i}") for i in range(n)]), {}) for n in (6, 8))
+    assert "more, listed below" not in six
+    assert "... and 2 more, listed below" in eight
+
+
 def test_telegrams_that_were_not_compared_are_said_not_to_be() -> None:
     assert "one side keeps no telegrams" in page_of(replace(equal(), events=EventComparison(compared=False)))
 
