@@ -38,11 +38,6 @@ class Recipe:
     record: Sequence[str] = ()
     overrides: Mapping[str, Any] = field(default_factory=dict)
 
-    @property
-    def runnable(self) -> bool:
-        """Whether it can be run again."""
-        return self.kind != "result"
-
     def to_data(self, folder: Path) -> dict[str, Any]:
         """Plain data for a file in `folder`."""
         data: dict[str, Any] = {"kind": self.kind}

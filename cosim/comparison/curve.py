@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -66,10 +66,6 @@ class Curve:
         steps = np.diff(self.time)
         steps = steps[steps > 0.0]
         return float(np.median(steps)) if len(steps) else 0.0
-
-    def as_held(self) -> Curve:
-        """The same rows, held."""
-        return self if self.held else replace(self, held=True)
 
 
 def rows_to_keep(time: np.ndarray) -> np.ndarray:

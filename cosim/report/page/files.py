@@ -5,6 +5,26 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
+from cosim.errors import OutputError
+
+
+def write_page(path: str | Path, text: str) -> Path:
+    """Write a page to a place that the user named; its folder is created.
+
+    Args:
+        path: the file. text: the page.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    file = Path(path)
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write_file(file, text.encode("utf-8", "backslashreplace"))
+    except OSError as error:
+        raise OutputError(f"{file} cannot be written: {error.strerror or error}. Choose another place with --out.") from error
+    return file
+
 
 def write_file(path: Path, data: bytes) -> None:
     """Write a file beside its place first, so that no half of it is ever seen.

@@ -14,7 +14,7 @@ from cosim.report.numbers import DASH, error_number, number
 from cosim.report.overlay.differences import differences, layout_note
 from cosim.report.overlay.measures import DETAIL_HEADINGS, ERROR_HEADINGS, Measured, cell, detailed, headings, measured
 from cosim.report.overlay.runs import Run, make_runs
-from cosim.report.page.files import write_file
+from cosim.report.page.files import write_file, write_page
 from cosim.report.page.parts import (
     box,
     bullets,
@@ -77,14 +77,7 @@ def write_overlay_page(
         runs: from `make_runs`. path: the file; its folder is created. pictures: from `draw_overlays`, drawn where None.
         signals: as for `write_overlay`.
     """
-    file = Path(path)
-    text = overlay_page(runs, _pictures(runs, signals) if pictures is None else pictures)
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        write_file(file, text.encode("utf-8", "backslashreplace"))
-    except OSError as error:
-        raise OutputError(f"{file} cannot be written: {error.strerror or error}. Choose another place with --out.") from error
-    return file
+    return write_page(path, overlay_page(runs, _pictures(runs, signals) if pictures is None else pictures))
 
 
 def _pictures(runs: Sequence[Run], signals: Sequence[str]) -> list[OverlayPicture]:

@@ -142,7 +142,7 @@ def folded(text: object, longest: int = 220) -> str:
     """A paragraph; of a long text the first sentence is seen, and the rest unfolds."""
     whole = str(text)
     first, *rest = SENTENCE_END.split(whole, 1) if len(whole) > longest else [whole]
-    return details(first, paragraph(rest[0])) if rest else paragraph(whole)
+    return details(first.removesuffix(";"), paragraph(rest[0])) if rest else paragraph(whole)
 
 
 def facts(entries: Iterable[tuple[str, str, str, str]]) -> str:

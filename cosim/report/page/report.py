@@ -16,7 +16,7 @@ from cosim.report.metrics import phase_metrics
 from cosim.report.numbers import DASH, number
 from cosim.report.page.cost import cost_html, messages_html
 from cosim.report.page.expectations import expectations_table, unmet_box
-from cosim.report.page.files import write_file
+from cosim.report.page.files import write_file, write_page
 from cosim.report.page.parts import (
     box,
     bullets,
@@ -90,14 +90,7 @@ def write_report_page(result: Result, spec: ReportSpec, path: str | Path) -> Pat
     Raises:
         OutputError: the file cannot be written.
     """
-    file = Path(path)
-    text = report_page(result, spec, draw_all(result, spec), draw_zooms(result, spec))
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        write_file(file, text.encode("utf-8", "backslashreplace"))
-    except OSError as error:
-        raise OutputError(f"{file} cannot be written: {error.strerror or error}. Choose another place with --out.") from error
-    return file
+    return write_page(path, report_page(result, spec, draw_all(result, spec), draw_zooms(result, spec)))
 
 
 def report_page(result: Result, spec: ReportSpec, figures: Mapping[Panel, bytes], zooms: Sequence[Zoom] = ()) -> str:

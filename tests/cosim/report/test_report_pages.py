@@ -23,6 +23,7 @@ from cosim.report.figures.panels import PANELS, Panel, draw_all, png
 from cosim.report.figures.style import new_figure, observer_line
 from cosim.report.figures.zooms import ZOOM_KEYS
 from cosim.report.metrics import phase_metrics
+from cosim.report.page.parts import folded
 from cosim.report.page.report import report_page, write_report
 from cosim.report.page.table import text_table
 from cosim.report.spec import ReportSpec
@@ -316,3 +317,11 @@ def test_zones_are_shaded(result: Result) -> None:
     draw: Callable[..., Axes] = PANELS[1].draw
     shaded = [p for p in draw(result, synthetic_spec(), None).patches if p.get_label() == "low adhesion" or p.get_zorder() == 0]
     assert len(shaded) == len(ZONES)
+
+
+def test_a_long_text_folds_behind_its_first_part_and_loses_no_word() -> None:
+    text = "unstable at a gap of 1 s: the error grows; " + "certified up to 0.5 s, and so on. " * 10
+    html = folded(text)
+    assert "<summary>unstable at a gap of 1 s: the error grows</summary>" in html
+    assert html.count("certified up to 0.5 s") == 10
+    assert "<summary>" not in folded("short; and seen whole")
