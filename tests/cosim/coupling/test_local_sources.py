@@ -71,3 +71,13 @@ def test_the_structure_shows_them() -> None:
 def test_parameters_and_inputs_are_no_sources() -> None:
     with pytest.raises(CouplingError, match=r"causality 'parameter', expected output or local"):
         observed("locomotive.mass").run()
+
+
+def test_an_input_that_was_set_on_purpose_is_no_doubt() -> None:
+    def doubts(**parameters: float) -> list[str]:
+        scenario = Scenario(stop=0.1, step=0.01)
+        scenario.add("train", model="locomotive", **{"as": "block3"}, parameters=parameters)
+        return [text for text in scenario.run().warnings if "start values" in text]
+
+    assert doubts(mass=80e3) == ["Unconnected inputs keep their start values: train.effort."]
+    assert doubts(effort=1e3) == []
