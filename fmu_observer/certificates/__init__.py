@@ -1,6 +1,6 @@
 """Certificates: exact stability checks of sampled observers, recomputed in NumPy and never taken from a solver's status."""
 
-from fmu_observer.certificates.aperiodic import certify_sampled_error
+from fmu_observer.certificates.aperiodic import certify_sampled_error, with_switching_noted
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.gap_error import GapError, first_unstable_gap
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
@@ -22,4 +22,5 @@ __all__ = [
     "common_quadratic_form",
     "decrease",
     "first_unstable_gap",
+    "with_switching_noted",
 ]

@@ -6,7 +6,7 @@ It uses the exact transitions of `gap_error` and the candidates of `quadratic`, 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache, reduce
 from math import inf
 
@@ -21,6 +21,7 @@ from fmu_observer.certificates.quadratic import (
     inequalities,
     transition_condition,
 )
+from fmu_observer.certificates.switching import SwitchingError
 
 MARGIN = 1e-6  # smallest recomputed decrease, in scaled coordinates, that counts: a thousand times the rounding of the check
 SHORTEST_HORIZON = 20.0  # [s]
@@ -32,34 +33,38 @@ LIMIT_TOLERANCE = 2e-4  # relative width of the last bisection interval
 
 
 @dataclass(frozen=True)
-class _Decrease:
+class Decrease:
     """The best common quadratic decrease found: recomputed margin, and P in the observer's own coordinates."""
 
     margin: float
     P: np.ndarray | None
 
 
-def certify_sampled_error(vertices: tuple[GapError, ...], max_gap: float, error_model: str) -> Certificate:
-    """Certificate of an observer whose error is, at any time, that of one of the vertices.
+def certify_sampled_error(
+    vertices: tuple[GapError, ...], max_gap: float, error_model: str, *, switching: bool = False
+) -> Certificate:
+    """Certificate of an observer whose error is that of one of the vertices over each gap, or at any time one between them.
 
     Args:
         vertices: error equations, one for each corner of what is uncertain, all of one size.
         max_gap: longest gap asked for [s].
         error_model: the error equations in words, and what they leave out.
+        switching: the error equations may change at any time within a gap, to any of the vertices' hull; what is certified holds
+            for that. Otherwise they change from gap to gap only.
 
     Returns:
         The certificate, without observer and preset.
 
     Raises:
-        ValueError: the vertices are errors of different components.
+        ValueError: the vertices are errors of different components; they are `switching` and do not share one linear reset.
     """
     if not all(vertices[0].comparable(vertex) for vertex in vertices):
         raise ValueError("Certificate: the vertices must be errors of the same components, reset in the same way; they are not.")
     horizon = max(SHORTEST_HORIZON, 4.0 * max_gap)
     constant_limit = first_unstable_gap(vertices, horizon)
-    found = _common_decrease(vertices, max_gap)
+    found = common_decrease(vertices, max_gap, switching)
     holds = found.margin > MARGIN
-    limit = aperiodic_limit(vertices, horizon)
+    limit = aperiodic_limit(vertices, horizon, switching)
     return Certificate(
         max_gap=max_gap,
         horizon=horizon,
@@ -73,48 +78,74 @@ def certify_sampled_error(vertices: tuple[GapError, ...], max_gap: float, error_
     )
 
 
+def with_switching_noted(certificate: Certificate, vertices: tuple[GapError, ...], what: str) -> Certificate:
+    """The certificate of errors constant over each gap, with a note whether it holds where they change within gaps as well.
+
+    Args:
+        certificate: of `vertices`. what: changes, in the plural, for the words.
+    """
+    covered = "covered too"
+    if common_decrease(vertices, certificate.max_gap, True).margin <= MARGIN:
+        limit = aperiodic_limit(vertices, certificate.horizon, switching=True)
+        covered = f"covered up to {limit:.4g} s only" if limit > 0.0 else "covered for no gap"
+    return replace(certificate, notes=(*certificate.notes, f"{what} that change within a gap are {covered}"))
+
+
 @lru_cache(maxsize=256)
-def aperiodic_limit(vertices: tuple[GapError, ...], horizon: float) -> float:
+def aperiodic_limit(vertices: tuple[GapError, ...], horizon: float, switching: bool = False) -> float:
     """Longest gap [s] up to which one quadratic Lyapunov function covers all gaps; inf if it covers the horizon.
 
-    By bisection: a function that covers a set of gaps covers every smaller one.
+    By bisection: a function that covers a set of gaps covers every smaller one. With `switching` see `certify_sampled_error`.
     """
     bound = min(first_unstable_gap(vertices, horizon), horizon)
-    if bound == horizon and _common_decrease(vertices, horizon).margin > MARGIN:
+    if bound == horizon and common_decrease(vertices, horizon, switching).margin > MARGIN:
         return inf
     low, high = 0.0, bound
     while high - low > LIMIT_TOLERANCE * high and high > SMALLEST_LIMIT * bound:
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if _common_decrease(vertices, middle).margin > MARGIN else (low, middle)
+        low, high = (middle, high) if common_decrease(vertices, middle, switching).margin > MARGIN else (low, middle)
     return low
 
 
 @lru_cache(maxsize=256)
-def _common_decrease(vertices: tuple[GapError, ...], longest: float) -> _Decrease:
+def common_decrease(vertices: tuple[GapError, ...], longest: float, switching: bool) -> Decrease:
     """Seek one P for all vertices and all gaps in (0, longest] on a coarse grid, and recompute on a fine one.
 
-    Where the fine grid finds a gap that the candidate does not cover, that gap joins the coarse grid.
+    Where the fine grid finds a gap that the candidate does not cover, that gap joins the coarse grid. What is switching is judged
+    at the centre of the vertices, with the most that changes within a gap may add to it.
     """
     scale = _scaling(vertices)
     with np.errstate(over="ignore", invalid="ignore"):
         fine = [_conditions(vertex, longest, FINE, scale) for vertex in vertices]
     if not all(np.abs(condition.N).max() < LARGEST_GROWTH for condition in fine):  # NaN included
-        return _Decrease(-inf, None)
+        return Decrease(-inf, None)
     sought = _pick(fine, range(0, FINE + 1, FINE // COARSE))
-    best = _Decrease(-inf, None)
+    inclusion = SwitchingError.between(vertices) if switching else None
+    judged = fine if inclusion is None else [_conditions(inclusion.centre, longest, FINE, scale)]
+    best = Decrease(-inf, None)
     for _ in range(CUTS):
         candidate = common_quadratic_form(sought)
         if candidate is None:
             break
-        values = [inequalities(condition, candidate.P) for condition in fine]
+        values = [inequalities(condition, candidate.P) for condition in judged]
+        if inclusion is not None:
+            values[0] += _growth(inclusion, candidate.P / np.outer(scale, scale), longest)[:, None, None] * candidate.P
         margin = -max(_largest_between(v) for v in values)
         if margin > best.margin:
-            best = _Decrease(margin, candidate.P / np.outer(scale, scale))
+            best = Decrease(margin, candidate.P / np.outer(scale, scale))
         if margin > MARGIN or candidate.margin <= MARGIN:
             break
         worst = {int(np.linalg.eigvalsh(v)[:, -1].argmax()) for v in values}
         sought = sought.joined(_pick(fine, sorted(worst)))
     return best
+
+
+def _growth(inclusion: SwitchingError, P: np.ndarray, longest: float) -> np.ndarray:
+    """What changes within a gap add to the inequalities of the centre, in units of P, shape (FINE + 1,)."""
+    if inclusion.centre.continuous_limit is None:  # not divided by the gap: see `_conditions`
+        gaps = longest / (FINE + 1) * np.arange(1, FINE + 2)
+        return np.asarray(inclusion.growth(P, longest, gaps) * gaps)
+    return np.asarray(inclusion.growth(P, longest, np.linspace(0.0, longest, FINE + 1)) / inclusion.centre.rate)
 
 
 def _conditions(vertex: GapError, longest: float, count: int, scale: np.ndarray) -> Condition:

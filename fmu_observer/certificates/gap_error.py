@@ -68,6 +68,11 @@ class GeneratorError(GapError):
     def generator(self) -> np.ndarray:
         """Matrix of everything that flows between samples, shape (N, N)."""
 
+    @property
+    @abstractmethod
+    def reset(self) -> np.ndarray:
+        """What a sample makes of it, shape (N, N)."""
+
     @abstractmethod
     def close(self, exponentials: np.ndarray) -> np.ndarray:
         """Exponentials of shape (count, N, N) as transitions of shape (count, n, n)."""
@@ -98,7 +103,10 @@ def matrix_powers(step: np.ndarray, count: int) -> np.ndarray:
 
 
 def first_unstable_gap(vertices: Sequence[GapError], horizon: float) -> float:
-    """First constant gap at which some vertex is unstable, by scanning (0, horizon] and bisection.
+    """First constant gap at which some vertex is seen unstable, by scanning (0, horizon] and bisection.
+
+    It is a scan of `SCAN_POINTS` gaps: a window of instability narrower than their distance, as lightly damped errors have, can
+    lie between two of them. What is guaranteed is the limit of `aperiodic`.
 
     Args:
         vertices: error equations. horizon: longest gap searched [s].

@@ -49,6 +49,13 @@ class SampledError(GeneratorError):
         matrix[n, n] = -self.decay
         return matrix
 
+    @cached_property
+    def reset(self) -> np.ndarray:
+        """``[[I, 0], [C, 0]]``: the errors stay and the innovation is set anew, shape (n + 1, n + 1)."""
+        matrix = np.eye(self.size + 1)
+        matrix[-1] = np.eye(self.size + 1)[0]
+        return matrix
+
     @property
     def continuous_limit(self) -> np.ndarray:
         """Error matrix for infinitely frequent balises, ``drift - gain C``, shape (n, n)."""

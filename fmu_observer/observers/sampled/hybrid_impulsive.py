@@ -27,8 +27,8 @@ class HybridImpulsive(SampledObserver):
     what that observer would give until the next sample at once (s = 1 leaves z = 0: a pure jump). All three are parameters.
 
     Its certificate takes the slopes of phi as constant over a gap, as those of the other sampled observers do, but here that
-    matters: close to the limit, at 0.999 of it on the pendulum, slopes that switch within gaps were found to make the error grow;
-    at 0.9 of it none were. Keep that distance for a nonlinear model.
+    matters: close to the limit, at 0.999 of it on the pendulum, slopes that switch within gaps were found to make the error grow.
+    The certificate notes up to which gap it covers such slopes too.
     """
 
     name = "hybrid_impulsive"

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampled_error
+from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampled_error, with_switching_noted
 from fmu_observer.models import ObserverModel
 from fmu_observer.models.model import shift_matrix
 from fmu_observer.observers.gap_certified import GapCertified
@@ -36,7 +36,8 @@ class SampledObserver(ModelObserver, GapCertified):
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate over the vertices of the model's Jacobian."""
         vertices = tuple(self.vertex_error(drift, p) for drift in self.model.drifts)
-        return certify_sampled_error(vertices, max_gap, self.error_model())
+        certificate = certify_sampled_error(vertices, max_gap, self.error_model())
+        return with_switching_noted(certificate, vertices, "slopes") if len(vertices) > 1 else certificate
 
     def error_model(self) -> str:
         """The error equations of the certificate in words."""

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampled_error
+from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampled_error, with_switching_noted
 from fmu_observer.condition import Condition
 from fmu_observer.models import TAKAGI_SUGENO_MODELS, TakagiSugenoModel, find_takagi_sugeno_model
 from fmu_observer.models.model import stacked
@@ -174,6 +174,8 @@ class GeneralTakagiSugenoCdo(HybridSystem):
             "of the weights and their difference to the plant's, which act as inputs to it, are left out"
         )
         found = certify_sampled_error(errors, float(max_gap), left_out)
+        if self.premise != "frozen":
+            found = with_switching_noted(found, errors, "weights")
         T = np.asarray(self.model.scaling)
         P = tuple(tuple(float(v * T[i] * T[j]) for j, v in enumerate(row)) for i, row in enumerate(found.lyapunov_matrix))
         values = tuple((name, float(v)) for s in self.parameters for name, v in self._named(s, p))

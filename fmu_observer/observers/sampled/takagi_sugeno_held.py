@@ -19,6 +19,7 @@ from fmu_observer.certificates import (
     certify_sampled_error,
     common_quadratic_form,
     decrease,
+    with_switching_noted,
 )
 from fmu_observer.certificates.quadratic import Condition as Inequalities
 from fmu_observer.certificates.quadratic import flow_condition
@@ -162,7 +163,8 @@ class TakagiSugenoHeld(GapCertified):
             f"error equations of the Takagi-Sugeno model {self.model.name!r} at its vertices and mixtures of every two, weights "
             f"constant over a gap; {self.premise_remark()}, disturbances and noise are left out"
         )
-        return certify_sampled_error(vertices, max_gap, model)
+        certificate = certify_sampled_error(vertices, max_gap, model)
+        return certificate if self.weight_memory() else with_switching_noted(certificate, vertices, "weights")
 
     # -- internals --------------------------------------------------------------------------------------------------
 

@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fmu_observer.certificates import Certificate, SampledError, certify_sampled_error
+from fmu_observer.certificates import Certificate, SampledError, certify_sampled_error, with_switching_noted
 from fmu_observer.observers.train.train_observer import POSITION, SPEED, Estimate, TrainObserver
 from plant_models.hybrid import (
     PeriodicEvent,
@@ -173,11 +173,13 @@ class AugmentedTrainObserver(TrainObserver):
         """Certificate of the sensors in use: of balises, and where fixes are used too, of fixes and of mixtures of both."""
         used = [sensor for sensor in SENSORS if float(self.gains_of(sensor, p)[0][0]) > 0.0] or ["balise"]
         model = (
-            "four-state error of position, speed, unknown acceleration and its rate, drag slopes at their extremes (exact "
-            "between them); the second derivative of the unknown acceleration and the error of the traction, inputs to it, and "
-            "standstill are left out"
+            "four-state error of position, speed, unknown acceleration and its rate, drag slopes at their extremes, "
+            "constant over a gap; the second derivative of the unknown acceleration and the error of the traction, inputs to it, "
+            "and standstill are left out"
         )
-        certificate = certify_sampled_error(self._errors_of(used[0], p), max_gap, f"{model}; corrected by '{used[0]}' samples")
+        errors = self._errors_of(used[0], p)
+        certificate = certify_sampled_error(errors, max_gap, f"{model}; corrected by '{used[0]}' samples")
+        certificate = with_switching_noted(certificate, errors, "drag slopes")
         if len(used) == 1:
             return certificate
         gap = float(p.fix_period)

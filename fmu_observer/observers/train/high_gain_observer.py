@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fmu_observer.certificates import Certificate, SampledError, certify_sampled_error
+from fmu_observer.certificates import Certificate, SampledError, certify_sampled_error, with_switching_noted
 from fmu_observer.design.certified_gains import certified_gains
 from fmu_observer.observers.parameter_values import Value
 from fmu_observer.observers.train.high_gain import HIGH_GAIN_K, correction, innovation_decay
@@ -90,7 +90,7 @@ class HighGainTrainObserver(TrainObserver):
         slopes = drag_slope_range(p, 0.0, TOP_SPEED)
         vertices = tuple(SampledError.of([[0.0, 1.0], [0.0, -s]], gain, theta * float(p.high_gain[0])) for s in slopes)
         model = (
-            f"position and speed error with the drag slope (b + 2 c v)/M of 0 to {TOP_SPEED:g} m/s (exact in that range, nothing "
-            "linearised); standstill and the error of the adhesion force, an input to it, are left out"
+            f"position and speed error with the drag slope (b + 2 c v)/M at 0 and {TOP_SPEED:g} m/s, constant over a gap; "
+            "standstill and the error of the adhesion force, an input to it, are left out"
         )
-        return certify_sampled_error(vertices, max_gap, model)
+        return with_switching_noted(certify_sampled_error(vertices, max_gap, model), vertices, "drag slopes")

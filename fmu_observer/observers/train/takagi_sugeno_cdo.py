@@ -110,17 +110,16 @@ class TakagiSugenoCdo(TrainObserver):
         return signal, low, high
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
-        """Certificate over the two vertices and three mixtures of them."""
+        """Certificate over the two vertices and three mixtures of them; live and estimated weights may change at any time."""
         vertices = tuple(self._error_at(h, p) for h in (1.0, 0.75, 0.5, 0.25, 0.0))
         slowest, fastest = float(p.premise_min), float(p.premise_max)
+        frozen = self.premise == "frozen"
+        changes = "constant over a gap, as frozen ones are" if frozen else f"changing at any time, {self._span(vertices)}"
         model = (
-            f"position and speed error at both vertices ({slowest:g} and {fastest:g} m/s) and three mixtures, weights constant "
-            "over a gap; standstill, slip and the neglected wheel inertia, the latter inputs to it, are left out"
+            f"position and speed error at both vertices ({slowest:g} and {fastest:g} m/s) and three mixtures, weights {changes}; "
+            "standstill, slip and the neglected wheel inertia, the latter inputs to it, are left out"
         )
-        if self.premise != "frozen":
-            span = float(p.davis_c) * (fastest - slowest) / float(p.mass)
-            model += f"; so is the change of the weights within a gap, which moves the drag slope by at most {span:.1e} 1/s"
-        return certify_sampled_error(vertices, max_gap, model)
+        return certify_sampled_error(vertices, max_gap, model, switching=not frozen)
 
     def alternative(self, max_gap: float, certify: Callable[[Mapping[str, Value]], Certificate]) -> str | None:
         """A decay that is consistent with the balise gains in use, else the largest high gain that is certified."""
@@ -146,6 +145,14 @@ class TakagiSugenoCdo(TrainObserver):
         ]
         gain = (_blend(h, p.balise_gain_position), _blend(h, p.balise_gain_speed))
         return SampledError.of(drift, gain, float(p.innovation_decay))
+
+    @staticmethod
+    def _span(vertices: Sequence[SampledError]) -> str:
+        """By how much the weights move the error equations, in words."""
+        slopes = [vertex.drift[1][1] for vertex in vertices]
+        on_position, on_speed = zip(*(vertex.gain for vertex in vertices), strict=True)
+        spans = [max(values) - min(values) for values in (slopes, on_position, on_speed)]
+        return "by {:.1e} 1/s in the slope of the speed error, {:.1e} 1/s and {:.1e} 1/s2 in the balise gains".format(*spans)
 
     @staticmethod
     def _weight_at(speed: Array, p: Any) -> Array:
