@@ -1,11 +1,38 @@
-"""What holds for all tests: no deadline on shared machines, and the same examples at every run of the continuous integration."""
+"""What holds for all tests: two tiers, no deadline on shared machines, the same examples at every continuous integration."""
 
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
+import pytest
 from hypothesis import settings
 
 settings.register_profile("here", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "here")
+
+SECOND_TIER = Path(__file__).with_name("second_tier.txt")
+KEPT = "! "
+
+
+def second_tier() -> dict[str, bool]:
+    """Beginnings of test names, and whether what begins so belongs to the second tier."""
+    lines = [line for line in SECOND_TIER.read_text(encoding="utf-8").splitlines() if line and not line.startswith("#")]
+    return {line.removeprefix(KEPT): not line.startswith(KEPT) for line in lines}
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark the second tier as slow; where whole files are collected, a line that fits none of their tests is an error."""
+    lines = second_tier()
+    used = set()
+    for item in items:
+        fitting = [beginning for beginning in lines if item.nodeid.startswith(beginning)]
+        used |= set(fitting)
+        if fitting and lines[max(fitting, key=len)]:
+            item.add_marker(pytest.mark.slow)
+    files = {item.nodeid.partition("::")[0] for item in items}
+    idle = [line for line in lines if line not in used and line.partition("::")[0] in files]
+    if idle and not any("::" in argument for argument in config.args):
+        raise pytest.UsageError(f"{SECOND_TIER.name}: no test begins with: {'; '.join(idle)}")

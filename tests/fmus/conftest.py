@@ -220,19 +220,23 @@ OF_EACH_KIND = {
 with dry friction, sampled, noisy, with memory, with events of its own and from outside, with a sliding mode, with matrices."""
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out FMI 2.0 of those that are none of `OF_EACH_KIND`."""
-    beside = [item for item in items if _is_beside(getattr(item, "callspec", None))]
+    """FMI 2.0 of what ships: leave out those that are none of `OF_EACH_KIND`, the others belong to the second tier."""
+    again = {item: _shipped_as_fmi2(getattr(item, "callspec", None)) for item in items}
+    beside = [item for item, names in again.items() if names and not names & OF_EACH_KIND]
+    for item, names in again.items():
+        if names & OF_EACH_KIND:
+            item.add_marker(pytest.mark.slow)
     if beside:
         config.hook.pytest_deselected(items=beside)
         items[:] = [item for item in items if item not in set(beside)]
 
 
-def _is_beside(callspec: Any) -> bool:
+def _shipped_as_fmi2(callspec: Any) -> set[str]:
     if callspec is None or callspec.params.get("version") != 2:
-        return False
-    names = {callspec.params.get("name"), callspec.params.get("system_name")} & set(SHIPPED)
-    return bool(names) and not names & OF_EACH_KIND
+        return set()
+    return {callspec.params.get("name"), callspec.params.get("system_name")} & set(SHIPPED)
 
 
 def make_system(name: str) -> HybridSystem:
