@@ -69,6 +69,7 @@ EXPORTED int64_t stepper_run(Program *program, int64_t first, int64_t last, doub
         row[0] = until;
         memcpy(row + 1, program->values, bytes);
         program->before = row + 1;
+        *program->rows_told = program->rows_before + used;
         if (!all_finite(program->values, program->value_count))
             stopped(program, STOP_NOT_FINITE, 0, 0);
     }

@@ -19,6 +19,8 @@ from cosim.components.fmi1_library import FMU1SlaveRepaired
 from cosim.components.fmi2 import FMI2Component
 from cosim.components.fmi3 import FMI3Component
 from cosim.errors import FmuLoadError
+from cosim.process.last_call import LAST_CALL
+from cosim.process.sentinel import guard_exit
 from fmu_observer.block import make_block
 from fmus.check.archive import MAX_UNPACKED_BYTES, Archive, NotAnFmuError, open_archive
 from fmus.check.description import negated_aliases
@@ -49,10 +51,12 @@ def load_fmu(path: str | Path, name: str) -> Component:
     except NotAnFmuError as error:
         raise FmuLoadError(f"{name}: {error}") from error
     folder = Path(mkdtemp(prefix="fmu_"))
+    guard_exit()
     here = Path.cwd()
     try:
         fmpy.extract(str(path), unzipdir=str(folder))
-        slave = _slave(folder, description, name)
+        with LAST_CALL.making(name, "loading its library"):
+            slave = _slave(folder, description, name)
     except Exception as error:
         shutil.rmtree(folder, ignore_errors=True)
         lacks = "its library lacks a function that FMI demands of every FMU: " if isinstance(error, AttributeError) else ""
