@@ -21,6 +21,7 @@ from cosim.components.capabilities import tool_warning
 from cosim.components.derivatives import directional_derivative, make_derivative_writer
 from cosim.components.described import Described, EventPort
 from cosim.components.start_values import StartValue, refusal, typed_value, typed_values
+from cosim.components.surroundings import Surroundings
 from cosim.components.values import element_reader, element_writer, exact_reader, exact_writer, write_start
 from cosim.diagnostics.log_choice import LogSwitch, log_switch, switch_log
 from cosim.diagnostics.messages import LogChoice, MessageLog
@@ -51,7 +52,8 @@ class Component(Described):
     called without arguments. Variables go by name; elements of arrays are named ``x[1]``, ``m[2,3]``, from 1, row by row.
     `save`, `restore` and `release` exist where `can_save` says so. Counters: `seconds` spent in doStep, `calls` of it, `tallies`
     of everything else. `messages` are what the slave logged. `time` is where it stands [s]. `terminated` says that the slave
-    asked for the end of the run. Whatever a call of the slave throws comes out as a `RunError` with component, time and the names
+    asked for the end of the run. `trespasses` are what it changed for everybody in the process before its first
+    step, each with the call that did; it was put back. Whatever a call of the slave throws comes out as a `RunError` with component, time and the names
     of the variables concerned.
 
     Args:
@@ -81,6 +83,7 @@ class Component(Described):
         self.clock: Callable[[], float] | None = None  # says where it stands [s] while somebody else than Python steps it
         self.log: LogSwitch | None = None
         self.tallies = new_tallies()
+        self.trespasses: dict[str, str] = {}
         self._last, self._numbers = LAST_CALL, LAST_CALL.numbers(name)
         self._outcomes, self._read_outcomes = np.zeros(len(OUTCOME_VARIABLES)), NOT_PREPARED
 
@@ -370,11 +373,15 @@ class Component(Described):
 
     def _guard(self, what: str, call: Callable[[], Any]) -> Any:
         """Run a call of the slave; turn whatever it throws into a RunError with component and time."""
+        before = None if self._running else Surroundings()  # in a run its steps are looked at
         try:
             with self._last.making(self.name, what, self.time):
                 return call()
         except Exception as error:
             raise self._explained(what, error) from error
+        finally:
+            for changed in () if before is None else before.put_back():
+                self.trespasses[changed] = what
 
     def _quietly(self, what: str, call: Callable[[], Any]) -> None:
         """A component that fails while it is put away changes nothing any more."""

@@ -56,7 +56,7 @@ class Master:
         stepper: who executes the plan: ``python``, ``compiled``, or ``auto`` for the compiled one wherever it can.
         events: of the components: ``propagate`` them to others at the same instant, or leave them ``local``.
 
-    `check_interruption` is called between two steps, and raises KeyboardInterrupt where the run is to end there.
+    `between_steps` is called between two steps, or stretches of the compiled stepper; it may raise KeyboardInterrupt.
 
     After `run`, `recorder`, `timing`, `exchange_rounds` and `balises.mailbox.log` hold what came out, also when it failed.
 
@@ -81,7 +81,7 @@ class Master:
         self._progress = progress
         self._all_finite = make_finite_check(plan.values)
         self.stepper = Choice(stepper)
-        self.check_interruption: Callable[[], None] = _nobody_asks
+        self.between_steps: Callable[[], None] = _nothing_to_do
 
     def choose_stepper(self) -> None:
         """Choose who executes the plan; `run` does so where nobody did before. After it no component may be instantiated anew.
@@ -125,7 +125,7 @@ class Master:
         axis, compiled = self.axis, self.stepper.compiled
         k = 0
         while k < axis.count:
-            self.check_interruption()
+            self.between_steps()
             step: Callable[[], Sequence[Row]] | None = partial(self.control.step, axis[k], axis[k + 1])
             if compiled is not None:
                 stretch = compiled.run(k, self.recorder)
@@ -202,7 +202,7 @@ class Master:
         raise RunError(f"Component '{component}' at t = {t:g} s: output {name} is {value}; the run ends here.", component, t)
 
 
-def _nobody_asks() -> None: ...
+def _nothing_to_do() -> None: ...
 
 
 def close(plan: Plan) -> None:

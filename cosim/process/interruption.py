@@ -13,7 +13,7 @@ from time import monotonic
 from typing import Any
 
 PATIENCE = 1.0
-"""One key may arrive more than once, from the terminal and from who watches; a signal after so long means that somebody insists [s]."""
+"""One key may arrive twice, from the terminal and from who watches; a signal after so long means that somebody insists [s]."""
 
 STOPPING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 """Signals that ask for the end."""

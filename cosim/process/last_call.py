@@ -9,7 +9,7 @@ from __future__ import annotations
 import mmap
 from collections.abc import Iterator
 from contextlib import contextmanager
-from math import nan
+from math import isnan, nan
 from pathlib import Path
 
 PAGE = 1 << 16
@@ -148,7 +148,7 @@ class LastCall:
         if not 0 < number <= len(lines):
             return ""
         component, _, what = lines[number - 1].partition("\0")
-        return f"component '{component}' in {what}" + (f" at t = {time:g} s" if time == time else "")
+        return f"component '{component}' in {what}" + (f" at t = {time:g} s" if not isnan(time) else "")
 
 
 def make_page(path: Path) -> LastCall:

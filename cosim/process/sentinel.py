@@ -7,7 +7,6 @@ standard library only.
 from __future__ import annotations
 
 import atexit
-import ctypes
 import os
 import threading
 import time
@@ -19,13 +18,13 @@ from typing import Any
 from cosim.process.last_call import LAST_CALL
 
 ERROR = 2
-_HANDLER = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
 _output = [2]
 
 
-def report_to(descriptor: int) -> None:
-    """Where the sentinel writes; by default to the error stream of the process."""
-    _output[0] = descriptor
+def report_to_copy_of_stderr() -> int:
+    """From now on the sentinel writes to what is the error stream now, also if that is captured later; returns the descriptor."""
+    _output[0] = os.dup(2)
+    return _output[0]
 
 
 @cache
@@ -35,12 +34,14 @@ def guard_exit() -> None:
     What the FMU calls is C's exit(): against _exit() only another process helps. Where the C library offers no way to be asked
     (Windows) nothing is done.
     """
+    import ctypes  # noqa: PLC0415 - a plugin of pytest imports this module at every start
+
     library = ctypes.CDLL(None) if os.name == "posix" else None
     add, remove = (getattr(library, name, None) for name in ("__cxa_atexit", "__cxa_finalize"))
     if add is None or remove is None or LAST_CALL.watched:
         return
     mark = ctypes.c_char()  # by its address the C library knows which handler to remove
-    handler = _HANDLER(lambda _: _exit_called())
+    handler = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(lambda _: _exit_called())
     add(handler, None, ctypes.byref(mark))
 
     def leave() -> None:  # when Python ends, nobody could answer any more

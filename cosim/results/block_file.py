@@ -94,7 +94,7 @@ def read_block(path: Path) -> ReadBlock:
     Raises:
         OSError: the file cannot be read. ValueError: it is no block.
     """
-    head = None
+    head = b""
     for _ in range(TRIES):  # it may be emptied into the table, and filled anew, while it is read
         content = path.read_bytes()
         former, head = head, content[: 8 * (FIRST + 1)]

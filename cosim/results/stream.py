@@ -1,8 +1,8 @@
 """The stream: the results folder of a run that is still going on, so that what was computed outlives the program.
 
 ``table.npy`` is a whole NumPy file after every flush: rows are written first, their number in its header afterwards. Rows are
-in SI. Those since the last flush are in the block, a file as well. Telegrams are appended, messages are few and written anew. Until the run ends ``summary.json`` says that it has not.
-Touches only the folder it is given.
+in SI. Those since the last flush are in the block, a file as well. Telegrams are appended, messages are few and written anew.
+Until the run ends ``summary.json`` says that it has not. Touches only the folder it is given.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import asdict, replace
 from itertools import pairwise
 from pathlib import Path
@@ -17,6 +17,7 @@ from cosim.components.capabilities import tool_warning
 from cosim.components.component import Component
 from cosim.components.fmi3 import FMI3Component
 from cosim.components.start_values import StartValue
+from cosim.components.surroundings import SurroundingsOfSteps
 from cosim.coupling.clocks import connect_clocks
 from cosim.coupling.connection import Connection, connect
 from cosim.coupling.graph import execution_groups
@@ -187,13 +188,20 @@ class _Setup:
         assert self.master is not None
         master = self.master
         failure: str | None = None
-        master.check_interruption = interruption.check
+        surroundings = SurroundingsOfSteps()
+
+        def between_steps() -> None:
+            surroundings.look()
+            interruption.check()
+
+        master.between_steps = between_steps
         try:
             master.run()
         except CosimError as error:
             failure = str(error)
         except KeyboardInterrupt:
             failure = INTERRUPTED
+        self._warn_of_trespasses(surroundings.finish())
         if master.ended_early is not None:
             self._warn(master.ended_early)
         premises, left = premise_findings(self._as_recorded(), self.table.components, self.connections)
@@ -327,6 +335,18 @@ class _Setup:
             rejected = (component.outcomes() or {}).get("rejected", 0)
             if rejected:
                 self._warn(f"{name}: {rejected} telegrams were rejected: stamped in the past, and beyond what it replays.")
+
+    def _warn_of_trespasses(self, in_steps: Set[str]) -> None:
+        """What was changed for everybody in this process, and put back."""
+        for name, component in self.components.items():
+            for changed, call in component.trespasses.items():
+                self._warn(f"{name}: {call} changed {changed} of the whole program; it was put back.")
+        native = [name for name, component in self.components.items() if component.kind == "FMU"]
+        for changed in sorted(in_steps):
+            self._warn(
+                f"{' or '.join(native)}: its steps change {changed} of the whole program; it was put back, but not after "
+                "every step: other components, and their numbers, may have been touched."
+            )
 
     def _warn_of_logs(self) -> None:
         """What the components logged of things gone wrong, in numbers; and a call log that could not be finished."""
