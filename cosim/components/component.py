@@ -52,9 +52,9 @@ class Component(Described):
     called without arguments. Variables go by name; elements of arrays are named ``x[1]``, ``m[2,3]``, from 1, row by row.
     `save`, `restore` and `release` exist where `can_save` says so. Counters: `seconds` spent in doStep, `calls` of it, `tallies`
     of everything else. `messages` are what the slave logged. `time` is where it stands [s]. `terminated` says that the slave
-    asked for the end of the run. `trespasses` are what it changed for everybody in the process before its first
-    step, each with the call that did; it was put back. Whatever a call of the slave throws comes out as a `RunError` with component, time and the names
-    of the variables concerned.
+    asked for the end of the run. `trespasses` are what it changed for everybody in the process before its first step, each with
+    the call that did; it was put back. Whatever a call of the slave throws comes out as a `RunError` with component, time and
+    the names of the variables concerned.
 
     Args:
         name: name in the scenario.

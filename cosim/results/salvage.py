@@ -27,7 +27,7 @@ def salvage(note: Mapping[str, Any], reason: str) -> str:
     """
     spare, out = Path(note["spare"]), Path(note["out"])
     try:
-        if not (spare / SUMMARY).exists():
+        if not (spare / SUMMARY).exists() or not (spare / TABLES["npy"]).exists():
             return "Nothing had been computed yet."
         close_unfinished(spare, reason)
         result = read_results(spare)

@@ -43,7 +43,8 @@ def saved(fmu: Path, folder: Path, deed: str, **master: Any) -> str:
 
 
 def start(fmu: Path, folder: Path, deed: str, *options: str, **master: Any) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "cosim.cli", "run", saved(fmu, folder, deed, **master), "--out", "out", "--no-report", "--quiet", *options]
+    what = saved(fmu, folder, deed, **master)
+    command = [sys.executable, "-m", "cosim.cli", "run", what, "--out", "out", "--no-report", "--quiet", *options]
     return subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
 
 
