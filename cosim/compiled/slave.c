@@ -88,7 +88,6 @@ static void about_to(const Program *program, int64_t which, int64_t what) {
 /* True where the step was taken as asked and nothing is to be seen to. */
 static bool do_step(Program *program, int64_t which, double t, double h) {
     about_to(program, which, LAST_STEP);
-    *program->last_time = t;
     bool ordinary = called_step(program, &program->slaves[which], t, h);
     if (program->journal.on) {
         Note *made = note(program, which, CALL_STEP, 0); /* nothing said: as far as it was asked to go */

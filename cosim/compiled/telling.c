@@ -4,6 +4,7 @@
 /* One slave alone, with its gathered inputs, from t by h [s]; its outputs are read where that is wanted. Counts nothing. Returns 1
    where that was ordinary, else 0 and says why in the program. */
 EXPORTED int64_t stepper_move(Program *program, int64_t which, double t, double h, int64_t reads) {
+    *program->last_time = t;
     if (!send_inputs(program, which))
         return 0;
     if (!do_step(program, which, t, h))
