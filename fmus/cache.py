@@ -11,6 +11,8 @@ import hashlib
 import inspect
 import os
 import sys
+import zipfile
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -80,11 +82,29 @@ def cache_entry(
     by_request = _known.setdefault(system, {})
     request = (fmi_version, preset, protocol, folder, os.environ.get("CC"))
     known = by_request.get(request)  # a system does not change once it is built, so within one process this is enough
-    if known is not None and known.exists():
+    if known is not None and _is_whole(known):
         return CacheEntry(known)
     plan, targets = plan_fmu(system, fmi_version, preset, protocol), choose_targets()
     path = by_request[request] = folder / content_key(plan, targets) / f"{system.name}.fmu"
-    return CacheEntry(path, None if path.exists() else Draft.of(plan, targets))
+    return CacheEntry(path, None if _is_whole(path) else Draft.of(plan, targets))
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether an FMU is there and all of it can be read: a full disk, or a machine that stopped, may have left a part."""
+    try:
+        stamp = path.stat()
+        return _can_be_read(path, stamp.st_size, stamp.st_mtime_ns)
+    except OSError:
+        return False
+
+
+@cache
+def _can_be_read(path: Path, _size: int, _modified: int) -> bool:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return archive.testzip() is None
+    except (OSError, ValueError, EOFError, NotImplementedError, zipfile.BadZipFile, zlib.error):
+        return False
 
 
 def content_key(plan: Plan, targets: Sequence[Target]) -> str:

@@ -1,4 +1,7 @@
-"""The command line ``cosim``: run, show, list, info, export. Exit codes: 0 done, 1 not as asked for, 2 usage or run error."""
+"""The command line ``cosim``: run, show, list, info, export. Exit codes: 0 done, 1 not as asked for, 2 usage or run error.
+
+A command runs in a process of its own, so that an FMU that crashes, exits or hangs there does not decide how it ends.
+"""
 
 from __future__ import annotations
 
@@ -7,34 +10,53 @@ import os
 import shlex
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 
-from cosim.cli import baseline, benchmark_observers, compare, convert, export, info, listing, new, report, rerun, run, show, sweep
 from cosim.errors import CosimError
+from cosim.process.interruption import ends_like_ctrl_c
+from cosim.process.watch import can_watch, watched
+from fmus.terminal_text import printable
 
 __all__ = ["main"]
 
 ERROR = 2
+COMMANDS = (
+    "run", "rerun", "sweep", "compare", "baseline", "benchmark_observers", "report", "convert", "new", "show", "listing", "info",
+    "export",
+)  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of ``cosim``; returns the exit code."""
+    """Entry point of ``cosim``; returns the exit code.
+
+    Args:
+        arguments: words after the program's name: the command runs in this process. None for those of the process: it runs in
+            another one, where that can be.
+    """
+    if arguments is None and can_watch():
+        return watched(lambda: _main(sys.argv[1:]))
+    return _main(sys.argv[1:] if arguments is None else arguments)
+
+
+def _main(arguments: Sequence[str]) -> int:
     parser = argparse.ArgumentParser(
         prog="cosim", description="Co-simulate train observers with train plant FMUs, balise events exact."
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for command in (run, rerun, sweep, compare, baseline, benchmark_observers, report, convert, new, show, listing, info, export):
-        command.register(commands)
+    for command in COMMANDS:  # imported here and not above: whoever watches needs none of it
+        import_module(f"cosim.cli.{command}").register(commands)
     options = parser.parse_args(arguments)
-    options.command_line = shlex.join(["cosim", *(sys.argv[1:] if arguments is None else arguments)])
+    options.command_line = shlex.join(["cosim", *arguments])
     try:
-        code = int(options.execute(options))
+        with ends_like_ctrl_c():
+            code = int(options.execute(options))
         sys.stdout.flush()
         return code
     except BrokenPipeError:  # whoever read has seen enough, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return ERROR
     except CosimError as error:
-        print(f"cosim: {error}", file=sys.stderr)
+        print(f"cosim: {printable(str(error))}", file=sys.stderr)
         return ERROR
     except KeyboardInterrupt:
         print("cosim: interrupted.", file=sys.stderr)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from pathlib import Path
 from typing import Any
 
 from cosim.cli.scenarios import OVERRIDES, parse_setting
@@ -39,9 +40,10 @@ def execute(options: argparse.Namespace) -> int:
 
     settings = dict(parse_setting(setting) for setting in options.settings)
     bar = None if options.quiet or options.json else ProgressBar()
+    out = None if options.out is None else Path(options.out).absolute()
     try:
         again = rerun(
-            options.directory, out=options.out, overrides=settings, tolerance=options.tolerance, trust=options.trust,
+            options.directory, out=out, overrides=settings, tolerance=options.tolerance, trust=options.trust,
             progress=bar, warn=_warn, building=_ignore if options.quiet else _say,
         )  # fmt: skip
     finally:

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import argparse
 import json
+import shutil
 import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from cosim.cli.scenarios import add_scenario, load_scenario, positive
 from cosim.errors import OutputError
+from cosim.process.last_call import LAST_CALL
+from cosim.results.unfinished import SPARE
 from cosim.scenario import Outcome, Scenario
+from fmus.terminal_text import printable
 
 DONE, NOT_AS_ASKED, ERROR = 0, 1, 2
 CALL_LOG = "calls.log"
@@ -43,23 +49,27 @@ def execute(options: argparse.Namespace) -> int:
 
     scenario = load_scenario(options)
     formats = scenario.table().report.tables
-    directory = Path(options.out) if options.out is not None else Path("results") / scenario.name
+    directory = (Path(options.out) if options.out is not None else Path("results") / scenario.name).absolute()
     check_writable(directory, formats)
     call_log = _call_log(options, scenario, directory)
     bar = None if options.quiet or options.json else ProgressBar()
+    results = _Results(directory, options)
     try:
         building = _ignore if options.quiet else _say
         stream = directory if options.stream else None
-        outcome = scenario.run(progress=bar, warn=_warn, call_log=call_log, building=building, stream=stream)
+        with _kept(directory, options.stream, formats) as spare:
+            scenario.run(
+                progress=bar, warn=_warn, call_log=call_log, building=building, stream=stream, spare=spare, finished=results.write
+            )
+    except OutputError:
+        if results.outcome is not None:
+            _tell(results.outcome, None, {}, options)  # what the disk did not take is at least on the screen
+        raise
     finally:
         if bar is not None:
             bar.close()
-    outcome = outcome.asked_by(options.command_line)
-    try:
-        paths = outcome.write(directory, report=not options.no_report)
-    except OutputError:
-        _tell(outcome, None, {}, options)  # what the disk did not take is at least on the screen
-        raise
+    assert results.outcome is not None
+    outcome, paths = results.outcome, results.paths
     study = None
     if options.seeds and outcome.failure is None:
         study = _study(scenario, options)
@@ -69,6 +79,38 @@ def execute(options: argparse.Namespace) -> int:
     if outcome.failure is not None:
         return ERROR
     return NOT_AS_ASKED if outcome.unmet or (options.strict and outcome.warnings) else DONE
+
+
+class _Results:
+    """What a run leaves, written as soon as it is there."""
+
+    def __init__(self, directory: Path, options: argparse.Namespace) -> None:
+        self.directory, self.options = directory, options
+        self.outcome: Outcome | None = None
+        self.paths: dict[str, Path] = {}
+
+    def write(self, outcome: Outcome) -> None:
+        """Take the outcome and write it."""
+        self.outcome = outcome.asked_by(self.options.command_line)
+        self.paths = self.outcome.write(self.directory, report=not self.options.no_report)
+        LAST_CALL.note(json.dumps({"written": str(self.directory)}))
+        shutil.rmtree(self.directory / SPARE, ignore_errors=True)
+
+
+@contextmanager
+def _kept(directory: Path, streamed: bool, formats: Sequence[str]) -> Iterator[Path | None]:
+    """Who watches this process is told what to keep should it die; yields the folder to stream to for that, if one is needed."""
+    if not LAST_CALL.watched:
+        yield None
+        return
+    spare = directory if streamed else directory / SPARE
+    LAST_CALL.note(json.dumps({"spare": str(spare), "out": str(directory), "formats": list(formats)}))
+    try:
+        yield None if streamed else spare
+    finally:
+        if not streamed:
+            shutil.rmtree(spare, ignore_errors=True)
+        LAST_CALL.note("")
 
 
 class ProgressBar:
@@ -95,7 +137,7 @@ class ProgressBar:
 def _call_log(options: argparse.Namespace, scenario: Scenario, directory: Path) -> Path | None:
     """Where calls are logged, if they are; a log that an earlier run left there would not belong to these results."""
     if options.log_calls:
-        return Path(options.log_calls)
+        return Path(options.log_calls).absolute()
     if options.log_calls is None and not scenario.table().master.log_calls:
         (directory / CALL_LOG).unlink(missing_ok=True)
         return None
@@ -110,7 +152,7 @@ def _ignore(_: str) -> None: ...
 
 
 def _warn(text: str) -> None:
-    print(f"warning: {text}", file=sys.stderr, flush=True)
+    print(f"warning: {printable(text)}", file=sys.stderr, flush=True)
 
 
 def _study(scenario: Scenario, options: argparse.Namespace) -> Any:
@@ -149,7 +191,7 @@ def _tell(outcome: Outcome, study: Any, paths: dict[str, Path], options: argpars
     for kind, path in paths.items():
         print(f"{kind:>10}: {path}")
     if outcome.failure is not None:
-        print(f"cosim: the run ended early: {outcome.failure}", file=sys.stderr)
+        print(f"cosim: the run ended early: {printable(outcome.failure)}", file=sys.stderr)
 
 
 def _headline(summary: Any) -> str:

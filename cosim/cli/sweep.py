@@ -56,7 +56,7 @@ def execute(options: argparse.Namespace) -> int:
     sweep = scenario.vary(values, mode, count=options.samples, seed=options.seed)
     directory = check_writable(Path(options.out) if options.out is not None else Path("results") / f"{scenario.name}_sweep")
     with _Bar(len(sweep), visible=not (options.quiet or options.json)) as bar:
-        result = sweep.run(options.workers, progress=bar.move, keep=False, directory=directory)
+        result = sweep.run(options.workers, progress=bar.move, keep=False, directory=directory.absolute())
     if options.json:
         print((directory / "index.json").read_text(encoding="utf-8"), end="")
     else:

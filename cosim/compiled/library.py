@@ -31,13 +31,30 @@ def cached_library(compiler: Compiler, folder: Path) -> Path:
     sources = {name: (files("cosim.compiled") / name).read_bytes() for name in SOURCES}
     digest = hashlib.sha256(b"\0".join([compiler.identity().encode(), *sources.values()])).hexdigest()[:32]
     target = folder / f"stepper-{digest}" / library_name("stepper")
-    if not target.exists():
+    check = target.with_suffix(".sha256")
+    if not _is_whole(target, check):
         target.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix="build-", dir=target.parent) as scratch:
             for name, text in sources.items():
                 (Path(scratch) / name).write_bytes(text)
-            compile_library(compiler, Path(scratch), ["stepper.c"], target.name).replace(target)
+            library = compile_library(compiler, Path(scratch), ["stepper.c"], target.name)
+            written = Path(scratch) / check.name
+            written.write_text(_sha256(library))
+            library.replace(target)
+            written.replace(check)
     return target
+
+
+def _is_whole(library: Path, check: Path) -> bool:
+    """Whether a library is the one that was built: to load a part of one can end the process."""
+    try:
+        return check.read_text() == _sha256(library)
+    except (OSError, ValueError):
+        return False
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 @cache

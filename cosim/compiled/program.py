@@ -20,6 +20,7 @@ from cosim.components.elements import Element
 from cosim.coupling.plan import Plan, PlannedComponent
 from cosim.errors import CosimError
 from cosim.master.axis import TimeAxis
+from cosim.process.last_call import LAST_CALL
 from fmus.ports import c_type, getter_type, size
 
 KINDS = (
@@ -72,6 +73,7 @@ class CSlave(ctypes.Structure):
         ("calls_here", ctypes.c_int64),
         ("more_calls", ctypes.c_int64),
         ("seconds_over", ctypes.c_double),
+        ("numbers", ctypes.c_int64),
     )
 
 
@@ -121,6 +123,8 @@ class CProgram(ctypes.Structure):
         ("balises", CBalises),
         ("journal", CJournal),
         ("seconds_at_most", ctypes.c_double),
+        *((name, ctypes.c_void_p) for name in ("last_call", "last_time", "rows_told")),
+        ("rows_before", ctypes.c_int64),
         ("rows_done", ctypes.c_int64),
         *((name, ctypes.c_double) for name in ("seconds", "sampled")),
         *((name, ctypes.c_int64) for name in ("stop", "slave", "port", "status", "event", "terminate", "early")),
@@ -152,10 +156,23 @@ class Program:
         self.head.values, self.head.value_count = plan.values.ctypes.data, len(plan.values)
         self.head.slaves, self.head.slave_count = ctypes.addressof(self.slaves), len(plan.steps)
         self.head.watch.slave = -1
+        self.head.last_call = LAST_CALL.address
+        self.head.last_time = LAST_CALL.address + 8
+        self._nobody_reads = ctypes.c_int64()
+        self.tell_rows(None, 0)
         self.before = np.zeros_like(plan.values)
         self._versions = [step.component.fmi_version for step in plan.steps]
         calls = [len(writes) + len(reads) + 1 for writes, reads in zip(self.writes, self.reads, strict=True)]
         self.journal = Journal(self.head.journal, sum(calls), sum(int(r.raw_bytes) for s in self.slaves for r in _ports_read(s)))
+
+    def tell_rows(self, place: int | None, before: int) -> None:
+        """Have the stepper count the rows it fills.
+
+        Args:
+            place: address of the count; None where nobody reads it. before: rows that are filled already.
+        """
+        self.head.rows_told = ctypes.addressof(self._nobody_reads) if place is None else place
+        self.head.rows_before = before
 
     def watch(self, slave: int, position: int, speed: int, scales: tuple[float, float], places: np.ndarray, limit: float) -> None:
         """Have the stepper leave steps in which a balise may be passed.
@@ -222,6 +239,7 @@ class Program:
         outputs = [s.name.removeprefix(f"{component.name}.") for s in self.plan.signals[step.columns]]
         made = CSlave(instance=_address_of(component.slave.component), fmi_version=component.fmi_version)
         made.do_step = self.function(component, f"fmi{component.fmi_version}DoStep")
+        made.numbers = LAST_CALL.numbers(component.name)
         made.heeds_events = bool(getattr(component, "has_event_mode", False))
         writes, names = self._ports(component, "Set", inputs.names, inputs.buffer)
         self.writes.append(names)

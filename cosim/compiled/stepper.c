@@ -55,6 +55,7 @@ EXPORTED int64_t stepper_run(Program *program, int64_t first, int64_t last, doub
             break;
         }
         double t = program->start + (double)k * program->step, until = program->start + (double)(k + 1) * program->step;
+        *program->last_time = t;
         if (is_over(program, t, until)) {
             int64_t events = step_over(program, t, until, rows + used * width, room - used);
             if (events < 0)
@@ -69,6 +70,7 @@ EXPORTED int64_t stepper_run(Program *program, int64_t first, int64_t last, doub
         row[0] = until;
         memcpy(row + 1, program->values, bytes);
         program->before = row + 1;
+        *program->rows_told = program->rows_before + used;
         if (!all_finite(program->values, program->value_count))
             stopped(program, STOP_NOT_FINITE, 0, 0);
     }

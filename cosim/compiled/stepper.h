@@ -44,6 +44,7 @@ typedef struct {
     double now;                        /* where it stands [s] */
     int64_t calls_here, more_calls;    /* of doStep in the present step; in all of them, beyond one for each step */
     double seconds_over;
+    int64_t numbers;                   /* of its calls, as `LastCall` counts them: the first one is that of setting inputs */
 } Slave;
 
 /* A plant that is watched: steps in which it may pass a balise are not for the stepper. */
@@ -111,6 +112,9 @@ typedef struct {
     int64_t steps;          /* done in all, also those that passed none */
 } Balises;
 
+/* What a slave is called for, counted from its `numbers`, as in `last_call.py`. */
+enum { LAST_WRITE, LAST_READ, LAST_STEP, LAST_EVENT };
+
 /* Functions in a journal. */
 enum {
     CALL_SET, CALL_STEP, CALL_GET, CALL_ENTER_EVENT, CALL_SET_CLOCK, CALL_SET_REALS, CALL_UPDATE, CALL_ENTER_STEP, CALL_COUNT, CALL_SAVE,
@@ -162,6 +166,10 @@ typedef struct {
     Balises balises;
     Journal journal;
     double seconds_at_most;     /* a stretch is to last [s] */
+    int64_t *last_call;         /* where the call that is being made is noted, and the time [s], for whoever watches */
+    double *last_time;
+    int64_t *rows_told;         /* where the rows that are filled are counted, for the same */
+    int64_t rows_before;        /* those that are filled before the stretch */
     int64_t rows_done;          /* in the stretch: one for each step, and those of events */
     double seconds, sampled;    /* it lasted; steps of all stretches whose doStep calls were timed */
     /* where and why it ended */

@@ -110,6 +110,7 @@ class CompiledStepper:
         wanted = min(free, self._longest)
         rows = recorder.block(wanted + ROWS_OF_EVENTS if own_passings else wanted)
         head, before = self._program.head, self._program.before
+        self._program.tell_rows(recorder.count_address, recorder.block_start)
         self._first = k
         run = self._library.stepper_run
         done = int(run(self._program.address, k, k + wanted, rows.ctypes.data, len(rows), before.ctypes.data))

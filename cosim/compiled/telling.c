@@ -4,6 +4,7 @@
 /* One slave alone, with its gathered inputs, from t by h [s]; its outputs are read where that is wanted. Counts nothing. Returns 1
    where that was ordinary, else 0 and says why in the program. */
 EXPORTED int64_t stepper_move(Program *program, int64_t which, double t, double h, int64_t reads) {
+    *program->last_time = t;
     if (!send_inputs(program, which))
         return 0;
     if (!do_step(program, which, t, h))
@@ -70,6 +71,7 @@ static bool tell_stage(Program *program, int64_t which, Telegram *telegram, cons
     const uint32_t clock = (uint32_t)telegram->clock;
     const bool on = true, arrives = times[1] > times[0], goes_on = times[2] > times[1];
     void *instance = program->slaves[which].instance;
+    about_to(program, which, LAST_EVENT);
     switch (stage) {
     case STAGE_SEND: return send_inputs(program, which);
     case STAGE_ARRIVE: return !arrives || simple_move(program, which, times[0], times[1] - times[0]);

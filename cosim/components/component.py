@@ -21,12 +21,14 @@ from cosim.components.capabilities import tool_warning
 from cosim.components.derivatives import directional_derivative, make_derivative_writer
 from cosim.components.described import Described, EventPort
 from cosim.components.start_values import StartValue, refusal, typed_value, typed_values
+from cosim.components.surroundings import Surroundings
 from cosim.components.values import element_reader, element_writer, exact_reader, exact_writer, write_start
 from cosim.diagnostics.log_choice import LogSwitch, log_switch, switch_log
 from cosim.diagnostics.messages import LogChoice, MessageLog
 from cosim.diagnostics.native_log import forget
 from cosim.diagnostics.tally import Tally, count_methods, new_tallies
 from cosim.errors import CouplingError, RunError
+from cosim.process.last_call import LAST_CALL, READ, STEP, WRITE
 from fmu_observer.event_protocol import OUTCOME_VARIABLES
 from fmus.exact_ports import Values
 
@@ -50,8 +52,9 @@ class Component(Described):
     called without arguments. Variables go by name; elements of arrays are named ``x[1]``, ``m[2,3]``, from 1, row by row.
     `save`, `restore` and `release` exist where `can_save` says so. Counters: `seconds` spent in doStep, `calls` of it, `tallies`
     of everything else. `messages` are what the slave logged. `time` is where it stands [s]. `terminated` says that the slave
-    asked for the end of the run. Whatever a call of the slave throws comes out as a `RunError` with component, time and the names
-    of the variables concerned.
+    asked for the end of the run. `trespasses` are what it changed for everybody in the process before its first step, each with
+    the call that did; it was put back. Whatever a call of the slave throws comes out as a `RunError` with component, time and
+    the names of the variables concerned.
 
     Args:
         name: name in the scenario.
@@ -80,6 +83,8 @@ class Component(Described):
         self.clock: Callable[[], float] | None = None  # says where it stands [s] while somebody else than Python steps it
         self.log: LogSwitch | None = None
         self.tallies = new_tallies()
+        self.trespasses: dict[str, str] = {}
+        self._last, self._numbers = LAST_CALL, LAST_CALL.numbers(name)
         self._outcomes, self._read_outcomes = np.zeros(len(OUTCOME_VARIABLES)), NOT_PREPARED
 
     # -- how it stands ----------------------------------------------------------------------------------------------
@@ -162,12 +167,12 @@ class Component(Described):
 
     def reader(self, names: Sequence[str], values: np.ndarray) -> Callable[[], None]:
         """A call that reads scalars and elements into `values`, shape (len(names),), a contiguous view of the caller's array."""
-        return self._counted(self.tallies["get"], f"reading {_shown(names)}", self._unguarded_reader(names, values))
+        return self._counted("get", READ, f"reading {_shown(names)}", self._unguarded_reader(names, values))
 
     def writer(self, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
         """A call that writes scalars and elements, and the array of shape (len(names),) it writes from."""
         write, buffer = self._unguarded_writer(names)
-        return self._counted(self.tallies["set"], f"writing {_shown(names)}", write), buffer
+        return self._counted("set", WRITE, f"writing {_shown(names)}", write), buffer
 
     def exact_reader(self, name: str) -> Callable[[], Values]:
         """A call that returns the values of a whole variable as they are: texts, bytes, integers of any size; row by row."""
@@ -244,15 +249,15 @@ class Component(Described):
         """End the run; errors of a dying component are of no interest."""
         if self._alive and self._running:
             self._running = False
-            _quietly(self.slave.terminate)
+            self._quietly("terminate", self.slave.terminate)
 
     def free(self) -> None:
         """Free the instance, its library and its files."""
         if self._alive:
             self._alive = False
-            _quietly(self.slave.freeInstance)
+            self._quietly("freeInstance", self.slave.freeInstance)
         elif self._release_files is not None and math.isnan(self.time):
-            _quietly(self._free_library)  # loaded, never instantiated: freeInstance did not do it
+            self._quietly("unloading", self._free_library)  # loaded, never instantiated: freeInstance did not do it
         if self._release_files is not None:
             self._release_files()
             self._release_files = None
@@ -332,6 +337,8 @@ class Component(Described):
 
     def _step_whole(self, do_step: Step, refused: Refused, t: float, until: float) -> None:
         """One timed doStep of a slave that gets to `until` [s] or refuses (FMI 1, 2)."""
+        last = self._last
+        last.call[0], last.time[0] = self._numbers + STEP, t
         begin = perf_counter()
         try:
             do_step(t, until - t)
@@ -350,9 +357,10 @@ class Component(Described):
     def _unguarded_writer(self, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
         return element_writer(self, names)
 
-    def _counted(self, tally: Tally, what: str, call: Callable[[], None]) -> Callable[[], None]:
-        """`_guarded`, counted."""
-        return tally.counting(call, lambda error: self._explained(what, error))
+    def _counted(self, kind: str, number: int, what: str, call: Callable[[], None]) -> Callable[[], None]:
+        """`_guarded`, counted, and noted as the last call: the one of this number among those that are made often."""
+        tally: Tally = self.tallies[kind]
+        return tally.counting(call, lambda error: self._explained(what, error), self._last.call, self._numbers + number)
 
     def _guarded(self, what: str, call: Callable[[], None]) -> Callable[[], None]:
         def guarded() -> None:
@@ -365,10 +373,20 @@ class Component(Described):
 
     def _guard(self, what: str, call: Callable[[], Any]) -> Any:
         """Run a call of the slave; turn whatever it throws into a RunError with component and time."""
+        before = None if self._running else Surroundings()  # in a run its steps are looked at
         try:
-            return call()
+            with self._last.making(self.name, what, self.time):
+                return call()
         except Exception as error:
             raise self._explained(what, error) from error
+        finally:
+            for changed in () if before is None else before.put_back():
+                self.trespasses[changed] = what
+
+    def _quietly(self, what: str, call: Callable[[], Any]) -> None:
+        """A component that fails while it is put away changes nothing any more."""
+        with suppress(Exception), self._last.making(self.name, what, self.time):
+            call()
 
     def _saved_state(self, name: str, get: Callable[[], Any]) -> Any:
         """A state from the slave; a null pointer is none, and to restore it would end the process."""
@@ -388,9 +406,3 @@ class Component(Described):
 
 def _shown(names: Sequence[str]) -> str:
     return ", ".join(names[:NAMES_SHOWN]) + (f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else "")
-
-
-def _quietly(call: Callable[[], Any]) -> None:
-    """A component that fails while it is put away changes nothing any more."""
-    with suppress(Exception):
-        call()

@@ -19,6 +19,7 @@ from cosim.components.quick_calls import quicken
 from cosim.components.start_values import StartValue
 from cosim.components.structure import STRUCTURAL, resize, structural_value
 from cosim.errors import RunError
+from cosim.process.last_call import STEP
 from fmus.exact_ports import make_exact_writer
 from fmus.native_calls import prepared_call
 
@@ -140,6 +141,8 @@ class FMI3Component(Component):
         Raises:
             RunError: doStep failed, or says that it reached a time outside the step.
         """
+        last = self._last
+        last.call[0], last.time[0] = self._numbers + STEP, t
         begin = perf_counter()
         try:
             event, terminate, early, reached = self._do_step(t, until - t)

@@ -18,7 +18,11 @@ from cosim.components.fmi1 import FMI1Component
 from cosim.components.fmi1_library import FMU1SlaveRepaired
 from cosim.components.fmi2 import FMI2Component
 from cosim.components.fmi3 import FMI3Component
+from cosim.components.shared_libraries import refuse_foreign_libraries
+from cosim.components.surroundings import Surroundings
 from cosim.errors import FmuLoadError
+from cosim.process.last_call import LAST_CALL
+from cosim.process.sentinel import guard_exit
 from fmu_observer.block import make_block
 from fmus.check.archive import MAX_UNPACKED_BYTES, Archive, NotAnFmuError, open_archive
 from fmus.check.description import negated_aliases
@@ -49,21 +53,29 @@ def load_fmu(path: str | Path, name: str) -> Component:
     except NotAnFmuError as error:
         raise FmuLoadError(f"{name}: {error}") from error
     folder = Path(mkdtemp(prefix="fmu_"))
-    here = Path.cwd()
+    guard_exit()
+    here, before = Path.cwd(), Surroundings()
     try:
         fmpy.extract(str(path), unzipdir=str(folder))
-        slave = _slave(folder, description, name)
+        refuse_foreign_libraries(_library(folder, description), path, name)
+        with LAST_CALL.making(name, "loading its library"):
+            slave = _slave(folder, description, name)
+    except FmuLoadError:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
     except Exception as error:
         shutil.rmtree(folder, ignore_errors=True)
         lacks = "its library lacks a function that FMI demands of every FMU: " if isinstance(error, AttributeError) else ""
         raise FmuLoadError(f"{name}: cannot load {path}: {lacks}{error}") from error
     finally:
         os.chdir(here)  # fmpy changes it while it loads, and leaves it so when it fails
+        changed = before.put_back()
     more = {"negated": negated_aliases(folder)} if _version(description) == 1 else {}
     component: Component = COMPONENTS[_version(description)](
         name, slave, description, source=str(path), kind="FMU",
         release_files=lambda: shutil.rmtree(folder, ignore_errors=True), **more,
     )  # fmt: skip
+    component.trespasses |= dict.fromkeys(changed, "loading its library")
     return component
 
 
@@ -106,6 +118,12 @@ def load_block(system: HybridSystem, name: str, fmi_version: Literal[2, 3] = 3, 
 
 def _version(description: ModelDescription) -> int:
     return int(str(description.fmiVersion)[0])
+
+
+def _library(folder: Path, description: ModelDescription) -> Path:
+    place = fmpy.platform_tuple if _version(description) == 3 else fmpy.platform
+    name = f"{description.coSimulation.modelIdentifier}{fmpy.sharedLibraryExtension}"
+    return folder / "binaries" / str(place) / name
 
 
 def _slave(folder: Path, description: ModelDescription, name: str) -> Any:

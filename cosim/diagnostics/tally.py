@@ -48,12 +48,16 @@ class Tally:
         self._timed += count
         self._seconds += seconds
 
-    def counting(self, call: Callable[[], None], explain: Callable[[Exception], Exception]) -> Callable[[], None]:
-        """The same call, counted; one in many is timed. Costs 20 ns.
+    def counting(
+        self, call: Callable[[], None], explain: Callable[[Exception], Exception], last: Any = None, number: int = 0
+    ) -> Callable[[], None]:
+        """The same call, counted; one in many is timed. Costs 40 ns.
 
         Args:
             call: what is called often. explain: what to raise in place of what it raises.
+            last: a cell in which to store, before each call, its `number`; see `cosim.process.last_call`.
         """
+        last = [0] if last is None else last
         cycle = left = EARLY
 
         def timed() -> None:
@@ -68,6 +72,7 @@ class Tally:
         def counted() -> None:
             nonlocal left
             left -= 1
+            last[0] = number
             try:
                 if left:
                     call()

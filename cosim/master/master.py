@@ -26,6 +26,7 @@ from cosim.master.events.choose import Events
 from cosim.master.finite import make_finite_check
 from cosim.master.initialisation import initialise
 from cosim.master.system import Row, System
+from cosim.process.last_call import LAST_CALL
 from cosim.results.recorder import Recorder
 from cosim.results.result import SignalInfo
 
@@ -55,6 +56,8 @@ class Master:
         stepper: who executes the plan: ``python``, ``compiled``, or ``auto`` for the compiled one wherever it can.
         events: of the components: ``propagate`` them to others at the same instant, or leave them ``local``.
 
+    `between_steps` is called between two steps, or stretches of the compiled stepper; it may raise KeyboardInterrupt.
+
     After `run`, `recorder`, `timing`, `exchange_rounds` and `balises.mailbox.log` hold what came out, also when it failed.
 
     Raises:
@@ -78,6 +81,7 @@ class Master:
         self._progress = progress
         self._all_finite = make_finite_check(plan.values)
         self.stepper = Choice(stepper)
+        self.between_steps: Callable[[], None] = _nothing_to_do
 
     def choose_stepper(self) -> None:
         """Choose who executes the plan; `run` does so where nobody did before. After it no component may be instantiated anew.
@@ -109,6 +113,7 @@ class Master:
             if self._stopped_at(self.axis.start) is None:
                 self._step_all()
         finally:
+            LAST_CALL.call[0] = 0
             self.timing.stepping = perf_counter() - begin - self.timing.recording
             if self.stepper.compiled is not None:
                 self.stepper.compiled.close()
@@ -120,6 +125,7 @@ class Master:
         axis, compiled = self.axis, self.stepper.compiled
         k = 0
         while k < axis.count:
+            self.between_steps()
             step: Callable[[], Sequence[Row]] | None = partial(self.control.step, axis[k], axis[k + 1])
             if compiled is not None:
                 stretch = compiled.run(k, self.recorder)
@@ -194,6 +200,9 @@ class Master:
         name, value = self.plan.signals[bad].name, self.plan.values[bad]
         component = name.partition(".")[0]
         raise RunError(f"Component '{component}' at t = {t:g} s: output {name} is {value}; the run ends here.", component, t)
+
+
+def _nothing_to_do() -> None: ...
 
 
 def close(plan: Plan) -> None:

@@ -6,13 +6,19 @@ library only; what runs and compares is loaded when the fixture is first called.
 
 from __future__ import annotations
 
+import os
+
 import pytest
 
+from cosim.process import sentinel
 from cosim.pytest_plugin import finish, markers, options, startup
 from cosim.pytest_plugin.fixture import FmuRegression
 from cosim.pytest_plugin.records import Records
 
 __all__ = ["FmuRegression", "fmu_regression"]
+
+ERROR_STREAM: pytest.StashKey[int] = pytest.StashKey()
+"""As it was before pytest captured it: what an FMU did that ends the session must be seen."""
 
 
 def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginManager) -> None:
@@ -24,6 +30,7 @@ def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginMa
 def pytest_configure(config: pytest.Config) -> None:
     """Register the markers."""
     markers.register(config)
+    config.stash[ERROR_STREAM] = sentinel.report_to_copy_of_stderr()
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -62,3 +69,4 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
 def pytest_unconfigure(config: pytest.Config) -> None:
     """Remove what was left for the controller."""
     Records.of(config).remove()
+    os.close(config.stash[ERROR_STREAM])

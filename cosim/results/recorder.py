@@ -16,6 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from cosim.errors import OutputError
+from cosim.results.block_file import COUNT, FIRST, BlockFile
 from cosim.results.result import SignalInfo
 from cosim.results.row_file import RowFile
 from cosim.results.table_layout import table_dtype
@@ -34,6 +35,10 @@ class Stream(Protocol):
         """The file for rows of this type, with space for so many."""
         ...
 
+    def block(self, rows: int) -> BlockFile:
+        """The block of so many rows that are not in the file yet."""
+        ...
+
 
 class Recorder:
     """Rows ``(time, values...)``.
@@ -49,7 +54,8 @@ class Recorder:
         stream: writes rows where others see them while the run goes on, block by block and whenever its `seconds` have passed;
             in memory is then no more than a block.
 
-    `count` is the number of rows that are kept.
+    `count` is the number of rows that are kept. Of a stream the block is first one row and is doubled whenever it is full, so
+    that a run that dies at once leaves whole files as well.
     """
 
     def __init__(
@@ -67,12 +73,30 @@ class Recorder:
         self._source: np.ndarray | None = None
         self.count = self._first = 0  # `_first`: first row of the block in memory; all before it are in the file
         self._seconds, self._due = inf, inf  # when rows are to be brought into the file at the latest [s]
-        if stream is not None:
-            self._limit = max(min(int(BLOCK // self._dtype.itemsize), self._limit), FIRST_ROWS)
-            self._file = stream.open(self._dtype, self._limit)
-            self._seconds, self._due = stream.seconds, monotonic() + stream.seconds
-        room = self._limit if stream is not None else min(max(expected_rows // every + 1, FIRST_ROWS), self._limit)
-        self._use(np.empty((room, self._width)))
+        self._block: BlockFile | None = None
+        self._filled: Any = [0, 0]  # first row and rows of the block, kept where they outlive the process if it is a stream's
+        if stream is None:
+            self._use(np.empty((min(max(expected_rows // every + 1, FIRST_ROWS), self._limit), self._width)))
+            return
+        self._limit = max(min(int(BLOCK // self._dtype.itemsize), self._limit), FIRST_ROWS)
+        self._file = stream.open(self._dtype, self._limit)
+        self._seconds, self._due = stream.seconds, monotonic() + stream.seconds
+        self._block = stream.block(self._limit)
+        self._filled = self._block.cells
+        self._use(self._block.rows[:1])
+
+    @property
+    def count_address(self) -> int | None:
+        """Where somebody who fills a `block` may say with each row how many are filled in all; None where nobody reads it.
+
+        They are counted from `block_start`.
+        """
+        return None if self._block is None else self._block.count_address
+
+    @property
+    def block_start(self) -> int:
+        """How many rows are filled before those of the last `block`."""
+        return self.count - self._first
 
     def add(self, t: float, values: np.ndarray) -> None:
         """Copy the row of a communication point: time [s] and values, shape (n,).
@@ -123,6 +147,7 @@ class Recorder:
             rows = len(kept)
             filled[:rows] = kept
         self.count += rows
+        self._filled[COUNT] = self.count - self._first
 
     def table(self) -> np.ndarray:
         """The rows as a structured array, shape (rows,), ``time`` first.
@@ -157,6 +182,7 @@ class Recorder:
         self._cells[at] = t
         self._cells[at + 1 : at + self._width] = self._view
         self.count += 1
+        self._filled[COUNT] = place + 1
         if self._due != inf and monotonic() >= self._due:
             self._make_room()
 
@@ -191,11 +217,14 @@ class Recorder:
         else:
             self._file.reserve(self.count + len(self._rows))
             self._flush()
+            if self._block is not None and len(self._rows) < self._limit:
+                self._use(self._block.rows[: 2 * len(self._rows)])
 
     def _flush(self) -> None:
         """Bring the block in memory into the file; only then it counts as being there."""
         assert self._file is not None
         self._file.write(self._first, self._rows[: self.count - self._first])
-        self._first = self.count
+        self._filled[COUNT], self._first = 0, self.count
+        self._filled[FIRST] = self._first
         if self._seconds != inf:
             self._due = monotonic() + self._seconds

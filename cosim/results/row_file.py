@@ -54,7 +54,7 @@ class RowFile:
         """
         size = self._offset + rows * self._row_bytes
         try:
-            _allocate(self._file.fileno(), self._reserved, size - self._reserved)
+            allocate(self._file.fileno(), self._reserved, size - self._reserved)
         except OSError as error:
             raise self._explained(error) from error
         self._reserved = max(size, self._reserved)
@@ -108,7 +108,7 @@ def _folder_for_large_files() -> str:
     return DISK if not chosen and os.access(DISK, os.W_OK | os.X_OK) else tempfile.gettempdir()
 
 
-def _allocate(descriptor: int, start: int, size: int) -> None:
+def allocate(descriptor: int, start: int, size: int) -> None:
     """Have the file system set space aside; where it cannot, zeros are written."""
     if size <= 0:
         return

@@ -1,8 +1,8 @@
 """The stream: the results folder of a run that is still going on, so that what was computed outlives the program.
 
 ``table.npy`` is a whole NumPy file after every flush: rows are written first, their number in its header afterwards. Rows are
-in SI. Telegrams are appended, messages are few and written anew. Until the run ends ``summary.json`` says that it has not.
-Touches only the folder it is given.
+in SI. Those since the last flush are in the block, a file as well. Telegrams are appended, messages are few and written anew.
+Until the run ends ``summary.json`` says that it has not. Touches only the folder it is given.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import numpy as np
 
 from cosim.diagnostics.messages import MessageLog, in_order, write_messages
 from cosim.errors import OutputError
+from cosim.results.block_file import BLOCK_FILE, BlockFile
 from cosim.results.events_file import record_row, write_events
 from cosim.results.folder import EVENTS, LAYOUT, MESSAGES, SUMMARY, TABLES, check_writable
 from cosim.results.formats.growing_npy import growing_header
@@ -61,6 +62,7 @@ class Stream:
         self._events, self._logs = events, logs
         self._told = self._logged = 0
         self._file: _StreamFile | None = None
+        self._block: BlockFile | None = None
         self._begin(summary)
 
     def open(self, dtype: np.dtype[np.void], rows: int) -> RowFile:
@@ -71,6 +73,21 @@ class Stream:
         """
         self._file = _StreamFile(self.directory / TABLES["npy"], dtype, rows, self)
         return self._file
+
+    def block(self, rows: int) -> BlockFile:
+        """The block of rows that are not in the table yet.
+
+        Raises:
+            OutputError: there is no space.
+        """
+        units = [self.units.get(signal.name) for signal in self.signals]
+        factors, offsets = ([neutral, *(neutral if u is None else getattr(u, name) for u in units)]
+                            for neutral, name in ((1.0, "factor"), (0.0, "offset")))  # fmt: skip
+        try:
+            self._block = BlockFile(self.directory / BLOCK_FILE, rows, np.array(factors), np.array(offsets))
+        except OSError as error:
+            raise OutputError(f"Results cannot be streamed to {self.directory}: {error.strerror or error}.") from error
+        return self._block
 
     def append(self) -> None:
         """Bring the telegrams and messages into the folder that are not there yet.
@@ -96,12 +113,14 @@ class Stream:
         """Give back the space that was reserved and not used; what is in the folder stays."""
         if self._file is not None:
             self._file.finish()
+        if self._block is not None:
+            self._block.remove()
 
     def _begin(self, summary: Mapping[str, Any]) -> None:
         """An empty result that says it has not ended; while its parts are brought together the folder has no summary."""
         folder = self.directory
         try:
-            for name in (SUMMARY, "report.html", *TABLES.values()):
+            for name in (SUMMARY, "report.html", BLOCK_FILE, *TABLES.values()):
                 (folder / name).unlink(missing_ok=True)
             write_events(folder / EVENTS, ())
             write_messages(folder / MESSAGES, ())

@@ -6,10 +6,16 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from cosim.diagnostics.messages import read_messages
+from cosim.results.block_file import BLOCK_FILE, read_block
 from cosim.results.events_file import read_events
 from cosim.results.formats.growing_npy import read_grown
 from cosim.results.result import BaliseRecord, Result, SignalInfo
+
+SPARE = ".unfinished"
+"""The folder, within that of the results, to which a run is streamed in case its process dies."""
 
 DID_NOT_END = "the run did not end"
 EXPLAINED = (
@@ -27,13 +33,24 @@ def read_unfinished(table: Path, events: Path, messages: Path, content: dict[str
     Raises:
         ValueError: a file is not what a stream writes. OSError: it cannot be read.
     """
-    rows = read_grown(table)
+    rows = _all_rows(table)
     reached = float(rows["time"][-1]) if len(rows) else None
     content["summary"] |= {"reached": reached, "rows": len(rows)}
     content["failure"] = f"{content['failure']} They " + ("are none." if reached is None else f"end at t = {reached:g} s.")
     signals = [SignalInfo(**signal) for signal in content["signals"]]
     logged = read_messages(messages) if messages.exists() else []
     return Result(rows, signals, _whole_lines(events), messages=logged)
+
+
+def _all_rows(table: Path) -> np.ndarray:
+    """The rows of the table and those of the block, which may be on their way from one to the other while this is read."""
+    path = table.with_name(BLOCK_FILE)
+    block = read_block(path) if path.exists() else None
+    rows = read_grown(table)
+    if block is None:
+        return rows
+    new = block.after(len(rows), rows.dtype)
+    return np.concatenate([rows, new]) if len(new) else rows
 
 
 def _whole_lines(path: Path) -> list[BaliseRecord]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import asdict, replace
 from itertools import pairwise
 from pathlib import Path
@@ -17,6 +17,7 @@ from cosim.components.capabilities import tool_warning
 from cosim.components.component import Component
 from cosim.components.fmi3 import FMI3Component
 from cosim.components.start_values import StartValue
+from cosim.components.surroundings import SurroundingsOfSteps
 from cosim.coupling.clocks import connect_clocks
 from cosim.coupling.connection import Connection, connect
 from cosim.coupling.graph import execution_groups
@@ -31,6 +32,8 @@ from cosim.master.algorithms.choose import AlgorithmChoice, choose_algorithm
 from cosim.master.axis import TimeAxis
 from cosim.master.lines.draw import draw_lines
 from cosim.master.master import Master, close
+from cosim.process.interruption import Interruption
+from cosim.process.sentinel import limited_calls
 from cosim.report.spec import Phase, ReportSpec
 from cosim.results.recorder import Recorder
 from cosim.results.result import BaliseRecord, Result, SignalInfo
@@ -66,7 +69,7 @@ Streaming = tuple[Path, Callable[[], None]]
 def run_scenario(
     table: ScenarioTable, name: str, folder: Path, where: str, progress: Progress | None = None, warn: Warn | None = None,
     call_log: Path | None = None, building: Warn | None = None, stream: Streaming | None = None,
-    doubts: Sequence[str] = (),
+    doubts: Sequence[str] = (), finish: Callable[[Outcome], Outcome] = lambda outcome: outcome,
 ) -> Outcome:  # fmt: skip
     """Run a scenario to its end or to its first failure.
 
@@ -78,6 +81,8 @@ def run_scenario(
         building: told of FMUs that are built before the run, as they are done; by default the log, as information.
         stream: the folder that rows are written to as they come; None to keep them in memory.
         doubts: warnings from before, which have been told already.
+        finish: called with the outcome before any component is closed, since an FMU may take the process along there; what it
+            returns is returned.
 
     Raises:
         CosimError: the scenario cannot be set up; failures on the way are in the outcome.
@@ -88,11 +93,16 @@ def run_scenario(
     setup.name, setup.streaming = name, stream
     setup.warnings += doubts
     try:
-        try:
-            setup.prepare(progress)
-        except CosimError as error:
-            raise error if str(error).startswith(where) else type(error)(f"{where}: {error}") from error
-        return setup.execute()
+        with limited_calls(table.master.call_timeout):
+            try:
+                setup.prepare(progress)
+            except CosimError as error:
+                raise error if str(error).startswith(where) else type(error)(f"{where}: {error}") from error
+            with Interruption() as interruption:
+                outcome = finish(setup.execute(interruption))
+        if outcome.failure is None:
+            interruption.check()  # it came while the results were put away
+        return outcome
     finally:
         setup.close()
 
@@ -172,18 +182,26 @@ class _Setup:
         self._begin_stream(self.master)
         self.setup_seconds = perf_counter() - begin
 
-    def execute(self) -> Outcome:
+    def execute(self, interruption: Interruption) -> Outcome:
         """Run the master and gather what came out."""
         assert self.plan is not None
         assert self.master is not None
         master = self.master
         failure: str | None = None
+        surroundings = SurroundingsOfSteps()
+
+        def between_steps() -> None:
+            surroundings.look()
+            interruption.check()
+
+        master.between_steps = between_steps
         try:
             master.run()
         except CosimError as error:
             failure = str(error)
         except KeyboardInterrupt:
             failure = INTERRUPTED
+        self._warn_of_trespasses(surroundings.finish())
         if master.ended_early is not None:
             self._warn(master.ended_early)
         premises, left = premise_findings(self._as_recorded(), self.table.components, self.connections)
@@ -198,6 +216,8 @@ class _Setup:
         spec = self._report_spec()
         summary["report"] = asdict(spec)  # so that the folder tells which signal plays which role
         table, signals = self._in_si()
+        if interruption.came:
+            failure = failure or INTERRUPTED
         messages = in_order(component.messages for component in self.components.values())
         result = Result(table, signals, events, summary, failure, messages)
         outcome = Outcome(result, spec, tuple(self.table.report.tables))
@@ -315,6 +335,18 @@ class _Setup:
             rejected = (component.outcomes() or {}).get("rejected", 0)
             if rejected:
                 self._warn(f"{name}: {rejected} telegrams were rejected: stamped in the past, and beyond what it replays.")
+
+    def _warn_of_trespasses(self, in_steps: Set[str]) -> None:
+        """What was changed for everybody in this process, and put back."""
+        for name, component in self.components.items():
+            for changed, call in component.trespasses.items():
+                self._warn(f"{name}: {call} changed {changed} of the whole program; it was put back.")
+        native = [name for name, component in self.components.items() if component.kind == "FMU"]
+        for changed in sorted(in_steps):
+            self._warn(
+                f"{' or '.join(native)}: its steps change {changed} of the whole program; it was put back, but not after "
+                "every step: other components, and their numbers, may have been touched."
+            )
 
     def _warn_of_logs(self) -> None:
         """What the components logged of things gone wrong, in numbers; and a call log that could not be finished."""

@@ -278,6 +278,7 @@ class Scenario:
         self, progress: Callable[[float, float], None] | None = None, overrides: Mapping[str, Any] | None = None,
         warn: Callable[[str], None] | None = None, call_log: str | Path | None = None,
         building: Callable[[str], None] | None = None, stream: str | Path | None = None,
+        finished: Callable[[Outcome], None] | None = None, spare: str | Path | None = None,
     ) -> Outcome:  # fmt: skip
         """Run it.
 
@@ -292,6 +293,9 @@ class Scenario:
             stream: a results folder to which everything is written while the run goes on, so that it outlives the program; what
                 an earlier run left there is removed when the first step is about to be taken. The table is written as
                 ``table.npy``; `Outcome.write` adds other formats only where the scenario asks for them.
+            finished: called with the outcome before the components are closed, which is what is returned as well: what it writes
+                is not lost where an FMU crashes while it is freed.
+            spare: a folder to which rows are written as for `stream`, only in case the process dies: whoever gives it removes it.
 
         Returns:
             The outcome: result, report roles, warnings; also for a run that failed on the way (see `Outcome.failure`).
@@ -311,10 +315,21 @@ class Scenario:
         with self._places_named():
             place = scenario.name, self.folder, self.where
             origin = Origin.of(table, *place, self._files)
-            streaming = None if stream is None else streaming_to(stream, origin)
-            outcome = run_scenario(table, *place, progress, warn, log, building, doubts=self._doubts, stream=streaming)
-        outcome = replace(outcome, origin=origin)
-        return outcome if stream is None else finish_stream(outcome, stream, warn or LOG.warning)
+            folder = None if stream is None else Path(stream).absolute()  # an FMU may change the working directory
+            streaming = None if folder is None else streaming_to(folder, origin)
+            if streaming is None and spare is not None:
+                streaming = Path(spare).absolute(), lambda: None
+
+            def finish(outcome: Outcome) -> Outcome:
+                outcome = replace(outcome, origin=origin)
+                outcome = outcome if folder is None else finish_stream(outcome, folder, warn or LOG.warning)
+                if finished is not None:
+                    finished(outcome)
+                return outcome
+
+            return run_scenario(
+                table, *place, progress, warn, log, building, doubts=self._doubts, stream=streaming, finish=finish
+            )
 
     def structure(self) -> Structure:
         """How the components hang together: order, groups, loops, what is held over a step. Nothing is run or built.

@@ -6,10 +6,12 @@ Unknown keys, wrong types and values out of range are refused with the place and
 from __future__ import annotations
 
 import json
+from math import ulp
 from typing import Any, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
+from cosim.components.component import TIME_TOLERANCE
 from cosim.errors import ScenarioError, nearest
 from cosim.scenario.expectation_tables import EXPECTATIONS, ExpectationItem
 from cosim.scenario.tables import (
@@ -49,6 +51,12 @@ class ScenarioTable(Table):
         step_count(self.start, self.stop, self.step)
         if not self.components:
             raise ValueError("a scenario needs at least one component")
+        for name, component in self.components.items():
+            if component.substeps > 1:
+                check_resolution(f"components.{name}: one of {component.substeps} substeps,", self.step / component.substeps,
+                                 self.start, self.stop)  # fmt: skip
+        if self.master.smallest_step is not None:
+            check_resolution("master.smallest_step", self.master.smallest_step, self.start, self.stop)
         return self
 
 
@@ -68,12 +76,34 @@ def step_count(start: float, stop: float, step: float) -> int:
         raise ValueError(f"stop ({stop!r} s) must lie behind start ({start!r} s)")
     if (stop - start) / step > MAX_STEPS:
         raise ValueError(f"step {step!r} s from {start!r} s to {stop!r} s: more than {MAX_STEPS:g} steps; use a larger step")
+    check_resolution("step", step, start, stop)
     count = round((stop - start) / step)
     if count < 1 or abs(start + count * step - stop) > 1e-9 * max(1.0, abs(stop)):
         below = int((stop - start) / step)
         proposals = f"stop = {start + below * step:g} or {start + (below + 1) * step:g}"
         raise ValueError(f"step {step!r} s does not divide the horizon from {start!r} s to {stop!r} s; use {proposals}")
     return count
+
+
+APART = 10.0
+"""A step is at least so many times the distance at which two times are still told apart: a grid of fewer is uneven."""
+
+
+def check_resolution(what: str, step: float, start: float, stop: float) -> None:
+    """A step must be longer than the resolution of time: that of the numbers, and `TIME_TOLERANCE`.
+
+    Args:
+        what: name of the step, for the message. step: [s]. start, stop: of the run [s].
+
+    Raises:
+        ValueError: it is too short.
+    """
+    largest = max(abs(start), abs(stop))
+    distance = max(ulp(largest), TIME_TOLERANCE)
+    if step < APART * distance:
+        why = f"times near {largest:g} s are told apart from {distance:.2g} s on"
+        least = f"a step must be {APART:g} times that; use {APART * distance:.2g} s or more"
+        raise ValueError(f"{what} {step!r} s is too short: {why}, and {least}")
 
 
 def parse_scenario(data: dict[str, Any], where: str) -> ScenarioTable:

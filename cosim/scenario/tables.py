@@ -150,6 +150,7 @@ class MasterTable(Table):
     events: Literal["propagate", "local"] = "propagate"
     stepper: Literal["auto", "python", "compiled"] = "auto"
     log_calls: bool = False
+    call_timeout: Annotated[float, Field(gt=0.0)] | None = None
     record_every: Annotated[int, Field(ge=1)] = 1
     record_memory: Annotated[float, Field(gt=0.0)] = 256.0
 

@@ -10,8 +10,12 @@ import signal
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from multiprocessing.connection import Connection, wait
+from pathlib import Path
 from pickle import PicklingError
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
+
+from cosim.process.last_call import LAST_CALL, make_page
 
 STOP_SECONDS = 5.0
 
@@ -77,7 +81,10 @@ class _Worker:
         context = multiprocessing.get_context("spawn")
         self.pipe, theirs = context.Pipe()
         self.number = -1
-        self.process = context.Process(target=_serve, args=(task, theirs), daemon=True)
+        self._folder = TemporaryDirectory(prefix="worker-")
+        page = Path(self._folder.name) / "last_call"
+        self._last = make_page(page)
+        self.process = context.Process(target=_serve, args=(task, theirs, page), daemon=True)
         self.process.start()
         theirs.close()  # so that the pipe ends when the process does
 
@@ -93,7 +100,7 @@ class _Worker:
             return self.pipe.recv()
         except (EOFError, ConnectionResetError):
             self.process.join(STOP_SECONDS)
-            return Died(_how_it_ended(self.process.exitcode))
+            return Died(self._last.noted or ": ".join(filter(None, (self._last.words(), _how_it_ended(self.process.exitcode)))))
 
     def stop(self) -> None:
         """Let it end; it has nothing to do."""
@@ -107,10 +114,12 @@ class _Worker:
             self.process.kill()
         self.process.join()
         self.pipe.close()
+        self._folder.cleanup()
 
 
-def _serve(task: Callable[[Any], Any], pipe: Connection) -> None:
+def _serve(task: Callable[[Any], Any], pipe: Connection, page: Path) -> None:
     """In the process: answer until nobody asks any more."""
+    LAST_CALL.attach(page)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one who asks is interrupted, and ends this process
     while True:
         try:

@@ -143,7 +143,7 @@ DEFAULTS: dict[str, Define] = {
 def build_fmu(
     folder: Path, name: str, source: str, version: Version, variables: Sequence[Variable], flags: Mapping[str, str],
     defines: Mapping[str, Define], enumerations: Mapping[str, Sequence[str]] | None = None,
-    categories: Sequence[str] = CATEGORIES,
+    categories: Sequence[str] = CATEGORIES, beside: Path | None = None,
 ) -> Path:  # fmt: skip
     """An FMU of one of the C sources.
 
@@ -151,20 +151,22 @@ def build_fmu(
         folder: where ``<name>.fmu`` goes. name: model identifier. source: file in ``zoo/c``. version: of FMI.
         variables: the time first. flags: see `capability_flags`. defines: macros of ``config.h``; sequences become arrays of
             double. enumerations: items by type name. categories: log categories.
+        beside: a shared library, named ``lib....so``, that it is linked to and brings along.
     """
     token = hashlib.sha256(f"{name} {source} {version} {variables!r} {sorted(flags.items())}".encode()).hexdigest()[:32]
     defines = DEFAULTS | dict(defines)
     if tuple(categories) != CATEGORIES:
         defines["LOG_CATEGORIES"] = ", ".join(f'"{text}"' for text in categories)
     config = config_header(defines, version, name, token)
-    library = compiled(source, config, name)
+    linked = () if beside is None else (f"-L{beside.parent}", "-Wl,--no-as-needed", f"-l:{beside.name}", "-Wl,-rpath,$ORIGIN")
+    library = compiled(source, config, name, linked)
     platform = host_platform()
     place = platform.fmi2_folder if version < 3 else platform.name
     model = Model(name, token, variables, flags, enumerations or {}, categories)
     content = {
         "modelDescription.xml": description_xml(model, version).encode(),
         f"binaries/{place}/{library_name(name)}": library,
-    }
+    } | ({} if beside is None else {f"binaries/{place}/{beside.name}": beside.read_bytes()})
     return pack_fmu(content, Path(folder) / f"{name}.fmu")
 
 
@@ -180,9 +182,10 @@ def config_header(defines: Mapping[str, Define], version: Version, name: str, to
     return "\n".join(lines) + "\n"
 
 
-def compiled(source: str, config: str, name: str) -> bytes:
+def compiled(source: str, config: str, name: str, linked: Sequence[str] = ()) -> bytes:
     """The shared library of a source with its ``config.h``, from the cache or compiled now."""
     compiler = find_compiler()
+    compiler = replace(compiler, flags=(*compiler.flags, *linked))
     if source != "linear.c":  # the one that benchmarks use; the others compile three times faster so
         compiler = replace(compiler, flags=(*compiler.flags, "-O0"))
     digest = hashlib.sha256("\0".join((compiler.identity(), source, config, name, _source_text())).encode()).hexdigest()[:32]

@@ -297,5 +297,21 @@ def chatter(until: float, at: float = 0.25, every: float = 0.1, u: float = 1.0) 
     return said
 
 
+DEEDS = (
+    "nothing", "exits", "exits-at-once", "crashes", "hangs", "crashes-when-freed", "crashes-when-terminated", "exits-when-freed",
+    "moves", "rounds", "paints", "interrupts",
+)  # fmt: skip
+"""What `hostile_fmu` does with ``deed = 0, 1, 2, ...``"""
+
+
+def hostile_fmu(folder: Path, name: str = "hostile", beside: Path | None = None) -> Path:
+    """An integrator, ``y' = 1`` (FMI 2.0), that harms its process in the step over the time ``at``; the parameter ``deed`` is the
+    place in `DEEDS`: calls exit or _exit, raises SIGSEGV, never returns, changes the working directory or the rounding mode, logs
+    escape sequences, sends SIGINT to its own process. `beside` is a shared library that it brings along."""
+    parameters = [Variable("deed", 1, "parameter", start=0.0), Variable("at", 2, "parameter", start=0.25)]
+    variables = [TIME, *parameters, Variable("y", 3, "output")]
+    return build_fmu(folder, name, "hostile.c", 2, variables, capability_flags(2), {}, beside=beside)
+
+
 LOG_CATEGORIES = CATEGORIES
 """Of all FMUs here."""

@@ -236,7 +236,7 @@ def test_nothing_of_a_former_run_is_left_and_who_reads_it_may_go_on(tmp_path: Pa
         (tmp_path / name).write_text("of a former run")
     seen: list[list[str]] = []
     first = quietly(small(), stream=tmp_path, progress=lambda _t, _stop: seen.append(sorted(p.name for p in tmp_path.iterdir())))
-    assert seen[0] == ["events.csv", "made_from", "messages.csv", "summary.json", "table.npy"]
+    assert seen[0] == [".block", "events.csv", "made_from", "messages.csv", "summary.json", "table.npy"]
     before = first.result.table.copy()
     quietly(small().set("locomotive.train_speed", 5.0), stream=tmp_path)
     np.testing.assert_array_equal(first.result.table, before)

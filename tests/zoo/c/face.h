@@ -7,6 +7,10 @@
 
 #define TIME_SLACK 1e-9
 
+#ifndef LEAVING
+#define LEAVING(event, model) /* fmi2Terminate and fmi2FreeInstance of one that does not go in peace */
+#endif
+
 typedef struct {
     Model model;
     double time;

@@ -19,7 +19,10 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     return create(name, guid, functions->componentEnvironment, functions->logger, logging);
 }
 
-void fmi2FreeInstance(fmi2Component c) { free(c); }
+void fmi2FreeInstance(fmi2Component c) {
+    LEAVING(FREED, &((Instance *)c)->now.model);
+    free(c);
+}
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance, fmi2Real start,
                                fmi2Boolean stop_defined, fmi2Real stop) {
@@ -47,6 +50,7 @@ fmi2Status fmi2Terminate(fmi2Component c) {
     Instance *instance = c;
     if (!may(instance, STEP_MODE | STOPPED, __func__))
         return fmi2Error;
+    LEAVING(TERMINATED, &instance->now.model);
     instance->now.mode = STOPPED;
     return fmi2OK;
 }

@@ -1,0 +1,92 @@
+"""The sentinel: an FMU that calls exit() ends no script, and no test, as if all were well. For processes that nobody watches.
+
+The C library calls it when somebody exits while Python is at work. It also ends a call that takes too long. Imports the
+standard library only.
+"""
+
+from __future__ import annotations
+
+import atexit
+import os
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from functools import cache
+from typing import Any
+
+from cosim.process.last_call import LAST_CALL
+
+ERROR = 2
+_output = [2]
+
+
+def report_to_copy_of_stderr() -> int:
+    """From now on the sentinel writes to what is the error stream now, also if that is captured later; returns the descriptor."""
+    _output[0] = os.dup(2)
+    return _output[0]
+
+
+@cache
+def guard_exit() -> None:
+    """From now on exit() in a call of an FMU ends this process with code 2, and with words; once for a process.
+
+    What the FMU calls is C's exit(): against _exit() only another process helps. Where the C library offers no way to be asked
+    (Windows) nothing is done.
+    """
+    import ctypes  # noqa: PLC0415 - a plugin of pytest imports this module at every start
+
+    library = ctypes.CDLL(None) if os.name == "posix" else None
+    add, remove = (getattr(library, name, None) for name in ("__cxa_atexit", "__cxa_finalize"))
+    if add is None or remove is None or LAST_CALL.watched:
+        return
+    mark = ctypes.c_char()  # by its address the C library knows which handler to remove
+    handler = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(lambda _: _exit_called())
+    add(handler, None, ctypes.byref(mark))
+
+    def leave() -> None:  # when Python ends, nobody could answer any more
+        LAST_CALL.call[0] = 0
+        remove(ctypes.byref(mark))
+
+    leave.kept = handler, mark  # type: ignore[attr-defined]
+    atexit.register(leave)
+
+
+def _exit_called() -> None:
+    if LAST_CALL.call[0]:
+        _give_up("ended the program by calling exit(), which an FMU must not do")
+
+
+@contextmanager
+def limited_calls(seconds: float | None) -> Iterator[None]:
+    """Within this context a call may last so long [s]; None for any time. A process that does not return is ended with code 2."""
+    LAST_CALL.limit(seconds)
+    over = threading.Event()
+    if seconds is not None and not LAST_CALL.timed:
+        threading.Thread(target=_keep_time, args=(seconds, over), daemon=True).start()
+    try:
+        yield
+    finally:
+        over.set()
+        LAST_CALL.limit(None)
+
+
+def _keep_time(seconds: float, over: threading.Event) -> None:
+    seen: Any = None
+    since = time.monotonic()
+    while not over.wait(min(0.1, seconds / 4.0)):
+        now = LAST_CALL.now()
+        if now != seen or not now[0]:
+            seen, since = now, time.monotonic()
+        elif time.monotonic() - since > seconds:
+            _give_up(f"has not returned for {seconds:g} s, the limit that master.call_timeout sets")
+
+
+def _give_up(what: str) -> None:
+    """Say what happened, and end the process: there is no way back out of the call."""
+    test = os.environ.get("PYTEST_CURRENT_TEST", "")
+    reason = f"{LAST_CALL.words()} {what}" + (f", in the test {test}" if test else "")
+    LAST_CALL.note(reason)
+    with suppress(OSError):
+        os.write(_output[0], f"\ncosim: {reason}.\n".encode(errors="replace"))
+    os._exit(ERROR)

@@ -1,0 +1,169 @@
+"""The watch: a command runs in a process of its own, and this one tells what an FMU did to it. Standard library only.
+
+The process is forked before anything large is loaded, so this one costs milliseconds and a few megabytes. It hands signals on,
+ends a call that takes too long, and keeps what was computed when the other one is gone.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import signal
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from time import monotonic
+from typing import Any
+
+from cosim.process.interruption import STOPPING
+from cosim.process.last_call import LAST_CALL
+
+ERROR = 2
+POLL = 0.1
+"""How often is looked at the other process [s]."""
+
+GRACE = 3.0
+"""A call that has not returned so long after Ctrl-C is ended with its process [s]."""
+
+PARENT_DEATH = 1  # prctl: PR_SET_PDEATHSIG
+
+
+def can_watch() -> bool:
+    """Whether this platform has what is needed; Windows has not."""
+    return hasattr(os, "fork") and hasattr(os, "waitpid")
+
+
+def watched(command: Callable[[], int]) -> int:
+    """The exit code of a command that runs in a process of its own; 2 where an FMU ended that process.
+
+    Args:
+        command: returns its exit code. In its process this function returns as well, or raises what the command raises.
+    """
+    sys.stdout.flush()
+    sys.stderr.flush()
+    signal.pthread_sigmask(signal.SIG_BLOCK, STOPPING)
+    parent = os.getpid()
+    child = os.fork()
+    if child == 0:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, STOPPING)
+        return _run(command, parent)
+    return _Watch(child).wait()
+
+
+def _run(command: Callable[[], int], parent: int) -> int:
+    LAST_CALL.watched = LAST_CALL.timed = True
+    _end_with(parent)
+    code = 1  # of a program that ends with a traceback
+    try:
+        code = command()
+    except SystemExit as end:
+        code = end.code if isinstance(end.code, int) else int(end.code is not None)
+        raise
+    finally:
+        LAST_CALL.end(code)
+    return code
+
+
+def _end_with(parent: int) -> None:
+    """When the process that watches is gone, this one is asked to end too: Linux only."""
+    if sys.platform != "linux":
+        return
+    import ctypes  # noqa: PLC0415 - the watching process does without
+
+    ctypes.CDLL(None).prctl(PARENT_DEATH, signal.SIGTERM, 0, 0, 0)
+    if os.getppid() != parent:
+        os.kill(os.getpid(), signal.SIGTERM)
+
+
+class _Watch:
+    """One process that is looked at."""
+
+    def __init__(self, child: int) -> None:
+        self.child = child
+        self._asked: float | None = None
+        self._seen: tuple[int, float] = (0, 0.0)
+        self._same = 0.0  # the present call has been the present one for so long [s]
+        self._why = ""
+
+    def wait(self) -> int:
+        """The exit code, after everything that is to be told has been told."""
+        status = self._status()
+        for number in STOPPING:
+            signal.signal(number, signal.SIG_IGN)  # what is kept now is kept quickly
+        code = LAST_CALL.exit_code
+        if code is not None:
+            return code
+        where = LAST_CALL.words()
+        what = self._why or _how_it_ended(os.waitstatus_to_exitcode(status))
+        reason = f"{where} {what}" if where else f"the program {what}, in no call of an FMU"
+        if sys.stderr.isatty():
+            print(file=sys.stderr)  # there may be a progress bar
+        print(f"cosim: {reason}.", file=sys.stderr)
+        self._keep(reason)
+        return ERROR
+
+    def _status(self) -> int:
+        """Look at the other process until it ends; how it did."""
+        read, write = os.pipe()
+        os.set_blocking(read, False)
+        os.set_blocking(write, False)
+        signal.set_wakeup_fd(write, warn_on_full_buffer=False)
+        for number in (signal.SIGCHLD, *STOPPING):
+            if number == signal.SIGCHLD or signal.getsignal(number) != signal.SIG_IGN:
+                signal.signal(number, self._hear)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, STOPPING)
+        while True:
+            ended, status = os.waitpid(self.child, os.WNOHANG)
+            if ended:
+                signal.set_wakeup_fd(-1)
+                return status
+            begin = monotonic()
+            if select.select([read], [], [], POLL)[0]:
+                with suppress(BlockingIOError):
+                    os.read(read, 4096)
+            self._look(min(monotonic() - begin, 2.0 * POLL))  # no longer: this program may have been stopped meanwhile
+
+    def _hear(self, number: int, _frame: Any) -> None:
+        if number == signal.SIGCHLD:
+            return
+        self._asked = monotonic() if self._asked is None else self._asked
+        with suppress(ProcessLookupError):
+            os.kill(self.child, number)
+
+    def _look(self, elapsed: float) -> None:
+        """End the process where its present call takes too long; `elapsed` since the last look [s]."""
+        now = LAST_CALL.now()
+        self._same = self._same + elapsed if now == self._seen and now[0] else 0.0
+        self._seen = now
+        limit = LAST_CALL.seconds_at_most
+        if limit and self._same > limit:
+            self._end(f"has not returned for {limit:g} s, the limit that master.call_timeout sets")
+        elif self._asked is not None and min(self._same, monotonic() - self._asked) > GRACE:
+            self._end("does not return; the run was interrupted, and its process ended")
+
+    def _end(self, why: str) -> None:
+        self._why = self._why or why
+        with suppress(ProcessLookupError):
+            os.kill(self.child, signal.SIGKILL)
+
+    def _keep(self, reason: str) -> None:
+        """Keep what was computed, and say where."""
+        note = json.loads(LAST_CALL.noted or "{}")
+        if "spare" in note:
+            from cosim.results.salvage import salvage  # noqa: PLC0415 - only here is anything large needed
+
+            print(salvage(note, reason), file=sys.stderr)
+        elif "written" in note:
+            print(f"The results were written before: {note['written']}", file=sys.stderr)
+
+
+def _how_it_ended(code: int) -> str:
+    if code >= 0:
+        return f"ended the program with exit code {code}; it must not call exit"
+    try:
+        name = signal.Signals(-code).name
+    except ValueError:
+        name = f"signal {-code}"
+    more = " (from outside: perhaps the memory ran out)" if -code == signal.SIGKILL else ""
+    return f"ended with {name}{more}"

@@ -1,0 +1,70 @@
+"""Salvage: what a run had computed becomes a result when its process is gone. Touches the folders it is told of."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from cosim.errors import CosimError
+from cosim.results.block_file import BLOCK_FILE, read_block
+from cosim.results.folder import SUMMARY, TABLES, read_results, write_results
+from cosim.results.formats.growing_npy import growing_header, read_grown
+from cosim.results.summary_file import read_summary, write_summary
+from cosim.results.unfinished import DID_NOT_END
+
+
+def salvage(note: Mapping[str, Any], reason: str) -> str:
+    """Keep what was computed.
+
+    Args:
+        note: ``spare``: the folder that was streamed to; ``out``: that of the results, perhaps the same; ``formats`` of its
+            table. reason: why the run ended.
+
+    Returns:
+        What to tell the user.
+    """
+    spare, out = Path(note["spare"]), Path(note["out"])
+    try:
+        if not (spare / SUMMARY).exists() or not (spare / TABLES["npy"]).exists():
+            return "Nothing had been computed yet."
+        close_unfinished(spare, reason)
+        result = read_results(spare)
+        if spare != out:
+            write_results(result, out, note["formats"])
+            (out / "report.html").unlink(missing_ok=True)  # of an earlier run, as what it was made from
+            shutil.rmtree(out / "made_from", ignore_errors=True)
+    except (CosimError, OSError, ValueError) as error:
+        return f"What was computed could not be brought to {out}: {error} It is in {spare}."
+    finally:
+        if spare != out and not (spare / SUMMARY).exists():
+            shutil.rmtree(spare, ignore_errors=True)
+    if spare != out:
+        shutil.rmtree(spare, ignore_errors=True)
+    return f"What was computed is kept: {len(result.table)} rows in {out}. To see it: cosim report {out}"
+
+
+def close_unfinished(folder: Path, reason: str) -> None:
+    """Bring the rows of the block into the table of a folder that was streamed to, and say why the run ended.
+
+    Raises:
+        OSError, ValueError: a file cannot be read or written, or is none of a stream.
+    """
+    table, block = folder / TABLES["npy"], folder / BLOCK_FILE
+    if block.exists():
+        rows = read_grown(table)
+        new = read_block(block).after(len(rows), rows.dtype)
+        count, dtype = len(rows) + len(new), rows.dtype
+        del rows
+        with table.open("r+b") as file:
+            start = len(growing_header(dtype, 0))
+            file.seek(start + (count - len(new)) * dtype.itemsize)
+            file.write(new.tobytes())
+            file.truncate(start + count * dtype.itemsize)
+            file.seek(0)
+            file.write(growing_header(dtype, count))
+        block.unlink()
+    content = dict(read_summary(folder / SUMMARY))
+    content["failure"] = f"{DID_NOT_END}: {reason}. The rows are those recorded until then."
+    write_summary(folder / SUMMARY, content)

@@ -1,0 +1,242 @@
+"""FMUs that harm their process: nothing ends green, what was computed is kept, and who did it is told."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+from zoo.events import DEEDS, hostile_fmu
+
+from cosim import CosimError, Scenario, load_result
+from cosim.cli import main
+from cosim.compiled.library import cached_library
+from cosim.process.last_call import LAST_CALL, TEXTS, USED, make_page
+from cosim.studies.workers import Died, in_processes
+from fmus import cache
+from fmus.toolchain.compile import find_compiler
+from plant_models import PLANTS
+
+pytestmark = [pytest.mark.compiler, pytest.mark.skipif(not hasattr(os, "fork"), reason="watching needs fork")]
+
+
+@pytest.fixture(scope="module")
+def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return hostile_fmu(tmp_path_factory.mktemp("hostile"))
+
+
+def hostile(fmu: Path, deed: str, **master: Any) -> Scenario:
+    parameters = {"deed": float(DEEDS.index(deed))}
+    return Scenario(stop=0.5, step=0.01, master=master).add("bad", fmu=str(fmu), log="all", parameters=parameters)
+
+
+def saved(fmu: Path, folder: Path, deed: str, **master: Any) -> str:
+    path = folder / "scenario.toml"
+    hostile(fmu, deed, **master).save(path)
+    return str(path)
+
+
+def start(fmu: Path, folder: Path, deed: str, *options: str, **master: Any) -> subprocess.Popen[str]:
+    what = saved(fmu, folder, deed, **master)
+    command = [sys.executable, "-m", "cosim.cli", "run", what, "--out", "out", "--no-report", "--quiet", *options]
+    return subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+
+
+def told(process: subprocess.Popen[str]) -> str:
+    """What a command that is to end with 2 wrote to its error stream."""
+    _, error = process.communicate(timeout=60)
+    assert process.returncode == 2, error
+    assert "Traceback" not in error
+    return error
+
+
+DEATHS = [
+    ("exits", "python", "in doStep at t = 0.24 s ended the program with exit code 0"),
+    ("exits-at-once", "compiled", "in doStep at t = 0.24 s ended the program with exit code 0"),
+    ("crashes", "compiled", "in doStep at t = 0.24 s ended with SIGSEGV"),
+]
+
+
+@pytest.mark.parametrize(("deed", "stepper", "words"), DEATHS)
+def test_a_death_is_told_and_every_row_is_kept(fmu: Path, tmp_path: Path, deed: str, stepper: str, words: str) -> None:
+    error = told(start(fmu, tmp_path, deed, stepper=stepper))
+    assert f"component 'bad' {words}" in error
+    result = load_result(tmp_path / "out")
+    assert result.time[-1] == pytest.approx(0.24)
+    assert len(result.table) == 25
+    assert words in str(result.failure)
+    assert (tmp_path / "out" / "table.csv").exists()
+    assert not (tmp_path / "out" / ".unfinished").exists()
+
+
+def test_what_was_streamed_is_whole(fmu: Path, tmp_path: Path) -> None:
+    told(start(fmu, tmp_path, "crashes", "--stream", stepper="python"))
+    result = load_result(tmp_path / "out")
+    assert len(result.table) == 25
+    assert "SIGSEGV" in str(result.failure)
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
+        "events.csv", "made_from", "messages.csv", "summary.json", "table.npy",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("deed", ["crashes-when-freed", "crashes-when-terminated"])
+def test_a_crash_at_the_end_loses_nothing(fmu: Path, tmp_path: Path, deed: str) -> None:
+    error = told(start(fmu, tmp_path, deed))
+    assert "The results were written before" in error
+    result = load_result(tmp_path / "out")
+    assert (len(result.table), result.failure) == (51, None)
+    assert not (tmp_path / "out" / ".unfinished").exists()
+
+
+def test_a_call_past_its_limit_ends_the_run_in_words(fmu: Path, tmp_path: Path) -> None:
+    error = told(start(fmu, tmp_path, "hangs", call_timeout=0.5))
+    assert "component 'bad' in doStep at t = 0.24 s has not returned for 0.5 s" in error
+    assert len(load_result(tmp_path / "out").table) == 25
+
+
+def test_ctrl_c_works_while_an_fmu_hangs(fmu: Path, tmp_path: Path) -> None:
+    process = start(fmu, tmp_path, "hangs")
+    block = tmp_path / "out" / ".unfinished" / "table.npy"
+    while not block.exists() and process.poll() is None:
+        time.sleep(0.05)
+    time.sleep(0.5)
+    process.send_signal(signal.SIGTERM)
+    assert "component 'bad' in doStep at t = 0.24 s does not return; the run was interrupted" in told(process)
+    assert len(load_result(tmp_path / "out").table) == 25
+
+
+@pytest.mark.parametrize("stepper", ["python", "compiled"])
+def test_ctrl_c_within_a_step_loses_no_row(fmu: Path, stepper: str) -> None:
+    """The signal comes in the middle of a stretch of the compiled stepper, or in a call of the Python one."""
+    outcome = hostile(fmu, "interrupts", stepper=stepper).run()
+    assert outcome.failure is not None
+    assert "interrupted" in outcome.failure
+    assert outcome.result.time[-1] >= 0.25 - 1e-12
+
+
+def test_streaming_keeps_rows_that_were_recorded_at_once(fmu: Path, tmp_path: Path) -> None:
+    """In a script, which nobody watches: the whole run takes a millisecond."""
+    script = f"from cosim import Scenario; Scenario.load({saved(fmu, tmp_path, 'crashes')!r}).run(stream='out')"
+    done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, check=False)
+    assert done.returncode == -signal.SIGSEGV
+    assert len(load_result(tmp_path / "out").table) == 25
+
+
+def test_pytest_is_not_green(fmu: Path, tmp_path: Path) -> None:
+    (tmp_path / "test_it.py").write_text(
+        "from cosim import Scenario\n"
+        "def test_bad():\n"
+        f"    s = Scenario(stop=0.5, step=0.01).add('bad', fmu={str(fmu)!r}, parameters={{'deed': 1.0}})\n"
+        "    s.run()\n"
+    )
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_it.py"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "component 'bad' in doStep at t = 0.24 s ended the program by calling exit()" in done.stderr
+    assert "test_it.py::test_bad" in done.stderr
+
+
+def run_it(scenario: Scenario) -> Any:
+    return scenario.run().failure
+
+
+def test_a_worker_tells_who_took_it_along(fmu: Path) -> None:
+    ((_, answer),) = in_processes(run_it, [hostile(fmu, "exits")], workers=1)
+    assert isinstance(answer, Died)
+    assert "component 'bad' in doStep at t = 0.24 s" in answer.reason
+
+
+def test_words_run_out_without_harm(tmp_path: Path) -> None:
+    page = make_page(tmp_path / "page")
+    for number in range(3000):
+        page.call[0] = page.number(f"component{number}", "doStep")
+    assert "of which nothing is known" in page.words()
+    assert TEXTS + page._cells[USED] <= len(page.memory) // 2
+    assert LAST_CALL.words() == ""
+
+
+# -- what belongs to everybody ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("deed", "what"), [("moves", "the working directory"), ("rounds", "the rounding of floating-point numbers")]
+)
+@pytest.mark.parametrize("stepper", ["python", "compiled"])
+def test_what_an_fmu_changes_for_all_is_put_back_and_told(
+    fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, deed: str, what: str, stepper: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", saved(fmu, tmp_path, deed, stepper=stepper), "--out", "out", "--no-report", "--quiet"]) == 0
+    assert Path.cwd() == tmp_path
+    assert 0.1 + 0.2 == 0.30000000000000004 and -0.1 - 0.2 == -0.30000000000000004  # noqa: PT018 - rounded to nearest
+    warnings = load_result(tmp_path / "out").summary["warnings"]
+    assert [w for w in warnings if w.startswith(f"bad: its steps change {what}")]
+
+
+def test_escape_sequences_never_reach_the_terminal(fmu: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", saved(fmu, tmp_path, "paints"), "--out", str(tmp_path / "out"), "--no-report", "--quiet"]) == 0
+    shown = "".join(capsys.readouterr())
+    result = load_result(tmp_path / "out")
+    assert "\x1b" not in shown + (tmp_path / "out" / "messages.csv").read_text() + str(result.summary)
+    assert result.messages[0].text == "\\x1b]0;owned\\x07\\x1b[31mred"
+
+
+# -- the resolution of time -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"start": 1e9, "stop": 1e9 + 1e-6, "step": 1e-7},
+        {"stop": 1e-7, "step": 1e-10},
+        {"start": 9e16, "stop": 9.0000001e16, "step": 100.0},
+    ],
+)
+def test_steps_below_the_resolution_of_time_are_refused(keys: dict[str, float]) -> None:
+    with pytest.raises(CosimError, match=r"step .* s is too short: times near .* s are told apart"):
+        Scenario(**keys).add("driver", model="driver").table()
+
+
+def test_parts_of_steps_below_the_resolution_of_time_are_refused() -> None:
+    with pytest.raises(CosimError, match=r"one of 10000000 substeps, 1e-09 s is too short"):
+        Scenario(stop=1.0, step=0.01).add("driver", model="driver", substeps=10_000_000).table()
+    with pytest.raises(CosimError, match=r"master\.smallest_step 1e-30 s is too short"):
+        Scenario(stop=1.0, step=0.01, master={"smallest_step": 1e-30}).add("driver", model="driver").table()
+
+
+# -- damaged files of the cache ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("damage", [b"", b"PK\x03\x04", None])
+def test_a_damaged_fmu_in_the_cache_is_built_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damage: bytes | None) -> None:
+    monkeypatch.setattr(cache, "Draft", FakeDraft)
+    monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path)
+    entry = cache.cache_entry(PLANTS["odometer"](), 2)
+    assert entry.draft is not None
+    entry.path.parent.mkdir(parents=True)
+    with zipfile.ZipFile(entry.path, "w") as archive:
+        archive.writestr("modelDescription.xml", "words " * 100)
+    assert cache.cache_entry(PLANTS["odometer"](), 2).draft is None
+    whole = entry.path.read_bytes()
+    entry.path.write_bytes(whole[:60] + b"\xff" + whole[61:] if damage is None else damage)
+    assert cache.cache_entry(PLANTS["odometer"](), 2).draft is not None
+
+
+class FakeDraft:
+    @staticmethod
+    def of(*_: Any) -> str:
+        return "to be built"
+
+
+def test_a_damaged_stepper_in_the_cache_is_built_again(tmp_path: Path) -> None:
+    path = cached_library(find_compiler(), tmp_path)
+    content = path.read_bytes()
+    path.write_bytes(content[:5000])
+    assert cached_library(find_compiler(), tmp_path).read_bytes()[:4] == b"\x7fELF"
+    assert len(path.read_bytes()) == len(content)
