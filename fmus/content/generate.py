@@ -150,7 +150,9 @@ def _event_tables(system: HybridSystem, equations: Equations) -> str:
     payload = width(system.inputs)
     for event in system.triggered_events:
         count = width(event.payload)
-        triggered.append(f"{_text(event.name)}, {equations.jumps[event.name].name()}, {payload}, {count}")
+        triggered.append(
+            f"{_text(event.name)}, {equations.jumps[event.name].name()}, {payload}, {count}, {system.verdict_index(event)}"
+        )
         payload += count
     communications = [equations.jumps[event.name].name() for event in system.communication_events]
     tables = (
@@ -158,6 +160,7 @@ def _event_tables(system: HybridSystem, equations: Equations) -> str:
         ("TriggeredEvent", "triggered", triggered),
         ("ModelFunction", "communications", communications),
         ("Resource", "resources", _resource_rows(system)),
+        ("Bounded", "bounded", _bounded_rows(system)),
         ("int", "frictions", [str(i) for i in system.friction_indices()]),
     )
     return "".join(_table(*table) for table in tables)
@@ -167,6 +170,16 @@ def _resource_rows(system: HybridSystem) -> list[str]:
     first = {s.name: width(system.parameter_signals[:i]) for i, s in enumerate(system.parameter_signals)}
     sizes = {s.name: s.width for s in system.parameter_signals}
     return [f"{_text(r.file)}, {_text(r.column)}, {first[r.parameter]}, {sizes[r.parameter]}" for r in system.resources]
+
+
+def _bounded_rows(system: HybridSystem) -> list[str]:
+    positions = {name: i for i, name in enumerate(scalar_names(system.parameter_signals))}
+    signals = [s for s in system.parameters if s.name in system.bounded]
+    return [f"{positions[s.name]}, {_bound(s.min, '-')}, {_bound(s.max, '')}" for s in signals]
+
+
+def _bound(limit: float | None, sign: str) -> str:
+    return f"{sign}HUGE_VAL" if limit is None else repr(float(limit))
 
 
 def _variable_table(system: HybridSystem, description: ModelDescription) -> str:
@@ -215,6 +228,8 @@ def _model_table(system: HybridSystem, equations: Equations, description: ModelD
         "outputs": width(system.outputs),
         "parameters": len(parameters),
         "internal_step": parameters.index("internal_step"),
+        "bounded_count": len(system.bounded),
+        "bounded": "bounded",
         "seed": parameters.index("seed") if "seed" in parameters else -1,
         "integer_work": max((f.sz_iw() for f in functions), default=0),
         "real_work": max((f.sz_w() for f in functions), default=0),
@@ -241,7 +256,7 @@ def _model_table(system: HybridSystem, equations: Equations, description: ModelD
         "variables": "variables",
     }
     rows = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
-    return f"#include <stddef.h>\n\nPRIVATE const Model model = {{\n{rows}}};\n"
+    return f"#include <math.h>\n#include <stddef.h>\n\nPRIVATE const Model model = {{\n{rows}}};\n"
 
 
 def _protocol(system: HybridSystem, description: ModelDescription) -> dict[str, str]:
