@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -96,7 +96,7 @@ class GatedObserver(HybridSystem):
         )
 
 
-def _is_gated(event: Event) -> bool:
+def _is_gated(event: Event) -> TypeGuard[TriggeredEvent]:
     return event.name == GATED_EVENT and isinstance(event, TriggeredEvent) and TOLD_POSITION in (s.name for s in event.payload)
 
 

@@ -30,7 +30,7 @@ class Equations:
     """The traced, densified functions of a system.
 
     Args:
-        step: ``(t, h, x, u, p) -> x``, or None where nothing flows.
+        step: ``(t, h, x, u, p) -> x``, the continuous states of it, or None where nothing flows.
         output: ``(t, x, u, p) -> y``, or None without outputs.
         jumps: by event name, ``(t, x, u, p) -> x``.
         derivative: ``(t, x, u, p, s) -> derivatives``, or None where nothing flows.
@@ -78,7 +78,7 @@ def trace_equations(system: HybridSystem) -> Equations:
     check_payloads(system, {"step": traced.step} | jumps if system.continuous_count else jumps)
     prefix, flows, outputs = system.name, bool(system.continuous_count), bool(width(system.outputs))
     return Equations(
-        step=_dense(traced.step, f"{prefix}_step") if flows else None,
+        step=_dense(traced.step, f"{prefix}_step", system.continuous_count) if flows else None,
         output=_dense(traced.output, f"{prefix}_output") if outputs else None,
         jumps={event.name: _dense(jumps[f"jump_{event.name}"], f"{prefix}_jump_{event.name}") for event in system.events},
         derivative=_dense(traced.derivative, f"{prefix}_derivative") if flows else None,
@@ -113,9 +113,9 @@ def generate_model(system: HybridSystem, equations: Equations, description: Mode
 # -- equations ----------------------------------------------------------------------------------------------------------
 
 
-def _dense(function: ca.Function, name: str) -> ca.Function:
+def _dense(function: ca.Function, name: str, rows: int | None = None) -> ca.Function:
     arguments = [ca.SX.sym(function.name_in(i), *function.size_in(i)) for i in range(function.n_in())]
-    return ca.Function(name, arguments, [ca.cse(ca.densify(function(*arguments)))])
+    return ca.Function(name, arguments, [ca.cse(ca.densify(function(*arguments)[:rows]))])
 
 
 def _equations_source(name: str, equations: Equations) -> str:

@@ -100,7 +100,7 @@ typedef struct {
     const double *start_x;
     const double *start_u;
     const double *start_p;
-    ModelFunction step;   /* (t, h, x, u, p) -> x, or NULL where nothing flows */
+    ModelFunction step;   /* (t, h, x, u, p) -> continuous states, or NULL where nothing flows */
     ModelFunction output; /* (t, x, u, p) -> y, or NULL without outputs */
     int periodic_count;
     const PeriodicEvent *periodic;

@@ -116,7 +116,7 @@ static void step(Runtime *runtime, double t, double h) {
     const double *arguments[] = {&t, &h, runtime->x, runtime->u, runtime->p};
     double *results[] = {runtime->x_next};
     model.step(arguments, results, runtime->integer_work, runtime->real_work, 0);
-    copy(runtime->x, runtime->x_next, model.states);
+    copy(runtime->x, runtime->x_next, model.continuous); /* memory changes in jumps only */
 }
 
 static void grid_steps(Runtime *runtime, double t0, double k, double count, double h) {

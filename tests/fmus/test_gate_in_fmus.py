@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -21,14 +21,14 @@ KINDS = {"fmi2": (2, False), "fmi3": (3, False), "fmi3 counts": (3, True)}
 
 
 @pytest.fixture(params=KINDS)
-def pair(request: pytest.FixtureRequest, component: Callable[..., Any], reference: Callable[[str], Any]) -> Iterator[list[Any]]:
+def pair(request: pytest.FixtureRequest, component: Callable[..., Any], reference: Callable[[str], Any]) -> list[Any]:
     """An FMU and a block behind the same handle."""
     version, counts = KINDS[request.param]
     sealed, borrowed = (component(NAME, version, counts=counts) for _ in range(2))
     borrowed.slave.freeInstance()
     borrowed.slave = make_block(reference(NAME).system, version, announcement="counts" if counts else None)  # type: ignore[arg-type]
     borrowed.instantiate()
-    yield [sealed, borrowed]
+    return [sealed, borrowed]
 
 
 def telegrams(delay: int = 0) -> list[tuple[int, float, float]]:
