@@ -26,6 +26,8 @@ OUTCOME_TEXTS = {
     "late": "Of the accepted events, the late ones applied when they were told",
     "rejected": "Late events without effect so far",
     "lost": "Events announced so far of which nothing else is known",
+    "doubted": "Of the accepted events, those that the model doubted",
+    "ignored": "Events that the model doubted and kept out",
 }
 """What became of events, and what its count says; in the order of `Outcome` in an FMU."""
 

@@ -19,7 +19,14 @@ from cosim.coupling.plan import PlannedComponent
 from cosim.results.result import BaliseRecord
 
 Timing = Literal["exact", "stale"]
-OUTCOMES = ("replayed", "late", "rejected", "accepted")  # of several that changed at once the first one says most
+OUTCOMES = (
+    "ignored",
+    "doubted",
+    "replayed",
+    "late",
+    "rejected",
+    "accepted",
+)  # of several that changed at once the first one says most
 
 
 @dataclass
@@ -29,7 +36,8 @@ class Delivery:
     Args:
         time: when the receiver was told [s].
         before, after: its outputs before and after, shape (q,); None where it could not be stopped there.
-        outcome: what became of it: ``accepted``, ``replayed``, ``late``, ``rejected``, or ``told`` where that is not known.
+        outcome: what became of it: ``accepted``, ``replayed``, ``late``, ``rejected``, ``doubted`` (and used), ``ignored``, or
+            ``told`` where that is not known.
     """
 
     time: float

@@ -279,15 +279,16 @@ class Component(Described):
         counters = getattr(self.slave, "counters", None)
         if counters is not None:
             return dict(vars(counters))
-        if not all(name in self.variables for name in OUTCOME_VARIABLES):
+        counted = [name for name in OUTCOME_VARIABLES if name in self.variables]  # an older export knows fewer
+        if not counted:
             return None
         if self._alive and self._read_outcomes is None:
-            read = element_reader(self, list(OUTCOME_VARIABLES), self._outcomes)
+            read = element_reader(self, counted, self._outcomes[: len(counted)])
             self._read_outcomes = self._guarded("counts of events", read)
         if self._alive and self._read_outcomes is not None:
             with suppress(RunError):
                 self._read_outcomes()
-        return dict(zip(OUTCOME_VARIABLES.values(), map(int, self._outcomes), strict=True))
+        return dict(zip(map(OUTCOME_VARIABLES.__getitem__, counted), map(int, self._outcomes), strict=False))
 
     def choose_log(self, choice: LogChoice | None) -> None:
         """What the slave shall log; before `instantiate`. None leaves that to the slave.

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from cosim.results.result import BaliseRecord
 
-OUTCOMES = ("accepted", "replayed", "late", "rejected", "told", "undelivered")
-USED = ("accepted", "replayed", "late", "told")
+OUTCOMES = ("accepted", "replayed", "late", "doubted", "ignored", "rejected", "told", "undelivered")
+USED = ("accepted", "replayed", "late", "doubted", "told")
 """Outcomes after which the telegram is part of the estimate; ``told`` is a receiver that does not say."""
 
 

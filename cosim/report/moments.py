@@ -21,7 +21,7 @@ from cosim.results.result import BaliseRecord, Result
 
 FEWEST_ROWS = 3  # below these there is nothing to enlarge
 MOST = 6  # windows; more would hide what matters
-NOT_TAKEN = ("late", "rejected", "undelivered")
+NOT_TAKEN = ("late", "ignored", "rejected", "undelivered")
 SPIKE = 3.0  # an observer whose error leaves the scale by this factor has diverged: its error is no moment
 UNITS: dict[Quantity, str] = {"speed": "m/s", "position": "m"}
 View = Literal["errors", "slip"]

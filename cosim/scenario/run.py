@@ -59,6 +59,8 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger("cosim")
 CALL_LOG = Path("calls.log")
+DOUBTS = {"doubted": "used what it doubted", "ignored": "ignored what it doubted"}
+NAMED_DOUBTS = 5
 LOGGED_FAULTS = frozenset({"discard", "error", "fatal"})
 Progress = Callable[[float, float], None]
 Warn = Callable[[str], None]
@@ -210,6 +212,7 @@ class _Setup:
         summary = run_summary(self.name, self.table, self.plan, master, self.setup_seconds)
         events = [] if self.service is None else self._all_telegrams(self.service)
         self._warn_of_rejections()
+        self._warn_of_doubts(events)
         self._warn_of_logs()
         summary |= self._balise_summary([e.stamp for e in events if e.kind == "true"])
         summary |= {"certificates": self.certificates, "premises": premises} | {"warnings": self.warnings, "notes": self.notes}
@@ -347,6 +350,19 @@ class _Setup:
                 f"{' or '.join(native)}: its steps change {changed} of the whole program; it was put back, but not after "
                 "every step: other components, and their numbers, may have been touched."
             )
+
+    def _warn_of_doubts(self, telegrams: list[BaliseRecord]) -> None:
+        """Which telegrams the observers did not believe."""
+        for name in self.components:
+            for outcome, what in DOUBTS.items():
+                found = [e for e in telegrams if e.outcomes.get(name) == outcome]
+                if found:
+                    first = ", ".join(f"{e.stamp:.6g} s" for e in found[:NAMED_DOUBTS])
+                    more = ", ..." if len(found) > NAMED_DOUBTS else ""
+                    plural = "telegram" if len(found) == 1 else "telegrams"
+                    self._warn(
+                        f"{name} doubted {len(found)} {plural} (stamped {first}{more}) and {what}; see docs/telegram_gate.md."
+                    )
 
     def _warn_of_logs(self) -> None:
         """What the components logged of things gone wrong, in numbers; and a call log that could not be finished."""

@@ -156,19 +156,17 @@ class Events:
         runtime = self._runtime
         if event.stamp >= runtime.t - TIME_TOLERANCE:
             advance(runtime, self.journal, event.stamp)
-            jump(runtime, self.journal, event)
+            self.counters.judged(jump(runtime, self.journal, event))
         elif self.late_policy == "late":
-            jump(runtime, None, event)
-            self.counters.late += 1
+            self.counters.late += self.counters.judged(jump(runtime, None, event))
         else:
-            reason = "late_policy is reject"
+            reason, verdict = "late_policy is reject", 0
             if self.journal is not None:
-                reason = replay(runtime, self.journal, event, self._given, TIME_TOLERANCE)
+                reason, verdict = replay(runtime, self.journal, event, self._given, TIME_TOLERANCE)
             if reason:
                 self._reject(event, reason)
                 return
-            self.counters.replayed += 1
-        self.counters.accepted += 1
+            self.counters.replayed += self.counters.judged(verdict)
 
     def _reject(self, event: Stamped, reason: str) -> None:
         self.counters.rejected += 1

@@ -14,6 +14,7 @@ import numpy as np
 from fmu_observer.block.journal import Journal, Record, Stamped
 from fmu_observer.event_protocol import LATE_POLICIES, LatePolicy
 from plant_models.hybrid import Runtime, Snapshot
+from plant_models.hybrid.event import DOUBTED, IGNORED
 
 __all__ = ["LATE_POLICIES", "Counters", "LatePolicy", "advance", "communicate", "jump", "replay"]
 
@@ -26,6 +27,7 @@ class Counters:
         accepted: events that took effect, on time or not. replayed: of these, the late ones applied at their stamp.
         late: of these, the late ones applied at the time they were told. rejected: late events without effect.
         lost: events announced (count raised by more than one, or too many waiting) of which nothing else is known.
+        doubted: of the accepted ones, those that the model doubted. ignored: those it doubted and kept out.
     """
 
     accepted: int = 0
@@ -33,6 +35,15 @@ class Counters:
     late: int = 0
     rejected: int = 0
     lost: int = 0
+    doubted: int = 0
+    ignored: int = 0
+
+    def judged(self, verdict: int) -> bool:
+        """Count an event by what the model made of it; whether it took effect."""
+        self.accepted += verdict != IGNORED
+        self.doubted += verdict == DOUBTED
+        self.ignored += verdict == IGNORED
+        return verdict != IGNORED
 
 
 def advance(runtime: Runtime, journal: Journal | None, until: float) -> None:
@@ -43,15 +54,19 @@ def advance(runtime: Runtime, journal: Journal | None, until: float) -> None:
         runtime.advance(until)
 
 
-def jump(runtime: Runtime, journal: Journal | None, event: Stamped) -> None:
-    """Let a runtime jump now, and remember it. The payload is there for the time of the jump; what was set in `u` stays."""
+def jump(runtime: Runtime, journal: Journal | None, event: Stamped) -> int:
+    """Let a runtime jump now, and remember it; returns the verdict on the event.
+
+    The payload is there for the time of the jump; what was set in `u` stays.
+    """
     if journal is not None:
         journal.append(runtime, runtime.t, event)
     positions = list(event.positions)
     standing = runtime.u[positions]
     runtime.u[positions] = event.payload
-    runtime.trigger(event.name)
+    verdict = runtime.trigger(event.name)
     runtime.u[positions] = standing
+    return verdict
 
 
 def communicate(runtime: Runtime, journal: Journal | None) -> None:
@@ -62,7 +77,7 @@ def communicate(runtime: Runtime, journal: Journal | None) -> None:
         runtime.communicate()
 
 
-def replay(runtime: Runtime, journal: Journal, event: Stamped, given: np.ndarray, tolerance: float) -> str:
+def replay(runtime: Runtime, journal: Journal, event: Stamped, given: np.ndarray, tolerance: float) -> tuple[str, int]:
     """Live the past again with `event` at its stamp: what comes out is what would be, had it been told in time.
 
     Args:
@@ -73,22 +88,23 @@ def replay(runtime: Runtime, journal: Journal, event: Stamped, given: np.ndarray
         tolerance: how far the stamp may lie before the first record [s].
 
     Returns:
-        An empty text, or, with nothing changed, the reason why memory does not reach back to the stamp.
+        An empty text, or, with nothing changed, the reason why memory does not reach back to the stamp; and the verdict on the
+        event. Those after it are judged anew.
     """
     reason = journal.out_of_reach(event.stamp, tolerance, runtime.t)
     if reason:
-        return reason
+        return reason, IGNORED
     past = journal.cut(event.stamp)
     present = runtime.memory[given]
     runtime.restore(Snapshot(past[0].memory, past[0].t, runtime.t0, past[0].ticks))
     if past[0].moves:
         advance(runtime, journal, event.stamp)
-    jump(runtime, journal, event)
+    verdict = jump(runtime, journal, event)
     for record in past:
         runtime.memory[given] = record.memory[given]
         _repeat(runtime, journal, record)
     runtime.memory[given] = present
-    return ""
+    return "", verdict
 
 
 def _repeat(runtime: Runtime, journal: Journal, record: Record) -> None:

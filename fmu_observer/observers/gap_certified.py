@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.certificates import Certificate
+from fmu_observer.observers.gated_observer import is_gate_parameter
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import HybridSystem, Signal
 
@@ -52,7 +53,7 @@ class GapCertified(HybridSystem):
 
     def deciding_parameters(self) -> tuple[Signal, ...]:
         """What the certificate names as the values it judged: all parameters but the timing, unless a subclass knows better."""
-        return tuple(s for s in self.parameters if s.name != "sample_period")
+        return tuple(s for s in self.parameters if s.name != "sample_period" and not is_gate_parameter(s))
 
     def _deciding_values(self, values: Any) -> tuple[tuple[str, float], ...]:
         return tuple(

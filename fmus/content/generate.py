@@ -30,7 +30,7 @@ class Equations:
     """The traced, densified functions of a system.
 
     Args:
-        step: ``(t, h, x, u, p) -> x``, or None where nothing flows.
+        step: ``(t, h, x, u, p) -> x``, the continuous states of it, or None where nothing flows.
         output: ``(t, x, u, p) -> y``, or None without outputs.
         jumps: by event name, ``(t, x, u, p) -> x``.
         derivative: ``(t, x, u, p, s) -> derivatives``, or None where nothing flows.
@@ -78,7 +78,7 @@ def trace_equations(system: HybridSystem) -> Equations:
     check_payloads(system, {"step": traced.step} | jumps if system.continuous_count else jumps)
     prefix, flows, outputs = system.name, bool(system.continuous_count), bool(width(system.outputs))
     return Equations(
-        step=_dense(traced.step, f"{prefix}_step") if flows else None,
+        step=_dense(traced.step, f"{prefix}_step", system.continuous_count) if flows else None,
         output=_dense(traced.output, f"{prefix}_output") if outputs else None,
         jumps={event.name: _dense(jumps[f"jump_{event.name}"], f"{prefix}_jump_{event.name}") for event in system.events},
         derivative=_dense(traced.derivative, f"{prefix}_derivative") if flows else None,
@@ -113,9 +113,9 @@ def generate_model(system: HybridSystem, equations: Equations, description: Mode
 # -- equations ----------------------------------------------------------------------------------------------------------
 
 
-def _dense(function: ca.Function, name: str) -> ca.Function:
+def _dense(function: ca.Function, name: str, rows: int | None = None) -> ca.Function:
     arguments = [ca.SX.sym(function.name_in(i), *function.size_in(i)) for i in range(function.n_in())]
-    return ca.Function(name, arguments, [ca.cse(ca.densify(function(*arguments)))])
+    return ca.Function(name, arguments, [ca.cse(ca.densify(function(*arguments)[:rows]))])
 
 
 def _equations_source(name: str, equations: Equations) -> str:
@@ -150,7 +150,9 @@ def _event_tables(system: HybridSystem, equations: Equations) -> str:
     payload = width(system.inputs)
     for event in system.triggered_events:
         count = width(event.payload)
-        triggered.append(f"{_text(event.name)}, {equations.jumps[event.name].name()}, {payload}, {count}")
+        triggered.append(
+            f"{_text(event.name)}, {equations.jumps[event.name].name()}, {payload}, {count}, {system.verdict_index(event)}"
+        )
         payload += count
     communications = [equations.jumps[event.name].name() for event in system.communication_events]
     tables = (
@@ -158,6 +160,7 @@ def _event_tables(system: HybridSystem, equations: Equations) -> str:
         ("TriggeredEvent", "triggered", triggered),
         ("ModelFunction", "communications", communications),
         ("Resource", "resources", _resource_rows(system)),
+        ("Bounded", "bounded", _bounded_rows(system)),
         ("int", "frictions", [str(i) for i in system.friction_indices()]),
     )
     return "".join(_table(*table) for table in tables)
@@ -167,6 +170,16 @@ def _resource_rows(system: HybridSystem) -> list[str]:
     first = {s.name: width(system.parameter_signals[:i]) for i, s in enumerate(system.parameter_signals)}
     sizes = {s.name: s.width for s in system.parameter_signals}
     return [f"{_text(r.file)}, {_text(r.column)}, {first[r.parameter]}, {sizes[r.parameter]}" for r in system.resources]
+
+
+def _bounded_rows(system: HybridSystem) -> list[str]:
+    positions = {name: i for i, name in enumerate(scalar_names(system.parameter_signals))}
+    signals = [s for s in system.parameters if s.name in system.bounded]
+    return [f"{positions[s.name]}, {_bound(s.min, '-')}, {_bound(s.max, '')}" for s in signals]
+
+
+def _bound(limit: float | None, sign: str) -> str:
+    return f"{sign}HUGE_VAL" if limit is None else repr(float(limit))
 
 
 def _variable_table(system: HybridSystem, description: ModelDescription) -> str:
@@ -215,6 +228,8 @@ def _model_table(system: HybridSystem, equations: Equations, description: ModelD
         "outputs": width(system.outputs),
         "parameters": len(parameters),
         "internal_step": parameters.index("internal_step"),
+        "bounded_count": len(system.bounded),
+        "bounded": "bounded",
         "seed": parameters.index("seed") if "seed" in parameters else -1,
         "integer_work": max((f.sz_iw() for f in functions), default=0),
         "real_work": max((f.sz_w() for f in functions), default=0),
@@ -241,7 +256,7 @@ def _model_table(system: HybridSystem, equations: Equations, description: ModelD
         "variables": "variables",
     }
     rows = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
-    return f"#include <stddef.h>\n\nPRIVATE const Model model = {{\n{rows}}};\n"
+    return f"#include <math.h>\n#include <stddef.h>\n\nPRIVATE const Model model = {{\n{rows}}};\n"
 
 
 def _protocol(system: HybridSystem, description: ModelDescription) -> dict[str, str]:

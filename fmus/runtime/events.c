@@ -45,6 +45,24 @@ static void count_outcome(Runtime *runtime, Outcome outcome) {
     runtime->outcomes[outcome] += 1.0;
 }
 
+/* An event that was applied, late in the way of `late` or on time where that is accepted; whether it took effect. */
+static bool count_applied(Instance *instance, int event, int verdict, Outcome late) {
+    Runtime *runtime = &instance->runtime;
+    const char *name = model.triggered[event].name;
+    if (verdict == VERDICT_IGNORED) {
+        count_outcome(runtime, OUTCOME_IGNORED);
+        instance_note(instance, "event %s is doubted and ignored at %.17g s (%.0f so far)", name, runtime->clock.t,
+                      runtime->outcomes[OUTCOME_IGNORED]);
+        return false;
+    }
+    if (verdict == VERDICT_DOUBTED)
+        count_outcome(runtime, OUTCOME_DOUBTED);
+    if (late != OUTCOME_ACCEPTED)
+        count_outcome(runtime, late);
+    count_outcome(runtime, OUTCOME_ACCEPTED);
+    return true;
+}
+
 static Status reject(Instance *instance, int event, double stamp, const char *reason) {
     count_outcome(&instance->runtime, OUTCOME_REJECTED);
     return instance_warn(instance, "event %s: its stamp %.17g s lies before the current time %.17g s; it is rejected (%.0f so far): %s",
@@ -120,10 +138,8 @@ static Status take_late(Instance *instance, int event, double stamp, double *pay
     if (*runtime->late_policy == (double)LATE_REJECT)
         return reject(instance, event, stamp, "late_policy is reject");
     if (*runtime->late_policy == (double)LATE_LATE) {
-        move_jump(runtime, &instance->journal, event, payload);
-        count_outcome(runtime, OUTCOME_LATE);
-        count_outcome(runtime, OUTCOME_ACCEPTED);
-        instance_note(instance, "event %s of %.17g s applied late at %.17g s", name, stamp, runtime->clock.t);
+        if (count_applied(instance, event, move_jump(runtime, &instance->journal, event, payload), OUTCOME_LATE))
+            instance_note(instance, "event %s of %.17g s applied late at %.17g s", name, stamp, runtime->clock.t);
         return STATUS_OK;
     }
     int reach = move_replay(runtime, &instance->journal, event, stamp, payload);
@@ -131,9 +147,8 @@ static Status take_late(Instance *instance, int event, double stamp, double *pay
         return reject(instance, event, stamp, "it lies further back than replay_horizon");
     if (reach == BEYOND_RECORDS)
         return reject(instance, event, stamp, "it lies before the first of the steps that are remembered");
-    count_outcome(runtime, OUTCOME_REPLAYED);
-    count_outcome(runtime, OUTCOME_ACCEPTED);
-    instance_note(instance, "event %s applied at %.17g s, from %.17g s", name, stamp, runtime->clock.t);
+    if (count_applied(instance, event, reach, OUTCOME_REPLAYED))
+        instance_note(instance, "event %s applied at %.17g s, from %.17g s", name, stamp, runtime->clock.t);
     return STATUS_OK;
 }
 
@@ -148,9 +163,8 @@ static Status apply_first(Instance *instance) {
         status = take_late(instance, event, stamp, first + 2);
     } else {
         move_advance(runtime, &instance->journal, stamp);
-        move_jump(runtime, &instance->journal, event, first + 2);
-        count_outcome(runtime, OUTCOME_ACCEPTED);
-        instance_note(instance, "event %s applied at %.17g s", model.triggered[event].name, runtime->clock.t);
+        if (count_applied(instance, event, move_jump(runtime, &instance->journal, event, first + 2), OUTCOME_ACCEPTED))
+            instance_note(instance, "event %s applied at %.17g s", model.triggered[event].name, runtime->clock.t);
     }
     remove_first(runtime);
     return status;
@@ -184,9 +198,8 @@ PRIVATE void events_apply_here(Instance *instance) {
     Runtime *runtime = &instance->runtime;
     double *first = entry(runtime, 0);
     int event = (int)first[0];
-    move_jump(runtime, &instance->journal, event, first + 2);
-    count_outcome(runtime, OUTCOME_ACCEPTED);
+    if (count_applied(instance, event, move_jump(runtime, &instance->journal, event, first + 2), OUTCOME_ACCEPTED))
+        instance_note(instance, "event %s applied at %.17g s", model.triggered[event].name, runtime->clock.t);
     remove_first(runtime);
     instance->outdated = OUTDATED_ALL;
-    instance_note(instance, "event %s applied at %.17g s", model.triggered[event].name, runtime->clock.t);
 }

@@ -27,7 +27,15 @@ typedef struct {
     ModelFunction jump; /* (t, x, u, p) -> x */
     int payload;        /* position of its payload in u */
     int payload_count;
+    int verdict;        /* position in x of what the model made of it, see `Verdict`; -1 where it uses every one */
 } TriggeredEvent;
+
+/* A parameter that must be finite and within its bounds. */
+typedef struct {
+    int parameter; /* position in p */
+    double min;
+    double max;
+} Bounded;
 
 /* A vector parameter that is read from a column of a CSV file among the FMU's resources. */
 typedef struct {
@@ -67,8 +75,11 @@ typedef struct {
 typedef enum { LATE_REPLAY = 1, LATE_REJECT = 2, LATE_LATE = 3 } LatePolicy;
 
 /* What became of an event, in the order of the variables that count them: it took effect; of these, late at its stamp, and late
-   when it was told; it was too late; it was announced and never seen. */
-typedef enum { OUTCOME_ACCEPTED, OUTCOME_REPLAYED, OUTCOME_LATE, OUTCOME_REJECTED, OUTCOME_LOST, OUTCOMES } Outcome;
+   when it was told; it was too late; it was announced and never seen; of the first, doubted by the model; doubted and kept out. */
+typedef enum { OUTCOME_ACCEPTED, OUTCOME_REPLAYED, OUTCOME_LATE, OUTCOME_REJECTED, OUTCOME_LOST, OUTCOME_DOUBTED, OUTCOME_IGNORED, OUTCOMES } Outcome;
+
+/* What the model made of an event; the numbers of its memory. */
+typedef enum { VERDICT_USED, VERDICT_DOUBTED, VERDICT_IGNORED } Verdict;
 
 typedef struct {
     const char *name;
@@ -81,13 +92,15 @@ typedef struct {
     int outputs;       /* length of y */
     int parameters;    /* length of p */
     int internal_step; /* position in p */
+    int bounded_count;
+    const Bounded *bounded; /* parameters that time does not run with outside their bounds */
     int seed;          /* position in p, or -1 where there is no noise */
     int integer_work;  /* length of iw */
     int real_work;     /* length of w */
     const double *start_x;
     const double *start_u;
     const double *start_p;
-    ModelFunction step;   /* (t, h, x, u, p) -> x, or NULL where nothing flows */
+    ModelFunction step;   /* (t, h, x, u, p) -> continuous states, or NULL where nothing flows */
     ModelFunction output; /* (t, x, u, p) -> y, or NULL without outputs */
     int periodic_count;
     const PeriodicEvent *periodic;

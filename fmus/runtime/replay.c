@@ -15,11 +15,12 @@ static void swap(double *one, double *other, int count) {
     }
 }
 
-static void jump_at(Runtime *runtime, int event, double *payload) {
+static int jump_at(Runtime *runtime, int event, double *payload) {
     const TriggeredEvent *declared = &model.triggered[event];
     swap(runtime->u + declared->payload, payload, declared->payload_count);
     runtime_trigger(runtime, event);
     swap(runtime->u + declared->payload, payload, declared->payload_count);
+    return declared->verdict < 0 ? VERDICT_USED : (int)runtime->x[declared->verdict];
 }
 
 PRIVATE void move_advance(Runtime *runtime, Journal *journal, double until) {
@@ -30,10 +31,10 @@ PRIVATE void move_advance(Runtime *runtime, Journal *journal, double until) {
     runtime_advance(runtime, until);
 }
 
-PRIVATE void move_jump(Runtime *runtime, Journal *journal, int event, double *payload) {
+PRIVATE int move_jump(Runtime *runtime, Journal *journal, int event, double *payload) {
     if (remembers(runtime, journal))
         journal_append(journal, runtime, runtime->clock.t, event, payload);
-    jump_at(runtime, event, payload);
+    return jump_at(runtime, event, payload);
 }
 
 PRIVATE void move_communicate(Runtime *runtime, Journal *journal) {
@@ -84,9 +85,9 @@ PRIVATE int move_replay(Runtime *runtime, Journal *journal, int event, double st
     journal_make_room(journal, number, room);
     if (moving)
         move_advance(runtime, journal, stamp);
-    move_jump(runtime, journal, event, payload);
+    int verdict = move_jump(runtime, journal, event, payload);
     for (int64_t i = number; i < end; i++)
         repeat(runtime, journal, journal_record(journal, i + room));
     journal_give(journal, runtime, journal->present);
-    return 0;
+    return verdict;
 }

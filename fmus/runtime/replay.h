@@ -10,14 +10,14 @@
 /* Advance to `until` [s]; nothing where the runtime is there already. */
 PRIVATE void move_advance(Runtime *runtime, Journal *journal, double until);
 
-/* Jump now at an event. The payload is handed to the model for the time of the jump; what stands in u stays. */
-PRIVATE void move_jump(Runtime *runtime, Journal *journal, int event, double *payload);
+/* Jump now at an event. The payload is handed to the model for the time of the jump; what stands in u stays. Returns its verdict. */
+PRIVATE int move_jump(Runtime *runtime, Journal *journal, int event, double *payload);
 
 /* A communication step ends now. */
 PRIVATE void move_communicate(Runtime *runtime, Journal *journal);
 
 /* Live the past again with an event at its stamp: what comes out is what would be, had it been told in time. What was given
-   last is kept. Returns 0, or BEYOND_... with nothing changed where the memory does not reach back to the stamp. */
+   last is kept. Returns the model's verdict on it (those after it are judged anew), or BEYOND_... with nothing changed where the memory does not reach back to the stamp. */
 PRIVATE int move_replay(Runtime *runtime, Journal *journal, int event, double stamp, double *payload);
 
 #endif

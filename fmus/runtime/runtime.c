@@ -116,7 +116,7 @@ static void step(Runtime *runtime, double t, double h) {
     const double *arguments[] = {&t, &h, runtime->x, runtime->u, runtime->p};
     double *results[] = {runtime->x_next};
     model.step(arguments, results, runtime->integer_work, runtime->real_work, 0);
-    copy(runtime->x, runtime->x_next, model.states);
+    copy(runtime->x, runtime->x_next, model.continuous); /* memory changes in jumps only */
 }
 
 static void grid_steps(Runtime *runtime, double t0, double k, double count, double h) {
@@ -231,6 +231,11 @@ PRIVATE int runtime_start(Runtime *runtime, double t0) {
         if (!isfinite(runtime->offsets[i]))
             return offset;
     }
+    for (int i = 0; i < model.bounded_count; i++) {
+        double value = runtime->p[model.bounded[i].parameter];
+        if (!(isfinite(value) && value >= model.bounded[i].min && value <= model.bounded[i].max))
+            return model.bounded[i].parameter;
+    }
     if (model.seed >= 0 && !(runtime->p[model.seed] >= 0.0 && runtime->p[model.seed] < LARGEST_WHOLE))
         return model.seed;
     runtime->clock.t = runtime->clock.t0 = t0;
@@ -340,6 +345,11 @@ static bool timing_is_sane(const Runtime *runtime) {
     for (int i = 0; i < model.periodic_count; i++)
         if (!is_positive(runtime->periods[i]) || !isfinite(runtime->offsets[i]) || !is_whole(runtime->ticks[i], 0.0, LARGEST_WHOLE - 1.0))
             return false;
+    for (int i = 0; i < model.bounded_count; i++) {
+        double value = runtime->p[model.bounded[i].parameter];
+        if (!(isfinite(value) && value >= model.bounded[i].min && value <= model.bounded[i].max))
+            return model.bounded[i].parameter;
+    }
     if (model.seed >= 0 && !(runtime->p[model.seed] >= 0.0 && runtime->p[model.seed] < LARGEST_WHOLE))
         return false;
     bool horizon = *runtime->horizon >= 0.0 && isfinite(*runtime->horizon);

@@ -11,6 +11,9 @@ from dataclasses import dataclass
 
 from plant_models.hybrid.signal import Signal
 
+USED, DOUBTED, IGNORED = 0, 1, 2
+"""Verdicts of a system on a triggered event: it took effect; so it did, although it was doubted; it was doubted and did not."""
+
 
 @dataclass(frozen=True, slots=True)
 class TriggeredEvent:
@@ -21,6 +24,8 @@ class TriggeredEvent:
         payload: discrete inputs that arrive with the event; each name starts with ``<name>_``. Only the jump at this event
             may read them: before it they are not known. What is needed later belongs into memory.
         description: one line for the user.
+        verdict: name of the memory that holds, after the jump, what the system made of the event (`USED`, `DOUBTED`, `IGNORED`);
+            empty where it uses every one.
 
     Raises:
         ValueError: a payload has another prefix, is not a discrete input, or takes the name of the count or the stamp.
@@ -29,6 +34,7 @@ class TriggeredEvent:
     name: str
     payload: tuple[Signal, ...] = ()
     description: str = ""
+    verdict: str = ""
 
     def __post_init__(self) -> None:
         for signal in self.payload:

@@ -11,6 +11,7 @@ from math import floor, inf, isfinite, ulp
 
 import numpy as np
 
+from plant_models.hybrid.event import USED
 from plant_models.hybrid.integration import effective_flow
 from plant_models.hybrid.kernel import Kernel, make_kernel
 from plant_models.hybrid.noise import standard_normal
@@ -55,6 +56,7 @@ class Runtime:
         self.t = self.t0 = 0.0
         self.ticks = [0] * len(system.periodic_events)
         self._parameter_names = list(scalar_names(system.parameter_signals))
+        self._verdicts = {event.name: system.verdict_index(event) for event in system.triggered_events}
         self._noise_offset = len(self.u) - sum(s.width for s in system.noises)
         self._read_timing()
 
@@ -97,9 +99,11 @@ class Runtime:
         for event in self.system.communication_events:
             self._kernel.jump(event.name, self.t)
 
-    def trigger(self, event: str) -> None:
-        """Jump at a triggered event now, with the payload in `u`."""
+    def trigger(self, event: str) -> int:
+        """Jump at a triggered event now, with the payload in `u`; returns what the system made of it (`hybrid.event`)."""
         self._kernel.jump(event, self.t)
+        place = self._verdicts.get(event, -1)
+        return USED if place < 0 else round(float(self.x[place]))
 
     def update_outputs(self) -> np.ndarray:
         """Compute and return `y`, shape (q,)."""
@@ -145,6 +149,9 @@ class Runtime:
         for event in self.system.periodic_events:
             if event.offset is not None and not isfinite(self._timing(event.offset)):
                 raise ValueError(self._illegal(event.offset, "a finite number of seconds"))
+        for signal in self.system.parameters:
+            if signal.name in self.system.bounded and not signal.allows(self._timing(signal.name)):
+                raise ValueError(self._illegal(signal.name, signal.bounds))
         if self.system.noises and not 0.0 <= self._timing("seed") < LARGEST_SEED:
             raise ValueError(self._illegal("seed", "a whole number from 0 to 2**53"))
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from keyword import iskeyword
+from math import isfinite
 from typing import Literal
 
 Causality = Literal["input", "output", "parameter", "local"]
@@ -76,6 +77,18 @@ class Signal:
         if self.size is None:
             return (self.name,)
         return tuple(f"{self.name}[{i + 1}]" for i in range(self.size))
+
+    def allows(self, value: float) -> bool:
+        """Whether a value is finite and lies within `min` and `max`."""
+        return isfinite(value) and (self.min is None or value >= self.min) and (self.max is None or value <= self.max)
+
+    @property
+    def bounds(self) -> str:
+        """Which values are legal, in words."""
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        named = (("at least", self.min), ("at most", self.max))
+        limits = " and ".join(f"{word} {limit:g}{unit}" for word, limit in named if limit is not None)
+        return f"a finite number, {limits}" if limits else "a finite number"
 
     @property
     def start_values(self) -> tuple[float, ...]:

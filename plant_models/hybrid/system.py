@@ -58,7 +58,8 @@ class HybridSystem:
     7. A vector parameter that an exported model reads from a file of its own is listed in `resources`.
     8. Where only some states are stiff, `stiff` names all of these and `rosenbrock` treats them alone implicitly. The step
        keeps its order; with all states that carry a conserved sum among them, momentum say, it stays conserved.
-    9. A system that cannot be traced says ``traceable = False`` and may then use any Python.
+    9. Time does not run with a scalar parameter of `bounded` that is not finite or lies outside its `min` and `max`.
+    10. A system that cannot be traced says ``traceable = False`` and may then use any Python.
     """
 
     name: str = ""
@@ -70,6 +71,7 @@ class HybridSystem:
     parameters: tuple[Signal, ...] = ()
     events: tuple[Event, ...] = ()
     frictions: tuple[str, ...] = ()
+    bounded: tuple[str, ...] = ()
     stiff: tuple[str, ...] = ()
     resources: tuple[Resource, ...] = ()
     presets: Mapping[str, Mapping[str, Any]] = {}
@@ -225,6 +227,10 @@ class HybridSystem:
         """Positions in `x` of the states with dry friction."""
         names = scalar_names(self.states)
         return [names.index(name) for name in self.frictions]
+
+    def verdict_index(self, event: TriggeredEvent) -> int:
+        """Position in `x` of the verdict on an event; -1 where there is none."""
+        return scalar_names(self.states).index(event.verdict) if event.verdict else -1
 
     def stiff_mask(self) -> np.ndarray | None:
         """1 for continuous states that `rosenbrock` treats implicitly, else 0, shape (nc,); None where it treats all so."""

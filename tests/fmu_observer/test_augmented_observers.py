@@ -73,7 +73,7 @@ def test_signals_and_events(make: Callable[[], AugmentedTrainObserver]) -> None:
     observer = make()
     assert [s.name for s in observer.inputs] == ["effort", "odometer", "gradient"]
     assert {e.name: [s.name for s in e.payload] for e in observer.triggered_events} == {
-        "balise": ["balise_position"], "gps": ["gps_position"]
+        "balise": ["balise_position", "balise_location_accuracy"], "gps": ["gps_position"]
     }  # fmt: skip
     units = {s.name: s.unit for s in observer.outputs}
     assert units == {

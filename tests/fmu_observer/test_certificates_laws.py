@@ -77,7 +77,7 @@ def test_mixed_gaps_between_the_limits_grow_although_each_alone_is_stable() -> N
 def uio_in_equilibrium() -> Bench:
     """At a speed where the linear drag of the observer is met by the effort, so that only the errors put in remain."""
     observer = DiscreteUio()
-    bench = Bench(observer)
+    bench = Bench(observer, gate=0.0)  # what is certified is the error while every telegram is used
     bench.set("u", {"effort": DAVIS_A + (DAVIS_B + DAVIS_C * 50.0 / 3.6) * MOTION.speed, "odometer": MOTION.speed})
     bench.runtime.x[1] = MOTION.speed
     return bench

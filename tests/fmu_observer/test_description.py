@@ -46,7 +46,7 @@ TABLE = [
     ("internal_step", "parameter", "fixed", "exact", "s", 0.01),
     ("seed", "parameter", "fixed", "exact", None, 0.0),
 ]
-OUTCOMES = ("accepted", "replayed", "late", "rejected", "lost")
+OUTCOMES = ("accepted", "replayed", "late", "rejected", "lost", "doubted", "ignored")
 EVENTS = {
     2: [("kick_count", "Integer"), ("kick_time", "Real"), ("mark_count", "Integer"), ("mark_time", "Real")],
     3: [("kick", "Clock"), ("kick_time", "Float64"), ("mark", "Clock"), ("mark_time", "Float64")],

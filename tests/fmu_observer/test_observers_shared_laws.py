@@ -26,7 +26,7 @@ def test_the_shared_signals_are_declared(make: Make) -> None:
     observer = make()
     assert [(s.name, s.unit) for s in observer.inputs] == [("effort", "N"), ("odometer", "m/s")]
     assert [s.name for s in observer.triggered_events] == ["balise"]
-    assert [s.name for s in observer.triggered_events[0].payload] == ["balise_position"]
+    assert [s.name for s in observer.triggered_events[0].payload] == ["balise_position", "balise_location_accuracy"]
     units = {s.name: s.unit for s in observer.outputs}
     assert units == {
         "position": "m", "speed": "m/s", "slip": "1", "adhesion_force": "N", "slip_indicator": "1", "innovation": "m"

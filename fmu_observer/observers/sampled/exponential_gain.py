@@ -31,7 +31,7 @@ class ExponentialGain(HighGainSampled):
         predicted = self.model.flow(self.estimates(x), self.known(u))
         return np.hstack([predicted - self.correction(eta, p), -self.decay(eta, p)])
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """The innovation is set anew; the estimates stay continuous, shape (n + q,)."""
         return np.hstack([self.estimates(x), self.innovation(x, u)])
 

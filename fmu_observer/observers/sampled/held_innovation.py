@@ -37,7 +37,7 @@ class HeldInnovation(HighGainSampled):
         """Model and correction, shape (n,)."""
         return self.model.flow(self.estimates(x), self.known(u)) - self.correction(self.sampled_part(x), p)
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """The innovation is set anew; the estimates stay continuous, shape (n + q,)."""
         return np.hstack([self.estimates(x), self.innovation(x, u)])
 

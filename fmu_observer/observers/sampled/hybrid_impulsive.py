@@ -53,7 +53,7 @@ class HybridImpulsive(SampledObserver):
         z = self.sampled_part(x)
         return np.hstack([self.model.flow(self.estimates(x), self.known(u)) + L @ z, H @ z])
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """The estimate jumps, and z is set to what the jump left over, shape (n + q,)."""
         _, _, F = self._gains(p)
         missing = -self.innovation(x, u)

@@ -36,7 +36,7 @@ class OutputPredictor(HighGainSampled):
         error = self.model.measured(self.estimates(x)) - self.sampled_part(x)
         return np.hstack([predicted - self.correction(error, p), self.model.measured(predicted)])
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """The predicted output is set to the measured one, shape (n + q,)."""
         return np.hstack([self.estimates(x), self.measured(u)])
 

@@ -15,15 +15,16 @@ from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampl
 from fmu_observer.models import ObserverModel
 from fmu_observer.models.model import shift_matrix
 from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.model_observer import ModelObserver
 from plant_models.hybrid import Signal, state
 from plant_models.hybrid.system import Array
 
 
-class SampledObserver(ModelObserver, GapCertified):
+class SampledObserver(ModelObserver, GatedObserver, GapCertified):
     """Base of the observers corrected at the model's own `event`, its payload the measurements, periodic or not.
 
-    A subclass writes `flow`, `jump`, `condition_of` and `vertex_error`, the error equations for one Jacobian of the model.
+    A subclass writes `flow`, `update`, `condition_of` and `vertex_error`, the error equations for one Jacobian of the model.
     """
 
     timing = "event"

@@ -15,10 +15,10 @@ from fmu_observer.condition import Condition
 from fmu_observer.models import TAKAGI_SUGENO_MODELS, TakagiSugenoModel, find_takagi_sugeno_model
 from fmu_observer.models.model import stacked
 from fmu_observer.observability import require_detectable_vertices
+from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from fmu_observer.observers.sampled.takagi_sugeno_gains import GAINS, TakagiSugenoGains
 from plant_models.hybrid import (
-    HybridSystem,
     Signal,
     TriggeredEvent,
     input_signal,
@@ -34,7 +34,7 @@ Premise = Literal["estimated", "live", "frozen"]
 PREMISES: tuple[Premise, ...] = ("estimated", "live", "frozen")
 
 
-class GeneralTakagiSugenoCdo(HybridSystem):
+class GeneralTakagiSugenoCdo(GatedObserver):
     """Takagi-Sugeno observer with continuous and aperiodic sampled outputs: Bouchama 2024, (2.6).
 
     ``dxh = sum_i h_i [A_i xh + B_i u - K_i2 (C2 xh - y2) - K_i1 c]``, ``dc = -eta c``, ``c = C1 xh - y1`` at a sample.
@@ -118,7 +118,7 @@ class GeneralTakagiSugenoCdo(HybridSystem):
         decaying = (-p.innovation_decay * innovation[i] for i in range(sampled))
         return vector(*(corrected[i] for i in range(n)), *decaying, model.outside(values))
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """The innovation is set anew and the premises are looked at; the estimates stay, shape (n + q1 + 1 + memory,)."""
         model = self.model
         n, sampled = model.order, len(model.sampled)

@@ -29,6 +29,7 @@ from fmu_observer.models.model import stacked
 from fmu_observer.models.takagi_sugeno import TakagiSugenoModel
 from fmu_observer.models.takagi_sugeno_registry import find_takagi_sugeno_model
 from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import Event, Signal, input_signal, memory, output_signal, parameter, state
 from plant_models.hybrid.system import Array
@@ -38,7 +39,7 @@ SHARES = (0.75, 0.5, 0.25)  # of the first vertex in the mixtures that are certi
 SUITED = ("pendulum", "takagi_sugeno_train")  # their default gains are certified for their gaps
 
 
-class TakagiSugenoHeld(GapCertified):
+class TakagiSugenoHeld(GatedObserver, GapCertified):
     """Base of ``dxh = sum_i h_i [A_i xh + B_i u - L_i eta]``, ``eta = C xh - y`` set at samples and held between them.
 
     All measurements of the model are sampled together. A subclass says when (`sampling_event`), and from what the weights come
@@ -107,7 +108,7 @@ class TakagiSugenoHeld(GapCertified):
             total = total - weight * (L @ eta)
         return total
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """The innovation is set anew, and the weights where they are frozen; the estimates stay continuous."""
         estimate = x[: self.model.order]
         parts = [estimate, self.model.C @ estimate - self.measured(u)]

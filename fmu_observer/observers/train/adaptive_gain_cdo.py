@@ -144,10 +144,10 @@ class AdaptiveGainCdo(HighGainTrainObserver):
         """The estimate with slip and indicator, and the gain in force."""
         return super().output(t, x, u, p) | {"gain": self.theta_in_force(x, p)}
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """At a balise innovation and gain are set anew; an odometer sample goes to the first stage."""
         if event != "balise":
-            parts = [x[i] for i in range(self.state_count)]
+            parts = [x[i] for i in range(self.own_count)]
             parts[FIRST : FIRST + len(self.stage.states)] = self.stage.sampled(self._wheel(x), u)
             return vector(*parts)
         speed = np.abs(u.odometer if self.gain_speed == "odometer" else x[1])

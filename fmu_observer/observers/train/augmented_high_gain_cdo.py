@@ -92,7 +92,7 @@ class AugmentedHighGainCdo(AugmentedTrainObserver):
 
     def own_jump(self, event: str, x: Array, u: Any, p: Any) -> Array:
         """An odometer sample."""
-        parts = [x[i] for i in range(self.state_count)]
+        parts = [x[i] for i in range(self.own_count)]
         parts[FIRST : FIRST + len(self.stage.states)] = self.stage.sampled(self._wheel(x), u)
         return vector(*parts)
 

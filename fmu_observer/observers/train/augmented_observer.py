@@ -153,17 +153,21 @@ class AugmentedTrainObserver(TrainObserver):
         force = -p.mass * (x[2] + GRAVITY * u.gradient)
         return super().output(t, x, u, p) | {"coupler_force": force, "disturbance": x[2]}
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """A balise or a fix sets the innovation anew and puts its gains in force; the estimates stay continuous."""
         if event not in POSITION_OF:
             return self.own_jump(event, x, u, p)
         sensor = "balise" if event == "balise" else "gps"
         measured = getattr(u, POSITION_OF[event])
         used = self.gains_of(sensor, p)[0][0] > 0.0
-        parts = [x[i] for i in range(self.state_count)]
+        parts = [x[i] for i in range(self.own_count)]
         parts[INNOVATION] = np.where(used, x[0] - measured, x[INNOVATION])
-        parts[-1] = np.where(used, BALISE_LAST if sensor == "balise" else FIX_LAST, x[self.state_count - 1])
+        parts[-1] = np.where(used, BALISE_LAST if sensor == "balise" else FIX_LAST, x[self.own_count - 1])
         return vector(*parts)
+
+    def listens(self, p: Any) -> Array:
+        """Whether balises have gains."""
+        return np.where(self.gains_of("balise", p)[0][0] > 0.0, 1.0, 0.0)
 
     def own_jump(self, event: str, x: Array, u: Any, p: Any) -> Array:
         """State after an event that the subclass adds."""
@@ -193,7 +197,7 @@ class AugmentedTrainObserver(TrainObserver):
     # -- internals --------------------------------------------------------------------------------------------------
 
     def _in_force(self, x: Array, p: Any) -> tuple[tuple[Array, ...], Array]:
-        fix = x[self.state_count - 1] == FIX_LAST
+        fix = x[self.own_count - 1] == FIX_LAST
         (by_balise, slow), (by_fix, fast) = (self.gains_of(sensor, p) for sensor in SENSORS)
         gains = tuple(np.where(fix, b, a) for a, b in zip(by_balise, by_fix, strict=True))
         return gains, np.where(fix, fast, slow)

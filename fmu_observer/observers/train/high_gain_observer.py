@@ -73,9 +73,9 @@ class HighGainTrainObserver(TrainObserver):
         """Position, speed, adhesion force and innovation."""
         return Estimate(x[0], x[1], self.adhesion(x, u, p), x[2])
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """At a balise the innovation is set anew; position and speed stay continuous."""
-        rest = [x[i] for i in range(3, self.state_count)]
+        rest = [x[i] for i in range(3, self.own_count)]
         return vector(x[0], x[1], x[0] - u.balise_position, *rest)
 
     def alternative(self, max_gap: float, certify: Callable[[Mapping[str, Value]], Certificate]) -> str | None:

@@ -50,11 +50,11 @@ class MultirateCdo(HighGainTrainObserver):
         """The wheel observer: ``r w``, its deceleration by adhesion, and the decaying innovation."""
         return STAGE.flow(x[FIRST:END], u, p)
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """A balise or an odometer sample sets its innovation anew."""
         if event == "balise":
-            return super().jump(event, t, x, u, p)
-        parts = [x[i] for i in range(self.state_count)]
+            return super().update(event, t, x, u, p)
+        parts = [x[i] for i in range(self.own_count)]
         parts[FIRST:END] = STAGE.sampled(x[FIRST:END], u)
         return vector(*parts)
 

@@ -98,7 +98,7 @@ class TakagiSugenoCdo(TrainObserver):
         """Position, speed, the effort in place of the adhesion force, and innovation."""
         return Estimate(x[0], x[1], u.effort, x[2])
 
-    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """At a balise the innovation is set anew, and the weight is frozen at the odometer reading of that moment."""
         weight = (self._weight_at(u.odometer, p),) if self.premise == "frozen" else ()
         return vector(x[0], x[1], x[0] - u.balise_position, x[3], *weight)

@@ -21,6 +21,7 @@ from fmu_observer.detection.slip_indicator import (
 )
 from fmu_observer.detection.slip_ratio import odometer_slip
 from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.parameter_values import Value
 from plant_models.hybrid import (
     PeriodicEvent,
@@ -53,14 +54,14 @@ class Estimate(NamedTuple):
     innovation: Array
 
 
-class TrainObserver(GapCertified):
+class TrainObserver(GatedObserver, GapCertified):
     """Base of the observers of a train ``dp = v``, ``M dv = F_ad - a sgn(v) - b v - c v|v|`` (Bouchama 2024, (3.1)-(3.3)).
 
     The contract:
 
     1. A subclass sets `estimator_states` (continuous), `estimator_memory`, `estimator_parameters` and `estimator_events`;
-       the state is laid out as estimator states, filtered slip, memory.
-    2. It writes `estimator_flow` (derivatives of the estimator states), `estimate`, `jump` and `error_certificate`.
+       the state is laid out as estimator states, filtered slip, memory, and the memory of the gate (`GatedObserver`).
+    2. It writes `estimator_flow` (derivatives of the estimator states), `estimate`, `update` and `error_certificate`.
     3. `certify` answers whether the very gains in use are stable for balise gaps up to a given length.
     4. Where the speed is a state, the Davis constant and a negative adhesion force (a brake) are dry friction: they stop the
        observed train and hold it, and never push it backwards. For a speed above zero that is the thesis's equation.
@@ -126,6 +127,10 @@ class TrainObserver(GapCertified):
             "slip": odometer_slip(u.odometer, estimate.speed, p.slip_floor),
             "slip_indicator": indicator_level(filtered, u.odometer, estimate.speed, p.slip_threshold, p.slip_min_speed),
         }
+
+    def odometer_of(self, u: Any) -> Array:
+        """The odometer [m/s]."""
+        return u.odometer
 
     def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Davis constant and brake as dry friction on the speed, ``(a + max(-F_ad, 0)) / M`` [m/s2], shape (len(frictions),)."""

@@ -1,0 +1,110 @@
+"""Base of every observer that is told of balises: what all of them do with a telegram before they believe it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, TypeGuard
+
+import numpy as np
+
+from fmu_observer.observers.innovation_gate import (
+    GATE_BOUNDED,
+    GATE_MEMORY,
+    GATE_PARAMETERS,
+    REJECT,
+    VERDICT,
+    GateMemory,
+    Told,
+    judge,
+)
+from plant_models.hybrid import Event, HybridSystem, Signal, TriggeredEvent, input_signal, vector, width
+from plant_models.hybrid.system import Array
+
+GATED_EVENT = "balise"
+TOLD_POSITION = "balise_position"
+LOCATION_ACCURACY = input_signal(
+    "balise_location_accuracy", "m", 0.0, "Location accuracy of the balise just passed", variability="discrete"
+)
+
+
+class GatedObserver(HybridSystem):
+    """A hybrid system whose `balise` telegrams pass an innovation gate; without that event it is as any other.
+
+    The contract:
+
+    1. A subclass declares the event `balise` with the payload `balise_position`, and the position it believes is the state
+       `position_state`. It writes `update` in place of `jump`, and sees there its own states only.
+    2. The gate's memory stands behind all states, its parameters behind all parameters, and the payload of the event gets
+       `balise_location_accuracy`. What became of a telegram is the event's `verdict`.
+    3. `odometer_of`, `own_bound` and `listens` say what the gate may know more of the observer, `gate_start` what `gate` is where
+       nobody sets it: `REJECT`, unless true telegrams are doubted in the shipped scenarios.
+    """
+
+    position_state: int = 0
+    gate_start: float = REJECT
+
+    def __init__(self, **options: Any) -> None:
+        self.own_count = width(self.states)
+        self.gated = any(_is_gated(event) for event in self.events)
+        if self.gated:
+            self.states = (*self.states, *GATE_MEMORY)
+            self.parameters = (
+                *self.parameters,
+                *(replace(s, start=self.gate_start) if s.name == "gate" else s for s in GATE_PARAMETERS),
+            )
+            self.bounded = (*self.bounded, *GATE_BOUNDED)
+            self.events = tuple(_judged(event) if _is_gated(event) else event for event in self.events)
+        super().__init__(**options)
+
+    # -- what a subclass writes -------------------------------------------------------------------------------------
+
+    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Own states after an event, shape (own_count,), of the own states before it; a telegram here is one to be used."""
+        raise NotImplementedError(f"{type(self).__name__} declares event {event!r} but has no update for it.")
+
+    def odometer_of(self, u: Any) -> Array | None:
+        """The odometer at the telegram [m/s]; None where the observer has none."""
+        return None
+
+    def own_bound(self, x: Array, p: Any) -> Array:
+        """What the observer itself says its position may be off [m], of a covariance, say; zero where it does not."""
+        return 0.0
+
+    def listens(self, p: Any) -> Array:
+        """Whether balises act on the estimate at all with these parameters, 1 or 0."""
+        return 1.0
+
+    # -- what follows -----------------------------------------------------------------------------------------------
+
+    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """`update`, where the gate lets the telegram pass; shape (n,)."""
+        own, gate = [x[i] for i in range(self.own_count)], [x[i] for i in range(self.own_count, self.state_count)]
+        if not self.gated or event != GATED_EVENT:
+            after = self.update(event, t, vector(*own), u, p)
+            return vector(*(after[i] for i in range(self.own_count)), *gate)
+        estimate = own[self.position_state]
+        told = Told(u.balise_position, u.balise_location_accuracy, estimate, self.own_bound(x, p), self.odometer_of(u), t)
+        judged = judge(GateMemory(*gate), told, p)
+        listens = self.listens(p)
+        used = np.where(listens > 0.0, judged.used, 1.0)
+        kept = list(own)
+        kept[self.position_state] = np.where(listens * judged.restart > 0.0, u.balise_position, estimate)
+        after = self.update(event, t, vector(*kept), u, p)
+        return vector(
+            *(np.where(used > 0.0, after[i], own[i]) for i in range(self.own_count)),
+            *(np.where(listens > 0.0, new, old) for new, old in zip(judged.memory, gate, strict=True)),
+        )
+
+
+def _is_gated(event: Event) -> TypeGuard[TriggeredEvent]:
+    return event.name == GATED_EVENT and isinstance(event, TriggeredEvent) and TOLD_POSITION in (s.name for s in event.payload)
+
+
+def _judged(event: TriggeredEvent) -> TriggeredEvent:
+    accuracy = () if LOCATION_ACCURACY.name in (s.name for s in event.payload) else (LOCATION_ACCURACY,)
+    return replace(event, payload=(*event.payload, *accuracy), verdict=VERDICT)
+
+
+def is_gate_parameter(signal: Signal) -> bool:
+    """Whether a parameter is one of the gate, which no question of stability depends on."""
+    return signal.name in GATE_BOUNDED

@@ -1,0 +1,71 @@
+"""False telegrams in a run: what is ignored is told, bad input is refused by name, and the study comes out again."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cosim import Scenario
+from cosim.errors import CosimError
+from fmu_observer import OBSERVERS
+
+STUDIES = Path(__file__).resolve().parents[3] / "docs" / "studies"
+OBSERVER = "takagi_sugeno_cdo"
+
+
+def scenario(**parameters: float) -> Scenario:
+    """A train with S2 as a block, and one false telegram of 100 m among balises 5 m apart."""
+    s = Scenario(stop=14.0, step=0.02, certificates="ignore")
+    s.add("train", model="locomotive", preset="chapter_3_four_axles")
+    s.add("driver", model="driver")
+    s.add("observer", observer=OBSERVER, parameters={"n_axles": 4, "davis_b": 32.0, "davis_c": 1.7, **parameters})
+    s.connect("driver.effort -> train.effort, observer.effort", "train.wheel_speed -> driver.odometer, observer.odometer")
+    false: Any = [{"time": 10.0, "offset": 100.0}]
+    s.balises(
+        position="train.position", speed="train.speed", layout="spacing", spacing=5.0, track_end=500.0, false_telegrams=false
+    )
+    return s
+
+
+@pytest.mark.parametrize(("gate", "outcome"), [(2.0, "ignored"), (1.0, "doubted"), (0.0, "accepted")])
+def test_a_false_telegram_is_told_by_its_outcome(gate: float, outcome: str) -> None:
+    run, clean = (
+        s.run(warn=lambda _text: None) for s in (scenario(gate=gate), scenario(gate=gate).set("balises.false_telegrams", []))
+    )
+    (false,) = [e for e in run.result.events if e.kind == "false"]
+    assert false.outcomes == {"observer": outcome}
+    assert {e.outcomes["observer"] for e in run.result.events if e.kind == "true"} == {"accepted"}
+    at_once = float(run["observer.speed"][run["time"] <= 10.2][-1] - clean["observer.speed"][clean["time"] <= 10.2][-1])
+    assert (abs(at_once) < 1e-9) == (outcome == "ignored")
+    said = [text for text in run.warnings if "doubted" in text]
+    assert said == ([] if gate == 0.0 else [said[0]])
+    assert all(text.startswith("observer doubted 1 telegram (stamped 10 s)") for text in said)
+    (counts,) = [c["events"] for c in run.result.summary["components"] if c["name"] == "observer"]
+    assert counts["doubted"] == (outcome == "doubted")
+    assert counts["ignored"] == (outcome == "ignored")
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("gate_floor", 0.0), ("gate_floor", -1.0), ("gate_drift", -0.1), ("gate_floor", np.inf)]
+)
+def test_a_gate_that_cannot_be_is_refused_by_name(name: str, value: float) -> None:
+    with pytest.raises(CosimError, match=rf"observer.*{name}"):
+        scenario(**{name: value}).run(warn=lambda _text: None)
+
+
+def test_a_part_of_the_study_comes_out_again() -> None:
+    sys.path.insert(0, str(STUDIES))
+    try:
+        study = import_module("telegram_gate")
+    finally:
+        sys.path.remove(str(STUDIES))
+        sys.modules.pop("telegram_gate", None)
+    telegrams = study.follow(OBSERVERS[OBSERVER](), study.record("slippery", stop=25.0), spacing=20.0, start=0.0)
+    assert len(telegrams) > 10
+    assert study.missed_true(telegrams) == 0.0
+    assert study.accepted_false(telegrams, (0.3, 3.0, 30.0)).tolist() == [1.0, 0.0, 0.0]

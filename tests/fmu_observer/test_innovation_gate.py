@@ -1,0 +1,185 @@
+"""The innovation gate: what every observer of balises does with telegrams that cannot be true, and with its own mistakes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache, partial
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from observer_bench import Bench, SteadyMotion
+
+from fmu_observer import OBSERVERS
+from fmu_observer.observers.gated_observer import GatedObserver
+from fmu_observer.observers.innovation_gate import OFF, REJECT, WARN
+from fmu_observer.observers.sampled import ExponentialGain, HeldInnovation, HybridImpulsive, OutputPredictor
+from fmu_observer.observers.train import SYSTEMS
+from plant_models.hybrid import NumpyKernel, Runtime, scalar_names
+from plant_models.hybrid.event import DOUBTED, IGNORED, USED
+
+MOTION, GAP = SteadyMotion(speed=14.0), 0.3
+GENERIC = (ExponentialGain, HeldInnovation, HybridImpulsive, OutputPredictor)
+MAKERS: dict[str, Callable[[], GatedObserver]] = {system.name: cache(system) for system in SYSTEMS}  # one of each is traced once
+MAKERS |= {f"{g.name} of freight_train": cache(partial(g, model="freight_train")) for g in GENERIC}
+MAKERS["general_takagi_sugeno_cdo"] = cache(OBSERVERS["general_takagi_sugeno_cdo"])  # type: ignore[arg-type]
+PRESETS = {"augmented_high_gain_cdo": "balises", "augmented_takagi_sugeno_cdo": "balises"}
+GATES = {"off": OFF, "warn": WARN, "reject": REJECT}
+every = pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS)
+
+
+def bench_of(make: Callable[[], GatedObserver], gate: float = REJECT, **parameters: float) -> Bench:
+    """An observer that believes the steady motion, and whose gate has settled."""
+    system = make()
+    bench = Bench(system, preset=PRESETS.get(system.name), gate=gate, **parameters)
+    names = scalar_names(system.states)
+    v, inputs = MOTION.speed, scalar_names(system.input_signals)
+    exact = {"estimated_speed": v, "wheel_rate": v / 0.575, "wheel_speed_estimate": v, "odometer_speed": v}
+    exact |= {"adhesion_deceleration": -(0.575**2) / 225.0 * MOTION.effort(0.0)}
+    bench.set("x", {name: value for name, value in exact.items() if name in names})
+    fed = {"effort": MOTION.effort(0.0), "odometer": v, "measured_odometer": v, "net_effort": MOTION.effort(0.0) - 900.0}
+    bench.set("u", {name: value for name, value in fed.items() if name in inputs})
+    bench.runtime.start(0.0)
+    run(bench, 5)
+    return bench
+
+
+def run(bench: Bench, count: int, offsets: dict[int, float] | None = None) -> list[int]:
+    """Pass balises, some of them off by so much [m]; the verdicts."""
+    verdicts = []
+    for k in range(count):
+        bench.runtime.advance(bench.runtime.t + GAP)
+        bench.set("u", {"balise_position": MOTION.position(bench.runtime.t) + (offsets or {}).get(k, 0.0)})
+        verdicts.append(bench.runtime.trigger("balise"))
+    return verdicts
+
+
+def error(bench: Bench, off: float = 0.0) -> float:
+    return abs(float(bench.runtime.x[0]) - MOTION.position(bench.runtime.t) - off)
+
+
+def test_every_observer_of_balises_has_the_gate() -> None:
+    told = {name: OBSERVERS[name]() for name in OBSERVERS}
+    told = {n: s for n, s in told.items() if any(e.name == "balise" for e in s.triggered_events)}
+    assert len(told) >= len(SYSTEMS)
+    for name, system in told.items():
+        assert isinstance(system, GatedObserver), name
+        assert system.gated
+
+
+@every
+def test_false_telegrams_are_ignored_and_change_nothing(make: Callable[[], GatedObserver]) -> None:
+    false, alone = bench_of(make), bench_of(make)
+    own = make().own_count
+    for offset in (2.0, -2.0, 100.0, -1000.0):
+        assert run(false, 1, {0: offset}) == [IGNORED]
+        assert run(false, 3) == [USED] * 3
+        alone.runtime.advance(alone.runtime.t + GAP)  # nothing is told there
+        run(alone, 3)
+        np.testing.assert_array_equal(false.runtime.x[:own], alone.runtime.x[:own])
+
+
+@every
+def test_warned_of_false_telegrams_are_used_as_with_the_gate_off(make: Callable[[], GatedObserver]) -> None:
+    benches = {name: bench_of(make, gate) for name, gate in GATES.items() if name != "reject"}
+    verdicts = {name: run(bench, 1, {0: 30.0}) for name, bench in benches.items()}
+    assert verdicts == {"off": [USED], "warn": [DOUBTED]}
+    own = make().own_count
+    np.testing.assert_array_equal(*(b.runtime.x[:own] for b in benches.values()))
+
+
+@every
+@settings(max_examples=5, deadline=None)
+@given(seed=st.integers(0, 1000))
+def test_without_false_telegrams_the_gate_changes_no_bit(make: Callable[[], GatedObserver], seed: int) -> None:
+    own = make().own_count
+    noise = dict(enumerate(np.random.default_rng(seed).uniform(-0.05, 0.05, 12).tolist()))
+    ends = []
+    for gate in GATES.values():
+        bench = bench_of(make, gate)
+        assert run(bench, 12, noise) == [USED] * 12
+        ends.append(bench.runtime.x[:own].copy())
+    np.testing.assert_array_equal(ends[0], ends[1])
+    np.testing.assert_array_equal(ends[0], ends[2])
+
+
+@every
+def test_a_wrong_estimate_recovers_from_telegrams_that_agree(make: Callable[[], GatedObserver]) -> None:
+    bench = bench_of(make)
+    off = dict.fromkeys(range(12), 50.0)  # the train is 50 m further than believed
+    assert run(bench, 3, off) == [IGNORED, IGNORED, DOUBTED]  # the third is believed, and the estimate restarts there
+    assert error(bench, 50.0) < 0.5
+    assert run(bench, 12, off) == [USED] * 12
+    assert error(bench, 50.0) < 0.2
+
+
+@every
+def test_false_telegrams_that_do_not_agree_are_never_believed(make: Callable[[], GatedObserver]) -> None:
+    bench = bench_of(make)
+    assert run(bench, 6, {k: 40.0 * (-1) ** k * (k + 1) for k in range(6)}) == [IGNORED] * 6
+
+
+@every
+def test_a_false_telegram_told_twice_is_one(make: Callable[[], GatedObserver]) -> None:
+    bench = bench_of(make)
+    run(bench, 1, {0: 40.0})
+    assert [bench.runtime.trigger("balise") for _ in range(5)] == [IGNORED] * 5
+
+
+@pytest.mark.parametrize("name", [s.name for s in SYSTEMS])
+def test_a_start_50_m_off_is_no_reason_to_doubt(name: str) -> None:
+    ends = []
+    for gate in (OFF, REJECT):
+        bench = Bench(MAKERS[name](), preset=PRESETS.get(name), gate=gate)
+        bench.set("u", {"effort": MOTION.effort(0.0), "odometer": MOTION.speed})
+        bench.runtime.x[:2] = -50.0, MOTION.speed
+        bench.runtime.start(0.0)
+        assert run(bench, 30) == [USED] * 30
+        ends.append(error(bench))
+    assert ends[0] == ends[1] < 1.0
+
+
+def test_the_location_accuracy_widens_the_gate() -> None:
+    for accuracy, expected in ((0.0, IGNORED), (10.0, USED)):
+        bench = bench_of(MAKERS["differentiator_cdo"])
+        bench.set("u", {"balise_location_accuracy": accuracy})
+        assert run(bench, 1, {0: 8.0}) == [expected]
+
+
+def test_a_balise_that_does_not_act_is_not_judged() -> None:
+    """Satellite fixes alone correct this one: what balises say neither restarts it nor counts."""
+    system = OBSERVERS["augmented_high_gain_cdo"]()
+    bench = Bench(system, preset="gps", gate=REJECT)
+    bench.set("u", {"effort": MOTION.effort(0.0), "odometer": MOTION.speed})
+    bench.runtime.start(0.0)
+    before = float(bench.runtime.x[0])
+    assert run(bench, 8, dict.fromkeys(range(8), 500.0)) == [USED] * 8
+    assert abs(float(bench.runtime.x[0]) - before) < 100.0
+
+
+@every
+def test_python_and_traced_code_judge_alike(make: Callable[[], GatedObserver]) -> None:
+    offsets = {1: 3.0, 3: -200.0, 5: 60.0, 6: 60.0, 7: 60.0, 9: 0.3}
+    traced, python = (bench_of(make, internal_step=0.01) for _ in range(2))  # few steps: NumPy is slow
+    python.runtime = _in_python(python)
+    assert run(traced, 12, offsets) == run(python, 12, offsets)
+    np.testing.assert_allclose(traced.runtime.x, python.runtime.x, rtol=1e-10, atol=1e-10)
+
+
+def _in_python(bench: Bench) -> Runtime:
+    """The same runtime, evaluated by NumPy."""
+    other = Runtime(bench.system, NumpyKernel(bench.system))
+    other.restore(bench.runtime.snapshot())
+    return other
+
+
+@pytest.mark.parametrize(("name", "value", "expected"), [
+    ("gate_floor", 0.0, "at least 0.001 m"), ("gate_floor", -1.0, "at least 0.001 m"), ("gate_floor", float("inf"), "finite"),
+    ("gate_drift", -0.1, "at least 0"), ("gate_spread", float("nan"), "finite"), ("gate_recover", 0.0, "at least 1"),
+    ("gate", 3.0, "at most 2"),
+])  # fmt: skip
+def test_a_gate_that_cannot_be_is_refused(name: str, value: float, expected: str) -> None:
+    bench = Bench(OBSERVERS["differentiator_cdo"](), **{name: value})
+    with pytest.raises(ValueError, match=rf"differentiator_cdo: time cannot run with parameter {name} = .*{expected}"):
+        bench.runtime.start(0.0)
