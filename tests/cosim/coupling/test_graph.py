@@ -12,7 +12,8 @@ from mock_slaves import Mock, component
 
 from cosim.coupling.connection import connect
 from cosim.coupling.graph import Group, declared_feedthrough, execution_groups, execution_order, undeclared
-from cosim.coupling.strong import arranged, closed_path, strong_groups, topological
+from cosim.coupling.ordering import Signal, in_order, satisfied
+from cosim.coupling.strong import closed_path, strong_groups, topological
 from cosim.errors import CouplingError
 
 
@@ -260,17 +261,39 @@ def earliest_listed_first(nodes: list[int], edges: set[tuple[int, int]]) -> list
     return made
 
 
-@given(GRAPHS)
-def test_arranging_keeps_the_last_level_wherever_it_has_no_cycle(case: tuple[list[int], set[tuple[int, int]]]) -> None:
+@given(GRAPHS, st.data())
+def test_ordering_keeps_the_last_level_and_whatever_has_no_cycle(
+    case: tuple[list[int], set[tuple[int, int]]], data: st.DataObject
+) -> None:  # fmt: skip
     nodes, edges = case
     must = {(a, b) for a, b in edges if a < b and (a + b) % 2}
-    found = arranged(nodes, [edges, must])
-    assert all(len(run) == 1 for run in found)
-    flat = [run[0] for run in found]
-    assert sorted(flat) == sorted(nodes)
-    assert all(flat.index(a) < flat.index(b) for a, b in must)
+    kept = satisfied(nodes, [edges, must])
     reach = reaches(edges, len(nodes))
-    assert all(flat.index(a) < flat.index(b) for a, b in edges if a not in reach[b])
+    assert must <= kept <= edges
+    assert {(a, b) for a, b in edges if a not in reach[b]} <= kept
+    signals = [Signal(a, frozenset({b}), bool((a + b) % 3)) for a, b in sorted(edges) if a != b]
+    rank = {node: node % 2 for node in nodes}
+    found = in_order(sorted(nodes), kept, signals, rank)
+    assert sorted(found) == sorted(nodes)
+    assert all(found.index(a) < found.index(b) for a, b in kept)
+    assert in_order(sorted(nodes), kept, data.draw(st.permutations(signals)), rank) == found
+
+
+@given(GRAPHS)
+def test_the_next_node_is_one_that_makes_fewest_signals_held(case: tuple[list[int], set[tuple[int, int]]]) -> None:
+    """The greedy choice against its words, all counts made anew at each node."""
+    nodes, edges = case
+    signals = [Signal(a, frozenset(b for c, b in edges if c == a and b != a), a % 3 > 0) for a in sorted(nodes)]
+    found = in_order(sorted(nodes), set(), signals, dict.fromkeys(nodes, 0))
+    placed: set[int] = set()
+    for node in found:
+
+        def price(candidate: int, placed: set[int] = placed) -> tuple[int, int]:
+            new = [s for s in signals if s.source not in placed and candidate in s.targets and not s.targets & placed]
+            return sum(s.flows for s in new), sum(not s.flows for s in new)
+
+        assert price(node) == min(price(n) for n in nodes if n not in placed)
+        placed.add(node)
 
 
 @given(GRAPHS)
