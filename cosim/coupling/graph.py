@@ -103,18 +103,19 @@ def execution_groups(
 
 
 def execution_order(
-    components: Mapping[str, Component], connections: Sequence[Connection], before: Iterable[Pair] = ()
-) -> list[str]:
+    components: Mapping[str, Component], connections: Sequence[Connection], before: Iterable[Pair] = (),
+    first: Iterable[str] = (), last: Iterable[str] = (),
+) -> list[str]:  # fmt: skip
     """Component names in Gauss-Seidel order, see `execution_groups`, for a master that does not iterate.
 
     Args:
-        components: by name. connections: checked. before: further pairs (first, second).
+        components, connections, before, first, last: as for `execution_groups`.
 
     Raises:
         CouplingError: an algebraic loop, with its signals named, or pairs in `before` that contradict each other.
     """
     check_algebraic_loops(components, connections)
-    return [name for group in execution_groups(components, connections, before) for name in group.names]
+    return [name for group in execution_groups(components, connections, before, first, last) for name in group.names]
 
 
 def check_algebraic_loops(components: Mapping[str, Component], connections: Sequence[Connection]) -> None:

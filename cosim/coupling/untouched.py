@@ -95,9 +95,7 @@ class UntouchedInputs:
     def hold(self, signals: Set[Signal]) -> None:
         """These signals are held over a step."""
         later = len(self._cells) // 2
-        self._places = [
-            place + later * (signal in signals) for place, signal in zip(self._sources, self._signals, strict=True)
-        ]
+        self._places = [place + later * (signal in signals) for place, signal in zip(self._sources, self._signals, strict=True)]
 
     def gather(self) -> None:
         """Take what holds for a step from the cells: of held signals the value at its start."""
