@@ -26,7 +26,7 @@ from cosim.report.figures.style import RC, new_figure, styled
 
 COLOURS = {"fresh": "#33475B", "held": "#D55E00", "iterated": "#7A4FA3", "loop": "#B00020", "event": "#009E73"}
 MEANINGS = {
-    "fresh": "passed on at once",
+    "fresh": "fresh, value of the end of the step",
     "held": "held, value of the start of the step",
     "iterated": "iterated until it settles",
     "loop": "algebraic loop",
