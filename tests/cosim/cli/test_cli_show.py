@@ -41,7 +41,7 @@ def test_text(file: str, capsys: pytest.CaptureFixture[str]) -> None:
 def test_json_and_settings(file: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["show", file, "--json", "--set", "step=0.05", "--set", "master.algorithm=jacobi"]) == 0
     data = json.loads(capsys.readouterr().out)
-    assert (data["step"], data["algorithm"], data["order"]) == (0.05, "jacobi", ["train", "driver"])
+    assert (data["step"], data["algorithm"], data["order"]) == (0.05, "jacobi", ["driver", "train"])
     assert all(link["held"] for link in data["links"])
 
 

@@ -166,7 +166,7 @@ def test_every_component_signal_and_connection_is_in_the_text() -> None:
 def test_columns_are_aligned() -> None:
     rows = section(small().structure().text(), "Connections")
     (place,) = {row.index("->") for row in rows[1:]}
-    assert rows[0].index("value used") == max(row.index("held") if "held" in row else row.index("passed") for row in rows[1:])
+    assert rows[0].index("value used") == max(row.index("held") if "held" in row else row.index("fresh") for row in rows[1:])
     assert place > 0
 
 
