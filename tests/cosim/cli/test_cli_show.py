@@ -34,7 +34,7 @@ def test_text(file: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["show", file]) == 0
     text = capsys.readouterr().out
     assert text.startswith("two: Two blocks\n0 s to 1 s in 10 steps of 0.1 s; 2 components, 2 connections")
-    assert "driver.effort      -> train.effort     held, of the start of the step" in text
+    assert "driver.effort      -> train.effort     fresh, of the end of the step" in text
     assert "\x1b" not in text
 
 
