@@ -51,7 +51,6 @@ class BaliseService:
         self._by_name = {r.planned.component.name: r for r in receivers}
         self._false = sorted(channel.false_telegrams, key=lambda f: f.time)
         self._t = self._until = nan
-        self._previous = np.zeros(0)
         self._snapshots: list[Snapshot] = []
         self._ahead: list[Snapshot] = []
         self._telegrams: list[BaliseRecord] | None = None
@@ -70,7 +69,6 @@ class BaliseService:
         """
         self._plan = plan
         self._check_order()
-        self._previous = np.zeros_like(plan.values)
         self._plant: PlannedComponent = plan.find(self.plant)
         self._plant.move = self._move_plant
         for receiver in self.receivers:
@@ -79,10 +77,9 @@ class BaliseService:
 
     # -- a step -----------------------------------------------------------------------------------------------------
 
-    def begin(self, t: float, until: float, values: np.ndarray | None = None) -> None:
-        """A step from `t` to `until` [s] begins; `values`, shape (n,), are those at `t`, by default what the plan holds."""
+    def begin(self, t: float, until: float) -> None:
+        """A step from `t` to `until` [s] begins."""
         self._t, self._until = t, until
-        self._previous[:] = self._plan.values if values is None else values
         self._snapshots = [found for found in self._ahead if found[0].stamp <= until + TIME_TOLERANCE]
         self._ahead = self._ahead[len(self._snapshots) :]
         self._telegrams, self._told = None, {}
@@ -260,7 +257,7 @@ class BaliseService:
     def _mixed(self, time: float, t: float, until: float, columns: slice, end: np.ndarray) -> np.ndarray:
         if until - time <= TIME_TOLERANCE:
             return end.copy()
-        start = self._previous[columns]
+        start = self._plan.start[columns]
         share = max((time - t) / (until - t), 0.0)
         return np.where(self._plan.continuous[columns], start + share * (end - start), start)
 

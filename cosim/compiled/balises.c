@@ -57,7 +57,7 @@ static bool is_near(Program *program, double h) {
 
 static bool crossed(const Program *program) {
     const Watch *watch = &program->watch;
-    double before = position_of(program, program->before), after = position_of(program, program->values);
+    double before = position_of(program, start_of(program)), after = position_of(program, program->values);
     if (after >= before) {
         int64_t ahead = first_ahead(watch, before);
         return ahead < watch->place_count && watch->places[ahead] <= after;
@@ -228,7 +228,7 @@ static double mixed(const Over *over, double time, int64_t column, double end) {
     const Program *program = over->program;
     if (over->until - time <= TIME_TOLERANCE)
         return end;
-    double start = program->before[column], share = (time - over->t) / (over->until - over->t);
+    double start = start_of(program)[column], share = (time - over->t) / (over->until - over->t);
     share = 0.0 > share ? 0.0 : share;
     return program->balises.continuous[column] ? start + share * (end - start) : start;
 }
@@ -277,8 +277,7 @@ static bool move_all(Over *over) {
         Slave *slave = &program->slaves[i];
         Telegram *telegram = program->balises.telegrams[i];
         double begin = now();
-        if (!program->gathers_first)
-            gather(slave, program->values);
+        gather(slave, program->values);
         bool ordinary;
         if (i == program->watch.slave)
             ordinary = move_plant(over);
@@ -366,15 +365,14 @@ static int64_t step_over(Program *program, double t, double until, double *rows,
     for (int64_t i = 0; i < program->slave_count; i++) {
         program->slaves[i].calls_here = 0;
         program->slaves[i].now = t;
-        if (program->gathers_first)
-            gather(&program->slaves[i], program->values);
     }
+    begin_step(program);
     program->journal.count = program->journal.used = 0;
     program->journal.on = 1;
     bool ordinary = move_all(&over);
     program->journal.on = 0;
     if (!ordinary) {
-        memcpy(program->values, program->before, (size_t)program->value_count * sizeof(double));
+        memcpy(program->values, start_of(program), (size_t)program->value_count * sizeof(double));
         stopped(program, STOP_HANDED, 0, 0);
         return -1;
     }

@@ -40,7 +40,7 @@ class Passings:
         assert isinstance(service.localiser, RollbackLocaliser)
         self.service, self.localiser, self._head = service, service.localiser, program.head.balises
         self._tellings, self._slaves, self._told = tellings, len(plan.steps), 0
-        self._places = {telling.component.name: place for place, telling in tellings.items()}
+        self._places = {telling.component.name: place for place, telling in sorted(tellings.items())}
         self._possible = set(self._places) == {r.planned.component.name for r in service.receivers} and self._is_plain()
         self._prepare(program, plan)
 

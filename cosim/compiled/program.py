@@ -115,10 +115,10 @@ class CProgram(ctypes.Structure):
 
     _fields_ = (
         *((name, ctypes.c_double) for name in ("start", "step")),
-        *((name, ctypes.c_void_p) for name in ("values", "before")),
+        ("values", ctypes.c_void_p),
         ("value_count", ctypes.c_int64),
         ("slaves", ctypes.c_void_p),
-        *((name, ctypes.c_int64) for name in ("slave_count", "gathers_first")),
+        ("slave_count", ctypes.c_int64),
         ("watch", CWatch),
         ("balises", CBalises),
         ("journal", CJournal),
@@ -138,7 +138,6 @@ class Program:
     Args:
         plan: prepared; components instantiated, and not to be instantiated anew.
         axis: communication points.
-        gathers_first: Jacobi, else Gauss-Seidel.
 
     Attributes `head` and `slaves` are the structures; `writes` and `reads` the names of the functions of each slave's ports.
 
@@ -146,13 +145,13 @@ class Program:
         NotCompilable: something in the plan has no place in it; it is named.
     """
 
-    def __init__(self, plan: Plan, axis: TimeAxis, gathers_first: bool) -> None:
+    def __init__(self, plan: Plan, axis: TimeAxis) -> None:
         self.plan = plan
         self._kept: list[Any] = []
         self.writes: list[list[str]] = []
         self.reads: list[list[str]] = []
         self.slaves = (CSlave * len(plan.steps))(*(self._slave(step) for step in plan.steps))
-        self.head = CProgram(start=axis.start, step=axis.step, gathers_first=gathers_first)
+        self.head = CProgram(start=axis.start, step=axis.step)
         self.head.values, self.head.value_count = plan.values.ctypes.data, len(plan.values)
         self.head.slaves, self.head.slave_count = ctypes.addressof(self.slaves), len(plan.steps)
         self.head.watch.slave = -1
@@ -160,7 +159,6 @@ class Program:
         self.head.last_time = LAST_CALL.address + 8
         self._nobody_reads = ctypes.c_int64()
         self.tell_rows(None, 0)
-        self.before = np.zeros_like(plan.values)
         self._versions = [step.component.fmi_version for step in plan.steps]
         calls = [len(writes) + len(reads) + 1 for writes, reads in zip(self.writes, self.reads, strict=True)]
         self.journal = Journal(self.head.journal, sum(calls), sum(int(r.raw_bytes) for s in self.slaves for r in _ports_read(s)))
@@ -192,11 +190,6 @@ class Program:
     def address(self) -> int:
         """Where the program is."""
         return ctypes.addressof(self.head)
-
-    def values_before(self) -> np.ndarray:
-        """The values at the beginning of the step in which the last stretch ended, shape (n,); valid until the next one."""
-        count = self.head.value_count
-        return np.frombuffer((ctypes.c_double * count).from_address(self.head.before), dtype=np.float64).copy()
 
     def reads_straight(self, which: int) -> bool:
         """Whether the outputs of an FMI 3 slave are read by one call, as doubles, into their place."""
@@ -247,7 +240,7 @@ class Program:
         reads, names = self._ports(component, "Get", outputs, step.outputs)
         self.reads.append(names)
         made.reads, made.read_count = ctypes.addressof(reads), len(reads)
-        made.input_count, made.sources = len(inputs), self.keep(inputs.sources.astype(np.int64))
+        made.input_count, made.sources = len(inputs), self.keep(inputs.places.astype(np.int64))
         if np.any(inputs.factors != 1.0) or np.any(inputs.offsets != 0.0):
             made.factors, made.offsets = self.keep(inputs.factors), self.keep(inputs.offsets)
         made.inputs = self.keep(inputs.buffer)

@@ -185,6 +185,15 @@ static bool pack(const Port *port) {
     }
 }
 
+/* The values at the start of the step, which held signals keep over it. */
+static double *start_of(const Program *program) {
+    return program->values + program->value_count;
+}
+
+static void begin_step(Program *program) {
+    memcpy(start_of(program), program->values, (size_t)program->value_count * sizeof(double));
+}
+
 static void gather(const Slave *slave, const double *values) {
     if (slave->factors == NULL) {
         for (int64_t i = 0; i < slave->input_count; i++)

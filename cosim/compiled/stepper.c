@@ -1,5 +1,5 @@
 /* The stepper: executes the plan of a run over the functions of the FMUs, many communication steps in one call. Mirrors `Master`,
-   `GaussSeidel`, `Jacobi` and `PlannedComponent` of the Python stepper: the same calls with the same numbers in the same order.
+   `GaussSeidel`, `Jacobi` (where every signal is held) and `PlannedComponent` of the Python stepper: the same calls with the same numbers in the same order.
 
    Nothing is allocated and nothing is kept here. Whatever is out of the ordinary is left to Python, which finishes the step. */
 #include "balises.c"
@@ -9,16 +9,13 @@
 static bool step_plan(Program *program, double t, double h, bool timed) {
     const Watch *watch = &program->watch;
     bool watched = watch->slave >= 0 && !program->balises.by_instant;
-    if (program->gathers_first)
-        for (int64_t i = 0; i < program->slave_count; i++)
-            gather(&program->slaves[i], program->values);
+    begin_step(program);
     for (int64_t i = 0; i < program->slave_count; i++) {
-        if (!program->gathers_first)
-            gather(&program->slaves[i], program->values);
+        gather(&program->slaves[i], program->values);
         if (!move(program, i, t, h, timed))
             return false;
         if (watched && i == watch->slave && crossed(program)) {
-            memcpy(program->values + watch->first_output, program->before + watch->first_output, (size_t)watch->output_count * sizeof(double));
+            memcpy(program->values + watch->first_output, start_of(program) + watch->first_output, (size_t)watch->output_count * sizeof(double));
             return stopped(program, STOP_CROSSED, i, 0);
         }
     }
@@ -33,14 +30,12 @@ static bool all_finite(const double *values, int64_t count) {
     return sum == 0.0;
 }
 
-/* Do the steps from number `first` up to `last`, at most, into at most `room` rows (time, values), one for each and those of events;
-   `before` has room for the values. Returns the number of steps. */
-EXPORTED int64_t stepper_run(Program *program, int64_t first, int64_t last, double *rows, int64_t room, double *before) {
+/* Do the steps from number `first` up to `last`, at most, into at most `room` rows (time, values), one for each and those of events.
+   Returns the number of steps. */
+EXPORTED int64_t stepper_run(Program *program, int64_t first, int64_t last, double *rows, int64_t room) {
     size_t bytes = (size_t)program->value_count * sizeof(double);
     const int64_t width = 1 + program->value_count;
     double begin = now();
-    memcpy(before, program->values, bytes);
-    program->before = before;
     program->balises.passed_count = 0;
     for (int64_t i = 0; i < program->slave_count; i++) {
         program->slaves[i].all_calls += program->slaves[i].calls;
@@ -69,7 +64,6 @@ EXPORTED int64_t stepper_run(Program *program, int64_t first, int64_t last, doub
         double *row = rows + used++ * width;
         row[0] = until;
         memcpy(row + 1, program->values, bytes);
-        program->before = row + 1;
         *program->rows_told = program->rows_before + used;
         if (!all_finite(program->values, program->value_count))
             stopped(program, STOP_NOT_FINITE, 0, 0);

@@ -34,7 +34,7 @@ typedef struct {
     int64_t fmi_version;
     int64_t heeds_events;              /* FMI 3 with event mode: eventHandlingNeeded means something */
     int64_t input_count;               /* inputs with a source */
-    const int64_t *sources;            /* their columns in the values of the plan */
+    const int64_t *sources;            /* where they lie in the values of the plan, or in those at the start behind them */
     const double *factors, *offsets;   /* NULL: nothing is converted */
     double *inputs;                    /* gathered */
     int64_t calls;                     /* of doStep in the present stretch */
@@ -156,12 +156,10 @@ enum {
 
 typedef struct {
     double start, step;         /* t_k = start + k * step [s] */
-    double *values;             /* of the plan */
-    const double *before;       /* the same at the beginning of the step in which the stretch ended */
+    double *values;             /* of the plan; behind them the same at the start of the step */
     int64_t value_count;
     Slave *slaves;
     int64_t slave_count;
-    int64_t gathers_first;      /* Jacobi: all inputs are gathered before anything is stepped */
     Watch watch;
     Balises balises;
     Journal journal;

@@ -14,8 +14,6 @@ from functools import partial
 from time import perf_counter
 from typing import Any
 
-import numpy as np
-
 from cosim.balises.rollback import RollbackLocaliser
 from cosim.compiled.answers import Answer, answered
 from cosim.compiled.library import load_stepper
@@ -86,7 +84,7 @@ class CompiledStepper:
         self.steps = 0
         self._longest = 1
         _check(control, self.system)
-        self._program = Program(self.plan, axis, self.system.algorithm.name == "jacobi")
+        self._program = Program(self.plan, axis)
         self._program.head.seconds_at_most = SECONDS
         self._library = _load()
         self._answering = False
@@ -109,11 +107,11 @@ class CompiledStepper:
             return Stretch(0, partial(self._whole_step, k))
         wanted = min(free, self._longest)
         rows = recorder.block(wanted + ROWS_OF_EVENTS if own_passings else wanted)
-        head, before = self._program.head, self._program.before
+        head = self._program.head
         self._program.tell_rows(recorder.count_address, recorder.block_start)
         self._first = k
         run = self._library.stepper_run
-        done = int(run(self._program.address, k, k + wanted, rows.ctypes.data, len(rows), before.ctypes.data))
+        done = int(run(self._program.address, k, k + wanted, rows.ctypes.data, len(rows)))
         self._first = None
         recorder.commit(int(head.rows_done))
         self.steps += done
@@ -134,7 +132,7 @@ class CompiledStepper:
             return Stretch(done, partial(self._whole_step, k + done))
         if stop is Stop.HANDED:
             return Stretch(done, partial(self._step_again, k + done, self._program.journalled()))
-        return Stretch(done, partial(self._rest_of_step, k + done, self._program.values_before()))
+        return Stretch(done, partial(self._rest_of_step, k + done))
 
     def _time_in_stretch(self, place: int, component: Component) -> float:
         """Where a component stands that logs something while C steps it: its calls so far tell the step it is in."""
@@ -175,16 +173,14 @@ class CompiledStepper:
         with self._answered(said):
             return self._whole_step(k)
 
-    def _rest_of_step(self, k: int, before: np.ndarray) -> Sequence[Row]:
-        """What is left of step `k` once the stepper has left it at one of the slaves."""
+    def _rest_of_step(self, k: int) -> Sequence[Row]:
+        """What is left of step `k` once the stepper, which has begun it, has left it at one of the slaves."""
         t, until, balises, first = self.axis[k], self.axis[k + 1], self.system.balises, int(self._program.head.slave)
         if balises is not None:
-            balises.begin(t, until, before)
+            balises.begin(t, until)
         for place, step in enumerate(self.plan.steps[first:]):
             if place == 0:
                 self._answered_move(step.move, t, until)
-            elif self._program.head.gathers_first:
-                step.move(t, until)
             else:
                 step.step(t, until)
         return NO_ROWS if balises is None else balises.rows()

@@ -80,6 +80,7 @@ class Component(Described):
         self._release_files = release_files
         self._alive = self._running = False
         self.messages = MessageLog(name)
+        self.held_outputs: frozenset[str] = frozenset()  # that others take at the start of a step, as where they were recorded
         self.clock: Callable[[], float] | None = None  # says where it stands [s] while somebody else than Python steps it
         self.log: LogSwitch | None = None
         self.tallies = new_tallies()

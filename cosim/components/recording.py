@@ -125,6 +125,7 @@ class RecordingComponent(FMI3Component):
         slave = RecordingSlave(recording)
         self.recording = recording
         super().__init__(name, slave, slave.model_description, source=recording.source, kind=KIND)
+        self.held_outputs = recording.held_over_steps
 
     def variable(self, name: str, *causalities: str) -> ModelVariable:
         """As for `Described`; a column that was left out is refused with the reason."""

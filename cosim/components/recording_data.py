@@ -30,6 +30,7 @@ class Recording:
         held: mask of the columns that keep their value until the next row, shape (n,); the others run on lines.
         events: times at which something may have jumped [s], increasing.
         left_out: columns that cannot be played back, by name, and why.
+        held_over_steps: signals of which the others took the value at the start of a step in the run that was recorded.
     """
 
     source: str
@@ -39,6 +40,7 @@ class Recording:
     held: np.ndarray
     events: np.ndarray
     left_out: Mapping[str, str] = field(default_factory=dict)
+    held_over_steps: frozenset[str] = frozenset()
 
     @cached_property
     def digest(self) -> str:
@@ -99,7 +101,15 @@ def make_recording(
     held = np.array([interpolation == "hold" or s.variability == "discrete" for s in signals])
     values = np.column_stack(columns)
     events = _events(time[rows], values, np.array([e.delivered_at for e in result.events]))
-    return Recording(source, time[rows], tuple(signals), values, held, events, left_out)
+    kept = _held_over_steps(result)
+    kept = frozenset(signal.name for column, signal in chosen.items() if column in kept)
+    return Recording(source, time[rows], tuple(signals), values, held, events, left_out, kept)
+
+
+def _held_over_steps(result: Result) -> frozenset[str]:
+    """Columns of which the run says that they were held; a measured table says nothing."""
+    algorithm = result.summary.get("master", {}).get("algorithm", {}) if isinstance(result.summary, Mapping) else {}
+    return frozenset(str(link).partition(" -> ")[0] for link in algorithm.get("held", ()))
 
 
 def _chosen(result: Result, source: str, component: str | None, name: str) -> dict[str, SignalInfo]:

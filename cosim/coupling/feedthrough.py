@@ -21,7 +21,7 @@ class AlgebraicLoop:
 
     Args:
         path: a shortest closed way through it, along connections and feedthrough, first node = last node.
-        components: all that take part, in the order listed.
+        components: all that take part, in the order in which they were given.
     """
 
     path: Path
@@ -64,7 +64,7 @@ def undeclared(components: Iterable[Component]) -> list[str]:
 def algebraic_loops(
     components: Mapping[str, Component], connections: Sequence[Connection], *, possible: bool = False
 ) -> list[AlgebraicLoop]:
-    """Cycles of direct feedthrough, one for each knot of them, in the order in which the components are listed.
+    """Cycles of direct feedthrough, one for each knot of them, in the order of the components.
 
     Args:
         components: by name. connections: checked.

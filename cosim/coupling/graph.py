@@ -7,7 +7,7 @@ alone. Only a cycle of direct feedthrough is an algebraic loop (`cosim.coupling.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from cosim.components.component import Component
 from cosim.coupling.connection import Connection
@@ -18,7 +18,8 @@ from cosim.coupling.feedthrough import (
     undeclared,
     undeclared_outputs,
 )
-from cosim.coupling.strong import arranged, strong_groups, topological
+from cosim.coupling.ordering import Signal, in_order, satisfied
+from cosim.coupling.strong import strong_groups, topological
 from cosim.errors import CouplingError
 
 __all__ = ["Group", "check_algebraic_loops", "declared_feedthrough", "execution_groups", "execution_order", "undeclared"]
@@ -46,25 +47,30 @@ class Group:
 
 
 def execution_groups(
-    components: Mapping[str, Component], connections: Sequence[Connection], before: Iterable[Pair] = ()
-) -> list[Group]:
+    components: Mapping[str, Component], connections: Sequence[Connection], before: Iterable[Pair] = (),
+    first: Iterable[str] = (), last: Iterable[str] = (),
+) -> list[Group]:  # fmt: skip
     """Strongly connected groups in topological order, the members of each in Gauss-Seidel order.
 
-    Inside a group the components of an algebraic loop stand together, and an input that acts directly on an output which is
-    passed on comes after its source; where an FMU does not say what its outputs depend on, every input is taken to act on all
-    of them as far as that contradicts nothing that is declared. What remains free follows the order in which the components
-    were listed, so list the plant first: the connection into the first component of a loop is the one that is held over a step.
-    The time it takes grows linearly with components and connections.
+    The order in which components and connections are listed does not matter. Inside a group the components of an algebraic loop
+    stand together, and who takes their iterated signals comes after them; an input that acts directly on an output which is
+    passed on comes after its source; where an FMU does not say what its outputs depend on, every input is taken to act on all of
+    them as far as that contradicts nothing that is declared. What remains free is ordered as `first` and `last` say, then so that
+    few signals are held (`cosim.coupling.instants`), rather those that are constant between their jumps; names decide last.
+    The time it takes grows linearly with components and connections, but for a logarithm.
 
     Args:
-        components: by name, in the order listed.
-        connections: checked connections.
-        before: further pairs (first, second), e.g. the watched plant before the receivers of its balises; these hold always.
+        components: by name. connections: checked.
+        before: pairs (first, second), e.g. the watched plant before the receivers of its balises; these hold always.
+        first, last: who comes first, and last, where that is free.
 
     Raises:
         CouplingError: pairs in `before` that contradict each other.
     """
-    names = list(components)
+    rank = dict.fromkeys(components, 0) | dict.fromkeys(first, -1) | dict.fromkeys(last, 1)
+    names = sorted(components, key=lambda name: (rank[name], name))
+    components = {name: components[name] for name in names}
+    connections = sorted(connections, key=lambda c: (c.source, c.target))
     must = {(a, b) for a, b in before if a != b}
     _check_consistent(names, must)
     algebraic = algebraic_loops(components, connections)
@@ -75,13 +81,19 @@ def execution_groups(
     levels = [_split(level, group_of, len(groups)) for level in _levels(components, connections, must)]
     loops: list[list[AlgebraicLoop]] = [[] for _ in groups]
     maybe: list[list[AlgebraicLoop]] = [[] for _ in groups]
+    signals: list[list[Signal[str]]] = [[] for _ in groups]
     for loop in algebraic:
         loops[group_of[loop.components[0]]].append(loop)
     for loop in possible:
         maybe[group_of[loop.components[0]]].append(loop)
+    for signal in _signals(components, connections):
+        inside = frozenset(name for name in signal.targets if group_of[name] == group_of[signal.source])
+        signals[group_of[signal.source]].append(replace(signal, targets=inside))
     found = []
     for i, group in enumerate(groups):
-        blocks = _blocks(group, loops[i], [level[i] for level in levels])
+        ties = [pair for loop in loops[i] for pair in _round(loop.components)]
+        inner = Inside(group, [level[i] for level in levels], signals[i], rank)
+        blocks = inner.blocks(ties)
         tied = {name for loop in loops[i] for name in loop.components}
         ordered = tuple(name for block in blocks for name in block)
         knots = tuple(block for block in blocks if not tied.isdisjoint(block))
@@ -91,18 +103,19 @@ def execution_groups(
 
 
 def execution_order(
-    components: Mapping[str, Component], connections: Sequence[Connection], before: Iterable[Pair] = ()
-) -> list[str]:
+    components: Mapping[str, Component], connections: Sequence[Connection], before: Iterable[Pair] = (),
+    first: Iterable[str] = (), last: Iterable[str] = (),
+) -> list[str]:  # fmt: skip
     """Component names in Gauss-Seidel order, see `execution_groups`, for a master that does not iterate.
 
     Args:
-        components: by name, in the order listed. connections: checked. before: further pairs (first, second).
+        components, connections, before, first, last: as for `execution_groups`.
 
     Raises:
         CouplingError: an algebraic loop, with its signals named, or pairs in `before` that contradict each other.
     """
     check_algebraic_loops(components, connections)
-    return [name for group in execution_groups(components, connections, before) for name in group.names]
+    return [name for group in execution_groups(components, connections, before, first, last) for name in group.names]
 
 
 def check_algebraic_loops(components: Mapping[str, Component], connections: Sequence[Connection]) -> None:
@@ -138,20 +151,68 @@ def _levels(components: Mapping[str, Component], connections: Sequence[Connectio
     return [hard | soft | must, hard | must, must]
 
 
-def _blocks(group: Sequence[str], loops: Sequence[AlgebraicLoop], levels: Sequence[set[Pair]]) -> list[tuple[str, ...]]:
-    """The members in order; together those that share algebraic loops."""
-    knots = strong_groups(group, [pair for loop in loops for pair in _round(loop.components)])
-    first = {name: knot[0] for knot in knots for name in knot}
-    members = {knot[0]: knot for knot in knots}
-    outer = [{(first[a], first[b]) for a, b in level if first[a] != first[b]} for level in levels]
-    listed = [name for name in group if first[name] == name]
-    blocks = []
-    for run in arranged(listed, outer):
-        inside = [name for name in group if first[name] in run] if len(run) > 1 else members[run[0]]
-        own = set(inside)
-        inner = [{(a, b) for a, b in level if a in own and b in own} for level in levels] if len(inside) > 1 else []
-        blocks.append(tuple(name for part in arranged(inside, inner) for name in part) if inner else tuple(inside))
-    return blocks
+def _signals(components: Mapping[str, Component], connections: Sequence[Connection]) -> list[Signal[str]]:
+    """What goes from component to component; an array is one signal."""
+    targets: dict[tuple[str, str], set[str]] = {}
+    for c in connections:
+        targets.setdefault(c.source_variable, set()).add(c.target[0])
+    return [
+        Signal(name, frozenset(taking - {name}), components[name].variables[variable].variability in (None, "continuous"))
+        for (name, variable), taking in targets.items()
+    ]
+
+
+@dataclass(frozen=True)
+class Inside:
+    """One group, to be ordered.
+
+    Args:
+        names: of its components. levels: pairs (first, second), as of `satisfied`; the last level holds always.
+        signals: between its components. rank: of components.
+    """
+
+    names: Sequence[str]
+    levels: Sequence[set[Pair]]
+    signals: Sequence[Signal[str]]
+    rank: Mapping[str, int]
+
+    def blocks(self, ties: Sequence[Pair]) -> list[tuple[str, ...]]:
+        """The components in order; those tied together into loops stand together."""
+        knots, after = self._knots(ties)
+        if len(knots) == len(self.names):
+            return [(name,) for name in self._arranged(self.names, self.levels, self.signals)]
+        head = {name: knot[0] for knot in knots for name in knot}
+        outer = [{(head[a], head[b]) for a, b in level | after if head[a] != head[b]} for level in self.levels]
+        joined = [Signal(head[s.source], frozenset(head[n] for n in s.targets) - {head[s.source]}, s.flows) for s in self.signals]
+        members = {knot[0]: knot for knot in knots}
+        return [self._inside(members[name]) for name in self._arranged(list(members), outer, joined)]
+
+    def _knots(self, ties: Sequence[Pair]) -> tuple[list[list[str]], set[Pair]]:
+        """Who is tied together, and pairs (first, second): who takes a signal that is iterated inside a knot comes after it.
+
+        Where that contradicts what holds always, or two knots take such signals of one another, they are one knot.
+        """
+        joined = list(ties)
+        while True:
+            knots = strong_groups(self.names, joined)
+            head = {name: knot[0] for knot in knots for name in knot}
+            inner = [s for s in self.signals if any(head[name] == head[s.source] for name in s.targets)]
+            iterated = [*inner, *(s for s in self.signals if (s.source, s.source) in joined)]
+            after = {(s.source, name) for s in iterated for name in s.targets if head[name] != head[s.source]}
+            outer = {(head[a], head[b]) for a, b in self.levels[-1] | after if head[a] != head[b]}
+            tangled = [group for group in strong_groups([knot[0] for knot in knots], outer) if len(group) > 1]
+            if not tangled:
+                return knots, after
+            joined += [pair for group in tangled for pair in _round(group)]
+
+    def _inside(self, knot: Sequence[str]) -> tuple[str, ...]:
+        own = set(knot)
+        levels = [{(a, b) for a, b in level if a in own and b in own} for level in self.levels]
+        signals = [replace(s, targets=s.targets & own) for s in self.signals if s.source in own]
+        return tuple(self._arranged(knot, levels, signals) if len(knot) > 1 else knot)
+
+    def _arranged(self, names: Sequence[str], levels: Sequence[set[Pair]], signals: Sequence[Signal[str]]) -> list[str]:
+        return in_order(names, satisfied(names, levels), signals, self.rank) if len(names) > 1 else list(names)
 
 
 def _round(names: Sequence[str]) -> list[Pair]:

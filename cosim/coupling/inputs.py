@@ -6,12 +6,13 @@ input may follow a line between communication points instead of the gathered val
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 
 import numpy as np
 
 from cosim.components.component import Component
 from cosim.coupling.connection import Connection
+from cosim.coupling.instants import Signal
 from cosim.coupling.untouched import UntouchedInputs
 
 
@@ -20,30 +21,50 @@ class Inputs:
 
     Args:
         names: the inputs, shape (m,).
-        sources: column of each one's source within `values`, shape (m,).
+        sources: column of each one's source within the values of the plan, shape (m,).
+        signals: the same as (component, variable), shape (m,).
         factors, offsets: unit conversion ``input = factor * source + offset``, shape (m,).
-        values: all outputs of all components, shape (n,).
+        values: all outputs of all components, now and after that as they were at the start of the step, shape (2 n,).
         buffer: what `send` writes, shape (m,).
         send: writes `buffer` to the component.
         tables: for an input whose values are mapped, its place -> {source: target}; a value without an entry passes unchanged.
         untouched: inputs that are no numbers, or integers beyond doubles, gathered and sent with the others; or None.
+
+    `gather` takes what holds for a step: of held signals the value at its start. `gather_now` takes what the sources say now.
+    `places` says where `gather` finds each value, shape (m,).
     """
 
     def __init__(
-        self, names: Sequence[str], sources: np.ndarray, factors: np.ndarray, offsets: np.ndarray, values: np.ndarray,
-        buffer: np.ndarray, send: Callable[[], None], tables: Mapping[int, Mapping[float, float]] | None = None,
-        untouched: UntouchedInputs | None = None,
+        self, names: Sequence[str], sources: np.ndarray, signals: Sequence[Signal], factors: np.ndarray, offsets: np.ndarray,
+        values: np.ndarray, buffer: np.ndarray, send: Callable[[], None],
+        tables: Mapping[int, Mapping[float, float]] | None = None, untouched: UntouchedInputs | None = None,
     ) -> None:  # fmt: skip
         self.names, self.sources, self.factors, self.offsets = tuple(names), sources, factors, offsets
         self.buffer, self.send = buffer, send
         self.tables = dict(tables or {})
-        self.gather = _mapped(_gatherer(sources, factors, offsets, values, buffer), self.tables, buffer)
+        self.places, self._signals, self._count = sources.copy(), tuple(signals), len(values) // 2
+        self.gather, self.gather_now = (
+            _mapped(_gatherer(places, factors, offsets, values, buffer), self.tables, buffer) for places in (self.places, sources)
+        )
         self.untouched = untouched
         if untouched is not None:
             self.gather, self.send = _both(self.gather, untouched.gather), _both(self.send, untouched.send)
+            self.gather_now = _both(self.gather_now, untouched.gather_now)
 
     def __len__(self) -> int:
         return len(self.names)
+
+    @property
+    def held(self) -> np.ndarray:
+        """Mask of the inputs whose signal is held over a step, shape (m,)."""
+        return np.asarray(self.places >= self._count)
+
+    def hold(self, signals: Set[Signal]) -> None:
+        """These signals are held over a step."""
+        held = np.array([signal in signals for signal in self._signals], dtype=bool)
+        self.places[:] = np.where(held, self.sources + self._count, self.sources)
+        if self.untouched is not None:
+            self.untouched.hold(signals)
 
 
 def connected_inputs(
@@ -54,8 +75,8 @@ def connected_inputs(
 
     Args:
         connections: of all components.
-        columns: (component, output) -> column of `values`.
-        values: all outputs of all components, shape (n,).
+        columns: (component, output) -> column of the values of the plan.
+        values: all outputs of all components, as for `Inputs`.
         untouched: the component's connected inputs that do not travel as doubles, if any.
     """
     own = [c for c in connections if c.target[0] == component.name and not c.exact]
@@ -63,7 +84,8 @@ def connected_inputs(
     sources = np.array([columns[c.source] for c in own], dtype=np.intp)
     factors, offsets = np.array([c.factor for c in own], dtype=float), np.array([c.offset for c in own], dtype=float)
     tables = {place: dict(c.table) for place, c in enumerate(own) if c.table}
-    return Inputs([c.target[1] for c in own], sources, factors, offsets, values, buffer, send, tables, untouched)
+    signals = [c.source_variable for c in own]
+    return Inputs([c.target[1] for c in own], sources, signals, factors, offsets, values, buffer, send, tables, untouched)
 
 
 def _both(first: Callable[[], None], second: Callable[[], None]) -> Callable[[], None]:

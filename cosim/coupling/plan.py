@@ -1,12 +1,13 @@
 """The plan: everything a step needs, prepared once as contiguous arrays and calls without arguments.
 
-One array `values` holds all outputs of all components, a contiguous slice each, which the FMUs write into directly. The
-inputs of a component are gathered from it by index. The stepper executes the plan; nothing is looked up in a step.
+One array `values` holds all outputs of all components, a contiguous slice each, which the FMUs write into directly; another one
+right behind it holds them as they were at the start of the step. The inputs of a component are gathered from the two by index.
+The stepper executes the plan; nothing is looked up in a step.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -17,6 +18,7 @@ from cosim.components.described import NUMERIC_TYPES
 from cosim.coupling.clocks import ClockConnection
 from cosim.coupling.connection import Connection, local_sources
 from cosim.coupling.inputs import Inputs, connected_inputs
+from cosim.coupling.instants import Signal
 from cosim.coupling.untouched import untouched_cells, untouched_inputs, with_untouched
 from cosim.errors import CouplingError, nearest
 from cosim.results.result import SignalInfo
@@ -30,6 +32,9 @@ class Carrier(Protocol):
     @property
     def name(self) -> str:
         """How the component is told."""
+
+    def begin(self) -> None:
+        """A step begins: what is held over it was true where its source stands now."""
 
     def prepare(self, until: float, *, ends_known: bool | np.ndarray = False) -> None:
         """Gather the inputs for a step to `until` [s]."""
@@ -130,8 +135,8 @@ class PlannedComponent:
         self.read()
 
     def write(self) -> None:
-        """Gather and send the connected inputs."""
-        self.inputs.gather()
+        """Send what the sources of the connected inputs say now."""
+        self.inputs.gather_now()
         self.inputs.send()
 
     def step(self, t: float, until: float) -> None:
@@ -147,21 +152,45 @@ class Plan:
     Args:
         steps: components in execution order.
         values: all outputs, shape (n,).
+        start: the same at the start of the step, shape (n,).
         signals: what each value is, in the same order.
         continuous: mask of the values that may be interpolated between communication points, shape (n,).
         untouched: connected outputs that are no numbers, or integers beyond doubles; shape (m,), of objects. Whoever keeps and
             restores a copy of `values` does so with them.
+        untouched_start: the same at the start of the step, shape (m,).
+        connections: in the order of their targets in the plan.
         clocks: connections between clocks.
         services: who took over how components move.
+        carriers: of the components with lines.
+        held: signals of which all targets take the value at the start of a step; see `cosim.coupling.instants`.
     """
 
     steps: list[PlannedComponent]
     values: np.ndarray
+    start: np.ndarray
     signals: list[SignalInfo]
     continuous: np.ndarray
-    untouched: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=object))
+    untouched: np.ndarray
+    untouched_start: np.ndarray
+    connections: Sequence[Connection] = ()
     clocks: Sequence[ClockConnection] = ()
     services: list[Service] = field(default_factory=list)
+    carriers: list[Carrier] = field(default_factory=list)
+    held: Set[Signal] = frozenset()
+
+    def hold(self, signals: Set[Signal]) -> None:
+        """All targets of these signals, and of no others, take the value at the start of a step."""
+        self.held = signals
+        for step in self.steps:
+            step.inputs.hold(signals)
+
+    def begin_step(self) -> None:
+        """A step begins, or a part of one: what the values are now is what is held over it."""
+        self.start[:] = self.values
+        if len(self.untouched):
+            self.untouched_start[:] = self.untouched
+        for carrier in self.carriers:
+            carrier.begin()
 
     def find(self, component: str) -> PlannedComponent:
         """The planned component of this name.
@@ -200,6 +229,7 @@ def make_plan(
     Raises:
         CouplingError: a variable to record does not exist or is not a number.
     """
+    connections = _in_order(connections, components, order)
     cells, places = untouched_cells(connections)
     hidden = local_sources(connections, components)
     read_names = {n: _names_to_read(components[n], (extra or {}).get(n, ()), hidden.get(n, ())) for n in order}
@@ -211,16 +241,33 @@ def make_plan(
         columns |= {(name, signal): first + i for i, signal in enumerate(read_names[name])}
         signals += [_info(components[name], signal) for signal in read_names[name]]
         spans[name] = slice(first, len(signals))
-    values = np.zeros(len(signals))
+    twice = np.zeros(2 * len(signals))
+    values, start = twice[: len(signals)], twice[len(signals) :]
     continuous = np.array([s.variability == "continuous" for s in signals], dtype=bool)
     steps = []
     for name in order:
         component, span = components[name], spans[name]
         read = with_untouched(component.reader(read_names[name], values[span]), component, places, cells)
         untouched = untouched_inputs(component, connections, places, cells)
-        inputs = connected_inputs(component, connections, columns, values, untouched)
+        inputs = connected_inputs(component, connections, columns, twice, untouched)
         steps.append(PlannedComponent(component, values[span], read, inputs, span, continuous[span]))
-    return Plan(steps, values, signals, continuous, cells, clocks)
+    now, before = cells[: len(places)], cells[len(places) :]
+    return Plan(steps, values, start, signals, continuous, now, before, connections, clocks)
+
+
+def _in_order(
+    connections: Sequence[Connection], components: Mapping[str, Component], order: Sequence[str]
+) -> list[Connection]:  # fmt: skip
+    """The connections in the order of their targets, however they were listed: as executed, then as described."""
+    place = {name: i for i, name in enumerate(order)}
+    described = {(n, v.name): i for n in order for i, v in enumerate(components[n].description.modelVariables)}
+
+    def key(c: Connection) -> tuple[int, int, str, int]:
+        element = components[c.target[0]].variables.element(c.target[1])
+        name = element.variable.name
+        return place[c.target[0]], described.get((c.target[0], name), 0), name, element.index or 0
+
+    return sorted(connections, key=key)
 
 
 def _names_to_read(component: Component, extra: Sequence[str], sources: Sequence[str]) -> list[str]:

@@ -15,10 +15,10 @@ Edges = Iterable[tuple[Node, Node]]
 
 
 def strong_groups(nodes: Sequence[Node], edges: Edges[Node]) -> list[list[Node]]:
-    """Strongly connected groups in topological order; ties, and the members of a group, in the order listed.
+    """Strongly connected groups in topological order; ties, and the members of a group, in the order of `nodes`.
 
     Args:
-        nodes: in the order listed. edges: pairs (first, second) of these nodes.
+        nodes: what is grouped. edges: pairs (first, second) of these nodes.
 
     Source: D. Pearce, An improved algorithm for finding the strongly connected components of a directed graph, 2005 (SciPy).
     """
@@ -35,7 +35,7 @@ def strong_groups(nodes: Sequence[Node], edges: Edges[Node]) -> list[list[Node]]
 
 
 def topological(nodes: Sequence[Node], edges: Edges[Node]) -> list[Node] | None:
-    """Kahn's order, of the free nodes the earliest listed first; None where the edges have a cycle."""
+    """Kahn's order, of the free nodes the first one of `nodes`; None where the edges have a cycle."""
     place = {node: i for i, node in enumerate(nodes)}
     successors: list[list[int]] = [[] for _ in nodes]
     waiting_for = [0] * len(nodes)
@@ -53,31 +53,6 @@ def topological(nodes: Sequence[Node], edges: Edges[Node]) -> list[Node] | None:
             if not waiting_for[following]:
                 heappush(free, following)
     return order if len(order) == len(nodes) else None
-
-
-def arranged(nodes: Sequence[Node], levels: Sequence[set[tuple[Node, Node]]]) -> list[list[Node]]:
-    """An order that satisfies the edges of the first level; where these have cycles, inside each cycle those of the next level.
-
-    Args:
-        nodes: in the order listed, which decides where the edges leave a choice.
-        levels: sets of edges, each a subset of the one before.
-
-    Returns:
-        The nodes in order, one by one; together only those that not even the last level can order.
-    """
-    if not levels:
-        return [list(nodes)]
-    groups = strong_groups(nodes, levels[0])
-    group_of = {node: i for i, group in enumerate(groups) for node in group}
-    inner: list[list[set[tuple[Node, Node]]]] = [[set() for _ in levels[1:]] if len(group) > 1 else [] for group in groups]
-    for depth, edges in enumerate(levels[1:]):
-        for a, b in edges:
-            if group_of[a] == group_of[b] and a != b:
-                inner[group_of[a]][depth].add((a, b))
-    runs: list[list[Node]] = []
-    for group, remaining in zip(groups, inner, strict=True):
-        runs += arranged(group, remaining) if len(group) > 1 else [group]
-    return runs
 
 
 def closed_path(start: Node, edges: Edges[Node]) -> list[Node]:

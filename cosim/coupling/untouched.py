@@ -1,18 +1,20 @@
 """Untouched values: texts, bytes and 64-bit integers on their way from outputs to inputs, as Python objects beside the doubles.
 
-One array of objects `cells` for the whole plan, one for each connected source, is to these values what `Plan.values` is to the
-numbers: outputs are read into it, inputs are gathered from it, and whoever keeps a copy of the one keeps one of the other.
+One array of objects `cells` for the whole plan, two for each connected source (now, and as it was at the start of the step), is
+to these values what the doubled values of the plan are to the numbers: outputs are read into it, inputs are gathered from it, and
+whoever keeps a copy of the one keeps one of the other.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from typing import Any
 
 import numpy as np
 
 from cosim.components.component import Component
 from cosim.coupling.connection import Connection
+from cosim.coupling.instants import Signal
 
 Cells = np.ndarray
 Node = tuple[str, str]
@@ -21,9 +23,9 @@ Write = tuple[Callable[[Sequence[Any]], None], Callable[[], Sequence[Any]], bool
 
 
 def untouched_cells(connections: Sequence[Connection]) -> tuple[Cells, dict[Node, int]]:
-    """The array of objects, shape (number of exact sources,), and where each source is in it."""
+    """The array of objects, shape (2 * number of exact sources,), and where each source is in it."""
     sources = list(dict.fromkeys(c.source for c in connections if c.exact))
-    return np.empty(len(sources), dtype=object), {source: i for i, source in enumerate(sources)}
+    return np.empty(2 * len(sources), dtype=object), {source: i for i, source in enumerate(sources)}
 
 
 def with_untouched(
@@ -73,6 +75,7 @@ class UntouchedInputs:
         self._writes: list[Write] = []
         self._held: list[object] = [None] * len(connections)
         self._sources = [places[c.source] for c in connections]
+        self._signals, self._places = [c.source_variable for c in connections], list(self._sources)
         targets: dict[str, list[tuple[int, int]]] = {}
         for i, connection in enumerate(connections):
             element = component.variables.element(connection.target[1])
@@ -89,8 +92,17 @@ class UntouchedInputs:
         """What was gathered last."""
         return tuple(self._held)
 
+    def hold(self, signals: Set[Signal]) -> None:
+        """These signals are held over a step."""
+        later = len(self._cells) // 2
+        self._places = [place + later * (signal in signals) for place, signal in zip(self._sources, self._signals, strict=True)]
+
     def gather(self) -> None:
-        """Take the values from the cells."""
+        """Take what holds for a step from the cells: of held signals the value at its start."""
+        self._held = [self._cells[place] for place in self._places]
+
+    def gather_now(self) -> None:
+        """Take what the sources say now."""
         self._held = [self._cells[place] for place in self._sources]
 
     def send(self) -> None:

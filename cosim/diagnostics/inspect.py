@@ -11,6 +11,7 @@ from cosim.components.component import Component
 from cosim.coupling.clocks import ClockConnection
 from cosim.coupling.connection import Connection
 from cosim.coupling.feedthrough import AlgebraicLoop, declared_feedthrough, undeclared_outputs
+from cosim.coupling.instants import held_signals
 from cosim.diagnostics.structure import Link, Part, Port, Signal
 from cosim.master.algorithms.choose import AlgorithmChoice
 
@@ -29,21 +30,23 @@ ABILITIES = {
 
 
 def make_links(
-    connections: Sequence[Connection], choice: AlgorithmChoice, order: Sequence[str], loops: Iterable[AlgebraicLoop]
-) -> tuple[Link, ...]:
+    components: Mapping[str, Component], connections: Sequence[Connection], choice: AlgorithmChoice, order: Sequence[str],
+    loops: Iterable[AlgebraicLoop],
+) -> tuple[Link, ...]:  # fmt: skip
     """Connections with what becomes of them in a step; those between the elements of two arrays as one.
 
     Args:
-        connections: checked. choice: of the algorithm. order: of execution. loops: algebraic ones.
+        components: by name. connections: checked. choice: of the algorithm. order: of execution. loops: algebraic ones.
     """
-    place = {name: i for i, name in enumerate(order)}
+    every = choice.algorithm == "jacobi"
+    kept = held_signals(components, connections, order, choice.iterated)
     in_loops = {pair for loop in loops for pair in pairwise(loop.path)}
     links: dict[tuple[Signal, Signal], Link] = {}
     for c in connections:
         whole = bool(c.source_array and c.target_array)
         source, target = (c.source_variable, c.target_variable) if whole else (c.source, c.target)
-        iterated = any(source[0] in loop and target[0] in loop for loop in choice.iterated)
-        held = not iterated and (choice.algorithm == "jacobi" or place[source[0]] >= place[target[0]])
+        held = every or c.source_variable in kept
+        iterated = not held and any(source[0] in loop and target[0] in loop for loop in choice.iterated)
         in_loop = (c.source, c.target) in in_loops or (c.source_variable, c.target_variable) in in_loops
         known = links.get((source, target))
         looped = in_loop or (known is not None and known.in_loop)

@@ -26,8 +26,8 @@ from cosim.report.figures.style import RC, new_figure, styled
 
 COLOURS = {"fresh": "#33475B", "held": "#D55E00", "iterated": "#7A4FA3", "loop": "#B00020", "event": "#009E73"}
 MEANINGS = {
-    "fresh": "passed on at once",
-    "held": "held, value of the step before",
+    "fresh": "fresh, value of the end of the step",
+    "held": "held, value of the start of the step",
     "iterated": "iterated until it settles",
     "loop": "algebraic loop",
     "event": "balise telegrams and clocks, at their own instants",

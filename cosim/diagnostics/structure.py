@@ -69,7 +69,7 @@ class Link:
 
     Args:
         source, target: its ends. factor, offset: unit conversion ``target = factor * source + offset``.
-        held: the target uses the value of the step before, since it is stepped no later than the source.
+        held: the target uses the value of the start of a step, as all targets of this signal do.
         in_loop: whether it is part of an algebraic loop. iterated: whether it is iterated until it settles.
         mapped: whether values are mapped one by one.
     """
@@ -152,7 +152,7 @@ class Structure:
 
     @property
     def held(self) -> tuple[Link, ...]:
-        """Connections whose value is one step old."""
+        """Connections whose value is that of the start of a step."""
         return tuple(link for link in self.links if link.held)
 
     def text(self, width: int | None = None) -> str:

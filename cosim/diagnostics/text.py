@@ -119,7 +119,7 @@ def _connections(structure: Structure) -> list[str]:
 
 def when(link: Link) -> str:
     """Which value the target uses."""
-    text = "held, of the step before" if link.held else "iterated" if link.iterated else "passed on at once"
+    text = "held, of the start of the step" if link.held else "iterated" if link.iterated else "fresh, of the end of the step"
     return f"{text}; in an algebraic loop" if link.in_loop else text
 
 

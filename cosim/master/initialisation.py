@@ -32,7 +32,7 @@ def initialise(plan: Plan, start_time: float, stop_time: float) -> int:
     """Bring all components from instantiated to step mode.
 
     What jumps when initialisation ends (a sample taken at the start time) is passed on once more, so that the first row is
-    consistent.
+    consistent. Until then the targets of held signals know what was before the jump, those of fresh ones what is after it.
 
     Args:
         plan: prepared, components instantiated and start values set.
@@ -50,16 +50,18 @@ def initialise(plan: Plan, start_time: float, stop_time: float) -> int:
     changing = settling.run()
     if changing:
         raise _unsettled(plan, changing, settling.residuals, start_time)
+    plan.begin_step()
     for step in plan.steps:
-        step.write()
+        step.inputs.gather()
+        step.inputs.send()
         step.component.exit_initialization()
         step.read()
     rounds = settling.rounds
     if settling.exchange_changes_feedback():
         settling.run()
-    for step in plan.steps:
-        if step.carrier is not None:
-            step.carrier.prepare(start_time)  # where its lines begin
+    plan.begin_step()
+    for carrier in plan.carriers:
+        carrier.prepare(start_time)  # where its lines begin
     return rounds
 
 

@@ -86,6 +86,7 @@ class System:
 
     def move(self, t: float, until: float) -> Sequence[Row]:
         """Bring everything from `t` to `until` [s] without a stop; returns and raises as `advance`."""
+        self.plan.begin_step()
         if self.balises is None:
             self.algorithm.advance(t, until)
             return NO_ROWS
@@ -103,6 +104,7 @@ class System:
             jumped: values that jumped, shape (n,): the lines from them begin with what the plan holds now.
             stale: values that may follow suit only in the next step, shape (n,): their lines begin with that.
         """
+        self.plan.begin_step()
         for step in self.plan.steps:
             if step.carrier is None:
                 continue
@@ -113,7 +115,7 @@ class System:
 
     def _begin_lines_of(self, names: Collection[str], t: float) -> None:
         """The outputs of these components may have jumped on the way to `t` [s]."""
-        if all(step.carrier is None for step in self.plan.steps):
+        if not self.plan.carriers:
             return
         jumped = np.zeros(len(self.plan.values), dtype=bool)
         for name in names:

@@ -1,12 +1,14 @@
-"""The master of a scenario: from the table `[master]` to algorithm, step control and master."""
+"""The master of a scenario: from its tables to order, algorithm, step control and master."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 
 from cosim.balises.service import BaliseService
 from cosim.components.component import Component
+from cosim.coupling.connection import Connection
+from cosim.coupling.graph import Group, execution_groups
 from cosim.coupling.plan import Plan
 from cosim.errors import CouplingError
 from cosim.master.algorithms.algorithm import Algorithm
@@ -70,9 +72,30 @@ def make_algorithm(table: MasterTable, plan: Plan, choice: AlgorithmChoice) -> A
     return algorithm
 
 
-def slow_last(components: Mapping[str, Component], table: ScenarioTable) -> dict[str, Component]:
-    """The components in the order listed, but those with `every` after the others, so that they find the newest inputs."""
-    return dict(sorted(components.items(), key=lambda item: table.components[item[0]].every > 1))
+def stepping_groups(
+    table: ScenarioTable, components: Mapping[str, Component], connections: Sequence[Connection], plant: str,
+    receivers: Iterable[str],
+) -> list[Group]:  # fmt: skip
+    """The components in the groups and the order in which a scenario steps them.
+
+    Before the receivers of telegrams must come the plant, and the odometer whose reading the telegrams carry. First where that is
+    free comes the train: the watched plant, else what the report holds observers against; last come those with `every`, so that
+    they find the newest inputs.
+
+    Args:
+        table: the scenario. components: by name. connections: checked. plant: watched for balises, or empty.
+        receivers: of telegrams.
+
+    Raises:
+        CouplingError: as for `execution_groups`.
+    """
+    odometer = None if table.balises is None else table.balises.odometer
+    sources = {plant} | (set() if odometer is None else {odometer.partition(".")[0]})
+    before = [(source, name) for source in sorted(sources) for name in receivers if source != name]
+    truth = (table.report.true_position or table.report.true_speed or "").partition(".")[0]
+    train = [name for name in (plant or truth,) if name in components]
+    slow = [name for name, component in table.components.items() if component.every > 1]
+    return execution_groups(components, connections, before, train, slow)
 
 
 def idle_settings(table: MasterTable) -> list[str]:

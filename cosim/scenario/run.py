@@ -20,7 +20,6 @@ from cosim.components.start_values import StartValue
 from cosim.components.surroundings import SurroundingsOfSteps
 from cosim.coupling.clocks import connect_clocks
 from cosim.coupling.connection import Connection, connect
-from cosim.coupling.graph import execution_groups
 from cosim.coupling.plan import Plan, make_plan
 from cosim.diagnostics.call_log import CallLog
 from cosim.diagnostics.logged_slave import log_calls
@@ -43,7 +42,7 @@ from cosim.scenario.certificates import check_certificates, expected_gap
 from cosim.scenario.connections import parse_connections
 from cosim.scenario.instances import check_instances
 from cosim.scenario.layouts import Layout, make_layout
-from cosim.scenario.master import idle_settings, make_master, slow_last
+from cosim.scenario.master import idle_settings, make_master, stepping_groups
 from cosim.scenario.models import component_factories, protocol_parameters
 from cosim.scenario.outcome import INTERRUPTED, Outcome
 from cosim.scenario.premises import premise_findings
@@ -158,7 +157,7 @@ class _Setup:
         receivers, plant = self._balise_roles()
         check_roles(table, self.components, self.where)
         table = self.table = check_expectations(table, self.components, receivers, self.where)
-        groups = execution_groups(slow_last(self.components, table), connections, self._before(plant, receivers))
+        groups = stepping_groups(table, self.components, connections, plant, receivers)
         self.algorithm = choose_algorithm(table.master.algorithm, groups, self.components)
         order = [name for group in groups for name in group.names]
         starts = {n: self._start_values(n, c) for n, c in self.components.items()}
@@ -267,12 +266,6 @@ class _Setup:
             return [], ""
         plant = watched_plant(balises, self.components, self.where)
         return find_receivers(balises, self.components, plant, self.where), plant
-
-    def _before(self, plant: str, receivers: list[str]) -> list[tuple[str, str]]:
-        """What must be stepped before the receivers: the plant, and the odometer whose reading the telegrams carry."""
-        balises = self.table.balises
-        sources = {plant} if balises is None or balises.odometer is None else {plant, balises.odometer.partition(".")[0]}
-        return [(source, name) for source in sorted(sources) for name in receivers if source != name]
 
     def _check_certificates(self, layout: Layout, receivers: list[str]) -> None:
         assert self.table.balises is not None

@@ -12,14 +12,14 @@ from cosim.components.loading import describe_fmu, load_block
 from cosim.components.recording import RecordingComponent
 from cosim.coupling.clocks import connect_clocks
 from cosim.coupling.connection import Connection, connect, unconnected_inputs
-from cosim.coupling.graph import Group, execution_groups, undeclared
+from cosim.coupling.graph import Group, undeclared
 from cosim.diagnostics.inspect import group_index, make_links, make_part, rate_text
 from cosim.diagnostics.structure import Balises, Link, Structure
 from cosim.errors import CosimError, CouplingError
 from cosim.master.algorithms.choose import AlgorithmChoice, choose_algorithm
 from cosim.scenario.balise_service import find_receivers, watched_plant
 from cosim.scenario.connections import parse_connections
-from cosim.scenario.master import slow_last
+from cosim.scenario.master import stepping_groups
 from cosim.scenario.models import make_system, open_recording
 from cosim.scenario.realisations import intended
 from cosim.scenario.schema import ScenarioTable
@@ -49,7 +49,8 @@ def _structure(table: ScenarioTable, name: str, folder: Path, where: str) -> Str
     clocks, pairs = connect_clocks(parse_connections(table.connections, where), components)
     connections = connect(pairs, components)
     balises = _balises(table, components, where)
-    groups = execution_groups(slow_last(components, table), connections, _before(balises))
+    plant, receivers = ("", ()) if balises is None else (balises.plant, balises.receivers)
+    groups = stepping_groups(table, components, connections, plant, receivers)
     choice, refusal = _choice(table, groups, components)
     order = [n for group in groups for n in group.names]
     loops = [loop for group in groups for loop in group.algebraic]
@@ -62,7 +63,7 @@ def _structure(table: ScenarioTable, name: str, folder: Path, where: str) -> Str
         stop=table.stop,
         step=table.step,
         parts=tuple(make_part(components[n], connections, number[n], rates[n], clocks) for n in order),
-        links=make_links(connections, choice, order, loops),
+        links=make_links(components, connections, choice, order, loops),
         clocks=tuple(Link(c.source, c.target) for c in clocks),
         groups=tuple(group.names for group in groups),
         loops=tuple(loop.path for loop in loops),
@@ -120,14 +121,6 @@ def _balises(table: ScenarioTable, components: Mapping[str, Component], where: s
     told = find_receivers(balises, components, plant, where)
     watched = balises.position or "", balises.speed or ""
     return Balises(plant, *watched, tuple(told), balises.method, balises.timing, balises.odometer)
-
-
-def _before(balises: Balises | None) -> list[tuple[str, str]]:
-    """What must be stepped before the receivers: the plant, and the odometer whose reading the telegrams carry."""
-    if balises is None:
-        return []
-    sources = {balises.plant} | ({balises.odometer.partition(".")[0]} if balises.odometer else set())
-    return [(source, name) for source in sorted(sources) for name in balises.receivers if source != name]
 
 
 def _warnings(table: ScenarioTable, components: Mapping[str, Component], connections: list[Connection]) -> list[str]:

@@ -201,15 +201,6 @@ def _loop_notes(sides: Sides, recording: Result) -> list[str]:
             f"{names} acts on the train in this scenario: the run was recorded with it in the loop, and every observer only "
             "listens to that run. What the train would do with another one in the loop is not told."
         )
-    order = {name: place for place, name in enumerate(recording.summary.get("order", []))}
-    for name in sides.in_loop:
-        sources = {link[0].partition(".")[0] for link in sides.sources(name).values()}
-        late = sorted(source for source in sources if order.get(source, -1) > order.get(name, len(order)))
-        if late:
-            notes.append(
-                f"{name} is stepped before {', '.join(late)} in the loop, so it has those inputs one step late there; played "
-                "back it has them in time, and its numbers differ from those of the run by that."
-            )
     steps = step_count(sides.table.start, sides.table.stop, sides.table.step)
     if len(recording.time) < steps + 1:
         notes.append(

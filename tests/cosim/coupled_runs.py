@@ -163,13 +163,13 @@ class Balises:
 def prepare(
     components: Sequence[Component], connections: Sequence[tuple[str, str]], h: float, count: int, balises: Balises | None = None,
     *, start: float = 0.0, starts: Mapping[str, Mapping[str, float]] | None = None,
-    extra: Mapping[str, Sequence[str]] | None = None, inputs: Any = "hold", **how: Any,
+    extra: Mapping[str, Sequence[str]] | None = None, inputs: Any = "hold", order: Sequence[str] = (), **how: Any,
 ) -> Master:  # fmt: skip
-    """A master ready to run; `how` as for `Master`."""
+    """A master ready to run; `order` of execution where it is not left to the graph, `how` as for `Master`."""
     by_name = {c.name: c for c in components}
     pairs = connect(connections, by_name)
     before = [] if balises is None else [(balises.plant, name) for name in balises.receivers]
-    order = execution_order(by_name, pairs, before)
+    order = order or execution_order(by_name, pairs, before, ["plant"])
     for component in components:
         component.instantiate()
         for name, value in (starts or {}).get(component.name, {}).items():

@@ -47,13 +47,13 @@ class EventRun:
 def prepare(
     components: Sequence[Component], connections: Sequence[str], h: float, count: int, *, start: float = 0.0,
     algorithm: Callable[[Plan], Any] = GaussSeidel, control: Callable[[Any], Any] = FixedStep, events: Any = "propagate",
-    balises: Balises | None = None, starts: dict[str, dict[str, float]] | None = None,
+    balises: Balises | None = None, starts: dict[str, dict[str, float]] | None = None, order: Sequence[str] = (),
 ) -> Master:  # fmt: skip
     by_name = {c.name: c for c in components}
     clocks, pairs = connect_clocks([tuple(c.split(" -> ")) for c in connections], by_name)  # type: ignore[misc]
     connected = connect(pairs, by_name)
     before = [] if balises is None else [(balises.plant, name) for name in balises.receivers]
-    order = execution_order(by_name, connected, before)
+    order = order or execution_order(by_name, connected, before)
     for component in components:
         component.instantiate()
         for name, value in (starts or {}).get(component.name, {}).items():

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
+from cosim.coupling.instants import held_signals
 from cosim.coupling.plan import Plan
 from cosim.master.algorithms.choose import AlgorithmChoice
-from cosim.master.algorithms.links import fed_back, plan_links
 
 
 class Algorithm(ABC):
@@ -18,16 +18,20 @@ class Algorithm(ABC):
     `save` and `restore`; who watches a plant or tells a receiver of balises takes their `move` over without its knowledge.
 
     Args:
-        plan: prepared, components initialised.
+        plan: prepared, components instantiated.
+        iterated: names of the components of each loop that is iterated.
 
     `choice` says why it is this one.
     """
 
     name: ClassVar[str]
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: Plan, iterated: Sequence[Sequence[str]] = ()) -> None:
         self.plan = plan
         self.choice = AlgorithmChoice(self.name)
+        self._loop_of = {name: i for i, loop in enumerate(iterated) for name in loop}
+        components = {step.component.name: step.component for step in plan.steps}
+        plan.hold(held_signals(components, plan.connections, list(components), iterated))
 
     @abstractmethod
     def advance(self, t: float, until: float) -> None:
@@ -38,8 +42,14 @@ class Algorithm(ABC):
         """
 
     def held(self) -> list[str]:
-        """Connections whose value is that of the communication point before, as ``a.y -> b.u``."""
-        return [link.text for link in fed_back(plan_links(self.plan))]
+        """Connections whose value is that of the start of a step, as ``a.y -> b.u``."""
+        return [str(c) for c in self.plan.connections if c.source_variable in self.plan.held]
+
+    def fresh(self) -> list[str]:
+        """Connections whose value is that of the end of a step without any iteration, as ``a.y -> b.u``."""
+        others = [c for c in self.plan.connections if c.source_variable not in self.plan.held]
+        loop = self._loop_of
+        return [str(c) for c in others if c.source[0] not in loop or loop[c.source[0]] != loop.get(c.target[0])]
 
     def save(self) -> Any:
         """What it remembers from step to step, so that a step taken again comes out the same; None where it is nothing."""
@@ -50,8 +60,8 @@ class Algorithm(ABC):
         return
 
     def summary(self) -> Mapping[str, Any]:
-        """What to tell of it after the run, plain data: the name, why, groups, held connections, iterations, residuals."""
-        return {"name": self.name, **self.choice.summary(), "held": self.held()}
+        """What to tell of it after the run, plain data: the name, why, groups, held and fresh connections, iterations."""
+        return {"name": self.name, **self.choice.summary(), "held": self.held(), "fresh": self.fresh()}
 
     def close(self) -> None:
         """Free what it holds (saved states, threads)."""

@@ -1,4 +1,4 @@
-"""Gauss-Seidel: one component after the other, each with the newest values there are."""
+"""Gauss-Seidel: one component after the other, fresh signals with the newest value."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from cosim.master.algorithms.algorithm import Algorithm
 
 
 class GaussSeidel(Algorithm):
-    """Components in the order of the plan. A value that is fed back to an earlier one is held over the step."""
+    """Components in the order of the plan. A signal that is fed back to an earlier one is held over the step for all targets."""
 
     name = "gauss-seidel"
 

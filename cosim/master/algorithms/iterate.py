@@ -7,7 +7,7 @@ from typing import Any
 
 from cosim.coupling.plan import Plan, PlannedComponent
 from cosim.master.algorithms.algorithm import Algorithm
-from cosim.master.algorithms.links import fed_back, plan_links
+from cosim.master.algorithms.links import plan_links
 from cosim.master.algorithms.loop import IteratedLoop
 from cosim.master.algorithms.settings import IterationSettings
 
@@ -27,9 +27,8 @@ class Iterate(Algorithm):
     name = "iterate"
 
     def __init__(self, plan: Plan, loops: Sequence[Sequence[str]], settings: IterationSettings | None = None) -> None:
-        super().__init__(plan)
+        super().__init__(plan, loops)
         links = plan_links(plan)
-        self._held = fed_back(links)
         places = {step.component.name: place for place, step in enumerate(plan.steps)}
         self.loops: list[IteratedLoop] = []
         self._parts: list[PlannedComponent | IteratedLoop] = []
@@ -44,7 +43,6 @@ class Iterate(Algorithm):
             assert {plan.steps[i].component.name for i in members} == set(first_of[place]), "a loop is consecutive in its plan"
             self.loops.append(IteratedLoop(plan, members, links, settings or IterationSettings()))
             self._parts.append(self.loops[-1])
-            self._held = [link for link in self._held if link not in fed_back(links, members)]
             place = members.stop
 
     def advance(self, t: float, until: float) -> None:  # noqa: D102 - see Algorithm
@@ -60,9 +58,6 @@ class Iterate(Algorithm):
     def restore(self, state: Any) -> None:  # noqa: D102 - see Algorithm
         for loop, saved in zip(self.loops, state, strict=True):
             loop.restore(saved)
-
-    def held(self) -> list[str]:  # noqa: D102 - see Algorithm
-        return [link.text for link in self._held]
 
     def summary(self) -> Mapping[str, Any]:  # noqa: D102 - see Algorithm
         return {**super().summary(), "loops": [loop.summary() for loop in self.loops]}

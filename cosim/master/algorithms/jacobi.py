@@ -1,4 +1,4 @@
-"""Jacobi: all components at once, each with the values of the communication point before. Threads, if wanted."""
+"""Jacobi: all components at once, every signal held. Threads, if wanted."""
 
 from __future__ import annotations
 
@@ -8,11 +8,10 @@ from typing import Any
 
 from cosim.coupling.plan import Plan, PlannedComponent
 from cosim.master.algorithms.algorithm import Algorithm
-from cosim.master.algorithms.links import plan_links
 
 
 class Jacobi(Algorithm):
-    """First all inputs are gathered, then all components are moved.
+    """All components are moved with the values of the start of the step.
 
     With threads the sealed FMUs step at the same time, since their C code runs outside Python's lock; blocks, and components
     whose `move` somebody took over (a watched plant, a receiver of balises), are moved by the calling thread in the order of the
@@ -28,6 +27,7 @@ class Jacobi(Algorithm):
 
     def __init__(self, plan: Plan, threads: int = 1) -> None:
         super().__init__(plan)
+        plan.hold(frozenset(c.source_variable for c in plan.connections))
         self.threads = threads
         self._pool = ThreadPoolExecutor(threads, "jacobi") if threads > 1 else None
 
@@ -39,9 +39,6 @@ class Jacobi(Algorithm):
             return
         for step in self.plan.steps:
             step.move(t, until)
-
-    def held(self) -> list[str]:  # noqa: D102 - see Algorithm
-        return [link.text for link in plan_links(self.plan)]
 
     def summary(self) -> Mapping[str, Any]:  # noqa: D102 - see Algorithm
         return {**super().summary(), "threads": self.threads}

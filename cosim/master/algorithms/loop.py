@@ -54,7 +54,8 @@ class IteratedLoop:
         self.steps = [plan.steps[place] for place in members]
         self.settings = settings
         self.history = History()
-        self._plan, self._columns, self._span = plan, interface(links, members), span(self.steps)
+        self._columns = interface([link for link in links if not link.held], members)
+        self._plan, self._span = plan, span(self.steps)
         self._known = [_ends_known(links, place, members) for place in members]
         self._jumps = ~plan.continuous[self._columns]
         self._sensitivity = Sensitivity(plan, members, links, self._columns)
@@ -191,5 +192,5 @@ class IteratedLoop:
 
 
 def _ends_known(links: Sequence[Link], place: int, members: range) -> np.ndarray:
-    """Of each input of a member, whether its value is that of the end of the step: the source is a member, or stepped before."""
-    return np.array([link.source < members.stop for link in links if link.target == place], dtype=bool)
+    """Of each input of a member, whether its value is that of the end of the step: not held, of a member or stepped before."""
+    return np.array([link.source < members.stop and not link.held for link in links if link.target == place], dtype=bool)

@@ -49,7 +49,7 @@ class Sensitivity:
 
     def __init__(self, plan: Plan, members: range, links: Sequence[Link], interface: np.ndarray) -> None:
         self._interface, self._count = interface, len(plan.values)
-        inner = [link for link in links if link.source in members and link.target in members]
+        inner = [link for link in links if link.source in members and link.target in members and not link.held]
         passages = [_passage(plan, place, inner) for place in members]
         self._passages = [p for p in passages if p is not None]
         self.usable = all(p.component.capabilities.providesDirectionalDerivatives for p in self._passages)

@@ -56,7 +56,7 @@ class Participant:
             return True
         if not self.gate.listens:
             return False
-        self.planned.inputs.gather()
+        self.planned.inputs.gather_now()
         return self.gate.changed()
 
     def trigger(self, clock: int) -> None:
@@ -77,7 +77,7 @@ class Participant:
             if not self.hears():
                 return False
             self._enter()
-        self.planned.inputs.gather()
+        self.planned.inputs.gather_now()
         if not self._take() and not self._unheard:
             return False
         self.needs_update, self._unheard = True, False

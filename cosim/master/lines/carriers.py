@@ -37,10 +37,14 @@ class Carrier(ABC):
     def send(self, t: float, until: float) -> None:
         """Tell of the line for a step from `t` to `until` [s]."""
 
+    def begin(self) -> None:
+        """A step begins: what is held over it was true where its source stands now."""
+        self.line.begin()
+
     def prepare(self, until: float, *, ends_known: bool | np.ndarray = False) -> None:
         """Gather the inputs and bend the line for a step to `until` [s]; arguments as for `Line.bend`."""
         self._inputs.gather()
-        self.line.bend(self._inputs.buffer, until, ends_known=ends_known)
+        self.line.bend(self._inputs.buffer, until, held=self._inputs.held, ends_known=ends_known)
 
     def forget(self, jumped: np.ndarray) -> None:
         """Values of the plan that jumped, as a mask of shape (n,): no line of an input leads over it."""

@@ -37,6 +37,7 @@ def _draw(planned: PlannedComponent, plan: Plan, givers: list[PlannedComponent],
         return "held"
     line = Line(method, [givers[source].component for source in inputs.sources], continuous)
     planned.carrier = make_carrier(line, inputs, component)
+    plan.carriers.append(planned.carrier)
     return planned.carrier.name
 
 

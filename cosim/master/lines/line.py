@@ -1,6 +1,6 @@
 """A line: the straight course of each input of one component, through the last two values that its source gave.
 
-Where the source has been stepped already the line interpolates, elsewhere it extrapolates. How a slave is told of it is in
+Where the value is that of the end of the step the line interpolates, elsewhere it extrapolates. How a slave is told of it is in
 `carriers`.
 """
 
@@ -52,15 +52,23 @@ class Line:
         count = len(continuous)
         self._history = History(np.zeros(count), np.zeros(count), np.full(count, np.nan), np.full(count, np.nan))
         self.slope = np.zeros(count)
+        self._stood = np.full(count, np.nan)
 
-    def bend(self, gathered: np.ndarray, until: float, *, ends_known: bool | np.ndarray = False) -> None:
+    def begin(self) -> None:
+        """A step begins: what is held over it was true where its source stands now."""
+        self._stood = self._times()
+
+    def bend(
+        self, gathered: np.ndarray, until: float, *, held: bool | np.ndarray = False, ends_known: bool | np.ndarray = False
+    ) -> None:  # fmt: skip
         """Take what was gathered for a step that ends at `until` [s], shape (m,).
 
         Args:
+            held: the values are those of the start of the step; for all or each, shape (m,).
             ends_known: the values are those of `until`, wherever their components stand (a step that is iterated); for all or
                 each, shape (m,).
         """
-        seen_at = np.where(ends_known, until, self._times())
+        seen_at = np.where(ends_known, until, np.where(held, self._stood, self._times()))
         history = self._history
         newer = seen_at > history.later_at + TIME_TOLERANCE
         first = np.isnan(history.later_at)

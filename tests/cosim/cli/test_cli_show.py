@@ -34,14 +34,14 @@ def test_text(file: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["show", file]) == 0
     text = capsys.readouterr().out
     assert text.startswith("two: Two blocks\n0 s to 1 s in 10 steps of 0.1 s; 2 components, 2 connections")
-    assert "driver.effort      -> train.effort     held, of the step before" in text
+    assert "driver.effort      -> train.effort     fresh, of the end of the step" in text
     assert "\x1b" not in text
 
 
 def test_json_and_settings(file: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["show", file, "--json", "--set", "step=0.05", "--set", "master.algorithm=jacobi"]) == 0
     data = json.loads(capsys.readouterr().out)
-    assert (data["step"], data["algorithm"], data["order"]) == (0.05, "jacobi", ["train", "driver"])
+    assert (data["step"], data["algorithm"], data["order"]) == (0.05, "jacobi", ["driver", "train"])
     assert all(link["held"] for link in data["links"])
 
 

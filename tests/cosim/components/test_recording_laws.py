@@ -63,7 +63,7 @@ def test_an_observer_cannot_tell_the_recording_from_the_plant(name: str, tmp_pat
     second = quietly(playback(tmp_path / "run", CASES[name]))
     assert second.failure is None
     fields = first.result.table.dtype.names or ()
-    assert second.result.table.dtype.names == fields
+    assert set(second.result.table.dtype.names or ()) == set(fields)
     different = [field for field in fields if first[field].tobytes() != second[field].tobytes()]
     assert [field for field in different if field == "time" or field.startswith("observer.")] == []
     assert [(e.identity, e.outcomes, e.stamp) for e in first.result.events] == [
@@ -76,7 +76,8 @@ def test_rows_at_telegrams_hold_what_the_plant_showed_there(tmp_path: Path) -> N
     first = quietly(joint({}))
     first.write(tmp_path / "run", report=False)
     second = quietly(playback(tmp_path / "run", {}))
-    assert second.result.table.tobytes() == first.result.table.tobytes()
+    for field in first.result.table.dtype.names or ():
+        assert second[field].tobytes() == first[field].tobytes(), field
 
 
 def test_half_of_a_run_is_told_its_own_telegrams_only(tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ def test_outputs_lie_in_one_array_in_the_order_of_stepping() -> None:
     own = ["integrated", "last", "at", "heard", "integral"]
     assert names == ["plant.position", "plant.speed", *(f"listener.{n}" for n in own)]  # an output asked for again comes once
     listener = made.find("listener")
-    assert listener.outputs.base is made.values
+    assert listener.outputs.base is made.values.base
     assert (listener.columns.start, listener.columns.stop) == (2, 7)
     assert made.column("listener.last") == 3
     np.testing.assert_array_equal(made.continuous, [True, True, True, False, False, False, True])

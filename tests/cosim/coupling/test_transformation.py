@@ -71,10 +71,11 @@ def test_a_table_that_cannot_be(tmp_path: Path, table: dict[str, object], messag
 
 
 def test_a_table_of_values_passes_what_it_does_not_name() -> None:
-    values, buffer, sent = np.array([1.0, 2.0, 3.0]), np.zeros(2), []
+    values, buffer, sent = np.array([1.0, 2.0, 3.0] * 2), np.zeros(2), []
+    sources = [("c", "x"), ("c", "y")]
     inputs = Inputs(
-        ["a", "b"], np.array([0, 2]), np.array([1.0, 2.0]), np.zeros(2), values, buffer, lambda: sent.append(buffer.copy()),
-        {0: {1.0: 7.0, 7.0: 9.0}},
+        ["a", "b"], np.array([0, 2]), sources, np.array([1.0, 2.0]), np.zeros(2), values, buffer,
+        lambda: sent.append(buffer.copy()), {0: {1.0: 7.0, 7.0: 9.0}},
     )  # fmt: skip
     for value, expected in ((1.0, 7.0), (7.0, 9.0), (5.0, 5.0)):
         values[0] = value

@@ -219,7 +219,7 @@ def test_a_restored_system_has_its_texts_back() -> None:
         system.advance(1.0, 2.0)
         seen.append([slave.v["said"] for slave in slaves] + master.plan.untouched.tolist())
         system.restore(kept)
-    assert seen[0] == seen[1] == seen[2] == ["secondxxx", "secondxxxx"] * 2
+    assert seen[0] == seen[1] == seen[2] == ["secondxxx", "secondxxxx", "secondxxxx", "secondxxx"]
     system.release(kept)
 
 

@@ -158,7 +158,8 @@ def test_each_kind_of_wire_has_its_colour_and_its_line_in_the_key() -> None:
 
     assert {to_rgba(colour) for colour in COLOURS.values()} <= drawn
     shown = texts_of(figure)
-    for key in ("passed on at once", "held, value of the step before", "algebraic loop", "iterated until it settles"):
+    ends = "fresh, value of the end of the step", "held, value of the start of the step"
+    for key in (*ends, "algebraic loop", "iterated until it settles"):
         assert key in shown
     assert {"a", "b", "c", "d", "1", "2", "3", "4", "balises"} <= set(shown)
     red = [line for line in figure.axes[0].lines if line.get_color() == COLOURS["loop"]]

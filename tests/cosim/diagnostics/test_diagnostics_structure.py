@@ -150,8 +150,8 @@ def test_every_component_signal_and_connection_is_in_the_text() -> None:
         (line,) = (
             row for row in section(text, "Connections") if row.split()[0:3:2] == [".".join(s) for s in (link.source, link.target)]
         )
-        assert ("held, of the step before" in line) == link.held
-        assert ("passed on at once" in line) == (not link.held)
+        assert ("held, of the start of the step" in line) == link.held
+        assert ("fresh, of the end of the step" in line) == (not link.held)
     rows = section(text, "Components")[1:]
     assert [row.split()[:2] for row in rows if row] == [[str(i), n] for i, n in enumerate(structure.order, 1)]
     signals = section(text, "Inputs and outputs")[1:]
@@ -166,7 +166,7 @@ def test_every_component_signal_and_connection_is_in_the_text() -> None:
 def test_columns_are_aligned() -> None:
     rows = section(small().structure().text(), "Connections")
     (place,) = {row.index("->") for row in rows[1:]}
-    assert rows[0].index("value used") == max(row.index("held") if "held" in row else row.index("passed") for row in rows[1:])
+    assert rows[0].index("value used") == max(row.index("held") if "held" in row else row.index("fresh") for row in rows[1:])
     assert place > 0
 
 

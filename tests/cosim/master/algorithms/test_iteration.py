@@ -300,8 +300,7 @@ def test_balises_inside_an_iterated_loop_are_told_once_and_leave_no_trace(method
 
     def result(balises: BaliseSide | None) -> Ran:
         parts = [load_block(systems[name](), name, 3) for name in names]
-        held = prepare_coupled(parts, [("plant.speed", "listener.speed"), *pairs], 0.1, 10, balises)
-        assert [step.component.name for step in held.plan.steps] == names
+        held = prepare_coupled(parts, [("plant.speed", "listener.speed"), *pairs], 0.1, 10, balises, order=names)
         master = Master(held.plan, held.axis, held.balises, algorithm=lambda plan: Iterate(plan, [loop]))
         master.run()
         close(master.plan)

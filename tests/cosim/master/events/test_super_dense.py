@@ -212,7 +212,7 @@ def test_who_cannot_save_its_state_stays_where_it_is_and_is_noted(folder: Path, 
     reached: list[float] = []
     sealed = component(Sealed(), "sealed")
     others = parts(s=triggered_fmu(folder), r=receiver_fmu(folder))
-    seen = run([sealed, *others] if first else [*others, sealed], WIRES, 0.1, 10)
+    seen = run([*others, sealed], WIRES, 0.1, 10, order=["sealed", "s", "r"] if first else ["s", "r", "sealed"])
     assert seen.end("sealed.total") == pytest.approx(1.0, abs=ULPS)
     np.testing.assert_allclose(seen.jumps("r.when"), crossing_times(1.0), rtol=0.0, atol=ULPS)
     assert reached == sorted(reached)
