@@ -61,7 +61,7 @@ def parse(text: bytes, file: str, kind: str, undeclared: Callable[[str, str], No
     try:
         root = etree.fromstring(text, parser, base_url=file)
     except etree.XMLSyntaxError as error:
-        prefixes = _undeclared(error)
+        prefixes = _undeclared(parser.error_log)
         if prefixes and undeclared is not None:
             for prefix in prefixes:
                 undeclared(prefix, namespace_of(prefix))
@@ -141,9 +141,9 @@ def _schema(version: str, kind: str) -> Any:
     return etree.XMLSchema(file=str(SCHEMAS / version / f"{FILES[kind]}.xsd"))
 
 
-def _undeclared(error: etree.XMLSyntaxError) -> list[str]:
+def _undeclared(faults: Iterable[Any]) -> list[str]:
     """The prefixes without declaration, where nothing else is wrong with a text; in the order in which they are met."""
-    found = [UNDECLARED.match(entry.message) for entry in error.error_log]
+    found = [UNDECLARED.match(entry.message) for entry in faults]
     return list(dict.fromkeys(match[1] for match in found if match)) if all(found) else []
 
 

@@ -80,6 +80,8 @@ class Pipe:
         if self.unit is None or unit is None or self.unit == unit:
             return self
         one, other = self.unit.unit, unit.unit
+        if (one is None or other is None) and self.unit.name == unit.name:
+            return self  # whatever it is, both call it the same
         if one is None or other is None:
             unknown = (self.unit if one is None else unit).name
             between = f"from {self.unit.name!r} to {unit.name!r}"

@@ -8,17 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import ceil
+from typing import Any
 
 from cosim.balises.layout import TrackLayout
 from cosim.scenario.balise_service import BALISE_EVENT
 from cosim.scenario.tables import BalisesTable, ComponentTable
 from cosim.ssp.common import FAMILIES, INTEGER
 from cosim.ssp.faces import Face
+from plant_models.railway.track.balise_layout import UNUSED
 
 NAME = "balise_reader"
 READS_BALISES = "reads_balises"
 """Key of the annotation of the reader: it was added for other tools, and goes when the system is read back."""
 TOLD = ("count", "time", "position")
+PAGE = 16
 PARALLEL = 0
 """Tools that read SSP step all components with the outputs of the step before (OMSimulator, libcosim)."""
 
@@ -54,15 +58,18 @@ def make_reader(
         name += "_"
     links = [f"{table.position} -> {name}.position", f"{table.speed} -> {name}.speed"]
     links += [f"{name}.{BALISE_EVENT}_{field} -> {n}.{BALISE_EVENT}_{field}" for n in told for field in TOLD]
-    places = [float(position) for position in layout.positions]
-    component = {
-        "model": "balise_reader", "as": f"fmu{version}", "options": {"layout": "positions", "balise_capacity": len(places)},
-        "parameters": {"input_instant": PARALLEL, "positions": places},
-    }  # fmt: skip
-    if table.layout == "spacing":
-        spaced = {"first_balise": places[0], "balise_spacing": table.spacing, "balise_total": len(places)}
-        component |= {"options": {}, "parameters": {"input_instant": PARALLEL, **spaced}}
+    options, parameters = _track(table, [float(position) for position in layout.positions])
+    component: dict[str, Any] = {"model": "balise_reader", "as": f"fmu{version}", "options": options}
+    component["parameters"] = {"input_instant": PARALLEL, **parameters}
     return Reader(name, ComponentTable.model_validate(component), links)
+
+
+def _track(table: BalisesTable, places: list[float]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Options and parameters of the reader for balises at these places."""
+    if table.layout == "spacing":
+        return {}, {"first_balise": places[0], "balise_spacing": table.spacing, "balise_total": len(places)}
+    capacity = PAGE * ceil(len(places) / PAGE)  # few different FMUs, so that most need not be built
+    return {"layout": "positions", "balise_capacity": capacity}, {"positions": places + [UNUSED] * (capacity - len(places))}
 
 
 def is_told_by_counts(face: Face) -> bool:
