@@ -7,11 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ssp_files import EXPERIMENT, connector, package, ramp_fmu, ssd, sum_fmu, wire
+from ssp_files import EXPERIMENT, connector, described_fmu, package, ramp_fmu, ssd, sum_fmu, wire
 
 from cosim import Scenario
 from cosim.cli import main
+from cosim.components.loading import read_description
 from cosim.errors import ScenarioError
+from cosim.ssp.load import load_package
 
 RAMP = f"""<ssd:Component name="ramp" source="resources/ramp.fmu">
 <ssd:Connectors>{connector("speed", "output", "m/s")}</ssd:Connectors></ssd:Component>"""
@@ -122,3 +124,18 @@ def test_the_step_in_an_annotation_is_read(packed: Callable[[str], Path], writte
     told: list[str] = []
     scenario.run(warn=told.append)
     assert any(words in line for line in told) if words else not any("annotation" in line for line in told)
+
+
+def test_internal_variables_of_one_name_are_told_apart(tmp_path: Path) -> None:
+    variables = '<ScalarVariable name="y" valueReference="1" causality="output"><Real/></ScalarVariable>' + "".join(
+        f'<ScalarVariable name="error" valueReference="{reference}"><Real/></ScalarVariable>' for reference in (20, 27)
+    )
+    fmu = described_fmu(tmp_path, "twins", variables)
+    names = [v.name for v in read_description(fmu).modelVariables]
+    assert names == ["y", "error (value reference 20)", "error (value reference 27)"]
+    element = '<ssd:Elements><ssd:Component name="twins" source="resources/twins.fmu"/></ssd:Elements>'
+    path = package(tmp_path / "system.ssp", {"SystemStructure.ssd": ssd(element), "resources/twins.fmu": fmu})
+    words = "the name 'error' is given to more than one internal variable"
+    assert words in "".join(load_package(str(path)).doubts)
+    with pytest.raises(ScenarioError, match=words):
+        load_package(str(path), strict=True)
