@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 from fmpy.model_description import (
@@ -33,6 +33,7 @@ from plant_models.hybrid import HybridSystem, Signal, TracedSystem, TriggeredEve
 from plant_models.hybrid.units import BASE_SYMBOLS, conversion, parse_unit
 
 FmiVersion = Literal[2, 3]
+ItemOfTable = TypeVar("ItemOfTable")
 
 STAMP_NOW = -1.0e30
 """Start value of ``<event>_time``: the event happened at the time at which it is told."""
@@ -43,6 +44,13 @@ LOG_CATEGORIES = {
     "logStatusWarning": "Events that came too late or were lost",
     "logEvents": "Events that were applied",
 }
+
+FIRST_REFERENCE = 1
+"""Value references count from here in the order of the variables: each is the index of its variable as well, as FMI 2 counts.
+
+OMSimulator takes the dependencies of FMI 3, which are value references, for such indices, and does not load an FMU whose
+references are none.
+"""
 
 VERSION_STRINGS = {2: "2.0", 3: "3.0"}
 LATE_POLICY_TYPE = "LatePolicy"
@@ -56,9 +64,10 @@ TOKEN_ATTRIBUTES = (
 
 @dataclass(frozen=True)
 class VariableTable:
-    """Value references of a system: 0 is time, then contiguous blocks in this order.
+    """Value references of a system: time, then contiguous blocks in this order.
 
     Args:
+        time: value reference of the independent variable.
         inputs: first value reference of inputs and payloads (noise is not exposed).
         outputs: first of the outputs. states: first of the states. parameters: first of the parameters.
         events: first of the event variables, two for each triggered event (clock or count, then stamp).
@@ -69,6 +78,7 @@ class VariableTable:
         end: first value reference that is not used.
     """
 
+    time: int
     inputs: int
     outputs: int
     states: int
@@ -84,10 +94,15 @@ class VariableTable:
     def of(cls, system: HybridSystem) -> VariableTable:
         """The table of a system, the same for FMI 2 and FMI 3."""
         triggered = len(system.triggered_events)
-        counts = [width(exposed_inputs(system)), width(system.outputs), system.state_count, width(system.parameter_signals)]
+        counts = [1, width(exposed_inputs(system)), width(system.outputs), system.state_count, width(system.parameter_signals)]
         counts += [2 * triggered, *((2, len(OUTCOME_VARIABLES)) if triggered else (0, 0))]
         counts += [system.continuous_count, len(system.frictions)]
-        return cls(*(1 + sum(counts[:i]) for i in range(len(counts) + 1)))
+        return cls(*(FIRST_REFERENCE + sum(counts[:i]) for i in range(len(counts) + 1)))
+
+
+def referenced(items: Sequence[ItemOfTable], first: int, count: int = 1) -> Sequence[ItemOfTable]:
+    """Those that have `count` value references from `first` on, of what stands in the order of the variables."""
+    return items[first - FIRST_REFERENCE : first - FIRST_REFERENCE + count]
 
 
 def exposed_inputs(system: HybridSystem) -> tuple[Signal, ...]:
@@ -132,13 +147,14 @@ def describe(
         modelVariables=variables,
     )
     table = VariableTable.of(system)
-    description.outputs = _structure(system, variables, "output", table.outputs, width(system.outputs))
-    description.derivatives = _structure(system, variables, "derivative", table.derivatives, system.continuous_count)
-    indicators = variables[table.indicators : table.end]
-    description.eventIndicators = [Unknown(index=v.valueReference + 1, variable=v) for v in indicators]
+    outputs = _unknowns(system, variables, "output", table.outputs, width(system.outputs))
+    derivatives = _unknowns(system, variables, "derivative", table.derivatives, system.continuous_count)
+    # A master that is told nothing of these takes each to depend on every input, and sees algebraic loops where there are none.
+    description.initialUnknowns = [*outputs, *derivatives]
+    description.outputs, description.derivatives = ([_running(system, u) for u in group] for group in (outputs, derivatives))
+    indicators = referenced(variables, table.indicators, len(system.frictions))
+    description.eventIndicators = [Unknown(index=v.valueReference, variable=v) for v in indicators]
     description.numberOfContinuousStates, description.numberOfEventIndicators = system.continuous_count, len(indicators)
-    unknowns = [*description.outputs, *description.derivatives]
-    description.initialUnknowns = [Unknown(index=u.index, variable=u.variable) for u in unknowns]
     description.instantiationToken = _token(system, description)
     return description
 
@@ -188,7 +204,7 @@ def _variables(system: HybridSystem, fmi_version: FmiVersion, preset: str | None
     table = VariableTable.of(system)
     real = "Real" if fmi_version == 2 else "Float64"
     starts = _start_values(system, preset)
-    time = _variable("time", 0, real, "independent", "continuous", unit="s", description="Simulation time")
+    time = _variable("time", table.time, real, "independent", "continuous", unit="s", description="Simulation time")
     variables = [time]
     for first, signals in (
         (table.inputs, exposed_inputs(system)),
@@ -255,7 +271,7 @@ def _outcome_variables(reference: int, integer: str) -> list[ModelVariable]:
 def _rate_variables(system: HybridSystem, variables: list[ModelVariable], real: str) -> list[ModelVariable]:
     """Derivatives of the continuous states, then the event indicators of the states with dry friction."""
     table = VariableTable.of(system)
-    states = variables[table.states : table.states + system.continuous_count]
+    states = referenced(variables, table.states, system.continuous_count)
     rates = []
     for i, state in enumerate(states):
         unit, text = _per_second(state.unit or "1"), f"Derivative of {state.name}"
@@ -328,22 +344,35 @@ def _unit_definition(name: str, shown: list[str]) -> Unit:
     return Unit(name=name, baseUnit=base, displayUnits=display)
 
 
-def _structure(system: HybridSystem, variables: list[ModelVariable], function: str, first: int, count: int) -> list[Unknown]:
-    """Outputs or derivatives, each with the inputs, continuous states and time that it depends on."""
-    table = VariableTable.of(system)
+def _unknowns(system: HybridSystem, variables: list[ModelVariable], function: str, first: int, count: int) -> list[Unknown]:
+    """Outputs or derivatives at initialisation: each with the time, inputs, start values and parameters that it depends on."""
+    named = referenced(variables, first, count)
     unknowns = []
-    for row, references in enumerate(_dependencies(system, function, count, table)):
-        known = [variables[reference] for reference in references]
-        unknown = Unknown(index=first + row + 1, variable=variables[first + row], dependencies=known)
-        unknown.dependenciesKind = ["dependent"] * len(known)
-        unknowns.append(unknown)
+    for variable, references in zip(named, _dependencies(system, function, count), strict=True):
+        known = [known for reference in references for known in referenced(variables, reference)]
+        unknowns.append(_unknown(variable, known))
     return unknowns
 
 
-def _dependencies(system: HybridSystem, function: str, count: int, table: VariableTable) -> list[list[int]]:
+def _running(system: HybridSystem, unknown: Unknown) -> Unknown:
+    """The same once time runs: what it depends on among time, inputs and continuous states."""
+    table = VariableTable.of(system)
+    last = table.states + system.continuous_count
+    known = (v for v in unknown.dependencies if v.valueReference < table.outputs or table.states <= v.valueReference < last)
+    return _unknown(unknown.variable, list(known))
+
+
+def _unknown(variable: ModelVariable, known: list[ModelVariable]) -> Unknown:
+    kinds = ["dependent"] * len(known)
+    return Unknown(index=variable.valueReference, variable=variable, dependencies=known, dependenciesKind=kinds)
+
+
+def _dependencies(system: HybridSystem, function: str, count: int) -> list[list[int]]:
     """Value references that each row of `output` or `derivative` depends on; all of them where it cannot be traced."""
-    inputs, states = width(exposed_inputs(system)), system.continuous_count
-    groups = (("t", 0, 1), ("u", table.inputs, inputs), ("x", table.states, states))
+    table = VariableTable.of(system)
+    inputs, parameters = width(exposed_inputs(system)), width(system.parameter_signals)
+    groups = (("t", table.time, 1), ("u", table.inputs, inputs), ("x", table.states, system.state_count),
+              ("p", table.parameters, parameters))  # fmt: skip
     rows: list[list[int]] = [[] for _ in range(count)]
     traced = TracedSystem(system) if system.traceable and count else None
     for group, first, width_ in groups:

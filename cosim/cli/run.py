@@ -33,7 +33,7 @@ def register(commands: Any) -> None:
     parser.add_argument("--json", action="store_true", help="print the summary as JSON instead of the table")
     parser.add_argument("--no-report", action="store_true", help="write result files only")
     parser.add_argument(
-        "--strict", action="store_true", help="exit with 1 when the run gave warnings, e.g. an exceeded certificate"
+        "--strict", action="store_true", help="refuse an SSP of wrong form; exit with 1 when the run gave warnings"
     )
     parser.add_argument("--log-calls", nargs="?", const="", metavar="FILE",
                         help="log every call of every component to FILE (default: calls.log among the results)")  # fmt: skip

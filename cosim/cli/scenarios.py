@@ -33,7 +33,7 @@ def load_scenario(options: argparse.Namespace) -> Scenario:
     Raises:
         ScenarioError: there is none, or an override is not ``NAME=VALUE``.
     """
-    scenario = Scenario.load(options.scenario)
+    scenario = Scenario.load(options.scenario, strict=getattr(options, "strict", False))
     for setting in options.settings:
         scenario.set(*parse_setting(setting))
     return scenario

@@ -64,7 +64,19 @@ def connect_clocks(
         taken[made.target] = pair[0]
         clocks.append(made)
         components[made.target[0]].events.pop(made.target[1], None)
+    for _, target, *_ in others:
+        _leave_to_connection(target, components)
     return clocks, others
+
+
+def _leave_to_connection(target: str, components: Mapping[str, Component]) -> None:
+    """An event whose count is connected is told by its source, stamp and payload with it: the master has no part in it."""
+    component, signal = split_name(target, components, "Connection target")
+    events = components[component].events
+    variable = components[component].variables.get(signal)
+    for name, port in list(events.items()):
+        if variable is not None and variable.valueReference == port.trigger:
+            del events[name]
 
 
 def _clock_connection(pair: Link, components: Mapping[str, Component]) -> ClockConnection | None:

@@ -215,7 +215,9 @@ def _connectable(component: Component, name: str, *causalities: str) -> ModelVar
     if variable.type == "Clock":
         raise CouplingError(f"{component.name}.{name} is a {described(variable)}; it has no value that could be connected.")
     if variable.causality == "input" and variable.valueReference in component.event_references():
-        raise CouplingError(f"{component.name}.{name} belongs to an event; the master sets it, it cannot be connected.")
+        raise CouplingError(
+            f"{component.name}.{name} belongs to an event, of which the master tells; connect its count too, or leave all of it."
+        )
     return variable
 
 

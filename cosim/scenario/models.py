@@ -17,6 +17,7 @@ from cosim.components.recording_data import Recording
 from cosim.errors import ScenarioError, nearest
 from cosim.scenario.realisations import FAULTS, Request, Tell, cannot_build, realise
 from cosim.scenario.tables import ComponentTable, Realisation
+from fmu_observer.event_protocol import EventProtocol
 from plant_models.hybrid import HybridSystem
 
 LATE_PARAMETERS = frozenset({"late_policy", "replay_horizon"})
@@ -128,14 +129,18 @@ def protocol_parameters(table: ComponentTable, component: Component, where: str)
     return given if component.kind == "FMU" else {}
 
 
-def native_fmu(system: HybridSystem, version: Any, preset: str | None, where: str) -> Path:
+def native_fmu(system: HybridSystem, version: Any, preset: str | None, where: str, protocol: EventProtocol | None = None) -> Path:
     """The FMU of a shipped system, built where it was not yet.
 
+    Args:
+        system: the system. version: of FMI. preset: of its parameters. where: place for messages.
+        protocol: how it is told of events; None for what is usual in the version of FMI.
+
     Raises:
-        FmuLoadError: it cannot be built; `where` is the place for the message.
+        FmuLoadError: it cannot be built.
     """
     try:
-        return fmus.cached_fmu(system, fmi_version=version, preset=preset)
+        return fmus.cached_fmu(system, fmi_version=version, preset=preset, protocol=protocol)
     except FAULTS as error:
         raise cannot_build(where, system, error) from error
 

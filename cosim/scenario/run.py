@@ -51,6 +51,7 @@ from cosim.scenario.roles import ROLES, check_roles, signals_to_record
 from cosim.scenario.schema import ScenarioTable, step_count
 from cosim.scenario.starts import start_values
 from cosim.scenario.summary import first_summary, run_summary
+from fmus.check.sense import doubled_names
 from plant_models.hybrid.units import Unit
 
 if TYPE_CHECKING:
@@ -152,6 +153,9 @@ class _Setup:
             warning = tool_warning(name, self.components[name].description)
             if warning is not None:
                 self._warn(warning)
+            doubled = doubled_names(self.components[name].description)
+            if doubled is not None and not any(doubled in told for told in self.warnings):
+                self._warn(f"{name}: {doubled}")
         clocks, pairs = connect_clocks(pairs, self.components)
         connections = self.connections = connect(pairs, self.components)
         receivers, plant = self._balise_roles()

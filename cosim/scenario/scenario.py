@@ -59,7 +59,7 @@ class Scenario:
         self._files: object = None  # what keeps unpacked files alive
 
     @classmethod
-    def load(cls, name_or_path: str | Path) -> Scenario:
+    def load(cls, name_or_path: str | Path, *, strict: bool = False) -> Scenario:
         """A shipped scenario by name, or one from a TOML file (paths in it are relative to the file) or from an SSP.
 
         A file is merged with those it names under ``include``; its ``[overrides]`` are applied last.
@@ -67,13 +67,14 @@ class Scenario:
         Args:
             name_or_path: ``freight_profile_d``, ``my.toml``, ``system.ssp``, or ``system.ssp#Variant`` for a structure in it; or
                 a results folder, for the scenario that it was made from.
+            strict: whether an SSP whose form is not as the standard wants it is refused; else the run warns of it.
 
         Raises:
             ScenarioError: there is no such scenario, or it is not TOML, or not SSP.
             ProvenanceError: the results folder does not say what it was made from.
         """
         if is_package(name_or_path):
-            return cls._from_package(str(name_or_path))
+            return cls._from_package(str(name_or_path), strict)
         stored = None
         if Path(name_or_path).is_dir() and str(name_or_path) not in shipped_scenarios():
             from cosim.provenance.manifest import read_manifest  # noqa: PLC0415 - only for those who load results
@@ -88,10 +89,10 @@ class Scenario:
         return scenario
 
     @classmethod
-    def _from_package(cls, name: str) -> Scenario:
+    def _from_package(cls, name: str, strict: bool) -> Scenario:
         from cosim.ssp.load import load_package  # noqa: PLC0415 - lxml only for those who read such files
 
-        loaded = load_package(name)
+        loaded = load_package(name, strict)
         scenario = cls(where=name, **loaded.tables)
         scenario._doubts, scenario._files = loaded.doubts, loaded.unpacked
         return scenario

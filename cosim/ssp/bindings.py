@@ -7,11 +7,12 @@ before inner ones. Values are converted to the units of the variables.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from cosim.errors import nearest
 from cosim.ssp.common import FAMILIES, INTEGER, REAL, NamedUnit
-from cosim.ssp.document import Node, fail, place
+from cosim.ssp.document import Node, fail
+from cosim.ssp.lapses import Lapses
 from cosim.ssp.model import Binding, ComponentElement, Element, Entry, Parameter, SystemElement
 from cosim.ssp.nets import Nets, Path, Point
 from cosim.ssp.pipe import BOOLEANS, Pipe
@@ -20,6 +21,8 @@ from cosim.ssp.values import LISTS
 Scalar = float | str
 Value = Scalar | list[Scalar]
 """A start value as a scenario writes it."""
+Starts = dict[Path, dict[str, Value]]
+"""Start values by path of the component and name of the variable."""
 ACCEPTED: dict[str, set[str]] = {
     REAL: {REAL, INTEGER},
     INTEGER: {INTEGER},
@@ -29,14 +32,6 @@ ACCEPTED: dict[str, set[str]] = {
     "Binary": {"Binary"},
 }
 """Types of parameters by the type of the variable that they may set; nothing may be lost."""
-
-
-@dataclass
-class Starts:
-    """Start values by path of the component and name of the variable, and what was doubtful."""
-
-    values: dict[Path, dict[str, Value]] = field(default_factory=dict)
-    doubts: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -61,13 +56,16 @@ class Given:
         return Pipe(self.parameter.type.unit).through(unit, suppress, step, self.node)
 
 
-def start_values(nets: Nets) -> Starts:
+def start_values(nets: Nets, lapses: Lapses) -> Starts:
     """Start values that the bindings of all elements give.
+
+    Args:
+        nets: the elements. lapses: told of parameters that nothing is called.
 
     Raises:
         ScenarioError: a value that does not fit its variable, or a mapping to what does not exist.
     """
-    applying = _Applying(nets)
+    applying = _Applying(nets, lapses)
     for path in sorted(nets.elements, key=len, reverse=True):  # what is applied later counts, and outer systems count most
         for binding in nets.elements[path].bindings:
             applying.apply(binding, path)
@@ -77,8 +75,9 @@ def start_values(nets: Nets) -> Starts:
 class _Applying:
     """Applies bindings one after the other."""
 
-    def __init__(self, nets: Nets) -> None:
-        self.nets, self.starts = nets, Starts()
+    def __init__(self, nets: Nets, lapses: Lapses) -> None:
+        self.nets, self.lapses = nets, lapses
+        self.starts: Starts = {}
 
     def apply(self, binding: Binding, path: Path) -> None:
         """All parameters of a binding of the element at `path`, or those that its mapping names."""
@@ -86,12 +85,12 @@ class _Applying:
         if binding.mapping is None:
             for name, parameter in parameters.items():
                 if not self.assign(Given(parameter), name, path):
-                    self.doubt(parameter.node, f"parameter {name!r} is {self.nothing(name, path)}, so it is ignored")
+                    self.lapses.tell(parameter.node, f"parameter {name!r} is {self.nothing(name, path)}, so it is ignored.")
             return
         for entry in binding.mapping:
             if entry.source not in parameters:
                 known = nearest(entry.source, parameters)
-                self.doubt(entry.node, f"{entry.source!r} is mapped and not in the parameter set; {known}")
+                self.lapses.tell(entry.node, f"{entry.source!r} is mapped and not in the parameter set; {known}")
             elif not self.assign(Given(parameters[entry.source], entry), entry.target, path):
                 fail(entry.node, f"{entry.source!r} is mapped to {entry.target!r}, {self.nothing(entry.target, path)}.")
 
@@ -127,7 +126,7 @@ class _Applying:
         values = [_value(text, parameter, pipe, node) for text in parameter.values]
         if family == "Enumeration":
             _check_items(values, face.items(name), point, node)
-        self.starts.values.setdefault(point.path, {})[point.name + point.suffix] = values if parameter.array else values[0]
+        self.starts.setdefault(point.path, {})[point.name + point.suffix] = values if parameter.array else values[0]
 
     def exists(self, point: Point) -> bool:
         """Whether the component has this variable, or an array of this name as variables of their own."""
@@ -142,10 +141,6 @@ class _Applying:
         if point.path in self.nets.faces:
             return self.nets.faces[point.path].unit(self.variable(point))
         return self.nets.unit(point)
-
-    def doubt(self, node: Node, text: str) -> None:
-        """Something that is not as it should be, and no fault by the standard."""
-        self.starts.doubts.append(f"{place(node)}: {text}.")
 
     def nothing(self, name: str, path: Path) -> str:
         """That there is nothing of this name, and what there is."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from cosim.ssp.document import Node, fail, find, find_all, short
-from plant_models.hybrid.units import BASE_SYMBOLS, Unit
+from cosim.ssp.lapses import Lapses
+from plant_models.hybrid.units import BASE_SYMBOLS, Unit, UnitError, parse_unit
 
 REAL, INTEGER = "Real", "Integer"
 FAMILIES: dict[str, str] = {
@@ -15,6 +17,7 @@ FAMILIES: dict[str, str] = {
     **{name: name for name in ("Boolean", "String", "Enumeration", "Binary", "Clock")},
 }
 """What a type of SSP or FMI is, whatever its size."""
+RAD = BASE_SYMBOLS.index("rad")  # the last one
 TRANSFORMATIONS = (
     "LinearTransformation", "BooleanMappingTransformation", "IntegerMappingTransformation", "EnumerationMappingTransformation",
 )  # fmt: skip
@@ -22,10 +25,10 @@ TRANSFORMATIONS = (
 
 @dataclass(frozen=True)
 class NamedUnit:
-    """A unit and what a file calls it."""
+    """A unit and what a file calls it; None where nothing says what it is."""
 
     name: str
-    unit: Unit
+    unit: Unit | None
 
 
 @dataclass(frozen=True)
@@ -70,39 +73,68 @@ Step = Linear | ValueMap
 """One transformation as it is written."""
 
 
-def read_units(root: Node, prefix: str) -> dict[str, Unit]:
+class UnitTable:
     """The units that a file defines, by name.
 
+    A file that uses what it does not define is read as far as that has one meaning: no name is no unit, and brackets around a
+    name are not part of it. What is left is a name only, whatever others mean by it: a number with it can go where the name is
+    the same or none, and nowhere else.
+
     Args:
-        root: its root element. prefix: of its own namespace.
+        root: root element of the file. prefix: of its own namespace. lapses: told of what is used and not defined.
 
     Raises:
         ScenarioError: a name is given twice.
     """
-    units: dict[str, Unit] = {}
-    for node in find_all(root, f"{prefix}:Units/ssc:Unit"):
-        base = find(node, "ssc:BaseUnit")
-        name = node.get("name")
-        if name in units:
-            fail(node, f"unit {name!r} is defined twice.")
-        powers = tuple(int(base.get(symbol, "0")) for symbol in BASE_SYMBOLS)
-        units[name] = Unit(powers, float(base.get("factor", "1")), float(base.get("offset", "0")))
-    return units
+
+    def __init__(self, root: Node, prefix: str, lapses: Lapses) -> None:
+        self._lapses = lapses
+        self._units: dict[str, Unit] = {}
+        for node in find_all(root, f"{prefix}:Units/ssc:Unit"):
+            base = find(node, "ssc:BaseUnit")
+            name = node.get("name")
+            if name in self._units:
+                fail(node, f"unit {name!r} is defined twice.")
+            powers = tuple(int(base.get(symbol, "0")) for symbol in BASE_SYMBOLS)
+            self._units[name] = Unit(powers, float(base.get("factor", "1")), float(base.get("offset", "0")))
+            self._compare(name, node)
+
+    def named(self, node: Node) -> NamedUnit | None:
+        """The unit that the attribute ``unit`` of an element names; None where it names none."""
+        name = node.get("unit")
+        if name is None or name in self._units:
+            return None if name is None else NamedUnit(name, self._units[name])
+        bare = name.strip().removeprefix("[").removesuffix("]").strip()
+        if not bare:
+            self._lapses.forgive(node, f"unit {name!r} is not defined in this file; taken as no unit: no number is converted.")
+            return None
+        unit = self._units.get(bare)
+        taken = f"taken as {bare!r}" + ("" if unit else ", whose numbers go only where the unit has the same name or none")
+        known = ", ".join(map(repr, self._units)) or "none"
+        self._lapses.forgive(node, f"unit {name!r} is not defined in this file, whose Units element has {known}; {taken}.")
+        return NamedUnit(bare, unit)
+
+    def _compare(self, name: str, node: Node) -> None:
+        """Tell of a unit that is defined otherwise than everybody understands its name: numbers follow the definition."""
+        usual, defined = _usual(name), self._units[name]
+        if usual is not None and not _same(usual, defined):
+            meant = f"unit {name!r} is defined as {_formula(defined)}, usually it is {_formula(usual)}"
+            self._lapses.tell(node, f"{meant}; values are converted by the definition of the package.")
 
 
-def read_type(node: Node, units: Mapping[str, Unit], prefix: str = "ssc") -> Type | None:
+def read_type(node: Node, units: UnitTable, prefix: str = "ssc") -> Type | None:
     """The type written within an element, or None where it has none.
 
     Args:
         node: connector, dictionary entry or parameter. units: those of its file. prefix: of the type's namespace.
 
     Raises:
-        ScenarioError: it names a unit that the file does not define.
+        ScenarioError: it names a unit that the file does not define, and the reading is strict.
     """
     for child in node:
         name = short(child.tag)
         if name in FAMILIES and find(node, f"{prefix}:{name}") is child:
-            return Type(name, _unit(child, units), child.get("name") if name == "Enumeration" else None)
+            return Type(name, units.named(child), child.get("name") if name == "Enumeration" else None)
     return None
 
 
@@ -131,10 +163,20 @@ def _entries(node: Node) -> dict[str, str]:
     return entries
 
 
-def _unit(node: Node, units: Mapping[str, Unit]) -> NamedUnit | None:
-    name = node.get("unit")
-    if name is None:
+def _usual(name: str) -> Unit | None:
+    """What everybody takes a name for, or None."""
+    try:
+        return parse_unit(name)
+    except UnitError:
         return None
-    if name not in units:
-        fail(node, f"unit {name!r} is not defined in this file; its Units element has {', '.join(map(repr, units)) or 'none'}.")
-    return NamedUnit(name, units[name])
+
+
+def _same(one: Unit, other: Unit) -> bool:
+    close = [math.isclose(a, b, rel_tol=1e-6, abs_tol=1e-12) for a, b in ((one.factor, other.factor), (one.offset, other.offset))]
+    return all(close) and one.exponents[:RAD] == other.exponents[:RAD]  # a radian is a number: written or not
+
+
+def _formula(unit: Unit) -> str:
+    powers = zip(BASE_SYMBOLS, unit.exponents, strict=True)
+    base = ".".join(f"{symbol}{power}" if power != 1 else symbol for symbol, power in powers if power) or "1"
+    return f"{unit.factor:g} {base}" + (f" + {unit.offset:g}" if unit.offset else "")

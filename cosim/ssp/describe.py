@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from cosim.ssp.lapses import Lapses
 from cosim.ssp.load import find_variant, load_structure
 from cosim.ssp.model import ComponentElement, DictionaryReference, Element, SystemElement
 from cosim.ssp.names import split_variant
@@ -23,7 +24,7 @@ def describe_package(name: str) -> dict[str, Any]:
         CosimError: it cannot be read.
     """
     path, variant = split_variant(name)
-    package = Package(Path(path), path, Unpacked())
+    package = Package(Path(path), path, Unpacked(), Lapses())
     structure = read_structure(package, find_variant(package, variant))
     loaded = load_structure(structure, package)
     tables = loaded.tables

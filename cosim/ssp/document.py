@@ -7,6 +7,7 @@ Touches lxml and the schema files beside it, nothing else of the package. The sc
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any, NoReturn
@@ -38,15 +39,20 @@ FILES = {
     "ssb": "SystemStructureSignalDictionary",
 }
 FAULTS_SHOWN = 3
+UNDECLARED = re.compile(r"Namespace prefix (\S+) (?:on|for) .* is not defined")
+"""What libxml2 says of a prefix without declaration."""
+FIRST_ELEMENT = re.compile(rb"<[A-Za-z_][\w:.-]*")
 Node = Any
 """An element of lxml; its `base` is the name of the file it stands in."""
 
 
-def parse(text: bytes, file: str, kind: str) -> Node:
+def parse(text: bytes, file: str, kind: str, undeclared: Callable[[str, str], None] | None = None) -> Node:
     """The root of a file of SSP, valid against the schema of its version.
 
     Args:
         text: its content. file: its name for messages. kind: ``ssd``, ``ssv``, ``ssm`` or ``ssb``.
+        undeclared: told of each prefix that is used and not declared, and of the namespace that is taken for it; without it
+            such a file is refused.
 
     Raises:
         ScenarioError: it is not XML, of another kind or version, or not as the schema wants it; with the line.
@@ -55,6 +61,11 @@ def parse(text: bytes, file: str, kind: str) -> Node:
     try:
         root = etree.fromstring(text, parser, base_url=file)
     except etree.XMLSyntaxError as error:
+        prefixes = _undeclared(parser.error_log)
+        if prefixes and undeclared is not None:
+            for prefix in prefixes:
+                undeclared(prefix, namespace_of(prefix))
+            return parse(_declared(text, prefixes), file, kind)
         raise ScenarioError(f"{file}, line {error.lineno}: not readable as XML: {error.msg}.") from error
     if root.getroottree().docinfo.doctype:
         raise ScenarioError(f"{file}: holds a document type declaration; files of SSP have none, and it may hide anything.")
@@ -84,6 +95,11 @@ def validated(root: Node, file: str, kind: str) -> Node:
         more = [f"{file}: and {len(faults) - FAULTS_SHOWN} more."] if len(faults) > FAULTS_SHOWN else []
         raise ScenarioError("\n".join([*lines, *more]))
     return root
+
+
+def namespace_of(prefix: str) -> str:
+    """The namespace that a prefix usually stands for; one of its own where none is known."""
+    return NAMESPACES.get(prefix, f"urn:undeclared:{prefix}")
 
 
 def find(node: Node, path: str) -> Node:
@@ -123,6 +139,18 @@ def flag(node: Node, name: str) -> bool:
 @cache
 def _schema(version: str, kind: str) -> Any:
     return etree.XMLSchema(file=str(SCHEMAS / version / f"{FILES[kind]}.xsd"))
+
+
+def _undeclared(faults: Iterable[Any]) -> list[str]:
+    """The prefixes without declaration, where nothing else is wrong with a text; in the order in which they are met."""
+    found = [UNDECLARED.match(entry.message) for entry in faults]
+    return list(dict.fromkeys(match[1] for match in found if match)) if all(found) else []
+
+
+def _declared(text: bytes, prefixes: Iterable[str]) -> bytes:
+    """The text with declarations of prefixes in its first element."""
+    added = "".join(f' xmlns:{prefix}="{namespace_of(prefix)}"' for prefix in prefixes)
+    return FIRST_ELEMENT.sub(lambda match: match[0] + added.encode(), text, count=1)
 
 
 def _namespace(tag: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,9 +11,11 @@ from typing import Any
 
 from fmpy.model_description import ModelDescription
 
+from cosim.balises.layout import TrackLayout
 from cosim.components.loading import describe_fmu
 from cosim.errors import CosimError, CouplingError, OutputError, ScenarioError, nearest
 from cosim.scenario.connections import parse_connections
+from cosim.scenario.layouts import make_layout
 from cosim.scenario.models import LATE_PARAMETERS, make_system, native_fmu
 from cosim.scenario.realisations import NATIVE
 from cosim.scenario.schema import ScenarioTable
@@ -23,11 +26,16 @@ from cosim.ssp.common import FAMILIES, INTEGER, REAL
 from cosim.ssp.document import VERSIONS, Node
 from cosim.ssp.faces import Face
 from cosim.ssp.package import DEFAULT_VARIANT
+from cosim.ssp.reader import READS_BALISES, Reader, is_told_by_counts, make_reader
 from cosim.ssp.write import TOOL, Definitions, add_connector, add_parameter, child, root_of, text_of
+from fmu_observer.event_protocol import EventProtocol
 from fmus.pack import check_target, pack_fmu
+from plant_models.railway.sensors.balise_reader import BaliseReader
 
 ELEMENT_OF_ARRAY = re.compile(r"(.+)\[(\d+(?:,\d+)*)\]")
 BALISES_FILE = "resources/balises.csv"
+MOST_BALISES = max(BaliseReader.option_choices["balise_capacity"])
+LOG = logging.getLogger("cosim")
 
 
 @dataclass(frozen=True)
@@ -89,6 +97,9 @@ class _Exporter:
             )
         for name, component in self.table.components.items():
             self.parts[name] = self.part(name, component)
+        reader = self.reader()
+        if reader is not None:
+            self.parts[reader.name] = self.part(reader.name, reader.table)
         root = root_of(
             "ssd", "SystemStructureDescription", self.version,
             name=self.table.title, description=self.table.description.strip(), generationTool=TOOL,
@@ -96,12 +107,34 @@ class _Exporter:
         system = child(root, "ssd", "System", name=self.name)
         elements = child(system, "ssd", "Elements")
         for name, part in self.parts.items():
-            self.add_component(elements, name, part)
-        self.add_connections(system)
+            self.add_component(elements, name, part, {READS_BALISES: True} if reader and name == reader.name else {})
+        self.add_connections(system, [*self.table.connections, *(reader.links if reader else ())])
         self.definitions.write(root, "ssd")
         child(root, "ssd", "DefaultExperiment", startTime=repr(self.table.start), stopTime=repr(self.table.stop))
         root.append(write_extras(self.extras()))
         self.files[DEFAULT_VARIANT] = text_of(root)
+
+    def reader(self) -> Reader | None:
+        """The component that tells the others of balises in a tool that knows of none, where one is needed and can be made."""
+        balises = self.table.balises
+        if balises is None:
+            return None
+        layout = make_layout(balises, self.table.start, self.table.stop, self.folder, self.where)
+        listed = isinstance(layout, TrackLayout) and (balises.layout == "spacing" or len(layout.positions) <= MOST_BALISES)
+        if not isinstance(layout, TrackLayout) or not listed:
+            why = f"layout '{balises.layout}' says when balises are passed and not where"
+            if isinstance(layout, TrackLayout):
+                why = f"a reader holds at most {MOST_BALISES} balises and there are {len(layout.positions)}"
+            LOG.warning(
+                "%s: other tools will tell the observers of no balises, for no reader could be added: %s.", self.where, why
+            )
+            return None
+        faces = {name: part.face for name, part in self.parts.items()}
+        taken = {link[1] for link in parse_connections(self.table.connections, self.where)}
+        newest = max(
+            (3 for face in faces.values() if is_told_by_counts(face) and face.description.fmiVersion[0] == "3"), default=2
+        )
+        return make_reader(balises, layout, faces, taken, newest)
 
     def part(self, name: str, component: ComponentTable) -> Part:
         """A component with its FMU, which is built where it is a model of this package."""
@@ -116,7 +149,9 @@ class _Exporter:
             fmu = (self.folder / str(component.fmu)).resolve()
         else:
             version = 2 if self.version == "1.0" else int((component.realisation or NATIVE)[-1])
-            fmu = native_fmu(system, version, component.preset, place)
+            # A master that knows no event mode can tell an FMU of events by counts only.
+            counts = None if self.table.balises is None else EventProtocol("counts")
+            fmu = native_fmu(system, version, component.preset, place, counts if system.triggered_events else None)
         face = Face(self.checked(fmu, name, component), f"component {name!r}")
         if self.version == "1.0" and face.description.fmiVersion.startswith("3"):
             raise ScenarioError(
@@ -137,8 +172,8 @@ class _Exporter:
             raise ScenarioError(f"{self.where}: {error}") from error
         return component.description
 
-    def add_component(self, parent: Node, name: str, part: Part) -> None:
-        """A component with its connectors, parameters and origin."""
+    def add_component(self, parent: Node, name: str, part: Part, more: Mapping[str, Any]) -> None:
+        """A component with its connectors, parameters and origin, and what else its annotation says."""
         node = child(parent, "ssd", "Component", name=name, type="application/x-fmu-sharedlibrary", source=part.member)
         variables = [v for v in part.face.variables.values() if v.causality in ("input", "output")]
         if variables:
@@ -151,7 +186,7 @@ class _Exporter:
             self.files[f"resources/{name}.ssv"] = values
             child(child(node, "ssd", "ParameterBindings"), "ssd", "ParameterBinding", source=f"resources/{name}.ssv")
         own = part.table.model_dump(mode="json", by_alias=True, exclude_unset=True, exclude={"fmu", "parameters"})
-        node.append(write_extras(own | {DIGEST: digest(part.fmu)}))
+        node.append(write_extras(own | {DIGEST: digest(part.fmu), **more}))
 
     def parameter_file(self, name: str, part: Part) -> bytes | None:
         """The parameter set of a component, or None where it has none."""
@@ -159,12 +194,11 @@ class _Exporter:
         given = {k: v for k, v in late.items() if k in part.face.variables} | part.table.parameters
         if not given:
             return None
-        root, definitions = root_of("ssv", "ParameterSet", self.version, name=name, generationTool=TOOL), Definitions()
+        root = root_of("ssv", "ParameterSet", self.version, name=name, generationTool=TOOL)
         parameters = child(root, "ssv", "Parameters")
         for key, value in given.items():
             for variable, values, shape in self.assignments(name, part.face, key, value):
-                self.add_parameter(parameters, part.face, variable, values, shape, definitions)
-        definitions.write(root, "ssv")
+                self.add_parameter(parameters, part.face, variable, values, shape)
         return text_of(root)
 
     def assignments(self, name: str, face: Face, key: str, value: Any) -> list[tuple[str, list[Any], list[int]]]:
@@ -187,13 +221,15 @@ class _Exporter:
             return [(v, values, []) for v in split]
         return [(f"{key}[{i}]", [v], []) for i, v in enumerate(values, start=1)]
 
-    def add_parameter(
-        self, parent: Node, face: Face, name: str, values: list[Any], shape: Sequence[int], definitions: Definitions
-    ) -> None:
-        """One parameter in the words of SSP: a number with its unit, an item by its name."""
+    def add_parameter(self, parent: Node, face: Face, name: str, values: list[Any], shape: Sequence[int]) -> None:
+        """One parameter in the words of SSP: a number, an item by its name.
+
+        Numbers are in the unit of the variable, which the standard takes where none is written; a Float64 with a unit is not read
+        by OMSimulator (November 2025).
+        """
         if name not in face.variables:
             raise ScenarioError(f"{self.where}: {face.what} has no variable {name!r}; {nearest(name, face.variables)}")
-        kind, unit = str(face.variables[name].type), face.unit(name)
+        kind = str(face.variables[name].type)
         if kind == "Enumeration" and not face.items(name):
             kind = "Integer"
         elif kind == "Enumeration":
@@ -201,12 +237,11 @@ class _Exporter:
             values = [v if isinstance(v, str) else names.get(int(v), v) for v in values]
         if shape and self.version == "1.0":
             raise ScenarioError(f"{self.where}: {face.what}: {name} is an array, which SSP 1.0 does not know; use version 2.0.")
-        attributes = {"unit": definitions.unit(unit)} if FAMILIES[kind] == REAL and unit is not None else {}
-        add_parameter(parent, name, kind, values, shape, **attributes)
+        add_parameter(parent, name, kind, values, shape)
 
-    def add_connections(self, system: Node) -> None:
-        """The connections of the root system."""
-        links = parse_connections(self.table.connections, self.where)
+    def add_connections(self, system: Node, written: Sequence[Any]) -> None:
+        """The connections of the root system, as a scenario writes them."""
+        links = parse_connections(written, self.where)
         holder = child(system, "ssd", "Connections") if links else None
         for source, target, *given in links:
             ends = [self.end(name, causality) for name, causality in ((source, "output"), (target, "input"))]

@@ -11,7 +11,9 @@ from cosim.components.loading import read_description
 from cosim.errors import FmuLoadError, nearest
 from cosim.ssp.common import FAMILIES, NamedUnit
 from cosim.ssp.document import Node, fail
+from cosim.ssp.lapses import Lapses
 from cosim.ssp.model import ComponentElement, Connector
+from fmus.check.sense import doubled_names
 from plant_models.hybrid.units import BASE_SYMBOLS, Unit, UnitError, parse_unit
 
 
@@ -86,8 +88,11 @@ class Face:
         return Unit(powers, 1.0 if base.factor is None else float(base.factor), float(base.offset or 0.0))
 
 
-def face_of(element: ComponentElement) -> Face:
+def face_of(element: ComponentElement, lapses: Lapses) -> Face:
     """The face of a component's FMU.
+
+    Args:
+        element: the component. lapses: told of names that it gives twice.
 
     Raises:
         ScenarioError: its file is no FMU that can be read.
@@ -96,4 +101,7 @@ def face_of(element: ComponentElement) -> Face:
         description = read_description(element.fmu, element.name)
     except FmuLoadError as error:
         fail(element.node, str(error).replace(str(element.fmu), element.member))
+    doubled = doubled_names(description)
+    if doubled is not None:
+        lapses.forgive(element.node, f"{element.member}: {doubled}")
     return Face(description, f"component {element.name!r} ({element.member})")

@@ -12,12 +12,14 @@ from cosim.errors import ScenarioError, nearest
 from cosim.scenario.models import LATE_PARAMETERS
 from cosim.ssp.annotation import DIGEST, digest
 from cosim.ssp.bindings import start_values
-from cosim.ssp.document import fail, place
+from cosim.ssp.document import fail
+from cosim.ssp.lapses import Lapses
 from cosim.ssp.model import ComponentElement, Structure
 from cosim.ssp.names import split_variant
 from cosim.ssp.nets import Chain, Nets, Path, flat_names
 from cosim.ssp.package import DEFAULT_VARIANT, Package, Unpacked
 from cosim.ssp.pipe import Pipe, by_items, numeric, simplest
+from cosim.ssp.reader import READS_BALISES
 from cosim.ssp.structure import read_structure
 
 ORIGIN = ("model", "observer", "as", "preset", "options", "late_policy", "replay_horizon")
@@ -41,18 +43,19 @@ class Loaded:
     doubts: list[str] = field(default_factory=list)
 
 
-def load_package(name: str) -> Loaded:
+def load_package(name: str, strict: bool = False) -> Loaded:
     """The scenario in an SSP.
 
     Args:
         name: path of the file, with ``#VARIANT`` for another structure than ``SystemStructure.ssd``.
+        strict: whether form that is not as the standard wants it refuses the package; else it is a doubt.
 
     Raises:
         CosimError: something in it is missing, broken or cannot be carried out; with file and line.
     """
     path, variant = split_variant(name)
     unpacked = Unpacked()
-    package = Package(FilePath(path), path, unpacked)
+    package = Package(FilePath(path), path, unpacked, Lapses(strict))
     return load_structure(read_structure(package, find_variant(package, variant)), package)
 
 
@@ -63,7 +66,7 @@ def list_variants(name: str) -> dict[str, str]:
         CosimError: one of them cannot be read.
     """
     path, _ = split_variant(name)
-    package = Package(FilePath(path), path, Unpacked())
+    package = Package(FilePath(path), path, Unpacked(), Lapses())
     return {member.removesuffix(".ssd"): read_structure(package, member).name for member in package.variants}
 
 
@@ -91,34 +94,33 @@ def load_structure(structure: Structure, package: Package) -> Loaded:
     Raises:
         CosimError: something in it cannot be carried out.
     """
-    nets = Nets(structure.system)
+    nets = Nets(structure.system, package.lapses)
     if not nets.faces:
         fail(structure.system.node, "the system holds no component; there is nothing to run.")
-    starts = start_values(nets)
-    loaded = Loaded({}, package.unpacked, list(starts.doubts))
-    names = flat_names(nets.faces)
+    starts = start_values(nets, package.lapses)
+    loaded = Loaded({}, package.unpacked)
+    names = flat_names([path for path in nets.faces if not _takes_our_place(nets, path, structure)])
     tables = loaded.tables
     tables |= {"title": structure.name, "description": structure.description}
     if not structure.extras:
-        tables["source"] = f"SSP {structure.version}: {package.title}"
+        step = "" if structure.step is None else f"; communication step of {structure.step:g} s by its annotation"
+        tables["source"] = f"SSP {structure.version}: {package.title}{step}"
     tables |= {key: value for key, value in structure.extras.items() if key not in ("components", "connections")}
     _localise_files(tables, package)
     tables |= _experiment(structure, nets, tables)
-    tables["components"] = {
-        names[path]: _component(nets, path, starts.values.get(path, {}), loaded.doubts) for path in nets.faces
-    }
+    tables["components"] = {names[path]: _component(nets, path, starts.get(path, {}), package.lapses) for path in names}
     tables["connections"] = [line for chain in nets.chains if (line := _connection(chain, nets, names)) is not None]
+    loaded.doubts = package.lapses.lines()
     return loaded
 
 
-def _component(nets: Nets, path: Path, parameters: Mapping[str, Any], doubts: list[str]) -> dict[str, Any]:
+def _component(nets: Nets, path: Path, parameters: Mapping[str, Any], lapses: Lapses) -> dict[str, Any]:
     element = nets.elements[path]
     assert isinstance(element, ComponentElement)
-    extras = dict(element.extras)
+    extras = {key: value for key, value in element.extras.items() if key != READS_BALISES}
     made = extras.pop(DIGEST, None)
     if made is not None and made != digest(element.fmu):
-        speaks = f"{element.member} is not the FMU that the annotation speaks of; it is used as it is."
-        doubts.append(f"{place(element.node)}: {speaks}")
+        lapses.tell(element.node, f"{element.member} is not the FMU that the annotation speaks of; it is used as it is.")
         extras = {key: value for key, value in extras.items() if key not in ORIGIN}
     if "model" not in extras and "observer" not in extras:
         extras["fmu"] = str(element.fmu)
@@ -126,18 +128,27 @@ def _component(nets: Nets, path: Path, parameters: Mapping[str, Any], doubts: li
     return extras | ({"parameters": own} if own else {})
 
 
+def _takes_our_place(nets: Nets, path: Path, structure: Structure) -> bool:
+    """Whether a component is a balise reader that was added for other tools; the balises of the structure's annotation do it."""
+    element = nets.elements[path]
+    assert isinstance(element, ComponentElement)
+    added = element.extras.get(READS_BALISES) is True and "balises" in structure.extras
+    return added and element.extras.get(DIGEST) == digest(element.fmu)
+
+
 def _experiment(structure: Structure, nets: Nets, tables: Mapping[str, Any]) -> dict[str, float]:
-    """Start, stop and step, as far as they are known: from the structure, from our annotation, or else from the FMUs."""
+    """Start, stop and step, as far as they are known: from the structure, from annotations, or else from the FMUs."""
     experiments = [face.description.defaultExperiment for face in nets.faces.values()]
     times = {k: [t for e in experiments if (t := _finite(getattr(e, k, None))) is not None] for k in ("stopTime", "stepSize")}
     start = 0.0 if structure.start is None else structure.start
     stop = structure.stop if structure.stop is not None else max(times["stopTime"], default=None)
-    if stop is None or not stop > start or not math.isfinite(stop):
-        return {"start": start} | ({} if stop is None else {"stop": stop})
+    known = {"start": start} | ({} if stop is None else {"stop": stop})
     if "step" in tables:
-        return {"start": start, "stop": stop}
-    wanted = min((s for s in times["stepSize"] if s > 0.0), default=(stop - start) / DEFAULT_STEPS)
-    return {"start": start, "stop": stop, "step": (stop - start) / max(1, math.ceil((stop - start) / wanted - 1e-9))}
+        return known
+    if stop is None or not stop > start or not math.isfinite(stop):
+        return known | ({} if structure.step is None else {"step": structure.step})
+    wanted = structure.step or min((s for s in times["stepSize"] if s > 0.0), default=(stop - start) / DEFAULT_STEPS)
+    return known | {"step": (stop - start) / max(1, math.ceil((stop - start) / wanted - 1e-9))}
 
 
 def _finite(text: str | None) -> float | None:
@@ -152,7 +163,7 @@ def _finite(text: str | None) -> float | None:
 def _connection(chain: Chain, nets: Nets, names: Mapping[Path, str]) -> str | dict[str, Any] | None:
     """A connection of the scenario, or None where no component drives the input."""
     root, sink, last = chain.root, chain.sink, chain.hops[-1].node
-    if root.path not in nets.faces:
+    if root.path not in names or sink.path not in names:
         return None
     if nets.kind(root) not in ("output", "inout"):
         fail(chain.hops[0].node, f"{root} is of kind {nets.kind(root)!r}; only outputs can drive inputs here.")

@@ -141,6 +141,7 @@ class Structure:
     Args:
         name, description: of it. system: the root. start, stop: of the default experiment [s], where given.
         version: of SSP. extras: what our own annotation says of it.
+        step: communication step that another tool's annotation asks for [s], where one does.
     """
 
     name: str
@@ -150,3 +151,4 @@ class Structure:
     start: float | None
     stop: float | None
     extras: Mapping[str, object]
+    step: float | None

@@ -5,13 +5,14 @@ Flattens; changes nothing. The directions follow the table "Allowed Connections"
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from cosim.errors import nearest
 from cosim.ssp.common import NamedUnit, Step
 from cosim.ssp.document import Node, fail
 from cosim.ssp.faces import Face, face_of
+from cosim.ssp.lapses import Lapses
 from cosim.ssp.model import ComponentElement, Connector, DictionaryReference, Element, End, SystemElement, Wire
 
 Path = tuple[str, ...]
@@ -110,17 +111,19 @@ class Nets:
     """All elements of a nested system by path, and the connections between their connectors.
 
     Args:
-        root: the root system.
+        root: the root system. lapses: told of names that an FMU gives twice.
 
     Raises:
         ScenarioError: a connector that does not exist or does not fit its FMU, a connection without direction, two drivers of
             one connector, or connections in a circle.
     """
 
-    def __init__(self, root: SystemElement) -> None:
+    def __init__(self, root: SystemElement, lapses: Lapses) -> None:
         self.root = root
         self.elements: dict[Path, Element] = dict(_walk(root, ()))
-        self.faces: dict[Path, Face] = {p: face_of(e) for p, e in self.elements.items() if isinstance(e, ComponentElement)}
+        self.faces: dict[Path, Face] = {
+            p: face_of(e, lapses) for p, e in self.elements.items() if isinstance(e, ComponentElement)
+        }
         for path, face in self.faces.items():
             for connector in self.elements[path].connectors.values():
                 face.check(connector)
@@ -251,7 +254,7 @@ def _walk(element: Element, path: Path) -> Iterator[tuple[Path, Element]]:
             yield from _walk(child, (*path, name))
 
 
-def flat_names(paths: Mapping[Path, object]) -> dict[Path, str]:
+def flat_names(paths: Iterable[Path]) -> dict[Path, str]:
     """A legal, unique component name for each path: its parts joined by ``__``, other characters than letters, digits and ``_``
     replaced.
     """

@@ -18,6 +18,7 @@ from urllib.parse import unquote, urlsplit
 
 from cosim.errors import ScenarioError, nearest
 from cosim.ssp.document import Node, fail
+from cosim.ssp.lapses import Lapses
 from fmus.check.archive import MAX_UNPACKED_BYTES, NotAnFmuError, demand_harmless
 
 DEFAULT_VARIANT = "SystemStructure.ssd"
@@ -45,13 +46,14 @@ class Package:
         path: the file.
         title: how it is called in messages.
         unpacked: where its members go when a file of them is needed.
+        lapses: told of what is not as the standard wants it.
 
     Raises:
         ScenarioError: it is missing, no archive, dangerous, or has no ``SystemStructure.ssd``.
     """
 
-    def __init__(self, path: Path, title: str, unpacked: Unpacked) -> None:
-        self.path, self.title, self.unpacked = path, title, unpacked
+    def __init__(self, path: Path, title: str, unpacked: Unpacked, lapses: Lapses) -> None:
+        self.path, self.title, self.unpacked, self.lapses = path, title, unpacked, lapses
         self._files: dict[str, Path] = {}
         if not path.is_file():
             what = "is a folder, expected an .ssp file" if path.is_dir() else "does not exist"

@@ -77,10 +77,19 @@ class Pipe:
         return name
 
     def _converted(self, unit: NamedUnit | None, node: Node) -> Pipe:
-        if self.unit is None or unit is None or self.unit.unit == unit.unit:
+        if self.unit is None or unit is None or self.unit == unit:
+            return self
+        one, other = self.unit.unit, unit.unit
+        if (one is None or other is None) and self.unit.name == unit.name:
+            return self  # whatever it is, both call it the same
+        if one is None or other is None:
+            unknown = (self.unit if one is None else unit).name
+            between = f"from {self.unit.name!r} to {unit.name!r}"
+            fail(node, f"nothing defines the unit {unknown!r}, so numbers cannot be brought {between}; define it in its Units.")
+        if one == other:
             return self
         try:
-            return self._affine(*conversion(self.unit.unit, unit.unit))
+            return self._affine(*conversion(one, other))
         except UnitError as error:
             fail(node, f"units {self.unit.name!r} and {unit.name!r} do not fit: {error}.")
 

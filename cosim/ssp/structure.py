@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from cosim.errors import nearest
 from cosim.ssp.annotation import read_extras
-from cosim.ssp.common import read_transformation, read_type, read_units
+from cosim.ssp.common import UnitTable, read_transformation, read_type
 from cosim.ssp.document import Node, fail, find, find_all, flag, parse, short, validated
 from cosim.ssp.model import (
     Binding,
@@ -23,6 +23,7 @@ from cosim.ssp.model import (
 )
 from cosim.ssp.names import split_variant
 from cosim.ssp.package import DEFAULT_VARIANT, Package
+from cosim.ssp.steps import read_step
 from cosim.ssp.values import read_mapping, read_parameter_set
 
 FMU = "application/x-fmu-sharedlibrary"
@@ -41,7 +42,7 @@ def read_structure(package: Package, member: str, outer: tuple[str, ...] = ()) -
     Raises:
         ScenarioError: with file and line.
     """
-    root = parse(package.read(member), _title(package, member), "ssd")
+    root = _parsed(package, member, "ssd")
     experiment = find(root, "ssd:DefaultExperiment")
     start, stop = (None, None) if experiment is None else (experiment.get("startTime"), experiment.get("stopTime"))
     return Structure(
@@ -52,6 +53,7 @@ def read_structure(package: Package, member: str, outer: tuple[str, ...] = ()) -
         start=None if start is None else float(start),
         stop=None if stop is None else float(stop),
         extras=read_extras(root),
+        step=read_step(root, package.lapses),
     )
 
 
@@ -64,7 +66,7 @@ class _Reader:
 
     def __init__(self, package: Package, member: str, root: Node, outer: tuple[str, ...]) -> None:
         self.package, self.member, self.root, self.outer = package, member, root, outer
-        self.units = read_units(root, "ssd")
+        self.units = UnitTable(root, "ssd", package.lapses)
         self.readers: dict[str, Callable[[Node], Element]] = {
             "Component": self.component, "System": self.system, "SignalDictionaryReference": self.reference,
         }  # fmt: skip
@@ -122,10 +124,17 @@ class _Reader:
     def wire(self, node: Node) -> Wire:
         """A connection."""
         start, end = (
-            End(node.get(f"{side}Element"), node.get(f"{side}Connector"), _indices(node.get(f"{side}Indices", "")))
+            End(self.element(node, f"{side}Element"), node.get(f"{side}Connector"), _indices(node.get(f"{side}Indices", "")))
             for side in ("start", "end")
         )
         return Wire(start, end, flag(node, "suppressUnitConversion"), read_transformation(node), node)
+
+    def element(self, node: Node, key: str) -> str | None:
+        """The element that one end of a connection names; None for the system itself."""
+        name: str | None = node.get(key)
+        if name == "":  # no element can have that name
+            self.package.lapses.forgive(node, f'{key}="" names no element; taken as the system itself, for which it is left out.')
+        return name or None
 
     def bindings(self, node: Node, component: str | None = None) -> list[Binding]:
         """The parameter bindings of an element in their order. `component`: the member that is the component's source."""
@@ -138,7 +147,7 @@ class _Reader:
             if child.get("name") in found:
                 fail(child, f"system {node.get('name')!r} has two signal dictionaries named {child.get('name')!r}.")
             root = self._part(child, "ssb", None)
-            units = read_units(root, "ssb")
+            units = UnitTable(root, "ssb", self.package.lapses)
             entries = find_all(root, "ssb:DictionaryEntry")
             found[child.get("name")] = {
                 e.get("name"): Connector(e.get("name"), "inout", read_type(e, units), len(find_all(e, "ssc:Dimension")), e)
@@ -148,7 +157,7 @@ class _Reader:
 
     def _binding(self, node: Node, component: str | None) -> Binding:
         holder = find(node, "ssd:ParameterValues")
-        parameters = read_parameter_set(self._part(node, "ssv", component, holder), node.get("prefix", ""))
+        parameters = read_parameter_set(self._part(node, "ssv", component, holder), node.get("prefix", ""), self.package.lapses)
         mapping: tuple[Entry, ...] | None = None
         mapped = find(node, "ssd:ParameterMapping")
         if mapped is not None:
@@ -170,7 +179,7 @@ class _Reader:
         if node.get("sourceBase", "SSD") != "SSD" and component is not None:
             fail(node, f"{what}: sources within the component ({component}) are not read; put {source!r} beside it.")
         member = self.package.member(node, source, self.member)
-        return parse(self.package.read(member), _title(self.package, member), kind)
+        return _parsed(self.package, member, kind)
 
     def _nested(self, node: Node, kind: str, source: str) -> SystemElement:
         """A component that is a structure of its own: its system takes its place, its bindings come last."""
@@ -188,7 +197,7 @@ class _Reader:
         member = self.package.member(node, path, self.member)
         package = self.package
         if kind == PACKAGE:
-            package = Package(self.package.file(member), _title(self.package, member), self.package.unpacked)
+            package = Package(self.package.file(member), _title(self.package, member), self.package.unpacked, self.package.lapses)
             member = fragment or DEFAULT_VARIANT
             if member not in package.sizes:
                 fail(node, f"{path} has no {member!r}; {nearest(member, package.variants)}")
@@ -206,6 +215,15 @@ class _Reader:
         if key in self.outer or systems[0] in list(node.iterancestors()):
             fail(node, f"component {node.get('name')!r} nests the system '#{identity}' within itself.")
         return _Reader(self.package, self.member, self.root, (*self.outer, key)).system(systems[0])
+
+
+def _parsed(package: Package, member: str, kind: str) -> Node:
+    title = _title(package, member)
+
+    def undeclared(prefix: str, namespace: str) -> None:
+        package.lapses.forgive(title, f"prefix {prefix!r} is used and not declared; taken as {namespace!r}.")
+
+    return parse(package.read(member), title, kind, undeclared)
 
 
 def _indices(text: str) -> tuple[int, ...]:

@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-from cosim.ssp.common import read_transformation, read_type, read_units
+from cosim.ssp.common import UnitTable, read_transformation, read_type
 from cosim.ssp.document import Node, fail, find, find_all, flag
+from cosim.ssp.lapses import Lapses
 from cosim.ssp.model import Entry, Parameter
-from plant_models.hybrid.units import Unit
 
 LISTS = ("String", "Enumeration", "Binary")
 """Types whose values may hold spaces: an array of them is written as Value elements."""
 
 
-def read_parameter_set(root: Node, prefix: str) -> tuple[Parameter, ...]:
+def read_parameter_set(root: Node, prefix: str, lapses: Lapses) -> tuple[Parameter, ...]:
     """The parameters of a valid ParameterSet.
 
     Args:
-        root: its element. prefix: put before every name.
+        root: its element. prefix: put before every name. lapses: told of units that are not defined.
 
     Raises:
-        ScenarioError: a name is given twice, a unit is unknown, or the number of values is not that of the dimensions.
+        ScenarioError: a name is given twice, or the number of values is not that of the dimensions.
     """
-    units = read_units(root, "ssv")
+    units = UnitTable(root, "ssv", lapses)
     parameters: dict[str, Parameter] = {}
     for node in find_all(root, "ssv:Parameters/ssv:Parameter"):
         parameter = _parameter(node, units, prefix)
@@ -47,7 +45,7 @@ def read_mapping(root: Node) -> tuple[Entry, ...]:
     return tuple(entries.values())
 
 
-def _parameter(node: Node, units: Mapping[str, Unit], prefix: str) -> Parameter:
+def _parameter(node: Node, units: UnitTable, prefix: str) -> Parameter:
     kind = read_type(node, units, "ssv")
     assert kind is not None, "the schema demands a type"
     holder = find(node, f"ssv:{kind.name}")

@@ -95,21 +95,20 @@ def add_connector(
         child(node, "ssc", "Dimension", size=str(size))
 
 
-def add_parameter(parent: Node, name: str, kind: str, values: Sequence[Any], shape: Sequence[int], **attributes: str) -> None:
+def add_parameter(parent: Node, name: str, kind: str, values: Sequence[Any], shape: Sequence[int]) -> None:
     """A parameter of a parameter set.
 
     Args:
         parent: ``Parameters`` element. kind: type in the words of SSP. values: in row-major order. shape: empty for a scalar.
-        attributes: ``unit`` of a real number.
     """
     node = child(parent, "ssv", "Parameter", name=name)
     texts = [_text(value, FAMILIES[kind]) for value in values]
     if FAMILIES[kind] in LISTS and shape:
-        holder = child(node, "ssv", kind, **attributes)
+        holder = child(node, "ssv", kind)
         for text in texts:
             child(holder, "ssv", "Value", value=text)
     else:
-        child(node, "ssv", kind, value=" ".join(texts), **attributes)
+        child(node, "ssv", kind, value=" ".join(texts))
     for size in shape:
         child(node, "ssc", "Dimension", size=str(size))
 

@@ -13,7 +13,7 @@ import numpy as np
 from fmpy.model_description import ModelVariable
 
 from fmu_observer.block.variables import BlockError
-from fmu_observer.description import VariableTable, exposed_inputs
+from fmu_observer.description import VariableTable, exposed_inputs, referenced
 from plant_models.hybrid import HybridSystem, Runtime, TracedSystem, width
 
 
@@ -22,7 +22,7 @@ class Sensitivity:
 
     Args:
         system: the hybrid system.
-        variables: all variables of its description, by value reference.
+        variables: all variables of its description, in their order.
     """
 
     def __init__(self, system: HybridSystem, variables: Sequence[ModelVariable]) -> None:
@@ -57,7 +57,7 @@ class Sensitivity:
         values = [float(value) for value in self._tangent(runtime, seeds)[rows]]
         for reference, value in zip(unknowns, values, strict=True):
             if not isfinite(value):
-                raise BlockError(f"the directional derivative of {self.variables[reference].name} is not a finite number here.")
+                raise BlockError(f"the directional derivative of {self._variable(reference).name} is not a finite number here.")
         return values
 
     # -- internals --------------------------------------------------------------------------------------------------
@@ -83,9 +83,8 @@ class Sensitivity:
     def _place(self, reference: int) -> tuple[int, int]:
         """Group (time, x, u, p) and position of a known."""
         table, variable = self._table, self._variable(reference)
-        if reference == 0:
-            return 0, 0
         for group, first, count in (
+            (0, table.time, 1),
             (1, table.states, self.system.state_count),
             (2, table.inputs, width(exposed_inputs(self.system))),
             (3, table.parameters, width(self.system.parameter_signals)),
@@ -95,9 +94,9 @@ class Sensitivity:
         raise BlockError(_refusal(variable, "known", "time, a real input, a state or a parameter"))
 
     def _variable(self, reference: int) -> ModelVariable:
-        if not 0 <= reference < len(self.variables):
-            raise BlockError(f"there is no variable with value reference {reference}; the last one is {len(self.variables) - 1}.")
-        return self.variables[reference]
+        if not self._table.time <= reference < self._table.end:
+            raise BlockError(f"there is no variable with value reference {reference}; the last one is {self._table.end - 1}.")
+        return referenced(self.variables, reference)[0]
 
 
 def _refusal(variable: ModelVariable, kind: str, expected: str) -> str:

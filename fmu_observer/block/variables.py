@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from fmu_observer.description import VariableTable, exposed_inputs
+from fmu_observer.description import FIRST_REFERENCE, VariableTable, exposed_inputs
 from fmu_observer.event_protocol import OUTCOME_VARIABLES
 from plant_models.hybrid import HybridSystem, Runtime, Signal, scalar_names
 
@@ -113,9 +113,9 @@ class Variables:
         Raises:
             BlockError: there is none.
         """
-        if not 0 <= reference < len(self._places):
-            raise BlockError(f"there is no variable with value reference {reference}; the last one is {len(self._places) - 1}.")
-        return self._places[reference]
+        if not self.table.time <= reference < self.table.end:
+            raise BlockError(f"there is no variable with value reference {reference}; the last one is {self.table.end - 1}.")
+        return self._places[reference - FIRST_REFERENCE]
 
     def readable(self, reference: int) -> Place:
         """The place of a real variable.

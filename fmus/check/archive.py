@@ -14,7 +14,7 @@ import fmpy
 from fmpy.model_description import ModelDescription
 
 from fmus.check.description import FILE, read_description, why_unreadable
-from fmus.check.sense import nonsense
+from fmus.check.sense import nonsense, tell_apart
 
 MAX_UNPACKED_BYTES = 2 * 1024**3
 MAX_FILES = 100_000
@@ -141,6 +141,7 @@ def _description(path: Path, names: list[str], versions: Sequence[str]) -> Model
         raise NotAnFmuError(f"{path} is FMI {version}; FMI {supported} are supported.")
     if all(getattr(description, name) is None for name in INTERFACES):
         raise NotAnFmuError(f"{path} offers no interface: neither {', '.join(INTERFACES.values())}.")
+    tell_apart(description)
     fault = nonsense(description)
     if fault is not None:
         raise NotAnFmuError(f"{path} cannot be used: modelDescription.xml: {fault}")

@@ -10,8 +10,37 @@ from fmpy.model_description import ModelDescription, ModelVariable
 MAX_REFERENCE = 2**32 - 1
 MAX_CONNECTORS = 1_000_000
 """Elements of an input or output array: each has a name and a column in the results."""
+INTERNAL = ("local", "internal", None)
+"""Causalities of variables that nobody has to name, in the words of FMI 1 to 3."""
+SHARED = " (value reference "
 CLOCKS = ("calculated", "constant", "fixed", "tunable", "changing", "countdown", "triggered")
 """What ``intervalVariability`` can be (FMI 3.0.2, 2.2.8.3)."""
+
+
+def tell_apart(description: ModelDescription) -> None:
+    """Give internal variables that share one name a name each: nobody can mean one of them by it, and nobody needs to.
+
+    Public FMUs have such pairs. Inputs, outputs and parameters are left as they are: they are set and connected by name, so that
+    two of one name are refused.
+    """
+    named: dict[str, list[ModelVariable]] = {}
+    for variable in description.modelVariables:
+        named.setdefault(variable.name, []).append(variable)
+    for name, same in named.items():
+        different = {(v.type, v.valueReference) for v in same}
+        if len(different) > 1 and all(v.causality in INTERNAL for v in same):
+            for variable in same:
+                variable.name = f"{name}{SHARED}{variable.valueReference})"
+
+
+def doubled_names(description: ModelDescription) -> str | None:
+    """Which internal variables had to be told apart, as a sentence, or None."""
+    shared = [v.name for v in description.modelVariables if SHARED in v.name]
+    if not shared:
+        return None
+    names = sorted({name.partition(SHARED)[0] for name in shared})
+    given = f"the names {', '.join(map(repr, names))} are" if len(names) > 1 else f"the name {names[0]!r} is"
+    return f"{given} given to more than one internal variable; they are called {', '.join(map(repr, shared))} here."
 
 
 def nonsense(description: ModelDescription) -> str | None:

@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 from fmpy.model_description import ModelDescription, ModelVariable
 
-from fmu_observer.description import VariableTable, exposed_inputs
+from fmu_observer.description import FIRST_REFERENCE, VariableTable, exposed_inputs, referenced
 from fmus.content.casadi_source import private_source
 from plant_models.hybrid import HybridSystem, TracedSystem, scalar_names, width
 from plant_models.hybrid.kernel import check_payloads
@@ -184,8 +184,10 @@ def _bound(limit: float | None, sign: str) -> str:
 
 def _variable_table(system: HybridSystem, description: ModelDescription) -> str:
     variables: Sequence[ModelVariable] = description.modelVariables
-    if [v.valueReference for v in variables] != list(range(len(variables))):
-        raise GenerationError(f"{system.name}: value references must count up from 0 in the order of the variables.")
+    if [v.valueReference for v in variables] != list(range(FIRST_REFERENCE, FIRST_REFERENCE + len(variables))):
+        raise GenerationError(
+            f"{system.name}: value references must count up from {FIRST_REFERENCE} in the order of the variables."
+        )
     table = VariableTable.of(system)
     rows = [f"{_text(v.name)}, {_role(system, table, v)}" for v in variables]
     return _table("Variable", "variables", rows)
@@ -208,7 +210,7 @@ def _role(system: HybridSystem, table: VariableTable, variable: ModelVariable) -
         (table.states, "ROLE_STATE"),
         (table.outputs, "ROLE_OUTPUT" if variable.type in ("Real", "Float64") else "ROLE_INTEGER_OUTPUT"),
         (table.inputs, "ROLE_INPUT" if reference < payload else "ROLE_PAYLOAD"),
-        (0, "ROLE_TIME"),
+        (table.time, "ROLE_TIME"),
     )
     first, role = next(block for block in blocks if reference >= block[0])
     return f"{role}, {reference - first}"
@@ -252,7 +254,8 @@ def _model_table(system: HybridSystem, equations: Equations, description: ModelD
         "friction_balance": _name(equations.friction_balance),
         "derivative": _name(equations.derivative),
         "tangent": _name(equations.tangent),
-        "variable_count": VariableTable.of(system).end,
+        "first_reference": FIRST_REFERENCE,
+        "variable_count": len(description.modelVariables),
         "variables": "variables",
     }
     rows = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
@@ -264,8 +267,8 @@ def _protocol(system: HybridSystem, description: ModelDescription) -> dict[str, 
     if not system.triggered_events:
         return {"counts_events": "false", "late_policy": "LATE_REJECT", "replay_horizon": "0.0"}
     table, variables = VariableTable.of(system), description.modelVariables
-    policy, horizon = variables[table.protocol : table.protocol + 2]
-    counts = "false" if variables[table.events].type == "Clock" else "true"
+    policy, horizon = referenced(variables, table.protocol, 2)
+    counts = "false" if referenced(variables, table.events)[0].type == "Clock" else "true"
     return {"counts_events": counts, "late_policy": f"(LatePolicy){policy.start}", "replay_horizon": str(horizon.start)}
 
 

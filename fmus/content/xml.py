@@ -158,7 +158,7 @@ def _base_unit(unit: BaseUnit) -> dict[str, str | None]:
 def _variable_2(parent: Element, variable: ModelVariable, exchanged: bool) -> None:
     names = ("name", "valueReference", "description", "causality", "variability", "initial")
     element = _element(parent, "ScalarVariable", {name: getattr(variable, name) for name in names})
-    derivative = None if variable.derivative is None else variable.derivative.valueReference + 1  # counted from one
+    derivative = None if variable.derivative is None else variable.derivative.valueReference  # its index, see FIRST_REFERENCE
     _element(element, variable.type, _values(variable, exchanged) | {"derivative": derivative})
 
 

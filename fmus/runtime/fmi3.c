@@ -212,7 +212,7 @@ fmi3Status fmi3GetClock(fmi3Instance instance, const fmi3ValueReference valueRef
     if (check_clocks(instance, __func__, valueReferences, nValueReferences, values) != fmi3OK)
         return fmi3Error;
     for (size_t i = 0; i < nValueReferences; i++)
-        values[i] = ((Instance *)instance)->runtime.active[model.variables[valueReferences[i]].index] != 0.0;
+        values[i] = ((Instance *)instance)->runtime.active[variables_at(valueReferences[i])->index] != 0.0;
     return fmi3OK;
 }
 
@@ -221,7 +221,7 @@ fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference valueRef
     if (check_clocks(instance, __func__, valueReferences, nValueReferences, values) != fmi3OK)
         return fmi3Error;
     for (size_t i = 0; i < nValueReferences; i++)
-        ((Instance *)instance)->runtime.active[model.variables[valueReferences[i]].index] = values[i] ? 1.0 : 0.0;
+        ((Instance *)instance)->runtime.active[variables_at(valueReferences[i])->index] = values[i] ? 1.0 : 0.0;
     return fmi3OK;
 }
 

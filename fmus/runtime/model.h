@@ -119,8 +119,9 @@ typedef struct {
     ModelFunction derivative; /* (t, x, u, p, s) -> derivatives of the continuous states, s the signs of the states with
                                  dry friction; or NULL where nothing flows */
     ModelFunction tangent;    /* (t, x, u, p, s, dt, dx, du, dp) -> dy, then d derivative; or NULL where both are empty */
+    unsigned first_reference; /* value reference of the first variable; the others count up from there */
     unsigned variable_count;
-    const Variable *variables; /* by value reference */
+    const Variable *variables;
 } Model;
 
 PRIVATE const Model model; /* defined in model.c */

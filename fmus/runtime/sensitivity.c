@@ -81,7 +81,7 @@ static Status check_finite(const Instance *instance, const char *function, const
     for (size_t i = 0; i < count; i++)
         if (!isfinite(values[i]))
             return instance_discard(instance, "%s: the directional derivative of %s is not a finite number at %.17g s; the equations have none here",
-                                    function, model.variables[unknowns[i]].name, instance->runtime.clock.t);
+                                    function, variables_at(unknowns[i])->name, instance->runtime.clock.t);
     return STATUS_OK;
 }
 
@@ -94,6 +94,6 @@ PRIVATE Status sensitivity_directional(Instance *instance, const char *function,
         return STATUS_ERROR;
     evaluate_tangent(instance);
     for (size_t i = 0; i < unknown_count; i++)
-        sensitivity[i] = *result_place(&instance->runtime, &model.variables[unknowns[i]]);
+        sensitivity[i] = *result_place(&instance->runtime, variables_at(unknowns[i]));
     return check_finite(instance, function, unknowns, unknown_count, sensitivity);
 }

@@ -5,11 +5,15 @@
 
 /* -- finding ----------------------------------------------------------------------------------------------------- */
 
+PRIVATE const Variable *variables_at(unsigned reference) {
+    return &model.variables[reference - model.first_reference];
+}
+
 PRIVATE const Variable *variables_find(const Instance *instance, const char *function, unsigned reference) {
-    if (reference < model.variable_count)
-        return &model.variables[reference];
+    if (reference - model.first_reference < model.variable_count) /* unsigned: what lies below wraps around */
+        return variables_at(reference);
     instance_fail(instance, "%s: there is no variable with value reference %u; the last one is %u", function, reference,
-                  model.variable_count - 1);
+                  model.first_reference + model.variable_count - 1);
     return NULL;
 }
 
@@ -161,7 +165,7 @@ PRIVATE Status instance_set_reals(Instance *instance, const char *function, cons
         if (check_real(instance, function, references[i]) != STATUS_OK)
             return STATUS_ERROR;
     for (size_t i = 0; i < count; i++)
-        *place_of(instance, &model.variables[references[i]]) = values[i];
+        *place_of(instance, variables_at(references[i])) = values[i];
     instance->outdated = OUTDATED_ALL;
     return STATUS_OK;
 }
@@ -190,5 +194,5 @@ PRIVATE Status instance_check_integer(const Instance *instance, const char *func
 }
 
 PRIVATE void instance_put_integer(Instance *instance, unsigned reference, int64_t value) {
-    *place_of(instance, &model.variables[reference]) = (double)value;
+    *place_of(instance, variables_at(reference)) = (double)value;
 }

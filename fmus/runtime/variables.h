@@ -23,6 +23,9 @@ PRIVATE Status instance_get_integer(Instance *instance, const char *function, un
 PRIVATE Status instance_check_integer(const Instance *instance, const char *function, unsigned reference, unsigned roles, int64_t value);
 PRIVATE void instance_put_integer(Instance *instance, unsigned reference, int64_t value);
 
+/* The variable behind a reference that has been checked. */
+PRIVATE const Variable *variables_at(unsigned reference);
+
 /* The variable behind a reference, or NULL with a message; and the name of the one with one of these roles and this index. */
 PRIVATE const Variable *variables_find(const Instance *instance, const char *function, unsigned reference);
 PRIVATE const char *variables_name(unsigned roles, int index);

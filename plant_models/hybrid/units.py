@@ -43,6 +43,7 @@ _SYMBOLS: dict[str, Unit] = {
     "permille": _unit(1e-3),
     "g": _unit(1e-3, kg=1),
     "t": _unit(1e3, kg=1),
+    "L": _unit(1e-3, m=3),
     "km": _unit(1e3, m=1),
     "cm": _unit(1e-2, m=1),
     "mm": _unit(1e-3, m=1),

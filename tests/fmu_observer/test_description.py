@@ -11,7 +11,7 @@ from block_systems import SWING, Doorman, Swing
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmu_observer import OBSERVERS
-from fmu_observer.description import STAMP_NOW, VariableTable, can_exchange, describe, exposed_inputs
+from fmu_observer.description import STAMP_NOW, VariableTable, can_exchange, describe, exposed_inputs, referenced
 from fmu_observer.event_protocol import EventProtocol
 from plant_models import PLANTS
 from plant_models.hybrid import CommunicationEvent, HybridSystem, output_signal, parameter, scalar_names, state
@@ -99,7 +99,7 @@ def test_the_event_protocol_follows_and_then_the_derivatives(version: Any) -> No
 def test_a_state_with_dry_friction_has_an_event_indicator(version: Any) -> None:
     locomotive, table = PLANTS["locomotive"](), VariableTable.of(PLANTS["locomotive"]())
     description = describe(locomotive, version)
-    names = [v.name for v in description.modelVariables[table.indicators :]]
+    names = [v.name for v in referenced(description.modelVariables, table.indicators, 2)]
     assert names == ["event_indicator.train_speed", "event_indicator.wheel_rate"]
     assert [u.variable.name for u in description.eventIndicators] == names
     assert description.numberOfEventIndicators == 2
@@ -169,7 +169,7 @@ def test_what_comes_with_an_event_carries_its_clock() -> None:
 def test_value_references_are_contiguous_and_in_the_order_of_the_runtime(system: HybridSystem, version: Any) -> None:
     description, table = describe(system, version), VariableTable.of(system)
     names = [v.name for v in description.modelVariables]
-    assert [v.valueReference for v in description.modelVariables] == list(range(table.end))
+    assert [v.valueReference for v in description.modelVariables] == list(range(1, table.end))  # see FIRST_REFERENCE
     assert len(set(names)) == len(names)
     for first, signals in (
         (table.inputs, exposed_inputs(system)),
@@ -178,14 +178,13 @@ def test_value_references_are_contiguous_and_in_the_order_of_the_runtime(system:
         (table.parameters, system.parameter_signals),
     ):
         expected = list(scalar_names(signals))
-        assert names[first : first + len(expected)] == expected
-    assert table.inputs == 1
+        assert referenced(names, first, len(expected)) == expected
+    assert (table.time, table.inputs) == (1, 2)
     assert table.protocol - table.events == 2 * len(system.triggered_events)
     assert table.outcomes - table.protocol == (2 if system.triggered_events else 0)
     assert table.derivatives - table.outcomes == (len(OUTCOMES) if system.triggered_events else 0)
-    assert names[table.derivatives : table.indicators] == [
-        f"der({n})" for n in scalar_names(system.states)[: system.continuous_count]
-    ]
+    rates = [f"der({n})" for n in scalar_names(system.states)[: system.continuous_count]]
+    assert referenced(names, table.derivatives, system.continuous_count) == rates
     assert not set(names) & {s.name for s in system.noises}
 
 
@@ -233,8 +232,28 @@ def test_dependencies_of_outputs_are_exact(version: Any) -> None:
     }
     for unknown in structure:
         assert unknown.dependenciesKind == ["dependent"] * len(unknown.dependencies)
-        assert unknown.index == unknown.variable.valueReference + 1  # FMI 2 counts from one
-    assert [u.variable.name for u in description.initialUnknowns] == list(found)
+        assert unknown.index == unknown.variable.valueReference  # FMI 2 counts from one, and so do we
+
+
+@BOTH
+@pytest.mark.parametrize("system", [SWING, Doorman(), *SHIPPED], ids=lambda s: s.name)
+def test_initial_unknowns_depend_on_what_running_ones_do_and_on_start_values(system: HybridSystem, version: Any) -> None:
+    """Without dependencies OMSimulator takes every input for one, and finds algebraic loops."""
+    description, table = describe(system, version), VariableTable.of(system)
+    running = [*description.outputs, *description.derivatives]
+    for unknown, initial in zip(running, description.initialUnknowns, strict=True):
+        assert initial.variable is unknown.variable
+        assert initial.dependenciesKind == ["dependent"] * len(initial.dependencies)
+        now, before = ({v.name for v in u.dependencies} for u in (unknown, initial))
+        starts = {v.name for v in description.modelVariables if table.states <= v.valueReference < table.events}
+        assert now <= before <= now | starts
+
+
+@BOTH
+def test_dependencies_of_initial_unknowns_are_exact(version: Any) -> None:
+    found = {u.variable.name: [v.name for v in u.dependencies] for u in describe(SWING, version).initialUnknowns}
+    assert found["der(angle)"] == ["rate"]
+    assert found["last_sample"] == ["sample"]
 
 
 ESTIMATE = {"position": [], "speed": [], "slip": ["odometer"], "slip_indicator": ["odometer"], "innovation": []}

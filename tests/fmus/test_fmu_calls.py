@@ -43,6 +43,7 @@ def _setter(made: Any) -> Any:
 
 def test_unknown_value_reference(running: Any) -> None:
     refused(running, "no variable with value reference 999", lambda: _getter(running)([999]))
+    refused(running, "no variable with value reference 0", lambda: _getter(running)([0]))  # they count from 1
     refused(running, "no variable with value reference 4294967295", lambda: _setter(running)([4294967295], [1.0]))
 
 

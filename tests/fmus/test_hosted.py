@@ -190,7 +190,7 @@ def too_little_room(slave: Any) -> None:
     ("call", "words"),
     [
         (lambda s: s.getReal([999]), "there is no variable with value reference 999"),
-        (lambda s: s.setReal([0], [1.0]), "time"),
+        (lambda s: s.setReal([1], [1.0]), "time"),
         (lambda s: s.setString([1], ["x"]), "fmi2SetString"),
         (lambda s: s.doStep(5.0, H), "currentCommunicationPoint = 5.0"),
         (lambda s: s.doStep(0.0, -H), "communicationStepSize"),

@@ -175,10 +175,11 @@ def _header(reference: Reference, component: Component, table: Result, texts: Ma
 def _parameters(text: bytes, member: str) -> dict[str, Any]:
     """The values of a parameter set (SSV); in the units of the FMU, in which nearly all sets are."""
     from cosim.ssp.document import parse  # noqa: PLC0415 - the schemas of SSP only for those who need them
+    from cosim.ssp.lapses import Lapses  # noqa: PLC0415
     from cosim.ssp.values import read_parameter_set  # noqa: PLC0415
 
     values: dict[str, Any] = {}
-    for parameter in read_parameter_set(parse(text, member, "ssv"), ""):
+    for parameter in read_parameter_set(parse(text, member, "ssv"), "", Lapses()):
         items = [_value(item, parameter.type.family) for item in parameter.values]
         values[parameter.name] = items if parameter.array else items[0]
     return values

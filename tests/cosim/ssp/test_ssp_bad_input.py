@@ -75,7 +75,10 @@ WRONG = {
     "wrong root": (ssm(""), "element 'ParameterMapping'", "expected 'SystemStructureDescription'"),
     "unknown version": (changed('version="1.0"', 'version="3.0"'), "line 1: version '3.0' of SSP is not known; 1.0 and 2.0"),
     "document type": ("<!DOCTYPE a [<!ENTITY b 'c'>]>" + GOOD, "document type declaration"),
-    "undefined unit": (changed('Unit name="kg"', 'Unit name="g"'), "unit 'kg' is not defined in this file"),
+    "undefined unit where numbers go": (
+        changed('name="u" kind="input"><ssc:Real unit="m/s"', 'name="u" kind="input"><ssc:Real unit="kn"'),
+        "nothing defines the unit 'kn', so numbers cannot be brought from 'm/s' to 'kn'",
+    ),
     "unit defined twice": (changed('Unit name="kg"', 'Unit name="km/h"'), "unit 'km/h' is defined twice"),
     "missing FMU": (changed("ramp.fmu", "rmap.fmu"), "line 3: source 'resources/rmap.fmu'", "did you mean 'resources/ramp.fmu'"),
     "source outside": (changed("resources/ramp", "../ramp"), "source '../ramp.fmu' leads out of the package"),
@@ -104,7 +107,7 @@ WRONG = {
     "no parameter set": (changed("ssv:Parameters>", "ssv:Values>", with_parameter("")), "Element 'Values'"),
     "parameter that is no number": (with_parameter(real("sum.w", "two")), "'two' is not a valid value"),
     "parameter twice": (with_parameter(real("a", "1") * 2), "parameter 'a' is given twice"),
-    "parameter in an undefined unit": (with_parameter(real("sum.u", "1", "mph")), "unit 'mph' is not defined"),
+    "parameter in an undefined unit": (with_parameter(real("sum.u", "1", "mph")), "nothing defines the unit 'mph'"),
     "parameter in a unit that does not fit": (with_parameter(real("sum.u", "1", "kg")), "units 'kg' and 'm/s' do not fit"),
     "mapping without target": (
         with_parameter(real("a", "1"), MAPPED), "'a' is mapped to 'sum.uu', nothing of the root system (did you mean 'sum.u'"

@@ -152,8 +152,10 @@ def test_one_name_for_two_units_becomes_two(tmp_path: Path) -> None:
 @pytest.mark.compiler
 def test_the_reader_of_fmpy_reads_it(tmp_path: Path) -> None:
     structure = fmpy.ssp.ssd.read_ssd(str(small().export_ssp(tmp_path / "small.ssp", "1.0")))
-    assert [c.name for c in fmpy.ssp.ssd.find_components(structure.system)] == ["locomotive", "odometer", "driver", "observer"]
-    assert len(structure.system.connections) == 5
+    assert [c.name for c in fmpy.ssp.ssd.find_components(structure.system)] == [
+        "locomotive", "odometer", "driver", "observer", "balise_reader",
+    ]  # fmt: skip
+    assert len(structure.system.connections) == 10
     assert {u.name for u in structure.units} >= {"m", "m/s", "N"}
 
 
