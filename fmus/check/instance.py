@@ -17,6 +17,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.model_description import ModelDescription, ModelVariable
 
+from fmus.check.description import declared_tolerance
 from fmus.check.library import fmi_version, load
 from fmus.ports import make_reader, make_writer
 
@@ -63,6 +64,11 @@ class FmuInstance:
     def declared(self) -> Any:
         """The element of the model description that holds the capabilities."""
         return getattr(self.description, self.interface)
+
+    @property
+    def tolerance(self) -> float | None:
+        """Relative tolerance that it is told at set-up: the declared one."""
+        return declared_tolerance(self.description)
 
     @property
     def can_save(self) -> bool:
@@ -217,13 +223,14 @@ class FmuInstance:
 
     def _enter_initialization(self, start_time: float, stop_time: float) -> None:
         """Begin initialisation; times in [s]."""
-        slave = self.slave
+        slave, tolerance = self.slave, self.tolerance
         if self.version == 2:
-            self.guarded("setupExperiment", lambda: slave.setupExperiment(startTime=start_time, stopTime=stop_time))
+            setup = slave.setupExperiment
+            self.guarded("setupExperiment", lambda: setup(tolerance=tolerance, startTime=start_time, stopTime=stop_time))
             self.guarded("enterInitializationMode", slave.enterInitializationMode)
         else:
             enter = slave.enterInitializationMode
-            self.guarded("enterInitializationMode", lambda: enter(startTime=start_time, stopTime=stop_time))
+            self.guarded("enterInitializationMode", lambda: enter(tolerance=tolerance, startTime=start_time, stopTime=stop_time))
 
     def _callbacks(self) -> Any:
         """fmpy's callbacks with our logger in place of the one that prints."""
