@@ -109,6 +109,14 @@ def _judged(first: np.ndarray, trips: Sequence[Trip], tolerance: float, problem:
     return Restoring(verdict, mismatch, furthest, problem)
 
 
+def near(bench: Bench, first: Sequence[np.ndarray], redone: Sequence[np.ndarray]) -> bool:
+    """Whether two runs differ by no more than the solver in the FMU may make of it."""
+    rows = np.array(first)
+    size = np.max(np.abs(rows), axis=0)
+    slack = SOLVER_FACTOR * solver_tolerance(bench) * size + ROUNDING * np.maximum(size, 1.0)
+    return bool(np.all(largest(rows, np.array([redone])) <= slack))
+
+
 def largest(first: np.ndarray | Sequence[np.ndarray], redone: np.ndarray) -> np.ndarray:
     """Largest differences of each output, shape (q,), between rows that should agree; infinite where only one is a number."""
     a, b = np.broadcast_arrays(np.asarray(first), redone)
