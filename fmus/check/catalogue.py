@@ -2,7 +2,7 @@
 
 What a failure means is judged by what becomes of a run of this package's master: NOTE, where no master of this package does such
 a thing; LIMIT, where a run is right as long as the advice is followed; DISTRUST, where a plain run may be wrong or may not come
-to its end. A crash is never less than a limit, and what crashes in something that it declares is not to be trusted.
+to its end. A crash is never less than a limit.
 """
 
 from __future__ import annotations
@@ -46,13 +46,14 @@ class Check:
 
     def lost(self, detail: str, *, crashed: bool) -> Finding:
         """The finding where the process ended or fell silent in this check."""
-        worse = {NOTE: LIMIT, LIMIT: DISTRUST, DISTRUST: DISTRUST} if crashed else {}
-        advice = self.advice or "run it in a process of its own"
-        return Finding(self.name, worse.get(self.failing, self.failing), detail, advice)
+        verdict = LIMIT if crashed and self.failing is NOTE else self.failing
+        advice = f"{self.advice}; {NO_PROBE}" if crashed and self.advice else self.advice
+        return Finding(self.name, verdict, detail, advice)
 
 
 REPEATED = "repeated run"
 ONE_INSTANCE = "have one instance of it in a process, a fresh process for each run"
+NO_PROBE = "with balises on it, choose the method early-return or interpolate: the probe for the others would crash too"
 MISSING = "do not use the capabilities whose functions are missing"
 NO_REDOING = "do not redo steps: the master finds passings by shorter steps or interpolation, and iterates nothing"
 FIXED_STEP = "keep to one communication step; an event inside it can only be interpolated"

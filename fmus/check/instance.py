@@ -25,7 +25,7 @@ from fmus.plain import one_line
 from fmus.ports import make_reader, make_writer
 
 LOADING = "loading the library"
-NOT_LOADED = f"{LOADING} failed"
+INSTANTIATING = "instantiate"
 FATAL = 4  # FMI status: the instance must not be called again
 MESSAGES_KEPT = 20
 OWN_MISTAKES = (TypeError, AttributeError, LookupError, NameError, AssertionError, ArithmeticError, ctypes.ArgumentError)
@@ -104,7 +104,7 @@ class FmuInstance:
 
     def instantiate(self) -> None:
         """Create the instance."""
-        self.guarded("instantiate", self._instantiate)
+        self.guarded(INSTANTIATING, self._instantiate)
         self._alive = True
 
     def reset(self) -> None:

@@ -16,7 +16,7 @@ from fmus.check.bench import end_of_experiment
 from fmus.check.catalogue import CATALOGUE
 from fmus.check.checks.static import platforms, validation
 from fmus.check.findings import Class, Finding, Verdict, class_of
-from fmus.check.instance import NOT_LOADED, NUMERIC_TYPES
+from fmus.check.instance import INSTANTIATING, LOADING, NUMERIC_TYPES
 from fmus.check.isolated import run_isolated
 from fmus.check.job import Job
 from fmus.check.library import CO_SIMULATION, SCHEDULED_EXECUTION
@@ -31,6 +31,8 @@ STEPS = 50
 WHOLE = 1e-6
 """Share of a step by which an end may miss a whole number of steps."""
 
+UNRUNNABLE = (f"{LOADING} failed", f"{INSTANTIATING} failed")
+NO_SLAVE = "there is no co-simulation: this package's master cannot step it"
 UNSETTABLE = frozenset({"output", "independent", "calculatedParameter"})
 STATIC = {"validation": validation, "platforms": platforms}
 
@@ -123,7 +125,9 @@ def check_fmu(
             names = tuple(check.name for check in CATALOGUE[interface])
             job = Job(str(folder), interface, names, size, start_time, timeout, count, chosen)
             findings += _meant(archive, interface, run_isolated(job, progress))
-    _demand_loaded(archive, findings)
+    _demand_runnable(archive, findings)
+    if CO_SIMULATION not in archive.interfaces:
+        findings.append(Finding("interface", Verdict.LIMIT, NO_SLAVE, "integrate it with a solver of your own"))
     found = _merged(findings)
     return CheckReport(archive, size, chosen, found, tuple(what_to_trust(found)), perf_counter() - begin, count)
 
@@ -164,25 +168,25 @@ def _steps(description: ModelDescription, step: float, steps: int | None, until:
 
 
 def _meant(archive: Archive, interface: str, findings: list[Finding]) -> list[Finding]:
-    """Findings by what they mean for co-simulation: those of model exchange are notes beside it, and it alone is a limit."""
-    if interface == CO_SIMULATION:
+    """Findings by what they mean for co-simulation: beside it those of model exchange are notes."""
+    if interface == CO_SIMULATION or CO_SIMULATION not in archive.interfaces:
         return findings
-    if CO_SIMULATION in archive.interfaces:
-        own = {check.name for check in CATALOGUE[interface]}
-        return [replace(f, verdict=Verdict.NOTE, advice="") if f.check in own and f.verdict.rank > 1 else f for f in findings]
-    alone = "there is no co-simulation: this package's master cannot step it"
-    return [*findings, Finding("interface", Verdict.LIMIT, alone, "integrate it with a solver of your own")]
+    own = {check.name for check in CATALOGUE[interface]}
+    meant = {Verdict.LIMIT, Verdict.DISTRUST}
+    return [replace(f, verdict=Verdict.NOTE, advice="") if f.check in own and f.verdict in meant else f for f in findings]
 
 
-def _demand_loaded(archive: Archive, findings: list[Finding]) -> None:
-    """Refuse an FMU whose library cannot be loaded on this machine: that is neither its fault nor can anything be said of it.
+def _demand_runnable(archive: Archive, findings: list[Finding]) -> None:
+    """Refuse an FMU that cannot be loaded or makes no instance on this machine: nothing can be said of it, good or bad.
 
     Raises:
-        NotAnFmuError: it is so.
+        NotAnFmuError: it is so for every interface; the message says why.
     """
     loading = [f.detail for f in findings if f.check.endswith("loading")]
-    if loading and all(detail.startswith(NOT_LOADED) for detail in loading):
-        raise NotAnFmuError(f"{archive.path} cannot be run on this machine: {loading[0]}")
+    reasons = [f.detail for f in findings if f.detail.startswith(UNRUNNABLE)]
+    if loading and len(reasons) >= len(loading):
+        hint = "a library, a licence or the tool that made it may be missing"
+        raise NotAnFmuError(f"{archive.path} cannot be run on this machine: {reasons[0]}; {hint}.")
 
 
 def _demand_settable(description: ModelDescription, starts: Mapping[str, float]) -> None:
