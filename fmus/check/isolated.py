@@ -143,10 +143,9 @@ def _end(process: subprocess.Popen[bytes]) -> None:
     if process.poll() is None:
         process.kill()
     process.wait()
-    for pipe in (process.stdin, process.stdout):
-        if pipe is not None:
-            with suppress(OSError):
-                pipe.close()
+    if process.stdin is not None:
+        with suppress(OSError):
+            process.stdin.close()
 
 
 def _reader(process: subprocess.Popen[bytes]) -> queue.Queue[bytes | None]:
@@ -159,6 +158,8 @@ def _reader(process: subprocess.Popen[bytes]) -> queue.Queue[bytes | None]:
             for line in process.stdout:
                 lines.put(line)
         lines.put(None)
+        with suppress(OSError):
+            process.stdout.close()  # here, where nobody reads it: what could not be ended may hold the other end
 
     threading.Thread(target=read, daemon=True).start()
     return lines

@@ -182,11 +182,11 @@ def _demand_runnable(archive: Archive, findings: list[Finding]) -> None:
     Raises:
         NotAnFmuError: it is so for every interface; the message says why.
     """
-    loading = [f.detail for f in findings if f.check.endswith("loading")]
-    reasons = [f.detail for f in findings if f.detail.startswith(UNRUNNABLE)]
-    if loading and len(reasons) >= len(loading):
-        hint = "a library, a licence or the tool that made it may be missing"
-        raise NotAnFmuError(f"{archive.path} cannot be run on this machine: {reasons[0]}; {hint}.")
+    loading = [f for f in findings if f.check.endswith("loading")]
+    started = [*loading, *(f for f in findings if f.check.endswith("initialise"))]
+    reasons = [f.detail for f in started if f.detail.startswith(UNRUNNABLE)]
+    if loading and len(reasons) == len(loading):
+        raise NotAnFmuError(f"{archive.path} cannot be run on this machine (is a library or a licence missing?): {reasons[0]}")
 
 
 def _demand_settable(description: ModelDescription, starts: Mapping[str, float]) -> None:
