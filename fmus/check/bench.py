@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -75,19 +76,24 @@ class Bench:
         """Whether each output is declared discrete, shape (q,)."""
         return np.array([self.component.variables[n].variability == "discrete" for n in self.output_names], dtype=bool)
 
-    def excite(self) -> bool:
+    def excite(self, limit: float = np.inf) -> bool:
         """Find inputs under which the outputs move; an amplitude that breaks the FMU is none.
 
         First the start values of the inputs, then the same value added to all, then a different one for each (a difference of
         inputs is zero under equal ones), then a change of the inputs (what has no memory moves with them only), then more steps
         (a sensor may be sampled slowly).
+
+        Args:
+            limit: time after which no more is tried [s].
         """
         if self.excited is None:
+            since = perf_counter()
             tries = [(amplitude, spread) for spread in SPREADS for amplitude in EXCITATIONS]
             self.excited = any(
                 self._moves(*one, change=change, steps=steps)
                 for change, steps in ((False, WARM_UP_STEPS), (True, WARM_UP_STEPS), (False, SLOW_STEPS))
                 for one in tries
+                if perf_counter() - since < limit
             )
             if not self.excited:
                 most, self.amplitude, self.spread = self._best

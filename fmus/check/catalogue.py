@@ -47,13 +47,14 @@ class Check:
     def lost(self, detail: str, *, crashed: bool) -> Finding:
         """The finding where the process ended or fell silent in this check."""
         verdict = LIMIT if crashed and self.failing is NOTE else self.failing
-        advice = f"{self.advice}; {NO_PROBE}" if crashed and self.advice else self.advice
+        advice = f"{self.advice}; {NO_PROBE}" if crashed and self.advice else self.advice if crashed else SLOW
         return Finding(self.name, verdict, detail, advice)
 
 
 REPEATED = "repeated run"
 ONE_INSTANCE = "have one instance of it in a process, a fresh process for each run"
 NO_PROBE = "with balises on it, choose the method early-return or interpolate: the probe for the others would crash too"
+SLOW = "it hangs or is slow there: a longer --timeout tells which"
 MISSING = "do not use the capabilities whose functions are missing"
 NO_REDOING = "do not redo steps: the master finds passings by shorter steps or interpolation, and iterates nothing"
 FIXED_STEP = "keep to one communication step; an event inside it can only be interpolated"

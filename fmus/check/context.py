@@ -12,6 +12,9 @@ from fmus.check.bench import Bench
 from fmus.check.model import FmuModel
 from fmus.check.slave import FmuSlave
 
+SHARE_OF_BUDGET = 0.3
+"""Of the time of a check, for finding inputs that move something."""
+
 
 class Context:
     """What is checked and how.
@@ -52,7 +55,7 @@ class Context:
     def bench(self) -> Bench:
         """The shared bench, excited where some input moves the outputs."""
         bench = self.quiet_bench()
-        bench.excite()
+        bench.excite(SHARE_OF_BUDGET * self.budget)
         return bench
 
     def fresh_bench(self) -> Bench:

@@ -180,13 +180,13 @@ def _demand_runnable(archive: Archive, findings: list[Finding]) -> None:
     """Refuse an FMU that cannot be loaded or makes no instance on this machine: nothing can be said of it, good or bad.
 
     Raises:
-        NotAnFmuError: it is so for every interface; the message says why.
+        NotAnFmuError: it is so for co-simulation, or for model exchange where there is nothing else; the message says why.
     """
-    loading = [f for f in findings if f.check.endswith("loading")]
-    started = [*loading, *(f for f in findings if f.check.endswith("initialise"))]
-    reasons = [f.detail for f in started if f.detail.startswith(UNRUNNABLE)]
-    if loading and len(reasons) == len(loading):
-        raise NotAnFmuError(f"{archive.path} cannot be run on this machine (is a library or a licence missing?): {reasons[0]}")
+    prefix = "" if CO_SIMULATION in archive.interfaces else "model exchange: "
+    for finding in findings:
+        if finding.check in (f"{prefix}loading", f"{prefix}initialise") and finding.detail.startswith(UNRUNNABLE):
+            where = f"{archive.path} cannot be run on this machine (is a library or a licence missing?)"
+            raise NotAnFmuError(f"{where}: {finding.detail}")
 
 
 def _demand_settable(description: ModelDescription, starts: Mapping[str, float]) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from fmpy.model_description import ModelVariable
 
 from fmus.check.behaviour import difference, repeatable
-from fmus.check.bench import WARM_UP_STEPS
+from fmus.check.bench import SLOW_STEPS, WARM_UP_STEPS
 from fmus.check.context import Context
 from fmus.check.findings import Outcome, Verdict, failed, limited, noted, passed, skipped
 from fmus.check.instance import REAL_TYPES, FmuInstance, SlaveError
@@ -19,7 +19,7 @@ from fmus.check.library import functions_of_capabilities
 
 SHARE_OF_BUDGET = 0.4
 TIMED_STEPS = 200
-UNSEEN = "what it does when it moves was not seen: give start values (--start) or look longer (--until)"
+UNSEEN = "what it does when it moves was not seen: give start values (--start) or a longer step (--step)"
 NAMES_SHOWN = 4
 
 
@@ -144,7 +144,7 @@ def _run(context: Context) -> Outcome:
     if not bench.output_names:
         return limited(f"{done}; it has no number that moves and can be read", UNSEEN)
     if not bench.excited:
-        return limited(f"{done}; nothing moved, what follows is weak", UNSEEN)
+        return limited(f"{done}; nothing moved in the first {SLOW_STEPS}, what follows is weak", UNSEEN)
     late = f"; {context.steps} were asked for, use a longer --timeout" if len(rows) < context.steps else ""
     above = f"inputs {bench.amplitude:g} above their start values" if bench.amplitude else "inputs at their start values"
     return passed(f"{done}, {above}{late}")
