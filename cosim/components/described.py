@@ -12,6 +12,7 @@ from cosim.components.capabilities import read_capabilities
 from cosim.components.elements import Element, Variables, described, elements_of
 from cosim.components.units import Units
 from cosim.errors import CouplingError, nearest
+from fmus.check.description import declared_tolerance
 from plant_models.hybrid.units import Unit, UnitError
 
 NUMERIC_TYPES = frozenset(
@@ -56,6 +57,8 @@ class Described(ABC):
     def __init__(self, name: str, description: ModelDescription, source: str, kind: str) -> None:
         self.name, self.description, self.source, self.kind = name, description, source, kind
         self.capabilities = read_capabilities(description)
+        self.tolerance: float | None = declared_tolerance(description)
+        """Relative tolerance of its solver, told at set-up: the scenario's, else the declared one."""
         self.variables = Variables({v.name: v for v in description.modelVariables})
         self.events: dict[str, EventPort] = self._find_events()
         self._units = Units(description)

@@ -182,13 +182,15 @@ def unconnected_inputs(
     """
     set_by_hand = {(name, signal) for name, signals in (given or {}).items() for signal in signals}
     taken = {c.target for c in connections} | set_by_hand
-    return [f"{c.name}.{name}" for c in components for v in _free_to_connect(c) for name in _without_source(c, v, taken)]
+    return [f"{c.name}.{name}" for c in components for v in _free_to_connect(c, taken) for name in _without_source(c, v, taken)]
 
 
-def _free_to_connect(component: Component) -> list[ModelVariable]:
+def _free_to_connect(component: Component, taken: set[tuple[str, str]]) -> list[ModelVariable]:
+    """The inputs that may be connected; an FMI 3 alias is its variable, and one that is taken takes it."""
     hidden = component.event_references()
-    inputs = [v for v in component.description.modelVariables if v.causality == "input" and v.type != "Clock"]
-    return [v for v in inputs if v.valueReference not in hidden]
+    inputs = [v for v in component.description.modelVariables if v.causality == "input" and v.type != "Clock" and v.alias is None]
+    by_alias = {v.name for v in inputs if any((component.name, alias.name) in taken for alias in v.aliases)}
+    return [v for v in inputs if v.valueReference not in hidden and v.name not in by_alias]
 
 
 def _without_source(component: Component, variable: ModelVariable, taken: set[tuple[str, str]]) -> list[str]:

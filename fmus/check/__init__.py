@@ -10,13 +10,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fmus.check.findings import Finding, Verdict
+    from fmus.check.findings import Class, Finding, Verdict
     from fmus.check.run import CheckReport, check_fmu
 
-__all__ = ["CheckReport", "Finding", "Verdict", "check_fmu"]
+__all__ = ["CheckReport", "Class", "Finding", "Verdict", "check_fmu"]
 
 _HOMES = {
     "CheckReport": "fmus.check.run",
+    "Class": "fmus.check.findings",
     "Finding": "fmus.check.findings",
     "Verdict": "fmus.check.findings",
     "check_fmu": "fmus.check.run",

@@ -73,8 +73,8 @@ class Archive:
             try:
                 with zipfile.ZipFile(self.path) as archive:
                     archive.extractall(name)
-            except (zipfile.BadZipFile, OSError, EOFError, ValueError, RuntimeError, NotImplementedError) as error:
-                raise NotAnFmuError(f"{self.path} is a corrupt archive: {error}") from error
+            except Exception as error:  # each compression throws its own: zlib.error, lzma.LZMAError
+                raise NotAnFmuError(f"{self.path} is a corrupt archive: {error or type(error).__name__}") from error
             yield Path(name)
 
 

@@ -51,20 +51,28 @@ def divided_steps(bench: Bench, scale: float = 1.0) -> str:
         bench: the instance.
         scale: the whole step, in communication steps of the bench.
     """
-    h, warm_up = scale * bench.h, (bench.h,) * WARM_UP_STEPS
-    bench.begin()
-    start, whole = bench.steps((*warm_up, h))[-2:]
+    h = scale * bench.h
+    start, whole, *all_divided = ends_of_divided_steps(bench, h)
     change = np.abs(whole - start)
     moving = change > RESOLUTION * np.abs(whole)
-    for parts in DIVISIONS:
-        bench.begin()
-        divided = bench.steps((*warm_up, *(h * part for part in parts)))[-1]
+    for parts, divided in zip(DIVISIONS, all_divided, strict=True):
         same = np.abs(divided - whole) <= STEP_TOLERANCE * change + RESOLUTION * np.abs(whole)
         if not _enough(same, moving):
             shares = " and ".join(f"{part:g}" for part in parts)
             found = worst(bench, whole, divided)
             return f"the outputs differ: a step of {h:g} s and one in parts of {shares} of it end apart, {found}"
     return ""
+
+
+def ends_of_divided_steps(bench: Bench, h: float) -> list[np.ndarray]:
+    """Outputs before a step of `h` [s], after it, and after it in the parts of `DIVISIONS`, each of shape (q,)."""
+    warm_up = (bench.h,) * WARM_UP_STEPS
+    bench.begin()
+    rows = bench.steps((*warm_up, h))[-2:]
+    for parts in DIVISIONS:
+        bench.begin()
+        rows.append(bench.steps((*warm_up, *(h * part for part in parts)))[-1])
+    return rows
 
 
 def short_step(bench: Bench) -> str:
@@ -90,39 +98,15 @@ def honest_step(bench: Bench) -> str:
     return divided_steps(bench) or short_step(bench)
 
 
-def exact_state(bench: Bench) -> str:
-    """Save, go on, go elsewhere under other inputs, restore twice: the same steps must give the same outputs.
-
-    Several steps are compared, because a part of the state that was not restored may take time to show, and one of them is
-    short where the FMU takes such steps.
-    """
-    path = continuation(bench)
-    bench.begin()
-    bench.steps((bench.h,) * WARM_UP_STEPS)
-    component = bench.component
-    state, saved_at = component.save(), bench.now
-    try:
-        first = bench.steps(path)
-        for _ in range(2):
-            go_elsewhere(bench)
-            component.restore(state)
-            problem = difference(bench, first, again(bench, saved_at, path))
-            if problem:
-                return f"after a restored state {problem}"
-        return ""
-    finally:
-        component.release(state)
-
-
 def continuation(bench: Bench) -> tuple[float, ...]:
     """The steps [s] by which continuations are compared."""
     h = bench.h
     return (h, UNEVEN * h, h, h) if bench.component.can_vary_step else (h, h, h)
 
 
-def go_elsewhere(bench: Bench) -> None:
-    """Some steps under other inputs, so that a restored state has something to undo."""
-    bench.set_inputs(elsewhere(bench.amplitude))
+def go_elsewhere(bench: Bench, distance: float = 1.0) -> None:
+    """Some steps under other inputs, `distance` times as large, so that a restored state has something to undo."""
+    bench.set_inputs(distance * elsewhere(bench.amplitude))
     bench.steps((bench.h,) * WARM_UP_STEPS)
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from time import perf_counter
 from typing import Any
 
 import numpy as np
+from fmpy.model_description import ModelDescription
 
 from fmus.check.steppable import FAILURES, Steppable
 
@@ -13,8 +15,12 @@ WARM_UP_STEPS = 5
 SLOW_STEPS = 25  # a quarter of a second at the usual step: what is sampled at 10 Hz moves in it
 EXCITATIONS = (0.0, 1.0, 1e3, 1e5)
 SPREADS = (0.0, 0.1)
+MOVING = (None, "continuous", "discrete")
 END = 1e6
-"""Stop time that is announced, seconds after the start [s]."""
+"""Stop time that is announced where the FMU has no default experiment, seconds after the start [s]."""
+
+LOOKED_AT = 200
+"""Local variables that are looked at where there is no output."""
 
 
 class Bench:
@@ -26,22 +32,25 @@ class Bench:
         start_time: [s].
         h: communication step [s].
         component: the first component to use, where it was made already.
+        until: end of the longest run [s]; what lies within the default experiment by default.
     """
 
     def __init__(
         self, make: Callable[[], Steppable], starts: Mapping[str, Any], start_time: float, h: float,
-        component: Steppable | None = None,
+        component: Steppable | None = None, until: float | None = None,
     ) -> None:  # fmt: skip
         self._make, self.starts, self.t0, self.h = make, starts, start_time, h
         self.component = make() if component is None else component
+        self.end = max(end_of_experiment(self.component.description, start_time), until or start_time)
         self.amplitude, self.spread, self.now = 0.0, 0.0, start_time
         self.excited: bool | None = None
         self.reset_works = False
+        self._best = 0, 0.0, 0.0  # outputs that moved, amplitude, spread
         self._started = False
 
     def twin(self, make: Callable[[], Steppable] | None = None) -> Bench:
         """A second bench with an instance of its own and the same inputs."""
-        other = Bench(make or self._make, self.starts, self.t0, self.h)
+        other = Bench(make or self._make, self.starts, self.t0, self.h, until=self.end)
         other.amplitude, other.spread, other.excited = self.amplitude, self.spread, self.excited
         return other
 
@@ -58,29 +67,37 @@ class Bench:
 
     @property
     def output_names(self) -> list[str]:
-        """Names of the outputs that are read."""
-        return self.component.names("output")
+        """Names of the outputs, elements of arrays included; where there are none, of the first local variables."""
+        locals_ = self.component.names("local")[:LOOKED_AT]
+        return self.component.names("output") or [n for n in locals_ if self.component.variables[n].variability in MOVING]
 
     @property
     def discrete(self) -> np.ndarray:
         """Whether each output is declared discrete, shape (q,)."""
         return np.array([self.component.variables[n].variability == "discrete" for n in self.output_names], dtype=bool)
 
-    def excite(self) -> bool:
+    def excite(self, limit: float = np.inf) -> bool:
         """Find inputs under which the outputs move; an amplitude that breaks the FMU is none.
 
-        First the same value for all inputs, then a different one for each (a difference of inputs is zero under equal ones), then
-        a change of the inputs (what has no memory moves with them only), then more steps (a sensor may be sampled slowly).
+        First the start values of the inputs, then the same value added to all, then a different one for each (a difference of
+        inputs is zero under equal ones), then a change of the inputs (what has no memory moves with them only), then more steps
+        (a sensor may be sampled slowly).
+
+        Args:
+            limit: time after which no more is tried [s].
         """
         if self.excited is None:
+            since = perf_counter()
             tries = [(amplitude, spread) for spread in SPREADS for amplitude in EXCITATIONS]
             self.excited = any(
                 self._moves(*one, change=change, steps=steps)
                 for change, steps in ((False, WARM_UP_STEPS), (True, WARM_UP_STEPS), (False, SLOW_STEPS))
                 for one in tries
+                if perf_counter() - since < limit
             )
             if not self.excited:
-                self.amplitude = self.spread = 0.0
+                most, self.amplitude, self.spread = self._best
+                self.excited = most > 0
         return self.excited
 
     def _moves(self, amplitude: float, spread: float, *, change: bool, steps: int) -> bool:
@@ -93,8 +110,10 @@ class Bench:
             after = self.steps((self.h,) * steps)[-1]
         except FAILURES:
             return False
-        moving = np.count_nonzero(~np.isclose(before, after, rtol=1e-12, atol=0.0) & np.isfinite(after))
-        return bool(moving >= max(1, len(before) // 3))
+        moving = int(np.count_nonzero(~np.isclose(before, after, rtol=1e-12, atol=0.0) & np.isfinite(after)))
+        if moving > self._best[0]:
+            self._best = moving, amplitude, spread
+        return moving >= max(1, len(before) // 3)
 
     def begin(self, *, excited: bool = True) -> np.ndarray:
         """An instance at the start, by a reset where resets are known to work, and its outputs there, shape (q,).
@@ -109,7 +128,7 @@ class Bench:
         for name, value in self.starts.items():
             self.component.set_start(name, value)
         self.now = self.t0
-        self.component.enter_initialization(self.t0, self.t0 + END)
+        self.component.enter_initialization(self.t0, self.end)
         if excited:
             self.set_inputs(self.amplitude)
         self.component.exit_initialization()
@@ -121,21 +140,31 @@ class Bench:
         return self._outputs.copy()
 
     def set_inputs(self, amplitude: float) -> None:
-        """All continuous inputs to one value, or to growing ones where a spread is set."""
-        self._inputs[:] = amplitude * (1.0 + self.spread * np.arange(len(self._inputs)))
+        """All continuous inputs to this much above their start values, more from one to the next where a spread is set.
+
+        Nothing goes beyond a declared range.
+        """
+        aim = self._own + amplitude * (1.0 + self.spread * np.arange(len(self._inputs)))
+        self._inputs[:] = np.clip(aim, self._lowest, self._highest)
         self._write()
 
     def steps(self, pattern: Sequence[float]) -> list[np.ndarray]:
         """Outputs after each step of a pattern of lengths [s] from where the instance stands, each of shape (q,)."""
         rows = []
         for h in pattern:
-            self._write()
-            self.component.advance(self.now, self.now + h)
+            rows += self.step(h)
             if self.component.terminated:
-                raise self.component.failure("asked to terminate under the probe")
-            self.now += h
-            rows.append(self.outputs())
+                raise self.component.failure("asked to terminate under the probe", self.now)
         return rows
+
+    def step(self, h: float) -> list[np.ndarray]:
+        """One step of length `h` [s]: the outputs after it in a list, which is empty where the FMU asks for the end."""
+        self._write()
+        self.component.advance(self.now, self.now + h)
+        if self.component.terminated:
+            return []
+        self.now += h
+        return [self.outputs()]
 
     def _renew(self) -> None:
         if self._started:
@@ -149,6 +178,29 @@ class Bench:
         self._read = component.reader(names, self._outputs)
         inputs = [n for n in component.names("input") if component.variables[n].variability in (None, "continuous")]
         self._write, self._inputs = component.writer(inputs)
+        declared = [component.variables[n] for n in inputs]
+        starts = (self.starts.get(n, v.start) for n, v in zip(inputs, declared, strict=True))
+        self._own = np.array([_number(start, 0.0) for start in starts])
+        self._lowest = np.array([_number(v.min, -np.inf) for v in declared])
+        self._highest = np.array([_number(v.max, np.inf) for v in declared])
+
+
+def end_of_experiment(description: ModelDescription, start_time: float) -> float:
+    """Where the default experiment ends [s]; long after the start where there is none.
+
+    Some FMUs divide the time up to the announced end into steps of their own: a far end is a coarse step, or a run without end.
+    """
+    experiment = description.defaultExperiment
+    stop = _number(experiment.stopTime if experiment else None, start_time)
+    return stop if start_time < stop < np.inf else start_time + END
+
+
+def _number(text: Any, otherwise: float) -> float:
+    """A number from a model description; another one where it holds none, or those of an array."""
+    try:
+        return float(text)
+    except (TypeError, ValueError):
+        return otherwise
 
 
 def elsewhere(amplitude: float) -> float:

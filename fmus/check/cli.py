@@ -1,6 +1,7 @@
 """Command line: ``fmus check FILE.fmu``.
 
-Exit codes: 0 all passed or was skipped, 1 something failed or warned, 2 the file cannot be checked or a mistake of the user.
+Exit codes: 0 use it as it is, or with the limits that are told; 1 do not trust it, with ``--strict`` also where there are limits;
+2 the file cannot be checked, the check itself failed, or a mistake of the user.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-CLEAN, PROBLEMS = 0, 1
+CLEAN, PROBLEMS, UNCHECKED = 0, 1, 2
 TRUTH = {"true": 1.0, "false": 0.0}
 
 
@@ -24,6 +25,10 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("--step", type=float, metavar="H", help="communication step in s (default: the FMU's own)")
     parser.add_argument("--start", action="append", default=[], metavar="K=V", help="start value; may be repeated")
     parser.add_argument("--timeout", type=float, default=30.0, metavar="S", help="time limit of each check in s (default 30)")
+    length = parser.add_mutually_exclusive_group()
+    length.add_argument("--steps", type=int, metavar="N", help="steps of the longest run (default 50, within its experiment)")
+    length.add_argument("--until", type=float, metavar="T", help="end of the longest run in s, in place of --steps")
+    parser.add_argument("--strict", action="store_true", help="limits end with exit code 1 too")
     parser.add_argument("--json", metavar="FILE", help="write the report as JSON; '-' prints it in place of the table")
     parser.set_defaults(run=run)
 
@@ -46,7 +51,16 @@ def run(options: argparse.Namespace) -> int:
         _write_json(options.json, reporting.as_data(report))
     if options.json != "-":
         print(reporting.table(report))
-    return CLEAN if report.clean else PROBLEMS
+    return _exit_code(report, options.strict)
+
+
+def _exit_code(report: Any, strict: bool) -> int:
+    findings = import_module("fmus.check.findings")
+    if report.verdict is findings.Class.DISTRUST:
+        return PROBLEMS
+    if any(finding.verdict is findings.Verdict.ERROR for finding in report.findings):
+        return UNCHECKED
+    return PROBLEMS if strict and not report.clean else CLEAN
 
 
 def _checked(options: argparse.Namespace) -> Any:
@@ -60,7 +74,10 @@ def _checked(options: argparse.Namespace) -> Any:
             bar.set_description(name)
             bar.update()
 
-        return running.check_fmu(options.file, step=options.step, starts=starts, timeout=options.timeout, progress=progress)
+        return running.check_fmu(
+            options.file, step=options.step, starts=starts, timeout=options.timeout, steps=options.steps, until=options.until,
+            progress=progress,
+        )  # fmt: skip
 
 
 def _starts(words: Sequence[str]) -> dict[str, float]:
@@ -77,8 +94,7 @@ def _starts(words: Sequence[str]) -> dict[str, float]:
 
 
 def _write_json(target: str, data: dict[str, Any]) -> None:
-    text = json.dumps(data, indent=2, ensure_ascii=False) + "\n"
-    if target == "-":
-        sys.stdout.write(text)
+    if target == "-":  # a terminal, perhaps: pure ASCII has no control characters
+        sys.stdout.write(json.dumps(data, indent=2) + "\n")
     else:
-        Path(target).write_text(text, encoding="utf-8")
+        Path(target).write_text(json.dumps(data, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")

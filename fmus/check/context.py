@@ -12,6 +12,9 @@ from fmus.check.bench import Bench
 from fmus.check.model import FmuModel
 from fmus.check.slave import FmuSlave
 
+SHARE_OF_BUDGET = 0.3
+"""Of the time of a check, for finding inputs that move something."""
+
 
 class Context:
     """What is checked and how.
@@ -23,14 +26,15 @@ class Context:
         start_time: [s].
         starts: start values by name.
         budget: time that one check may take [s]; checks that count on stop well before.
+        steps: of the longest run.
     """
 
     def __init__(
         self, folder: Path, description: ModelDescription, step: float, start_time: float,
-        starts: Mapping[str, float], budget: float,
+        starts: Mapping[str, float], budget: float, steps: int,
     ) -> None:  # fmt: skip
         self.folder, self.description = folder, description
-        self.step, self.start_time, self.starts, self.budget = step, start_time, dict(starts), budget
+        self.step, self.start_time, self.starts, self.budget, self.steps = step, start_time, dict(starts), budget, steps
         self._made = 0
 
     def slave(self, *, logging: bool = False) -> FmuSlave:
@@ -45,13 +49,13 @@ class Context:
 
     def quiet_bench(self) -> Bench:
         """A bench that has not been stepped to find an excitation; the caller puts it away."""
-        return Bench(self.slave, self.starts, self.start_time, self.step)
+        return Bench(self.slave, self.starts, self.start_time, self.step, until=self.start_time + self.steps * self.step)
 
     @cached_property
     def bench(self) -> Bench:
         """The shared bench, excited where some input moves the outputs."""
         bench = self.quiet_bench()
-        bench.excite()
+        bench.excite(SHARE_OF_BUDGET * self.budget)
         return bench
 
     def fresh_bench(self) -> Bench:

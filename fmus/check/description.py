@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -75,6 +76,16 @@ def _complete_clock(clock: ModelVariable, entry: ElementTree.Element) -> None:
         text = entry.get(name)
         if text is not None:
             setattr(clock, name, convert(text))
+
+
+def declared_tolerance(description: ModelDescription) -> float | None:
+    """Relative tolerance of the default experiment; None where none is declared, or no positive number."""
+    experiment = description.defaultExperiment
+    try:
+        tolerance = math.nan if experiment is None or experiment.tolerance is None else float(experiment.tolerance)
+    except ValueError:
+        return None
+    return tolerance if 0.0 < tolerance < math.inf else None
 
 
 def negated_aliases(source: Path) -> frozenset[str]:

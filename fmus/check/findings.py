@@ -1,20 +1,35 @@
-"""Findings: what one check saw, with a verdict. Standard library only; findings travel between processes as plain data."""
+"""Findings: what one check saw, and what it means for a co-simulation run. Standard library only; they travel as plain data."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
 
 class Verdict(StrEnum):
-    """How a check ended."""
+    """What the outcome of a check means for a co-simulation run, from nothing to everything."""
 
-    PASS = "pass"
-    WARN = "warn"
-    FAIL = "fail"
     SKIPPED = "skipped"
+    PASS = "pass"
+    NOTE = "note"
+    ERROR = "error"
+    LIMIT = "limit"
+    DISTRUST = "distrust"
+
+    @property
+    def rank(self) -> int:
+        """The higher, the worse."""
+        return list(Verdict).index(self)
+
+
+class Class(StrEnum):
+    """What is to be done with an FMU as a whole."""
+
+    USE = "use as it is"
+    LIMITS = "use with these limits"
+    DISTRUST = "do not trust"
 
 
 @dataclass(frozen=True)
@@ -22,12 +37,14 @@ class Outcome:
     """What a check function returns.
 
     Args:
-        verdict: how it ended.
+        verdict: what it means; None where it failed, and the catalogue says what that means.
         detail: what was seen, or why it was skipped.
+        advice: what to do about it, where the catalogue does not know.
     """
 
-    verdict: Verdict
+    verdict: Verdict | None
     detail: str = ""
+    advice: str = ""
 
 
 @dataclass(frozen=True)
@@ -36,13 +53,15 @@ class Finding:
 
     Args:
         check: name of the check.
-        verdict: how it ended.
+        verdict: what it means.
         detail: what was seen, or why it was skipped.
+        advice: what to do about it, where it is a limit.
     """
 
     check: str
     verdict: Verdict
     detail: str = ""
+    advice: str = ""
 
     def to_dict(self) -> dict[str, str]:
         """For JSON."""
@@ -51,7 +70,15 @@ class Finding:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Finding:
         """The finding that `to_dict` described."""
-        return cls(str(data["check"]), Verdict(data["verdict"]), str(data["detail"]))
+        return cls(str(data["check"]), Verdict(data["verdict"]), str(data["detail"]), str(data["advice"]))
+
+
+def class_of(findings: Iterable[Finding]) -> Class:
+    """The class of an FMU: that of its worst finding. What an error of the check left unseen is a limit."""
+    worst = max((finding.verdict for finding in findings), key=lambda verdict: verdict.rank, default=Verdict.PASS)
+    if worst in (Verdict.LIMIT, Verdict.ERROR):
+        return Class.LIMITS
+    return Class.DISTRUST if worst is Verdict.DISTRUST else Class.USE
 
 
 def passed(detail: str = "") -> Outcome:
@@ -59,14 +86,19 @@ def passed(detail: str = "") -> Outcome:
     return Outcome(Verdict.PASS, detail)
 
 
-def warned(detail: str) -> Outcome:
-    """Legal or harmless, but a master should know."""
-    return Outcome(Verdict.WARN, detail)
+def noted(detail: str) -> Outcome:
+    """For information: it changes nothing in a run of this package's master."""
+    return Outcome(Verdict.NOTE, detail)
+
+
+def limited(detail: str, advice: str = "") -> Outcome:
+    """A run is right as long as the advice, or that of the catalogue, is followed."""
+    return Outcome(Verdict.LIMIT, detail, advice)
 
 
 def failed(detail: str) -> Outcome:
-    """The FMU breaks the standard or its own word."""
-    return Outcome(Verdict.FAIL, detail)
+    """The FMU breaks the standard or its own word; what that means stands in the catalogue."""
+    return Outcome(None, detail)
 
 
 def skipped(reason: str) -> Outcome:

@@ -5,9 +5,11 @@ Every call is guarded: whatever the FMU or fmpy throws comes out as a `SlaveErro
 
 from __future__ import annotations
 
+import ctypes
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from itertools import product
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -17,16 +19,30 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.model_description import ModelDescription, ModelVariable
 
+from fmus.check.description import declared_tolerance
 from fmus.check.library import fmi_version, load
+from fmus.plain import one_line
 from fmus.ports import make_reader, make_writer
 
+LOADING = "loading the library"
+INSTANTIATING = "instantiate"
 FATAL = 4  # FMI status: the instance must not be called again
 MESSAGES_KEPT = 20
+OWN_MISTAKES = (TypeError, AttributeError, LookupError, NameError, AssertionError, ArithmeticError, ctypes.ArgumentError)
+"""What wrong calls end with, whatever FMU is called."""
+
 NUMERIC_TYPES = frozenset(
     {"Real", "Integer", "Boolean", "Enumeration", "Float64", "Float32"}
     | {f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)}
 )
 REAL_TYPES = frozenset({"Real", "Float64", "Float32"})
+
+
+def element_names(variable: ModelVariable) -> list[str]:
+    """The names of the elements of an array, ``y[1,2]``, row by row; of a scalar its own."""
+    if not variable.shape:
+        return [variable.name]
+    return [f"{variable.name}[{','.join(map(str, place))}]" for place in product(*(range(1, n + 1) for n in variable.shape))]
 
 
 class SlaveError(RuntimeError):
@@ -51,11 +67,11 @@ class FmuInstance:
     def __init__(self, folder: Path, description: ModelDescription, name: str = "checked", *, logging: bool = False) -> None:
         self.name, self.description, self.logging = name, description, logging
         self.version = fmi_version(description)
-        self.variables: dict[str, ModelVariable] = {v.name: v for v in description.modelVariables}
+        self.variables: dict[str, ModelVariable] = {n: v for v in description.modelVariables for n in (v.name, *element_names(v))}
         self.messages: deque[str] = deque(maxlen=MESSAGES_KEPT)
         self.terminated = False
         self._alive = self._running = False
-        self.slave: Any = self.guarded("loading the library", lambda: load(folder, description, self.interface, name))
+        self.slave: Any = self.guarded(LOADING, lambda: load(folder, description, self.interface, name))
 
     # -- what it declares -------------------------------------------------------------------------------------------
 
@@ -63,6 +79,11 @@ class FmuInstance:
     def declared(self) -> Any:
         """The element of the model description that holds the capabilities."""
         return getattr(self.description, self.interface)
+
+    @property
+    def tolerance(self) -> float | None:
+        """Relative tolerance that it is told at set-up: the declared one."""
+        return declared_tolerance(self.description)
 
     @property
     def can_save(self) -> bool:
@@ -75,18 +96,15 @@ class FmuInstance:
         return list(self.slave.dll.missing)
 
     def names(self, causality: str) -> list[str]:
-        """Names of the scalar numeric variables of one causality; no clocks, nothing clocked."""
-        return [
-            v.name
-            for v in self.description.modelVariables
-            if v.causality == causality and v.type in NUMERIC_TYPES and not v.shape and not v.clocks
-        ]
+        """Names of the numeric scalars and elements of one causality, each once; no clocks, nothing clocked, no aliases."""
+        own = [v for v in self.description.modelVariables if v.alias is None and v.causality == causality]
+        return [n for v in own if v.type in NUMERIC_TYPES and not v.clocks for n in element_names(v)]
 
     # -- life -------------------------------------------------------------------------------------------------------
 
     def instantiate(self) -> None:
         """Create the instance."""
-        self.guarded("instantiate", self._instantiate)
+        self.guarded(INSTANTIATING, self._instantiate)
         self._alive = True
 
     def reset(self) -> None:
@@ -127,14 +145,31 @@ class FmuInstance:
 
     def reader(self, names: Sequence[str], values: np.ndarray) -> Callable[[], None]:
         """A call that reads variables into `values`, shape (len(names),)."""
-        read = make_reader(self.slave, self.version, [self.variables[n] for n in names], values)
-        return lambda: self.guarded("reading variables", read)
+        variables, places, held = self._whole(names)
+        read = make_reader(self.slave, self.version, variables, held)
+
+        def call() -> None:
+            self.guarded("reading variables", read)
+            values[:] = held[places]
+
+        return call
 
     def writer(self, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
         """A call that writes variables, and the array of shape (len(names),) it writes from."""
-        buffer = np.zeros(len(names))
-        write = make_writer(self.slave, self.version, [self.variables[n] for n in names], buffer)
-        return (lambda: self.guarded("writing variables", write)), buffer
+        variables, places, held = self._whole(names)
+        buffer, write = np.zeros(len(names)), make_writer(self.slave, self.version, variables, held)
+
+        def call() -> None:
+            held[places] = buffer
+            self.guarded("writing variables", write)
+
+        return call, buffer
+
+    def _whole(self, names: Sequence[str]) -> tuple[list[ModelVariable], np.ndarray, np.ndarray]:
+        """The whole variables of scalars and elements, the places of these among all their values, and room for the values."""
+        whole = {self.variables[n].name: self.variables[n] for n in names}
+        place = {n: k for k, n in enumerate(n for v in whole.values() for n in element_names(v))}
+        return list(whole.values()), np.array([place[n] for n in names], dtype=np.intp), np.zeros(len(place))
 
     def read(self, names: Sequence[str]) -> np.ndarray:
         """Values of scalar numeric variables, shape (len(names),)."""
@@ -195,10 +230,10 @@ class FmuInstance:
         return SlaveError(reason + place + (f"; the FMU says: {self.messages[-1]}" if self.messages else ""))
 
     def guarded(self, what: str, call: Callable[[], Any]) -> Any:
-        """Run a call; whatever it throws becomes a `SlaveError`."""
+        """Run a call; whatever the FMU or fmpy throws for it becomes a `SlaveError`, a mistake of ours stays what it is."""
         try:
             return call()
-        except SlaveError:
+        except (SlaveError, *OWN_MISTAKES):
             raise
         except Exception as error:
             if isinstance(error, FMICallException) and error.status == FATAL:
@@ -217,13 +252,14 @@ class FmuInstance:
 
     def _enter_initialization(self, start_time: float, stop_time: float) -> None:
         """Begin initialisation; times in [s]."""
-        slave = self.slave
+        slave, tolerance = self.slave, self.tolerance
         if self.version == 2:
-            self.guarded("setupExperiment", lambda: slave.setupExperiment(startTime=start_time, stopTime=stop_time))
+            setup = slave.setupExperiment
+            self.guarded("setupExperiment", lambda: setup(tolerance=tolerance, startTime=start_time, stopTime=stop_time))
             self.guarded("enterInitializationMode", slave.enterInitializationMode)
         else:
             enter = slave.enterInitializationMode
-            self.guarded("enterInitializationMode", lambda: enter(startTime=start_time, stopTime=stop_time))
+            self.guarded("enterInitializationMode", lambda: enter(tolerance=tolerance, startTime=start_time, stopTime=stop_time))
 
     def _callbacks(self) -> Any:
         """fmpy's callbacks with our logger in place of the one that prints."""
@@ -237,6 +273,6 @@ class FmuInstance:
         self._note(message)
 
     def _note(self, message: bytes | None) -> None:
-        text = (message or b"").decode("utf-8", "replace").strip()
+        text = one_line((message or b"").decode("utf-8", "replace"))
         if text:
             self.messages.append(text)

@@ -19,7 +19,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
 from typing import IO, Any
 
-from fmus.check.catalogue import CATALOGUE
+from fmus.check.catalogue import check_of
 from fmus.check.findings import Finding, Verdict
 from fmus.check.job import Job
 from fmus.check.worker import unrun
@@ -27,9 +27,16 @@ from fmus.check.worker import unrun
 START_LIMIT = 60.0
 """Time a child may take to start before its first check [s]; a loaded machine takes seconds."""
 
-GRACE = 5.0
-"""Time a child may take to end after its last finding [s]."""
+GRACE = 10.0
+"""Time the keeper of a child may take to end all that it keeps [s]."""
 
+PROCESSES = 32
+"""Processes that an FMU may have running at once."""
+
+MEMORY = 4 * 1024**3
+"""Memory that an FMU, its processes and Python may take together [bytes]."""
+
+LEFT = "processes"
 CONSOLE = "console output"
 SHOWN = 80
 PACKAGE_ROOT = Path(__file__).resolve().parents[2]
@@ -41,11 +48,15 @@ class _Child:
 
     Args:
         findings: what it told. current: the check it was in when it ended, empty where it did all. end: how it ended, in words.
+        crashed: whether it ended by itself or had to be stopped for what it took; not where it was silent.
+        left: processes that it left running.
     """
 
     findings: list[Finding] = field(default_factory=list)
     current: str = ""
     end: str = ""
+    crashed: bool = True
+    left: int = 0
 
 
 def run_isolated(job: Job, progress: Callable[[str], None] = lambda _: None) -> list[Finding]:
@@ -56,25 +67,26 @@ def run_isolated(job: Job, progress: Callable[[str], None] = lambda _: None) -> 
         progress: is called with the name of each check that begins.
 
     Returns:
-        A finding for each check of the job, and one about what the FMU printed.
+        A finding for each check of the job, and those about what the FMU left running and what it printed.
     """
     found: list[Finding] = []
-    basis = {check.name for check in CATALOGUE[job.interface] if check.basis}
-    left = job.checks
+    left, running = job.checks, 0
     with TemporaryFile() as console:
         while left:
             child = _run_child(job.only(left), console, progress)
             found += child.findings
+            running += child.left
             left = tuple(name for name in left if name not in {f.check for f in found})
             if not left:
                 break
             lost = child.current or left[0]
-            found.append(Finding(lost, Verdict.FAIL, f"{child.end} in '{lost}'"))
+            check = check_of(job.interface, lost)
+            found.append(check.lost(f"{child.end} in '{lost}'", crashed=child.crashed))
             left = tuple(name for name in left if name != lost)
-            if lost in basis:
+            if check.basis:
                 found += [unrun(name, lost) for name in left]
                 left = ()
-        found.append(_console(console))
+        found += [_left(running), _console(console)]
     order = {name: place for place, name in enumerate(job.checks)}
     return sorted(found, key=lambda f: order.get(f.check, len(order)))
 
@@ -92,18 +104,19 @@ def _run_child(job: Job, console: IO[bytes], progress: Callable[[str], None]) ->
             try:
                 line = lines.get(timeout=limit)
             except queue.Empty:
-                seen.end = f"no answer within {limit:g} s"
-                return seen
+                seen.end, seen.crashed = f"no answer within {limit:g} s", False
+                break
             message = _parsed(line)
-            if line is None or "done" in message:
-                seen.end = _ending(process)
-                return seen
+            if line is None or "left" in message:
+                seen.end, seen.left = _ending(message), int(message.get("left", 0))
+                break
             if "start" in message:
                 seen.current, limit = str(message["start"]), job.budget
                 progress(seen.current)
             elif "finding" in message:
                 seen.findings.append(Finding.from_dict(message["finding"]))
-                seen.current = ""
+                seen.current, limit = "", START_LIMIT
+    return seen
 
 
 @contextmanager
@@ -112,7 +125,7 @@ def _process(console: IO[bytes]) -> Iterator[subprocess.Popen[bytes]]:
     with TemporaryDirectory(prefix="fmus-check-", ignore_cleanup_errors=True) as folder:
         paths = [str(PACKAGE_ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
         process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "fmus.check.worker"],
+            [sys.executable, "-P", "-m", "fmus.check.keeper", str(PROCESSES), str(MEMORY)],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=console, cwd=folder, start_new_session=True,
             env=os.environ | {"PYTHONPATH": os.pathsep.join(paths), "PYTHONWARNINGS": "ignore"},
         )  # fmt: skip
@@ -123,16 +136,16 @@ def _process(console: IO[bytes]) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
+    """The keeper ends all that it keeps; where it does not answer, it is killed with its group."""
+    process.terminate()
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(GRACE)
     if process.poll() is None:
         process.kill()
-    if hasattr(os, "killpg"):
-        with suppress(OSError):
-            os.killpg(process.pid, signal.SIGKILL)  # what the FMU itself has started
     process.wait()
-    for pipe in (process.stdin, process.stdout):
-        if pipe is not None:
-            with suppress(OSError):
-                pipe.close()
+    if process.stdin is not None:
+        with suppress(OSError):
+            process.stdin.close()
 
 
 def _reader(process: subprocess.Popen[bytes]) -> queue.Queue[bytes | None]:
@@ -145,6 +158,8 @@ def _reader(process: subprocess.Popen[bytes]) -> queue.Queue[bytes | None]:
             for line in process.stdout:
                 lines.put(line)
         lines.put(None)
+        with suppress(OSError):
+            process.stdout.close()  # here, where nobody reads it: what could not be ended may hold the other end
 
     threading.Thread(target=read, daemon=True).start()
     return lines
@@ -158,11 +173,13 @@ def _parsed(line: bytes | None) -> dict[str, Any]:
     return message if isinstance(message, dict) else {}
 
 
-def _ending(process: subprocess.Popen[bytes]) -> str:
-    try:
-        code = process.wait(timeout=GRACE)
-    except subprocess.TimeoutExpired:
-        return f"does not end within {GRACE:g} s"
+def _ending(message: dict[str, Any]) -> str:
+    """How a worker ended, in words, from the keeper's last line; empty where there is none."""
+    if "stopped" in message:
+        return str(message["stopped"])
+    if "ended" not in message:
+        return "ended, and its keeper with it,"
+    code = int(message["ended"])
     if code < 0:
         try:
             name = signal.Signals(-code).name
@@ -172,6 +189,15 @@ def _ending(process: subprocess.Popen[bytes]) -> str:
     return f"ended the process with exit code {code}"
 
 
+def _left(running: int) -> Finding:
+    """What the FMU started and did not end."""
+    if not running:
+        return Finding(LEFT, Verdict.PASS, "none is left running")
+    return Finding(
+        LEFT, Verdict.LIMIT, f"{running} were left running, and ended here", "end what it leaves running after each run"
+    )
+
+
 def _console(console: IO[bytes]) -> Finding:
     """What the FMU printed past its logger; everything a child prints comes from the FMU or from Python dying under it."""
     size = console.seek(0, os.SEEK_END)
@@ -179,4 +205,4 @@ def _console(console: IO[bytes]) -> Finding:
     first = console.readline().decode("utf-8", "replace").strip()[:SHOWN]
     if not size:
         return Finding(CONSOLE, Verdict.PASS, "nothing is printed past the logger")
-    return Finding(CONSOLE, Verdict.WARN, f"{size} bytes were printed past the logger, beginning with: {first!r}")
+    return Finding(CONSOLE, Verdict.NOTE, f"{size} bytes were printed past the logger, beginning with: {first!r}")

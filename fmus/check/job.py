@@ -16,7 +16,7 @@ class Job:
         interface: ``coSimulation`` or ``modelExchange``.
         checks: names of the checks, in order.
         step: communication step [s]. start_time: [s]. starts: start values by name.
-        budget: time that one check may take [s].
+        budget: time that one check may take [s]. steps: of the longest run.
     """
 
     folder: str
@@ -25,6 +25,7 @@ class Job:
     step: float
     start_time: float
     budget: float
+    steps: int
     starts: Mapping[str, float] = field(default_factory=dict)
 
     def only(self, checks: tuple[str, ...]) -> Job:

@@ -7,11 +7,14 @@ localisation method by it.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from fmus.check.behaviour import exact_state, honest_step, repeatable
+import numpy as np
+
+from fmus.check.behaviour import ends_of_divided_steps, honest_step, repeatable
 from fmus.check.bench import Bench
+from fmus.check.restoring import Restores, Restoring, largest, restoring
 from fmus.check.steppable import FAILURES, Steppable
 
 
@@ -23,24 +26,35 @@ class ProbeReport:
         component: name.
         declares_variable_step, declares_state: capability flags.
         honest_step: steps of any length did what they say.
-        exact_state: after save, steps elsewhere and restore, the same steps gave the identical outputs.
+        restores: what the same steps gave after save, steps elsewhere and restore: ``exact`` the identical outputs;
+            ``within_tolerance`` of the FMU's solver; ``no``, or its state cannot be saved.
+        restore_mismatch: largest relative difference after restoring; None where it is not known.
         repeatable: after a reset the same steps gave the identical outputs.
         excited: some input made the outputs move, so that the findings mean something.
         remarks: what failed, in words.
+        spread: by output, in its own unit: how far results lay apart that differ by the solver's steps alone, after restoring
+            and between a step and its parts. Empty where that was not measured.
     """
 
     component: str
     declares_variable_step: bool
     declares_state: bool
     honest_step: bool
-    exact_state: bool
+    restores: Restores
+    restore_mismatch: float | None
     repeatable: bool
     excited: bool
     remarks: tuple[str, ...] = ()
+    spread: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def exact_state(self) -> bool:
+        """Whether what follows a restored state is identical, bit for bit."""
+        return self.restores == "exact"
 
     def to_dict(self) -> dict[str, Any]:
         """For the summary."""
-        return asdict(self) | {"remarks": list(self.remarks)}
+        return asdict(self) | {"remarks": list(self.remarks), "spread": {n: s for n, s in self.spread.items() if s > 0.0}}
 
 
 def probe(make: Callable[[], Steppable], starts: Mapping[str, Any], start_time: float, h: float) -> ProbeReport:
@@ -55,8 +69,10 @@ def probe(make: Callable[[], Steppable], starts: Mapping[str, Any], start_time: 
         What was seen; an FMU that fails under the probe is reported, not raised.
     """
     component = make()
-    declares = {"declares_variable_step": component.can_vary_step, "declares_state": component.can_save}
-    nothing_seen = {"honest_step": False, "exact_state": False, "repeatable": False, "excited": False}
+    declares: dict[str, Any] = {"declares_variable_step": component.can_vary_step, "declares_state": component.can_save}
+    nothing_seen: dict[str, Any] = {
+        "honest_step": False, "restores": "no", "restore_mismatch": None, "repeatable": False, "excited": False,
+    }  # fmt: skip
     if component.description.coSimulation.canBeInstantiatedOnlyOncePerProcess:
         component.free()
         remark = "not probed: the FMU allows one instance per process only"
@@ -73,15 +89,42 @@ def probe(make: Callable[[], Steppable], starts: Mapping[str, Any], start_time: 
     return ProbeReport(component.name, **declares, **seen, remarks=tuple(remarks))
 
 
-def _seen(bench: Bench, declares: Mapping[str, bool], remarks: list[str]) -> dict[str, bool]:
+def _seen(bench: Bench, declares: Mapping[str, bool], remarks: list[str]) -> dict[str, Any]:
     """Find an excitation, then check what is declared. Resets come first: the other checks rely on them where they work."""
     excited = bench.excite()
     if not excited:
         remarks.append("no input made the outputs move; findings are weak")
     repeats = _attempt(bench, "reset and re-run", repeatable, remarks)
     honest = declares["declares_variable_step"] and _attempt(bench, "steps of other lengths", honest_step, remarks)
-    exact = declares["declares_state"] and _attempt(bench, "saving and restoring", exact_state, remarks)
-    return {"honest_step": honest, "exact_state": exact, "repeatable": repeats, "excited": excited}
+    found = _restoring(bench, remarks) if declares["declares_state"] else None
+    return {
+        "honest_step": honest, "repeatable": repeats, "excited": excited,
+        "restores": found.restores if found else "no", "restore_mismatch": found.mismatch if found else None,
+        "spread": _spread(bench, found) if honest else {},
+    }  # fmt: skip
+
+
+def _restoring(bench: Bench, remarks: list[str]) -> Restoring | None:
+    """What a restored state is worth; None where none could be had."""
+    found: list[Restoring] = []
+
+    def problem(bench: Bench) -> str:
+        found.append(restoring(bench))
+        within = " (within the tolerance of its solver)" if found[0].restores == "within_tolerance" else ""
+        return found[0].problem + within
+
+    _attempt(bench, "saving and restoring", problem, remarks)
+    return found[0] if found else None
+
+
+def _spread(bench: Bench, found: Restoring | None) -> dict[str, float]:
+    """By output: what the solver's own steps make of it, seen after restoring and between a step and its parts."""
+    try:
+        _, whole, *divided = ends_of_divided_steps(bench, bench.h)
+    except FAILURES:
+        return {}
+    apart = largest(whole, np.array(divided)) + (found.apart if found and found.restores == "within_tolerance" else 0.0)
+    return dict(zip(bench.output_names, apart.tolist(), strict=True))
 
 
 def _attempt(bench: Bench, what: str, check: Callable[[Bench], str], remarks: list[str]) -> bool:

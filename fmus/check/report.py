@@ -7,17 +7,19 @@ from typing import Any
 from fmus.check.archive import INTERFACES
 from fmus.check.findings import Verdict
 from fmus.check.run import CheckReport
+from fmus.plain import plain
 
-LINE = 118
+BULLET = "  - "
 
 
 def table(report: CheckReport) -> str:
-    """The report for people: what was checked, one line a finding, what to trust."""
+    """The report for people: what was checked, one line a finding, the verdict with its limits, what to trust."""
     width = max(len(finding.check) for finding in report.findings)
     lines = [_heading(report), ""]
-    lines += [f"{f.check:{width}}  {f.verdict:7}  {f.detail}".rstrip() for f in report.findings]
-    lines += ["", f"What to trust ({_counts(report)}, {report.seconds:.1f} s):"]
-    return "\n".join([*lines, *(f"  {sentence}" for sentence in report.trust)])
+    lines += [f"{f.check:{width}}  {f.verdict:8}  {f.detail}".rstrip() for f in report.findings]
+    lines += ["", f"Verdict: {report.verdict} ({_counts(report)}, {report.seconds:.1f} s)"]
+    lines += [f"{BULLET}{advice} ({', '.join(checks)})" for advice, checks in _reasons(report).items()]
+    return plain("\n".join([*lines, "", "What to trust:", *(f"{BULLET}{sentence}" for sentence in report.trust)]))
 
 
 def as_data(report: CheckReport) -> dict[str, Any]:
@@ -31,7 +33,9 @@ def as_data(report: CheckReport) -> dict[str, Any]:
         "platforms": list(report.archive.platforms),
         "communicationStepSize": report.step,
         "starts": dict(report.starts),
-        "verdict": "pass" if report.clean else "problems",
+        "steps": report.steps,
+        "verdict": str(report.verdict),
+        "limits": [{"check": finding.check, "advice": finding.advice} for finding in report.limits],
         "findings": [finding.to_dict() for finding in report.findings],
         "trust": list(report.trust),
         "seconds": round(report.seconds, 3),
@@ -42,6 +46,15 @@ def _heading(report: CheckReport) -> str:
     description = report.archive.description
     interfaces = ", ".join(INTERFACES[name] for name in report.archive.interfaces)
     return f"{description.modelName}: FMI {description.fmiVersion}, {interfaces}; communication step {report.step:g} s"
+
+
+def _reasons(report: CheckReport) -> dict[str, list[str]]:
+    """The checks behind the verdict, by the advice that comes of them."""
+    reasons: dict[str, list[str]] = {}
+    for finding in report.findings:
+        if finding.advice:
+            reasons.setdefault(finding.advice, []).append(finding.check)
+    return reasons
 
 
 def _counts(report: CheckReport) -> str:

@@ -2,27 +2,37 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 from time import perf_counter
 
 from fmpy.model_description import ModelDescription
 
-from fmus.check.archive import Archive, open_archive
+from fmus.check.archive import Archive, NotAnFmuError, open_archive
+from fmus.check.bench import end_of_experiment
 from fmus.check.catalogue import CATALOGUE
 from fmus.check.checks.static import platforms, validation
-from fmus.check.findings import Finding, Verdict
-from fmus.check.instance import NUMERIC_TYPES
+from fmus.check.findings import Class, Finding, Verdict, class_of
+from fmus.check.instance import INSTANTIATING, LOADING, NUMERIC_TYPES
 from fmus.check.isolated import run_isolated
 from fmus.check.job import Job
-from fmus.check.library import SCHEDULED_EXECUTION
+from fmus.check.library import CO_SIMULATION, SCHEDULED_EXECUTION
 from fmus.check.trust import what_to_trust
 
 TIMEOUT = 30.0
 DEFAULT_STEP = 0.01
 STEPS_TO_STOP = 1000
+STEPS = 50
+"""Of the longest run, where nothing else is asked for."""
+
+WHOLE = 1e-6
+"""Share of a step by which an end may miss a whole number of steps."""
+
+UNRUNNABLE = (f"{LOADING} failed", f"{INSTANTIATING} failed")
+NO_SLAVE = "there is no co-simulation: this package's master cannot step it"
 UNSETTABLE = frozenset({"output", "independent", "calculatedParameter"})
 STATIC = {"validation": validation, "platforms": platforms}
 
@@ -34,6 +44,7 @@ class CheckReport:
     Args:
         archive: the file. step: communication step [s]. starts: start values by name.
         findings: one for each check. trust: what a master can rely on, in sentences. seconds: time it took [s].
+        steps: of the longest run.
     """
 
     archive: Archive
@@ -42,11 +53,22 @@ class CheckReport:
     findings: tuple[Finding, ...]
     trust: tuple[str, ...]
     seconds: float
+    steps: int = 0
+
+    @property
+    def verdict(self) -> Class:
+        """What is to be done with it."""
+        return class_of(self.findings)
 
     @property
     def clean(self) -> bool:
-        """Whether every check passed or was skipped."""
-        return all(finding.verdict in (Verdict.PASS, Verdict.SKIPPED) for finding in self.findings)
+        """Whether it can be used as it is."""
+        return self.verdict is Class.USE
+
+    @property
+    def limits(self) -> tuple[Finding, ...]:
+        """What it must be used with, and what was not seen for an error of the check."""
+        return tuple(f for f in self.findings if f.verdict in (Verdict.LIMIT, Verdict.ERROR))
 
     def finding(self, check: str) -> Finding:
         """The finding of a check by its name.
@@ -62,7 +84,7 @@ class CheckReport:
 
 def check_fmu(
     path: Path | str, *, step: float | None = None, starts: Mapping[str, float] | None = None, timeout: float = TIMEOUT,
-    progress: Callable[[str], None] = lambda _: None,
+    steps: int | None = None, until: float | None = None, progress: Callable[[str], None] = lambda _: None,
 ) -> CheckReport:  # fmt: skip
     """Check what an FMU really does. Its code runs in child processes; a crash there is a finding.
 
@@ -71,36 +93,43 @@ def check_fmu(
         step: communication step [s]; by default that of the default experiment, a thousandth of its length, or 0.01 s.
         starts: start values of scalar numeric variables by name.
         timeout: time limit of each check [s].
+        steps: of the longest run; 50 by default, or what fits into the default experiment.
+        until: end of the longest run [s], in place of `steps`.
         progress: is called with the name of each check that begins.
 
     Raises:
-        NotAnFmuError: the file is no FMU, is dangerous, or has no library for this platform.
-        ValueError: step, timeout or a start value cannot be.
+        NotAnFmuError: the file is no FMU, is dangerous, or has no library that can be loaded here.
+        ValueError: step, steps, until, timeout or a start value cannot be.
     """
     begin = perf_counter()
     archive = open_archive(Path(path))
     archive.demand_this_platform()
     description = archive.description
     size = default_step(description) if step is None else step
-    if not 0.0 < size < float("inf") or not 0.0 < timeout < float("inf"):
+    if not 0.0 < size < math.inf or not 0.0 < timeout < math.inf:
         raise ValueError(f"The communication step ({size:g} s) and the time limit ({timeout:g} s) must be positive and finite.")
     chosen = dict(starts or {})
     _demand_settable(description, chosen)
-    start_time = float(getattr(description.defaultExperiment, "startTime", None) or 0.0)
+    start_time = _start_time(description)
+    count = _steps(description, size, steps, until)
     findings = []
     for name, static in STATIC.items():
         progress(name)
         outcome = static(archive)
-        findings.append(Finding(name, outcome.verdict, outcome.detail))
+        findings.append(Finding(name, outcome.verdict or Verdict.NOTE, outcome.detail))
     with archive.unpacked() as folder:
         for interface in archive.interfaces:
             if interface == SCHEDULED_EXECUTION:
                 findings.append(Finding("scheduled execution", Verdict.SKIPPED, "looked at, never run"))
                 continue
             names = tuple(check.name for check in CATALOGUE[interface])
-            findings += run_isolated(Job(str(folder), interface, names, size, start_time, timeout, chosen), progress)
+            job = Job(str(folder), interface, names, size, start_time, timeout, count, chosen)
+            findings += _meant(archive, interface, run_isolated(job, progress))
+    _demand_runnable(archive, findings)
+    if CO_SIMULATION not in archive.interfaces:
+        findings.append(Finding("interface", Verdict.LIMIT, NO_SLAVE, "integrate it with a solver of your own"))
     found = _merged(findings)
-    return CheckReport(archive, size, chosen, found, tuple(what_to_trust(found)), perf_counter() - begin)
+    return CheckReport(archive, size, chosen, found, tuple(what_to_trust(found)), perf_counter() - begin, count)
 
 
 def check_count(archive: Archive) -> int:
@@ -119,6 +148,47 @@ def default_step(description: ModelDescription) -> float:
     return length / STEPS_TO_STOP if length > 0.0 else DEFAULT_STEP
 
 
+def _start_time(description: ModelDescription) -> float:
+    return float(getattr(description.defaultExperiment, "startTime", None) or 0.0)
+
+
+def _steps(description: ModelDescription, step: float, steps: int | None, until: float | None) -> int:
+    """Steps of the longest run: as asked, or the usual ones as far as they fit into the default experiment."""
+    start = _start_time(description)
+    if steps is not None and until is not None:
+        raise ValueError("Say how far to look by a number of steps or by an end, not by both.")
+    if steps is None and until is None:
+        return max(1, min(STEPS, math.floor((end_of_experiment(description, start) - start) / step + WHOLE)))
+    if until is not None and not start < until < math.inf:
+        raise ValueError(f"The end of the longest run ({until:g} s) must lie after the start ({start:g} s) and be finite.")
+    count = steps if until is None else math.ceil((until - start) / step - WHOLE)
+    if count is None or count < 1:
+        raise ValueError(f"The longest run must have a step at least, not {count}.")
+    return count
+
+
+def _meant(archive: Archive, interface: str, findings: list[Finding]) -> list[Finding]:
+    """Findings by what they mean for co-simulation: beside it those of model exchange are notes."""
+    if interface == CO_SIMULATION or CO_SIMULATION not in archive.interfaces:
+        return findings
+    own = {check.name for check in CATALOGUE[interface]}
+    meant = {Verdict.LIMIT, Verdict.DISTRUST}
+    return [replace(f, verdict=Verdict.NOTE, advice="") if f.check in own and f.verdict in meant else f for f in findings]
+
+
+def _demand_runnable(archive: Archive, findings: list[Finding]) -> None:
+    """Refuse an FMU that cannot be loaded or makes no instance on this machine: nothing can be said of it, good or bad.
+
+    Raises:
+        NotAnFmuError: it is so for co-simulation, or for model exchange where there is nothing else; the message says why.
+    """
+    prefix = "" if CO_SIMULATION in archive.interfaces else "model exchange: "
+    for finding in findings:
+        if finding.check in (f"{prefix}loading", f"{prefix}initialise") and finding.detail.startswith(UNRUNNABLE):
+            where = f"{archive.path} cannot be run on this machine (is a library or a licence missing?)"
+            raise NotAnFmuError(f"{where}: {finding.detail}")
+
+
 def _demand_settable(description: ModelDescription, starts: Mapping[str, float]) -> None:
     variables = {v.name: v for v in description.modelVariables}
     for name in starts:
@@ -135,9 +205,8 @@ def _demand_settable(description: ModelDescription, starts: Mapping[str, float])
 
 def _merged(findings: list[Finding]) -> tuple[Finding, ...]:
     """One finding for each name: where two interfaces report the same, the worse one stands, at the end."""
-    rank = {Verdict.SKIPPED: 0, Verdict.PASS: 1, Verdict.WARN: 2, Verdict.FAIL: 3}
     worst: dict[str, Finding] = {}
     for finding in findings:
         held = worst.pop(finding.check, None)
-        worst[finding.check] = held if held is not None and rank[held.verdict] > rank[finding.verdict] else finding
+        worst[finding.check] = held if held is not None and held.verdict.rank > finding.verdict.rank else finding
     return tuple(worst.values())

@@ -33,6 +33,10 @@ class Steppable(Protocol):
         """Variables of the model description by name."""
 
     @property
+    def tolerance(self) -> float | None:
+        """Relative tolerance that it is told at set-up; None where nobody knows one."""
+
+    @property
     def can_save(self) -> bool:
         """Whether it says that its state can be saved and restored."""
 

@@ -6,6 +6,9 @@ from collections.abc import Iterable, Mapping
 
 from fmus.check.findings import Finding, Verdict
 
+ENDS = ("crashed", "no answer", "ended", "started more", "took more")
+"""How a finding begins where the process came to an end."""
+
 
 def what_to_trust(findings: Iterable[Finding]) -> list[str]:
     """Sentences for people who will step this FMU.
@@ -16,7 +19,7 @@ def what_to_trust(findings: Iterable[Finding]) -> list[str]:
     by_name = {finding.check: finding for finding in findings}
     if "stepping" not in by_name:
         return _no_steps(by_name)
-    if by_name["stepping"].verdict in (Verdict.FAIL, Verdict.SKIPPED):
+    if by_name["stepping"].verdict in (Verdict.DISTRUST, Verdict.ERROR, Verdict.SKIPPED):
         return ["Nothing: it could not be stepped."]
     sentences = [
         _variable_step(by_name), _rollback(by_name), _reset(by_name), _instances(by_name), _events(by_name), _process(by_name)
@@ -29,7 +32,11 @@ def _good(findings: Mapping[str, Finding], *names: str) -> bool:
 
 
 def _failed(findings: Mapping[str, Finding], *names: str) -> bool:
-    return any(name in findings and findings[name].verdict is Verdict.FAIL for name in names)
+    return any(name in findings and findings[name].verdict.rank >= Verdict.LIMIT.rank for name in names)
+
+
+def _why_not(findings: Mapping[str, Finding], name: str) -> str:
+    return "not declared" if "declare" in findings[name].detail else findings[name].detail
 
 
 def _no_steps(findings: Mapping[str, Finding]) -> list[str]:
@@ -45,14 +52,17 @@ def _no_steps(findings: Mapping[str, Finding]) -> list[str]:
 def _variable_step(findings: Mapping[str, Finding]) -> str:
     if _good(findings, "divided steps", "short step"):
         return "Variable step: yes. A master may shorten a step to hit an instant."
-    reason = "it declares them and does something else" if _failed(findings, "divided steps", "short step") else "not declared"
+    lies = _failed(findings, "divided steps", "short step")
+    reason = "it declares them and does something else" if lies else _why_not(findings, "divided steps")
     return f"Variable step: no ({reason}). Keep to one communication step; an event inside it can only be interpolated."
 
 
 def _rollback(findings: Mapping[str, Finding]) -> str:
     if _good(findings, "state round trip"):
         return "Rollback: yes. A restored state gives the identical continuation, so steps may be redone."
-    reason = "states are not restored exactly" if _failed(findings, "state round trip") else "not declared"
+    if "within the tolerance" in findings["state round trip"].detail:
+        return "Rollback: to within the tolerance of its solver. Steps may be redone, and what is redone differs by as much."
+    reason = "states are not restored" if _failed(findings, "state round trip") else _why_not(findings, "state round trip")
     return f"Rollback: no ({reason}). Do not redo steps."
 
 
@@ -77,5 +87,5 @@ def _events(findings: Mapping[str, Finding]) -> str:
 
 
 def _process(findings: Mapping[str, Finding]) -> str:
-    lost = [f.check for f in findings.values() if f.detail.startswith(("crashed", "no answer", "ended the process"))]
+    lost = [f.check for f in findings.values() if f.detail.startswith(ENDS)]
     return f"Run it in a process of its own: it died or hung in {', '.join(lost)}." if lost else ""

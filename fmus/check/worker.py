@@ -1,6 +1,6 @@
 """The child process: runs the checks of a job and tells each finding as one line of JSON.
 
-Started by `fmus.check.isolated` as ``python -m fmus.check.worker``. What the FMU prints goes to the file that the parent opened
+Forked by `fmus.check.keeper`. What the FMU prints goes to the file that the parent opened
 for it; the lines go to what was standard output when the process began.
 """
 
@@ -12,32 +12,38 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from traceback import extract_tb
+from typing import Any, NoReturn
 
-from fmus.check.catalogue import CATALOGUE, Check
+from fmus.check.catalogue import CATALOGUE, REPEATED, Check
 from fmus.check.context import Context
 from fmus.check.description import read_description
 from fmus.check.findings import Finding, Outcome, Verdict, failed
+from fmus.check.instance import SlaveError
 from fmus.check.job import Job
-from fmus.check.steppable import FAILURES
 
+BY_HAND = "check this by hand"
+DIFFERS = "not run, because equal runs differ"
 MAX_FILE_BYTES = 256 * 1024**2
 """A file that the FMU writes, its console output included, may not grow beyond this."""
 
 
-def main() -> int:
+def main() -> NoReturn:
     """Read a job from standard input, run it, tell the findings."""
     lines = os.fdopen(os.dup(1), "w", encoding="utf-8", buffering=1)
     os.dup2(2, 1)  # from here on standard output is the file for console output, like standard error
     _limit()
     job = Job.from_json(sys.stdin.readline())
 
+    me = os.getpid()
+
     def tell(message: dict[str, Any]) -> None:
+        if os.getpid() != me:
+            os._exit(0)  # the FMU has forked: a copy of the worker, which must tell nothing
         lines.write(json.dumps(message) + "\n")
         lines.flush()
 
     run(job, tell)
-    tell({"done": True})
     lines.close()
     os._exit(0)  # an FMU may have left threads, or handlers that crash at exit
 
@@ -50,7 +56,7 @@ def run(job: Job, tell: Callable[[dict[str, Any]], None]) -> None:
         tell: is called with ``{"start": name}`` before each check and with its finding after it.
     """
     description = read_description(Path(job.folder))
-    context = Context(Path(job.folder), description, job.step, job.start_time, job.starts, job.budget)
+    context = Context(Path(job.folder), description, job.step, job.start_time, job.starts, job.budget, job.steps)
     wanted = [check for check in CATALOGUE[job.interface] if check.name in job.checks]
     for finding in findings(wanted, context, lambda name: tell({"start": name})):
         tell({"finding": finding.to_dict()})
@@ -63,15 +69,16 @@ def findings(checks: list[Check], context: Context, starting: Callable[[str], No
     Args:
         checks: in order. context: what is checked. starting: is called with the name of each check before it runs.
     """
-    broken = ""
+    broken, differs = "", False
     for check in checks:
-        if broken:
-            yield unrun(check.name, broken)
+        if broken or (differs and check.compares):
+            yield unrun(check.name, broken) if broken else Finding(check.name, Verdict.SKIPPED, DIFFERS)
             continue
         starting(check.name)
-        outcome = _outcome(check, context)
-        yield Finding(check.name, outcome.verdict, outcome.detail)
-        if check.basis and outcome.verdict is Verdict.FAIL:
+        finding = check.finding(_outcome(check, context))
+        yield finding
+        differs |= check.name == REPEATED and finding.verdict is not Verdict.PASS
+        if check.basis and finding.verdict in (Verdict.DISTRUST, Verdict.ERROR):
             broken = check.name
 
 
@@ -81,12 +88,18 @@ def unrun(name: str, basis: str) -> Finding:
 
 
 def _outcome(check: Check, context: Context) -> Outcome:
+    """What a check says; what an FMU raises is its failure, what a mistake in the check raises is the check's own."""
     try:
         return check.run(context)
-    except FAILURES as error:
-        if "bench" in context.__dict__:
-            context.bench.reset_works = False  # whatever failed, go on with a fresh instance
-        return failed(str(error))
+    except SlaveError as error:
+        outcome = failed(str(error))
+    except Exception as error:  # whatever is wrong here must not be told of the FMU
+        place = extract_tb(error.__traceback__)[-1]
+        said = f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
+        outcome = Outcome(Verdict.ERROR, f"an error of this check, not of the FMU; please report it: {said}", BY_HAND)
+    if "bench" in context.__dict__:
+        context.bench.reset_works = False  # whatever failed, go on with a fresh instance
+    return outcome
 
 
 def _limit() -> None:
@@ -96,7 +109,3 @@ def _limit() -> None:
 
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         resource.setrlimit(resource.RLIMIT_FSIZE, (MAX_FILE_BYTES, MAX_FILE_BYTES))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -16,6 +16,7 @@ from fmus.check import cli as check_cli
 from fmus.cli import build as build_cli
 from fmus.cli.failures import EXPECTED, words
 from fmus.cli.signals import BROKEN_PIPE, forget_output, interruptible
+from fmus.plain import plain
 
 OK, PROBLEMS, FAILED = 0, 1, 2
 
@@ -38,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         forget_output()
         return BROKEN_PIPE
     except EXPECTED as error:
-        print(f"fmus: {words(error, options)}", file=sys.stderr)
+        print(f"fmus: {plain(words(error, options))}", file=sys.stderr)
         return FAILED
     except KeyboardInterrupt:
         print("fmus: interrupted.", file=sys.stderr)
@@ -102,8 +103,8 @@ def _info(options: argparse.Namespace) -> int:
     report = import_module("fmus.report")
     if not options.file.is_file():
         raise FileNotFoundError(f"{options.file} does not exist; give the path of an FMU.")
-    print("\n".join(report.describe_file(options.file)))
+    print("\n".join(map(plain, report.describe_file(options.file))))
     problems = report.problems_of(options.file)
     for problem in problems:
-        print(f"problem: {problem}")
+        print(f"problem: {plain(problem)}")
     return PROBLEMS if problems else OK

@@ -61,6 +61,10 @@ static void flow(Instance *instance, double h) {
     const double decay = exp(-0.5 * h), limit = 2.0 * force, v = d->value[SPEED];
     d->value[POSITION] += limit * h + (v - limit) * (1.0 - decay) * 2.0;
     d->value[SPEED] = limit + (v - limit) * decay;
+#ifdef LIE_NAN_MUCH_LATER
+    if (d->time > 0.7)
+        d->value[SPEED] = NAN;
+#endif
 #ifdef LIE_NAN_LATER
     if (d->time > 0.2)
         d->value[SPEED] = NAN;
@@ -101,8 +105,20 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
 #ifdef LIE_LEAKS_MEMORY
     memset(malloc(100000), 1, 100000);
 #endif
+#ifdef LIE_DAEMON
+    if (fork() == 0) {
+        setsid();
+        if (fork() == 0)
+            for (;;)
+                pause();
+        _exit(0);
+    }
+#endif
     Instance *instance = calloc(1, sizeof *instance);
     instance->logging = logging;
+#ifdef LIE_ESCAPES
+    functions->logger(functions->componentEnvironment, name, fmi2Error, "log", "\033]0;owned\007\033[31mred\302\233 and\nforged");
+#endif
     begin(instance);
     return instance;
 }
@@ -114,7 +130,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean td, fmi2Real tol, fm
 }
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return fmi2OK; }
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
-#ifdef LIE_REFUSES_START
+#if defined LIE_REFUSES_START || defined LIE_ESCAPES
     return fmi2Error;
 #endif
     return fmi2OK;
@@ -226,6 +242,21 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_set_state) {
     Instance *instance = c;
+#ifdef LIE_FORKS
+    if (fork() == 0)
+        for (;;)
+            pause();
+#endif
+#ifdef LIE_FORKS_COPIES
+    fork();
+#endif
+#ifdef LIE_EATS_MEMORY
+    memset(malloc(20000000), 1, 20000000);
+#endif
+#ifdef LIE_ENDS
+    if (t + h > 0.305)
+        return fmi2Discard;
+#endif
 #ifdef LIE_CRASH_IN_STEP
     *(volatile int *)(size_t)8 = 1;
 #endif
@@ -273,7 +304,10 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
 STATUS(Status, fmi2Status)
 STATUS(RealStatus, fmi2Real)
 STATUS(IntegerStatus, fmi2Integer)
-STATUS(BooleanStatus, fmi2Boolean)
+fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value) {
+    *value = kind == fmi2Terminated;
+    return fmi2OK;
+}
 STATUS(StringStatus, fmi2String)
 
 /* -- model exchange ------------------------------------------------------------------------------------------------ */

@@ -12,9 +12,11 @@ import fmpy
 import pytest
 from lying_fmus import description
 
+from fmus.check import Class, check_fmu
 from fmus.check import archive as archives
-from fmus.check import check_fmu
 from fmus.check.archive import NotAnFmuError, open_archive
+from fmus.check.checks.static import platforms
+from fmus.cli import main
 
 LIBRARY = f"binaries/{fmpy.platform}/liar{fmpy.sharedLibraryExtension}"
 
@@ -106,18 +108,32 @@ def test_a_file_that_is_not_what_it_declares(tmp_path: Path) -> None:
     refused(path, "is a corrupt archive")
 
 
-def test_a_library_that_is_none_is_a_finding(tmp_path: Path) -> None:
-    report = check_fmu(zipped(tmp_path, {"modelDescription.xml": description(), LIBRARY: b"no library"}))
-    finding = report.finding("initialise")
-    assert finding.verdict == "fail"
-    assert "loading the library failed" in finding.detail
-    assert report.finding("stepping").detail == "not run, because 'initialise' failed"
-    assert report.trust == ("Nothing: it could not be stepped.",)
+def test_a_library_that_cannot_be_loaded_here_is_not_judged(tmp_path: Path) -> None:
+    path = zipped(tmp_path, {"modelDescription.xml": description(), LIBRARY: b"no library"})
+    refused(path, "cannot be run on this machine .*: loading the library failed")
+
+
+@pytest.mark.parametrize("compression", [zipfile.ZIP_DEFLATED, zipfile.ZIP_LZMA, zipfile.ZIP_BZIP2])
+def test_damage_inside_is_told_whatever_the_compression(
+    compression: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "damaged.fmu"
+    with zipfile.ZipFile(path, "w", compression) as archive:
+        archive.writestr("modelDescription.xml", description(), zipfile.ZIP_STORED)
+        archive.writestr(LIBRARY, bytes(range(256)) * 40)
+    content, header = bytearray(path.read_bytes()), len(LIBRARY) + 30
+    begin = content.index(LIBRARY.encode()) - 30 + header
+    content[begin + 4 : begin + 24] = b"\xff" * 20
+    path.write_bytes(content)
+    assert main(["check", str(path)]) == 2
+    said = capsys.readouterr().err
+    assert "is a corrupt archive" in said
+    assert "Traceback" not in said
 
 
 def test_foreign_platforms_are_named_and_not_checked(tmp_path: Path) -> None:
-    report = check_fmu(zipped(tmp_path, {"modelDescription.xml": description(), LIBRARY: b"", "binaries/vax/liar.so": b""}))
-    assert report.finding("platforms").detail.endswith("not checked here: vax")
+    path = zipped(tmp_path, {"modelDescription.xml": description(), LIBRARY: b"", "binaries/vax/liar.so": b""})
+    assert platforms(open_archive(path)).detail.endswith("not checked here: vax")
 
 
 def test_scheduled_execution_is_not_run(tmp_path: Path) -> None:
@@ -131,3 +147,4 @@ def test_scheduled_execution_is_not_run(tmp_path: Path) -> None:
     report = check_fmu(zipped(tmp_path, {"modelDescription.xml": xml, library: b""}))
     assert report.finding("scheduled execution").verdict == "skipped"
     assert report.trust == ("Nothing: it was not run.",)
+    assert report.verdict is Class.LIMITS

@@ -26,18 +26,37 @@ def test_the_table_of_an_honest_fmu(honest: Path, capsys: Output) -> None:
     rows = {line.split("  ")[0]: line for line in shown.out.splitlines() if "  pass" in line}
     assert "2e-06" not in rows["time per step"]
     assert "microseconds for a step of 0.01 s" in rows["time per step"]
-    assert "What to trust (25 pass, " in shown.out
-    assert "  Rollback: yes. " in shown.out
+    assert "Verdict: use as it is (28 pass, " in shown.out
+    assert "  - Rollback: yes. " in shown.out
     assert "Traceback" not in shown.err
 
 
-def test_problems_end_with_one_and_json_says_which(tmp_path: Path, capsys: Output) -> None:
+@pytest.mark.parametrize(
+    ("lie", "arguments", "code", "verdict"),
+    [
+        ("ACCEPTS_ANYTHING", ["--strict"], 0, "use as it is"),
+        ("RESET_KEEPS", [], 0, "use with these limits"),
+        ("RESET_KEEPS", ["--strict"], 1, "use with these limits"),
+        ("NAN_LATER", [], 1, "do not trust"),
+    ],
+)
+def test_the_exit_code_is_what_a_pipeline_needs(
+    lie: str, arguments: list[str], code: int, verdict: str, tmp_path: Path, capsys: Output
+) -> None:
     target = tmp_path / "report.json"
-    assert main(["check", str(build(tmp_path, "RESET_KEEPS")), "--json", str(target)]) == 1
-    assert "reset and re-run           fail" in capsys.readouterr().out
+    assert main(["check", str(build(tmp_path, lie)), "--json", str(target), *arguments]) == code
+    assert f"Verdict: {verdict} (" in capsys.readouterr().out
+    assert json.loads(target.read_text(encoding="utf-8"))["verdict"] == verdict
+
+
+def test_limits_are_told_with_what_to_do(tmp_path: Path, capsys: Output) -> None:
+    target = tmp_path / "report.json"
+    main(["check", str(build(tmp_path, "RESET_KEEPS")), "--json", str(target)])
+    shown = capsys.readouterr().out
+    assert "reset and re-run           limit     after a reset the outputs differ" in shown
+    assert "\n  - make a new instance for each run (reset and re-run)\n" in shown
     data = json.loads(target.read_text(encoding="utf-8"))
-    assert data["verdict"] == "problems"
-    assert [f["check"] for f in data["findings"] if f["verdict"] not in ("pass", "skipped")] == ["reset and re-run"]
+    assert data["limits"] == [{"check": "reset and re-run", "advice": "make a new instance for each run"}]
     assert "Reset: no. Make a new instance for each run." in data["trust"]
 
 
@@ -46,7 +65,7 @@ def test_json_in_place_of_the_table(honest: Path, capsys: Output) -> None:
     data = json.loads(capsys.readouterr().out)
     assert (data["model"], data["fmiVersion"], data["communicationStepSize"]) == ("liar", "2.0", 0.02)
     assert data["starts"] == {"force": 3.0}
-    assert data["verdict"] == "pass"
+    assert data["verdict"] == "use as it is"
 
 
 @pytest.mark.parametrize(
@@ -58,6 +77,8 @@ def test_json_in_place_of_the_table(honest: Path, capsys: Output) -> None:
         (["--start", "position=1"], "position cannot be set: it is 'output'"),
         (["--step", "0"], "must be positive and finite"),
         (["--timeout", "-1"], "must be positive and finite"),
+        (["--steps", "0"], "must have a step at least"),
+        (["--until", "0"], "must lie after the start"),
         (["--json", "no/such/folder/report.json"], "no/such/folder/report.json"),
     ],
 )

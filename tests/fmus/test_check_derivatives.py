@@ -34,10 +34,10 @@ def test_exact_derivatives_pass_anywhere(name: str, at: float) -> None:
 def test_wrong_derivatives_fail(name: str, at: float, factor: float) -> None:
     curve, slope = CURVES[name]
     outcome = compared(curve, factor * slope(at), at)
-    assert outcome.verdict is Verdict.FAIL
+    assert outcome.verdict is None  # what a failure means is the catalogue's
     assert "the derivative of y along x is said to be" in outcome.detail
 
 
-@pytest.mark.parametrize(("slope", "verdict"), [(1.0, "pass"), (-1.0, "pass"), (0.0, "pass"), (1.1, "fail"), (np.nan, "fail")])
-def test_at_a_kink_every_slope_between_is_right(slope: float, verdict: str) -> None:
+@pytest.mark.parametrize(("slope", "verdict"), [(1.0, "pass"), (-1.0, "pass"), (0.0, "pass"), (1.1, None), (np.nan, None)])
+def test_at_a_kink_every_slope_between_is_right(slope: float, verdict: str | None) -> None:
     assert compared(abs, slope, 0.0).verdict == verdict

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from fmus import RECIPES, cached_fmu, recipe
-from fmus.check import Verdict, check_fmu
+from fmus.check import Class, Verdict, check_fmu
 from fmus.check.archive import open_archive
 from fmus.check.probe import probe
 from fmus.check.slave import FmuSlave
@@ -20,6 +20,7 @@ pytestmark = pytest.mark.compiler
 def test_a_shipped_fmu_passes_clean(name: str, version: Any) -> None:
     report = check_fmu(cached_fmu(recipe(name), version))
     assert {f.check: f.detail for f in report.findings if f.verdict not in (Verdict.PASS, Verdict.SKIPPED)} == {}
+    assert report.verdict is Class.USE
     passed = {f.check for f in report.findings if f.verdict is Verdict.PASS}
     assert {"divided steps", "short step", "state round trip", "state in another instance", "reset and re-run"} <= passed
 

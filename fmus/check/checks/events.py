@@ -14,10 +14,11 @@ from fmus.check.behaviour import RESOLUTION, STEP_TOLERANCE, UNEVEN, divided_ste
 from fmus.check.bench import WARM_UP_STEPS, Bench
 from fmus.check.checks.life import listed, not_finite
 from fmus.check.context import Context
-from fmus.check.findings import Outcome, failed, passed, skipped, warned
+from fmus.check.findings import Outcome, failed, limited, passed, skipped
 from fmus.check.instance import REAL_TYPES, FmuInstance
 from fmus.check.slave import FmuSlave
 
+PAYLOAD = "give what comes with an event a value that makes sense"
 NONE = "declares neither a triggered input clock nor a counted event"
 
 
@@ -48,7 +49,7 @@ def counted_events(instance: FmuInstance) -> list[str]:
 
 
 def _no_event_mode(clocks: Sequence[str]) -> Outcome:
-    return failed(f"declares the triggered input clocks {listed(clocks)} but no event mode")
+    return limited(f"declares the triggered input clocks {listed(clocks)} but no event mode", "leave its clocks alone")
 
 
 def _clocks(context: Context, clocks: Sequence[str]) -> Outcome:
@@ -65,7 +66,7 @@ def _clocks(context: Context, clocks: Sequence[str]) -> Outcome:
         bench.put_away()
     bad = not_finite(bench.output_names, np.sum(rows, axis=0))
     if bad:
-        return warned(f"not finite after a tick with the start values of its inputs: {listed(bad)}")
+        return limited(f"not finite after a tick with the start values of its inputs: {listed(bad)}", PAYLOAD)
     return passed(f"its input clocks tick in event mode and the run goes on: {listed(clocks)}")
 
 
@@ -78,7 +79,7 @@ def _counted(context: Context, names: Sequence[str]) -> Outcome:
         whole = _passing(bench, name, (), (bench.h,))
         bad = not_finite(bench.output_names, whole)
         if bad:
-            return warned(f"not finite after event {name} with the start values of its payload: {listed(bad)}")
+            return limited(f"not finite after event {name} with the start values of its payload: {listed(bad)}", PAYLOAD)
         slack = STEP_TOLERANCE * np.abs(whole - start) + RESOLUTION * np.abs(whole)
         until, rest = UNEVEN * bench.h, (1.0 - UNEVEN) * bench.h
         for before, after in (((), (until, rest)), ((until,), (rest,))) if divisible else ():

@@ -10,7 +10,7 @@ from pathlib import Path
 from time import perf_counter
 
 from fmus.check.behaviour import difference
-from fmus.check.bench import WARM_UP_STEPS, elsewhere
+from fmus.check.bench import WARM_UP_STEPS, elsewhere, end_of_experiment
 from fmus.check.checks.life import SHARE_OF_BUDGET, by
 from fmus.check.context import Context
 from fmus.check.findings import Outcome, failed, passed, skipped
@@ -32,7 +32,7 @@ def repeated_instantiation(context: Context) -> Outcome:
     try:
         for count in range(1, INSTANCES + 1):
             slave.instantiate()
-            slave.enter_initialization(context.start_time, context.start_time + 1.0)
+            slave.enter_initialization(context.start_time, end_of_experiment(context.description, context.start_time))
             slave.exit_initialization()
             slave.free_instance_only()
             if count in (FIRST_INSTANCES, INSTANCES):

@@ -11,16 +11,22 @@ import numpy as np
 from fmpy.model_description import ModelVariable
 
 from fmus.check.behaviour import difference, repeatable
-from fmus.check.bench import WARM_UP_STEPS
+from fmus.check.bench import SLOW_STEPS, WARM_UP_STEPS
 from fmus.check.context import Context
-from fmus.check.findings import Outcome, failed, passed, skipped, warned
+from fmus.check.findings import Outcome, Verdict, failed, limited, noted, passed, skipped
 from fmus.check.instance import REAL_TYPES, FmuInstance, SlaveError
 from fmus.check.library import functions_of_capabilities
 
-STEPS = 50
 SHARE_OF_BUDGET = 0.4
 TIMED_STEPS = 200
+UNSEEN = "what it does when it moves was not seen: give start values (--start) or a longer step (--step)"
 NAMES_SHOWN = 4
+
+
+def loading(context: Context) -> Outcome:
+    """The library can be loaded here, with all that it needs."""
+    context.slave().free()
+    return passed("the library and what it needs are loaded")
 
 
 def exported_symbols(instance: FmuInstance) -> Outcome:
@@ -38,7 +44,7 @@ def exported_symbols(instance: FmuInstance) -> Outcome:
     if needed:
         lies = "; ".join(f"declares {capability} but does not export {name}" for name, capability in needed.items())
         return failed(lies)
-    return warned(f"does not export {listed(sorted(missing.values()))}; some masters refuse such a library")
+    return noted(f"does not export {listed(sorted(missing.values()))}; some masters refuse such a library")
 
 
 def slave_symbols(context: Context) -> Outcome:
@@ -71,7 +77,7 @@ def values_at_start(context: Context) -> Outcome:
     if bad_outputs:
         return failed(f"not finite after initialisation: {listed(bad_outputs)}")
     if bad_locals:
-        return warned(f"not finite after initialisation: the local variables {listed(bad_locals)}")
+        return noted(f"not finite after initialisation: the local variables {listed(bad_locals)}")
     return passed(f"{len(outputs)} outputs and {len(locals_)} local variables are finite")
 
 
@@ -82,11 +88,12 @@ def getters(context: Context) -> Outcome:
         bench.begin(excited=False)
         slave = bench.component
         assert isinstance(slave, FmuInstance)
-        readable = [v for v in slave.variables.values() if v.type != "Clock" and not v.clocks]
+        own = [v for v in slave.description.modelVariables if v.alias is None]
+        readable = [v for v in own if v.type != "Clock" and not v.clocks]
         problems = list(filter(None, (_unreadable(slave, variable) for variable in readable)))
     finally:
         bench.put_away()
-    left_out = len(slave.variables) - len(readable)
+    left_out = len(own) - len(readable)
     note = f"; {left_out} clocks and clocked variables not tried" if left_out else ""
     if problems:
         return failed(f"{len(problems)} of {len(readable)} variables cannot be read: {problems[0]}{note}")
@@ -102,21 +109,56 @@ def _unreadable(slave: FmuInstance, variable: ModelVariable) -> str:
 
 
 def stepping(context: Context) -> Outcome:
-    """A run of steps without an error, all outputs finite."""
+    """A run of steps without an error, all outputs finite; where the inputs that excite it break it, under its start values."""
+    bench = context.bench
+    try:
+        return _run(context)
+    except SlaveError as error:
+        if not bench.amplitude:
+            raise
+        broken, bench.amplitude, bench.spread, bench.excited = str(error), 0.0, 0.0, False
+    outcome = _run(context)
+    if outcome.verdict is Verdict.DISTRUST:
+        return outcome
+    return limited(f"{outcome.detail}; under other inputs: {broken}", "keep its inputs in the range that it was made for")
+
+
+def _run(context: Context) -> Outcome:
     bench = context.bench
     bench.begin()
     rows: list[np.ndarray] = []
     since = perf_counter()
-    while len(rows) < STEPS and perf_counter() - since < SHARE_OF_BUDGET * context.budget:
-        rows += bench.steps((bench.h,))
+    while len(rows) < context.steps and perf_counter() - since < SHARE_OF_BUDGET * context.budget:
+        row = bench.step(bench.h)
+        if not row:
+            break
+        rows += row
+    if not rows:
+        raise bench.component.failure("asks for the end in its first step")
     bad = not_finite(bench.output_names, np.sum(rows, axis=0))
     if bad:
-        return failed(f"not finite while stepping: {listed(bad)}")
+        raise SlaveError(f"not finite while stepping: {listed(bad)}")
+    done = f"{len(rows)} steps of {bench.h:g} s"
+    if bench.component.terminated:
+        return limited(f"{done}, then it asks for the end", f"end runs at {bench.now:g} s, where it ends by itself")
     if not bench.output_names:
-        return warned("has no scalar numeric output; what follows cannot see much")
+        return limited(f"{done}; it has no number that moves and can be read", UNSEEN)
     if not bench.excited:
-        return warned(f"{len(rows)} steps of {bench.h:g} s; no input made the outputs move, what follows is weak")
-    return passed(f"{len(rows)} steps of {bench.h:g} s, inputs at {bench.amplitude:g}")
+        return limited(f"{done}; nothing moved in the first {SLOW_STEPS}, what follows is weak", UNSEEN)
+    late = f"; {context.steps} were asked for, use a longer --timeout" if len(rows) < context.steps else ""
+    above = f"inputs {bench.amplitude:g} above their start values" if bench.amplitude else "inputs at their start values"
+    return passed(f"{done}, {above}{late}")
+
+
+def repeated(context: Context) -> Outcome:
+    """Two instances, one after the other, under the same inputs: identical outputs."""
+    bench = context.bench
+    pattern = (bench.h,) * (2 * WARM_UP_STEPS)
+    bench.begin()
+    first = bench.steps(pattern)
+    bench.begin()
+    problem = difference(bench, first, bench.steps(pattern))
+    return by(problem and f"in a second run {problem}", "a second run is identical")
 
 
 def reset(context: Context) -> Outcome:
@@ -147,7 +189,8 @@ def time_per_step(context: Context) -> Outcome:
     bench.begin()
     seconds: list[float] = []
     advance, since = bench.component.advance, perf_counter()
-    while len(seconds) < TIMED_STEPS and perf_counter() - since < SHARE_OF_BUDGET * context.budget:
+    most = min(TIMED_STEPS, max(context.steps, 1))
+    while len(seconds) < most and not bench.component.terminated and perf_counter() - since < SHARE_OF_BUDGET * context.budget:
         t = bench.t0 + len(seconds) * bench.h
         begin = perf_counter()
         advance(t, t + bench.h)

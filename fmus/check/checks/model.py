@@ -38,6 +38,12 @@ def _start(model: FmuModel, context: Context) -> None:
     model.initialize(context.start_time)
 
 
+def loading(context: Context) -> Outcome:
+    """The library can be loaded here, with all that it needs."""
+    context.model().free()
+    return passed("the library and what it needs are loaded")
+
+
 def model_symbols(context: Context) -> Outcome:
     """`exported_symbols` for model exchange."""
     return exported_symbols(context.model())

@@ -7,7 +7,7 @@ import warnings
 from fmpy.validation import validate_fmu
 
 from fmus.check.archive import Archive
-from fmus.check.findings import Outcome, failed, passed
+from fmus.check.findings import Outcome, noted, passed
 
 SHOWN = 3
 
@@ -16,11 +16,14 @@ def validation(archive: Archive) -> Outcome:
     """The XML schema and fmpy's validation of the model description."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # libraries below warn about what the FMU did
-        problems = [" ".join(str(p).split()) for p in validate_fmu(str(archive.path))]
+        try:
+            problems = [" ".join(str(p).split()) for p in validate_fmu(str(archive.path))]
+        except Exception as error:  # a damaged file in the archive; unpacking says which
+            problems = [f"it could not be validated ({error or type(error).__name__})"]
     if not problems:
         return passed("the model description is valid against the schema and fmpy's rules")
     more = f"; and {len(problems) - SHOWN} more" if len(problems) > SHOWN else ""
-    return failed(f"{len(problems)} problems: " + "; ".join(problems[:SHOWN]) + more)
+    return noted(f"{len(problems)} problems, for which strict importers refuse it: " + "; ".join(problems[:SHOWN]) + more)
 
 
 def platforms(archive: Archive) -> Outcome:

@@ -192,6 +192,38 @@ def test_state_that_is_restored_in_part_is_seen(slave: type[Mock]) -> None:
     assert report.honest_step
 
 
+class Restarting(Train):
+    """Each step ends a little off, by `off` of the speed: its solver starts anew with whatever order it had before."""
+
+    off = 0.0
+
+    def begin(self) -> None:
+        super().begin()
+        self.order = 0  # not part of the state
+
+    def move(self, t: float, h: float) -> None:
+        super().move(t, h)
+        self.order = (self.order + 1) % 5
+        self.x["v"] *= 1.0 + self.off * self.order
+
+
+@pytest.mark.parametrize(
+    ("off", "restores"), [(0.0, "exact"), (1e-9, "within_tolerance"), (1e-5, "within_tolerance"), (0.05, "no")]
+)
+def test_restored_to_within_the_solver_is_another_verdict_than_not_restored(off: float, restores: str) -> None:
+    report = probed(type("Solver", (Restarting,), {"off": off}))
+    assert report.restores == restores, report.remarks
+    assert report.exact_state is (restores == "exact")
+    assert report.restore_mismatch == pytest.approx(15.0 * off, rel=0.9)
+    if off and report.honest_step:
+        assert report.spread["position"] > 0.0
+
+
+@pytest.mark.parametrize("slave", [HalfRestored, LateRestored, NoState])
+def test_a_state_that_lacks_something_is_not_taken_for_a_solver(slave: type[Mock]) -> None:
+    assert probed(slave).restores == "no"
+
+
 def test_bad_reset_is_seen_and_spoils_no_other_finding() -> None:
     for slave in (HalfReset, NoReset):
         report = probed(slave)

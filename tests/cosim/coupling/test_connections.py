@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 from coupled_runs import Listener, block, prepare
-from fmpy.model_description import BaseUnit, SimpleType
+from fmpy.model_description import BaseUnit, ModelVariable, SimpleType, VariableAlias
 from mock_slaves import Mock, component, variable
 
 from cosim.coupling.connection import connect, split_name, unconnected_inputs
@@ -178,3 +179,17 @@ def test_names_with_dots_and_what_is_left_free() -> None:
     free = unconnected_inputs(connections, pair().values())
     assert free == ["reader.force", "reader.length", "reader.temperature", "reader.free"]
     assert np.all([c.factor > 0 for c in connections])
+
+
+def test_an_alias_is_no_unconnected_input() -> None:
+    """FMI 3 gives one variable several names; a source of any of them is a source of the variable."""
+    own = ModelVariable(
+        name="force", valueReference=1, type="Float64", causality="input", aliases=[VariableAlias(name="flange.f")]
+    )
+    alias = ModelVariable(name="flange.f", valueReference=1, type="Float64", causality="input", alias=own)
+    described = SimpleNamespace(modelVariables=[own, alias])
+    part: Any = SimpleNamespace(name="plant", description=described, event_references=set)
+    assert unconnected_inputs([], [part]) == ["plant.force"]
+    for name in ("force", "flange.f"):
+        source: Any = SimpleNamespace(target=("plant", name))
+        assert unconnected_inputs([source], [part]) == []

@@ -104,7 +104,7 @@ def test_the_summary_says_how_the_run_was_made() -> None:
     summary = small().run().result.summary
     assert summary["localisation"]["method"] == "rollback"
     assert summary["order"] == ["locomotive", "odometer", "driver", "observer"]
-    assert summary["probe"]["exact_state"] is True
+    assert summary["probe"]["restores"] == "exact"
     assert summary["redo_differences"] == 0
     assert summary["reached"] == 0.5
     assert set(summary["seconds"]) == {"locomotive", "odometer", "driver", "observer", "master", "recording"}
