@@ -246,7 +246,7 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 t, fmi3Float64 h, fmi3Boolean 
     *event = outcome.event;
     *terminate = outcome.terminate;
     *early = outcome.early;
-    *reached = outcome.reached;
+    *reached = outcome.reached - outcome.lag;
     return (fmi3Status)(outcome.status > FATAL ? ERROR : outcome.status);
 }
 

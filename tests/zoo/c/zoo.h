@@ -56,6 +56,7 @@ typedef struct {
     bool event;      /* event mode is needed at `reached` */
     bool terminate;
     bool early;      /* what the model says; the faces pass it on */
+    double lag;      /* FMI 3: by how much lastSuccessfulTime, without an early return, lies before `reached` */
 } Outcome;
 
 typedef struct {
