@@ -22,6 +22,7 @@ from cosim.errors import FmuLoadError
 from fmu_observer.block import make_block
 from fmus.check.archive import MAX_UNPACKED_BYTES, Archive, NotAnFmuError, open_archive
 from fmus.check.description import negated_aliases
+from fmus.check.library import CO_SIMULATION
 from plant_models.hybrid import HybridSystem
 
 VERSIONS = ("1.0", "2.0", "3.0")
@@ -45,7 +46,7 @@ def load_fmu(path: str | Path, name: str) -> Component:
     if description.coSimulation is None:
         raise FmuLoadError(f"{name}: {path} offers no co-simulation interface; this master steps co-simulation FMUs only.")
     try:
-        archive.demand_this_platform()
+        archive.demand_this_platform(CO_SIMULATION)
     except NotAnFmuError as error:
         raise FmuLoadError(f"{name}: {error}") from error
     folder = Path(mkdtemp(prefix="fmu_"))
@@ -74,6 +75,19 @@ def read_description(path: str | Path, name: str = "FMU") -> ModelDescription:
         FmuLoadError: the file is missing, broken or dangerous, or of an FMI version that is not supported.
     """
     return _open(Path(path), name).description
+
+
+def runs_here(path: Path) -> str:
+    """``yes``, or why the co-simulation of an FMU file cannot run on this machine.
+
+    Raises:
+        FmuLoadError: as for `read_description`.
+    """
+    archive = _open(path, path.name)
+    if archive.description.coSimulation is None:
+        return "no, it offers no co-simulation"
+    reason = archive.why_not_here(CO_SIMULATION)
+    return f"no, it {reason}" if reason else "yes"
 
 
 def describe_fmu(path: str | Path, name: str) -> Component:

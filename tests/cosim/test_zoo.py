@@ -637,7 +637,6 @@ def test_coming_short(folder: Path) -> None:
     with plain(awkward(folder, "own-steps", 3)) as one:
         one.initialize()
         assert one.step(0.1) == (False, False, False, pytest.approx(0.08))
-        assert one.step(0.11) == (False, False, False, pytest.approx(0.08))
         assert one.get("y") == pytest.approx(0.08)
     with plain(awkward(folder, "short", 2)) as one:
         one.initialize()
