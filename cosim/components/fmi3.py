@@ -124,7 +124,8 @@ class FMI3Component(Component):
 
     def enter_initialization(self, start_time: float, stop_time: float) -> None:  # noqa: D102 - see Component
         call, self.time = self.slave.enterInitializationMode, start_time
-        self._guard("enterInitializationMode", lambda: call(startTime=start_time, stopTime=stop_time))
+        tolerance, words = self.tolerance_argument()
+        self._guard(f"enterInitializationMode{words}", lambda: call(startTime=start_time, stopTime=stop_time, **tolerance))
 
     def exit_initialization(self) -> None:  # noqa: D102 - see Component
         if self.clocks:

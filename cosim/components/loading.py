@@ -30,12 +30,13 @@ COMPONENTS: dict[int, Any] = {1: FMI1Component, 2: FMI2Component, 3: FMI3Compone
 SLAVES: dict[int, Any] = {1: FMU1SlaveRepaired, 2: fmpy.fmi2.FMU2Slave, 3: fmpy.fmi3.FMU3Slave}
 
 
-def load_fmu(path: str | Path, name: str) -> Component:
+def load_fmu(path: str | Path, name: str, tolerance: float | str | None = None) -> Component:
     """Unpack an FMU and prepare an instance of it.
 
     Args:
         path: the ``.fmu`` file.
         name: name of the component.
+        tolerance: relative, for its solver, or ``none``; where not given the declared one.
 
     Raises:
         FmuLoadError: the file is missing or broken, has no co-simulation, or no library for this platform.
@@ -65,6 +66,7 @@ def load_fmu(path: str | Path, name: str) -> Component:
         name, slave, description, source=str(path), kind="FMU",
         release_files=lambda: shutil.rmtree(folder, ignore_errors=True), **more,
     )  # fmt: skip
+    component.choose_tolerance(tolerance)
     return component
 
 

@@ -79,6 +79,7 @@ def test_the_sources_compile_without_warnings(folder: Path) -> None:
     others = {
         "INTERVAL": 0.1, "SHIFT": 0.0, "LEVEL_START": 1.0, "JUMPS": 1, "INSTANTS": (1.0,), "LEVELS": (1.0,), "FIRST_LEVEL": 1.0,
         "DELAY_START": 1.0, "ARM_START": 1.0, "KICK_START": 1.0, "ADD_START": 1.0, "LIMIT_START": 1.0, "AT": 1.0,
+        "W": 1.0, "MIDDLE": 0.0, "USUAL_TOLERANCE": 1e-4, "FINEST": 0.0, "FORGETS": False,
         "LONGEST_STEP": 1.0, "EVERY": 1.0, "INNER_LINEAR": 0, "CAN_RETURN_EARLY": 1,
     }  # fmt: skip
     defines = DEFAULTS | numbers | others

@@ -12,7 +12,9 @@
  *   Update model_update(Model *, const Host *, double t) one super-dense instant of an event
  *
  * Optional, announced by HAS_...: model_slope (INPUT_DERIVATIVES), model_rate (OUTPUT_DERIVATIVES), model_sensitivity
- * (DIRECTIONAL), model_interval (INTERVALS), model_resize (STRUCTURE).
+ * (DIRECTIONAL), model_interval (INTERVALS), model_resize (STRUCTURE). With TAKES_TOLERANCE:
+ *
+ *   bool model_tolerance(Model *, double tolerance)      told at set-up, 0 where none is; false refuses it
  */
 #ifndef ZOO_H
 #define ZOO_H
