@@ -113,23 +113,19 @@ def choose_method(
     """
     if table.layout == "recorded":
         return Choice("recorded", AS_RECORDED)
-    if table.method in UNTOUCHED and component.tolerance is None:  # a tolerance tells of a solver, which is looked at
-        return Choice(table.method, ASKED_FOR, error=plant_error(table, table.method, component, start))
+    asked: Method | None = None if table.method == "auto" else table.method
+    if asked is not None and asked in UNTOUCHED and component.tolerance is None:  # a tolerance tells of a solver: it is looked at
+        return Choice(asked, ASKED_FOR, error=plant_error(table, asked, component, start))
     if component.kind == RECORDING:
-        return Choice("rollback", PLAYED_BACK) if table.method == "auto" else Choice(table.method, ASKED_FOR)
+        return Choice("rollback", PLAYED_BACK) if asked is None else Choice(asked, ASKED_FOR)
     report = probe(make, starts, start, step)
     chosen, reason = choose(report.honest_step, report.restores, table.clock)
-    method = chosen if table.method == "auto" else table.method
-    choice = Choice(
-        method,
-        reason if table.method == "auto" else ASKED_FOR,
-        report,
-        error=plant_error(table, method, component, start, report),
-    )
-    if table.method != "auto" and choice.error.unknown:
+    method, why = (chosen, reason) if asked is None else (asked, ASKED_FOR)
+    choice = Choice(method, why, report, error=plant_error(table, method, component, start, report))
+    if asked is not None and choice.error.unknown:
         choice.warnings.append(
-            f"balises.method = '{table.method}' although the probe of '{component.name}' advises '{chosen}': {reason}. "
-            "How far the instants are off is unknown (time_bound = nan)."
+            f"balises.method = '{asked}' although the probe of '{component.name}' advises '{chosen}': {reason}. How far the "
+            f"instants are off is unknown (time_bound = nan): {choice.error.unknown}."
         )
     return choice
 
