@@ -9,6 +9,7 @@ from pathlib import Path
 from fmpy.model_description import ModelDescription, ModelVariable
 from fmpy.validation import validate_fmu
 
+from fmus.check.binaries import LIBRARY_SUFFIXES, why_not_here
 from fmus.check.description import read_description
 from fmus.toolchain.machine_code import platforms_of_library
 from fmus.toolchain.platforms import host_platform
@@ -34,7 +35,6 @@ _NAMES_3 = {
 }
 """Capabilities that FMI 3.0 spells differently from FMI 2.0 and fmpy."""
 _SHOWN = ("input", "output", "parameter")
-_EXTENSIONS = (".so", ".dll", ".dylib")
 _FOLDERS = {
     "linux32": {"x86-linux"},
     "linux64": {"x86_64-linux", "aarch64-linux"},  # many importers look there on any 64-bit processor
@@ -58,10 +58,7 @@ def describe_file(path: Path) -> list[str]:
     """
     try:
         with zipfile.ZipFile(path) as archive:
-            platforms, has_sources = (
-                _platforms(archive),
-                any(n.startswith("sources/") and n.endswith(".c") for n in archive.namelist()),
-            )
+            platforms, names = _platforms(archive), archive.namelist()
         description = read_description(path)
     except Exception as error:
         raise ValueError(f"{path} cannot be read as an FMU: {_reason(error)}") from error
@@ -69,7 +66,7 @@ def describe_file(path: Path) -> list[str]:
         f"{description.modelName}: FMI {description.fmiVersion}, {', '.join(_interfaces(description)) or 'no interface'}",
         *([description.description] if description.description else []),
         f"platforms: {', '.join(platforms) or 'none'}",
-        _on_this_machine(description, platforms, has_sources),
+        _on_this_machine(description, names),
         *_capabilities(description),
     ]
     for causality in _SHOWN:
@@ -98,16 +95,15 @@ def _platforms(archive: zipfile.ZipFile) -> list[str]:
 
 def _libraries(archive: zipfile.ZipFile) -> list[str]:
     names = (entry.filename for entry in archive.infolist() if not entry.is_dir())
-    return [name for name in names if name.startswith("binaries/") and name.count("/") == 2 and name.endswith(_EXTENSIONS)]
+    return [name for name in names if name.startswith("binaries/") and name.count("/") == 2 and name.endswith(LIBRARY_SUFFIXES)]
 
 
-def _on_this_machine(description: ModelDescription, platforms: Sequence[str], has_sources: bool) -> str:
-    host = host_platform()
-    wanted = [host.name] if str(description.fmiVersion).startswith("3") else [host.fmi2_folder, host.name]
-    if set(wanted) & set(platforms):
-        return f"this machine ({host.name}): yes"
-    rebuild = "; its sources can be compiled" if has_sources else ""
-    return f"this machine ({host.name}): no library in binaries/{' or binaries/'.join(wanted)}{rebuild}"
+def _on_this_machine(description: ModelDescription, names: Sequence[str]) -> str:
+    interfaces = (getattr(description, key) for key, _ in _INTERFACES)
+    reason = why_not_here(description, {i.modelIdentifier for i in interfaces if i is not None}, names)
+    has_sources = any(name.startswith("sources/") and name.endswith(".c") for name in names)
+    rebuild = " Its sources can be compiled." if reason and has_sources else ""
+    return f"this machine ({host_platform().name}): {f'no, it {reason}{rebuild}' if reason else 'yes'}"
 
 
 def _damage(archive: zipfile.ZipFile) -> list[str]:

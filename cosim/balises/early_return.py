@@ -59,7 +59,9 @@ class EarlyReturnLocaliser(Localiser):
     def _passing(self, stamp: float) -> Passing:
         """The plant says that it passed a balise; which one and how accurately it is placed, the layout knows."""
         self._count += 1
+        watch = self.watch
+        bound = watch.error.time(stamp, watch.position, watch.speed)
         if not isinstance(self.layout, TrackLayout):
-            return Passing(stamp, self.watch.position, f"E{self._count}", 0.0, self.method, 0.0)
-        balise = self.layout.nearest(self.watch.position)
-        return Passing(stamp, self.watch.position, balise.identity, balise.location_accuracy, self.method, 0.0)
+            return Passing(stamp, watch.position, f"E{self._count}", 0.0, self.method, bound)
+        balise = self.layout.nearest(watch.position)
+        return Passing(stamp, watch.position, balise.identity, balise.location_accuracy, self.method, bound)

@@ -18,24 +18,26 @@ from cosim.balises.predict import PredictLocaliser
 from cosim.balises.rollback import RollbackLocaliser
 from cosim.balises.watch import Watch
 from cosim.errors import CouplingError
+from fmus.check.restoring import Restores
 
 __all__ = ["METHODS", "Localiser", "Method", "choose", "make_localiser"]
 
 
-def choose(honest_step: bool, exact_state: bool, clock: str | None) -> tuple[Method, str]:
+def choose(honest_step: bool, restores: Restores, clock: str | None) -> tuple[Method, str]:
     """The best method a probed plant allows, and why.
 
     Args:
         honest_step: steps of any length were seen to do what they say.
-        exact_state: a restored state was seen to give the identical continuation.
+        restores: how what followed a restored state was seen to continue.
         clock: output clock that reports passings, where the scenario names one.
     """
     if clock is not None:
         return "early-return", f"the plant reports passings on its clock '{clock}'"
-    if exact_state and honest_step:
+    if restores == "exact" and honest_step:
         return "rollback", "the plant restores its state exactly and takes steps of any length"
     if honest_step:
-        return "predict", "the plant takes steps of any length but does not restore its state"
+        how = "only to within its solver's tolerance" if restores == "within_tolerance" else "not"
+        return "predict", f"the plant takes steps of any length, its state is restored {how}"
     return "interpolate", "the plant does not take steps of any length reliably"
 
 

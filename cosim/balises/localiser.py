@@ -57,14 +57,15 @@ class Localiser(ABC):
 
         Args:
             step: both ends of it. t: when it began [s]. start: the plant's outputs there, shape (q,).
-            bound: bound of the stamps' error [s].
+            bound: bound of the stamps' error [s], to which that of the plant itself is added.
         """
         assert isinstance(self.layout, TrackLayout)
         found = []
         for stretch in step.stretches():
             for balise in self.layout.crossed(stretch.before, stretch.after):
                 s = step.crossing(balise.position, stretch)
-                passing = Passing(t + s, balise.position, balise.identity, balise.location_accuracy, self.method, bound)
+                whole = bound + self.watch.error.time(t + s, balise.position, step.speed(s))
+                passing = Passing(t + s, balise.position, balise.identity, balise.location_accuracy, self.method, whole)
                 found.append((passing, self.watch.between(start, s / step.h, balise.position)))
         return found
 

@@ -74,7 +74,7 @@ class RollbackLocaliser(Localiser):
         if balise is None:
             return self.instant_passing(stamp, position)
         rounding = 4.0 * ulp(position) / max(abs(speed), 1e-12) + 2.0 * ulp(stamp)
-        bound = max(ROOT_TOLERANCE, rounding)
+        bound = max(ROOT_TOLERANCE, rounding) + self.watch.error.time(stamp, position, speed)
         return Passing(stamp, balise.position, balise.identity, balise.location_accuracy, self.method, bound)
 
     def _ends(self) -> tuple[float, float]:

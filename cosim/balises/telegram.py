@@ -24,7 +24,7 @@ class Passing:
 
     Args:
         stamp: when [s]. position: where the plant was [m]. identity: of the balise. location_accuracy: Q_LOCACC [m].
-        method: localisation method. time_bound: bound or estimate of the stamp's error [s].
+        method: localisation method. time_bound: bound or estimate of the stamp's error [s], NaN where it is not known.
     """
 
     stamp: float

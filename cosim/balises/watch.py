@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from cosim.balises.plant_error import PlantError
 from cosim.components.component import Component
 from cosim.coupling.plan import PlannedComponent
 
@@ -26,6 +27,8 @@ class Watch:
         self._position, self._speed = position, speed
         self._scales = position_scale, speed_scale
         self.redo_differences = 0
+        self.error = PlantError()
+        """What the plant's own solver leaves open of its position."""
 
     @property
     def position_column(self) -> int:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.components.capabilities import read_capabilities
-from cosim.components.loading import read_description
+from cosim.components.loading import read_description, runs_here
 from cosim.ssp.names import is_package
 
 
@@ -63,7 +63,6 @@ def describe_file(path: Path) -> dict[str, Any]:
     import fmpy  # noqa: PLC0415 - only here
 
     description = read_description(path, "info")
-    platforms = list(fmpy.supported_platforms(str(path)))
     interfaces = {"coSimulation": "co-simulation", "modelExchange": "model exchange", "scheduledExecution": "scheduled execution"}
     return {
         "file": str(path),
@@ -71,8 +70,8 @@ def describe_file(path: Path) -> dict[str, Any]:
         "description": description.description or "",
         "FMI version": description.fmiVersion,
         "interfaces": [text for name, text in interfaces.items() if getattr(description, name) is not None],
-        "platforms": platforms,
-        "runs here": "yes" if {fmpy.platform, fmpy.platform_tuple} & set(platforms) else f"no (this is {fmpy.platform_tuple})",
+        "platforms": list(fmpy.supported_platforms(str(path))),
+        "runs here": runs_here(path),
         "tool": description.generationTool or "",
         "declares": list(read_capabilities(description).declared()),
         "variables": [

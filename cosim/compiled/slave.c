@@ -71,8 +71,7 @@ static bool called_step(Program *program, const Slave *slave, double t, double h
     bool event = false, terminate = false, early = false;
     double reached = t + h; /* for slaves that do not fill it in */
     program->status = ((DoStep3)slave->do_step)(slave->instance, t, h, false, &event, &terminate, &early, &reached);
-    const bool came_short = t + TIME_TOLERANCE < reached && reached < t + h - TIME_TOLERANCE;
-    if (program->status <= STATUS_WARNING && !terminate && !early && !came_short && !(event && slave->heeds_events))
+    if (program->status <= STATUS_WARNING && !terminate && !early && !(event && slave->heeds_events))
         return true;
     program->event = event;
     program->terminate = terminate;

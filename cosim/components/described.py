@@ -57,11 +57,23 @@ class Described(ABC):
     def __init__(self, name: str, description: ModelDescription, source: str, kind: str) -> None:
         self.name, self.description, self.source, self.kind = name, description, source, kind
         self.capabilities = read_capabilities(description)
-        self.tolerance: float | None = declared_tolerance(description)
-        """Relative tolerance of its solver, told at set-up: the scenario's, else the declared one."""
+        self.tolerance: float | None = declared_tolerance(description) if self.fmi_version > 1 else None
+        """Relative tolerance that it is told at set-up; FMI 1.0 co-simulation has no call for it."""
         self.variables = Variables({v.name: v for v in description.modelVariables})
         self.events: dict[str, EventPort] = self._find_events()
         self._units = Units(description)
+
+    def choose_tolerance(self, tolerance: float | str | None) -> None:
+        """Another relative tolerance than the declared one, or ``none``; None changes nothing. FMI 1.0 knows of none."""
+        if tolerance is not None and self.fmi_version > 1:
+            self.tolerance = None if isinstance(tolerance, str) else tolerance
+
+    def tolerance_argument(self) -> tuple[dict[str, float], str]:
+        """The tolerance as an argument of the call that takes it, and what to say of that call where it fails."""
+        if self.tolerance is None:
+            return {}, ""
+        hint = "where it is the tolerance that it refuses, set another one with the key 'tolerance', or 'none'"
+        return {"tolerance": self.tolerance}, f" with the tolerance {self.tolerance:g} ({hint})"
 
     @property
     def can_save(self) -> bool:

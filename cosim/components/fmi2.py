@@ -52,7 +52,10 @@ class FMI2Component(Component):
 
     def enter_initialization(self, start_time: float, stop_time: float) -> None:  # noqa: D102 - see Component
         slave, self.time = self.slave, start_time
-        self._guard("setupExperiment", lambda: slave.setupExperiment(startTime=start_time, stopTime=stop_time))
+        tolerance, words = self.tolerance_argument()
+        self._guard(
+            f"setupExperiment{words}", lambda: slave.setupExperiment(startTime=start_time, stopTime=stop_time, **tolerance)
+        )
         self._guard("enterInitializationMode", slave.enterInitializationMode)
 
     def exit_initialization(self) -> None:  # noqa: D102 - see Component

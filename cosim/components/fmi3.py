@@ -125,7 +125,8 @@ class FMI3Component(Component):
 
     def enter_initialization(self, start_time: float, stop_time: float) -> None:  # noqa: D102 - see Component
         call, self.time = self.slave.enterInitializationMode, start_time
-        self._guard("enterInitializationMode", lambda: call(startTime=start_time, stopTime=stop_time))
+        tolerance, words = self.tolerance_argument()
+        self._guard(f"enterInitializationMode{words}", lambda: call(startTime=start_time, stopTime=stop_time, **tolerance))
 
     def exit_initialization(self) -> None:  # noqa: D102 - see Component
         if self.clocks:
@@ -155,10 +156,10 @@ class FMI3Component(Component):
             self.calls += 1
         if terminate:
             self.terminated = True
-            early = early or abs(reached - until) > TIME_TOLERANCE  # a slave that stops on the way says where
-        if not early and not t + TIME_TOLERANCE < reached < until - TIME_TOLERANCE:
+            early = early or t + TIME_TOLERANCE < reached < until - TIME_TOLERANCE  # a slave that stops on the way says where
+        if not early:  # lastSuccessfulTime may then be that of an internal step: the slave stands where it was asked to go
             self.time = until
-            return until, event  # otherwise it came less far than asked, whether it says so once or twice
+            return until, event
         if not t - TIME_TOLERANCE <= reached <= until + TIME_TOLERANCE:
             raise self.failure(f"doStep to {until:g} s says that it reached {reached!r} s", t)
         self.time = min(max(float(reached), t), until)

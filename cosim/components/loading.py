@@ -26,6 +26,7 @@ from cosim.process.sentinel import guard_exit
 from fmu_observer.block import make_block
 from fmus.check.archive import MAX_UNPACKED_BYTES, Archive, NotAnFmuError, open_archive
 from fmus.check.description import negated_aliases
+from fmus.check.library import CO_SIMULATION
 from plant_models.hybrid import HybridSystem
 
 VERSIONS = ("1.0", "2.0", "3.0")
@@ -33,12 +34,13 @@ COMPONENTS: dict[int, Any] = {1: FMI1Component, 2: FMI2Component, 3: FMI3Compone
 SLAVES: dict[int, Any] = {1: FMU1SlaveRepaired, 2: fmpy.fmi2.FMU2Slave, 3: fmpy.fmi3.FMU3Slave}
 
 
-def load_fmu(path: str | Path, name: str) -> Component:
+def load_fmu(path: str | Path, name: str, tolerance: float | str | None = None) -> Component:
     """Unpack an FMU and prepare an instance of it.
 
     Args:
         path: the ``.fmu`` file.
         name: name of the component.
+        tolerance: relative, for its solver, or ``none``; where not given the declared one.
 
     Raises:
         FmuLoadError: the file is missing or broken, has no co-simulation, or no library for this platform.
@@ -49,7 +51,7 @@ def load_fmu(path: str | Path, name: str) -> Component:
     if description.coSimulation is None:
         raise FmuLoadError(f"{name}: {path} offers no co-simulation interface; this master steps co-simulation FMUs only.")
     try:
-        archive.demand_this_platform()
+        archive.demand_this_platform(CO_SIMULATION)
     except NotAnFmuError as error:
         raise FmuLoadError(f"{name}: {error}") from error
     folder = Path(mkdtemp(prefix="fmu_"))
@@ -76,6 +78,7 @@ def load_fmu(path: str | Path, name: str) -> Component:
         release_files=lambda: shutil.rmtree(folder, ignore_errors=True), **more,
     )  # fmt: skip
     component.trespasses |= dict.fromkeys(changed, "loading its library")
+    component.choose_tolerance(tolerance)
     return component
 
 
@@ -86,6 +89,19 @@ def read_description(path: str | Path, name: str = "FMU") -> ModelDescription:
         FmuLoadError: the file is missing, broken or dangerous, or of an FMI version that is not supported.
     """
     return _open(Path(path), name).description
+
+
+def runs_here(path: Path) -> str:
+    """``yes``, or why the co-simulation of an FMU file cannot run on this machine.
+
+    Raises:
+        FmuLoadError: as for `read_description`.
+    """
+    archive = _open(path, path.name)
+    if archive.description.coSimulation is None:
+        return "no, it offers no co-simulation"
+    reason = archive.why_not_here(CO_SIMULATION)
+    return f"no, it {reason}" if reason else "yes"
 
 
 def describe_fmu(path: str | Path, name: str) -> Component:

@@ -45,7 +45,7 @@ class BaliseRecord:
         odometer_reading: odometer output at the passing [m/s], NaN without an odometer.
         kind: ``true``, ``missed`` (read by nobody) or ``false`` (told, but no balise is there).
         method: localisation method that gave the stamp.
-        time_bound: bound or estimate of the stamp's error [s].
+        time_bound: bound or estimate of the stamp's error [s], NaN where it is not known.
         outcomes: what became of it at each receiver: ``accepted``, ``replayed``, ``late``, ``rejected``, ``told``
             (it does not say), or ``undelivered`` (still on its way when the run ended).
     """

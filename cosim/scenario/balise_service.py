@@ -8,6 +8,7 @@ from typing import Any
 
 from cosim.balises.delivery import Receiver
 from cosim.balises.localise import Localiser, Method, choose, make_localiser
+from cosim.balises.plant_error import PlantError
 from cosim.balises.recorded import RecordedChannel, RecordedLayout, RecordedLocaliser
 from cosim.balises.service import BaliseService
 from cosim.balises.telegram import Channel, FalseTelegram
@@ -25,6 +26,9 @@ from plant_models.hybrid.units import UnitError, conversion, parse_unit
 BALISE_EVENT = "balise"
 ASKED_FOR = "asked for in the scenario"
 AS_RECORDED = "they are told as they were in an earlier run"
+NO_ERROR = PlantError()
+UNTOUCHED = ("early-return", "interpolate")
+"""Methods that neither cut nor redo the steps of the plant."""
 PLAYED_BACK = "the plant is a recording, which goes to any time and back"
 
 
@@ -34,13 +38,20 @@ class Choice:
 
     Args:
         method: its name. reason: why it was chosen. probe: what the plant was seen to do, where it was probed.
-        warnings: what speaks against it.
+        warnings: what speaks against it. error: what the plant itself adds to the error of the instants found.
     """
 
     method: Method
     reason: str
     probe: ProbeReport | None = None
     warnings: list[str] = field(default_factory=list)
+    error: PlantError = NO_ERROR
+
+    def to_dict(self) -> dict[str, str]:
+        """For the summary."""
+        return {"method": self.method, "reason": self.reason} | (
+            {} if self.method == "recorded" else {"bound": self.error.words()}
+        )
 
 
 def find_receivers(table: BalisesTable, components: Mapping[str, Component], plant: str, where: str) -> list[str]:
@@ -102,24 +113,59 @@ def choose_method(
     """
     if table.layout == "recorded":
         return Choice("recorded", AS_RECORDED)
-    if table.method in ("early-return", "interpolate"):
-        return Choice(table.method, ASKED_FOR)
+    asked: Method | None = None if table.method == "auto" else table.method
+    if asked is not None and asked in UNTOUCHED and component.tolerance is None:  # a tolerance tells of a solver: it is looked at
+        return Choice(asked, ASKED_FOR, error=plant_error(table, asked, component, start))
     if component.kind == RECORDING:
-        return Choice("rollback", PLAYED_BACK) if table.method == "auto" else Choice(table.method, ASKED_FOR)
+        return Choice("rollback", PLAYED_BACK) if asked is None else Choice(asked, ASKED_FOR)
     report = probe(make, starts, start, step)
-    chosen, reason = choose(report.honest_step, report.exact_state, table.clock)
-    if table.method == "auto":
-        return Choice(chosen, reason, report)
-    choice = Choice(table.method, ASKED_FOR, report)
-    if not report.honest_step or (table.method == "rollback" and not report.exact_state):
+    chosen, reason = choose(report.honest_step, report.restores, table.clock)
+    method, why = (chosen, reason) if asked is None else (asked, ASKED_FOR)
+    choice = Choice(method, why, report, error=plant_error(table, method, component, start, report))
+    if asked is not None and choice.error.unknown:
         choice.warnings.append(
-            f"balises.method = '{table.method}' although the probe of '{component.name}' advises '{chosen}': {reason}."
+            f"balises.method = '{asked}' although the probe of '{component.name}' advises '{chosen}': {reason}. How far the "
+            f"instants are off is unknown (time_bound = nan): {choice.error.unknown}."
         )
     return choice
 
 
+def plant_error(
+    table: BalisesTable, method: Method, component: Component, start: float, report: ProbeReport | None = None
+) -> PlantError:
+    """What the plant itself adds to the error of the instants that a method finds.
+
+    Args:
+        table: balise table. method: in use. component: the watched plant. start: of the run [s].
+        report: of the probe, where it was probed.
+    """
+    tolerance, signal = component.tolerance or 0.0, (table.position or "").partition(".")[2]
+    unknown = _why_unknown(method, report, signal, tolerance)
+    if unknown or report is None:
+        return PlantError(tolerance=tolerance, unknown=unknown)
+    scale = abs(_scale(component, str(table.position), "m"))
+    spread, drift = (scale * seen.get(signal, 0.0) for seen in (report.spread, report.drift))
+    if signal in report.spread and spread == 0.0:
+        tolerance = 0.0
+    return PlantError(0.0 if method in UNTOUCHED else spread, tolerance, drift, start, unknown)
+
+
+def _why_unknown(method: Method, report: ProbeReport | None, position: str, tolerance: float) -> str:
+    """Why nothing can be said of the plant's own error, if so; arguments as for `plant_error`, the position by its own name."""
+    if method == "early-return" and not tolerance:
+        return "the plant itself says when it passed, and knows of no tolerance"
+    if report is None or method in UNTOUCHED:
+        return ""
+    if not report.honest_step:
+        return "the probe saw steps of other lengths go wrong"
+    if method == "rollback" and report.restores == "no":
+        return "the probe saw states that are not restored"
+    seen = position in report.spread or tolerance > 0.0
+    return "" if seen else "the position is no output, and the probe looks at outputs only"
+
+
 def make_service(
-    table: BalisesTable, layout: Layout, plan: Plan, plant: str, receivers: Sequence[str], method: Method
+    table: BalisesTable, layout: Layout, plan: Plan, plant: str, receivers: Sequence[str], choice: Choice
 ) -> BaliseService:
     """Everything about balises for the master."""
     planned = plan.find(plant)
@@ -129,7 +175,8 @@ def make_service(
         position, speed = (plan.column(name) - first for name in (table.position, table.speed))
         scales = [_scale(planned.component, name, unit) for name, unit in ((table.position, "m"), (table.speed, "m/s"))]
         watch = Watch(planned, position, speed, *scales)
-    localiser, channel = _sources(table, layout, watch, method)
+    watch.error = choice.error
+    localiser, channel = _sources(table, layout, watch, choice.method)
     told = [Receiver(plan.find(name), BALISE_EVENT, table.timing) for name in receivers]
     odometer = None if table.odometer is None else plan.column(table.odometer)
     return BaliseService(localiser, channel, told, odometer, first + watch.position_column)

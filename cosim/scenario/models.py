@@ -51,13 +51,19 @@ def make_system(table: ComponentTable, where: str) -> HybridSystem | None:
 
 
 def component_factories(
-    tables: Mapping[str, ComponentTable], folder: Path, where: str, tell: Tell, span: tuple[float, float]
+    tables: Mapping[str, ComponentTable],
+    folder: Path,
+    where: str,
+    tell: Tell,
+    span: tuple[float, float],
+    tolerance: float | str | None = None,
 ) -> tuple[dict[str, Callable[[], Component]], list[str]]:
     """For each component a function that makes a fresh one, called once for the run and perhaps once for the probe; and notes.
 
     Args:
         tables: of the components. folder: paths are relative to it. where: place for messages.
         tell: told of FMUs that are built. span: start and stop of the run [s], which recordings must cover.
+        tolerance: of the FMUs whose table says nothing else; see `cosim.components.described.Described.choose_tolerance`.
 
     Raises:
         ScenarioError, FmuLoadError: a component cannot be made.
@@ -76,7 +82,8 @@ def component_factories(
             factories[name] = partial(load_block, systems[name], name, _version(made.kinds[name]), **_block_arguments(table))
         else:
             path = made.files[name] if name in systems else (folder / str(table.fmu)).resolve()
-            factories[name] = partial(load_fmu, path, name)
+            told = None if name in systems else tolerance if table.tolerance is None else table.tolerance
+            factories[name] = partial(load_fmu, path, name, told)
     return factories, made.notes
 
 

@@ -32,6 +32,9 @@ def coupling_remarks(
     """
     free = unconnected_inputs(connections, components.values(), given_values(table))
     doubts = [f"Unconnected inputs keep their start values: {', '.join(free)}."] if free else []
+    deaf = [name for name, of in table.components.items() if of.tolerance is not None and components[name].fmi_version == 1]
+    if deaf:
+        doubts.append(f"FMI 1.0 co-simulation has no call that takes a tolerance; it does nothing for {', '.join(deaf)}.")
     notes = []
     hidden = [f"{name}.{signal}" for name, signals in local_sources(connections, components).items() for signal in signals]
     if hidden:

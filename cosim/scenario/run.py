@@ -143,7 +143,9 @@ class _Setup:
         layout = None if table.balises is None else make_layout(table.balises, table.start, table.stop, self.folder, self.where)
         pairs = parse_connections(table.connections, self.where)
         span = table.start, table.stop
-        self.factories, notes = component_factories(table.components, self.folder, self.where, self._tell_of_builds, span)
+        self.factories, notes = component_factories(
+            table.components, self.folder, self.where, self._tell_of_builds, span, table.tolerance
+        )
         self.notes += notes
         files = {name: (self.folder / t.fmu).resolve() for name, t in table.components.items() if t.fmu is not None}
         check_instances(files, self.where)
@@ -289,7 +291,7 @@ class _Setup:
         self.notes.append(f"Balises localised by '{self.choice.method}': {self.choice.reason}.")
         for warning in late_telegram_doubts(table, self.components, receivers):
             self._warn(warning)
-        self.service = make_service(table, layout, self.plan, plant, receivers, self.choice.method)
+        self.service = make_service(table, layout, self.plan, plant, receivers, self.choice)
 
     def _begin_stream(self, master: Master) -> None:
         """From here on what is recorded, told and logged is in the folder as well."""
@@ -382,7 +384,7 @@ class _Setup:
             if limit is not None and gap > limit and certificate["holds"] is not False:
                 self._warn(f"{name}: the longest gap between balises was {gap:.3g} s, certified are {limit:.3g} s.")
         return {
-            "localisation": {"method": self.choice.method, "reason": self.choice.reason},
+            "localisation": self.choice.to_dict(),
             "probe": None if self.choice.probe is None else self.choice.probe.to_dict(),
             "redo_differences": self.service.localiser.watch.redo_differences,
             "largest_gap": gap,

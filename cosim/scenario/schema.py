@@ -26,6 +26,7 @@ from cosim.scenario.tables import (
     Name,
     ReportTable,
     Table,
+    Tolerance,
 )
 
 
@@ -38,6 +39,7 @@ class ScenarioTable(Table):
     start: float = 0.0
     stop: float
     step: float
+    tolerance: Tolerance | None = None
     certificates: Literal["warn", "require", "ignore"] = "warn"
     components: dict[Name, ComponentTable]
     connections: list[ConnectionItem] = Field(default_factory=list)

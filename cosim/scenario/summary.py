@@ -90,6 +90,7 @@ def _component(component: Component, table: ComponentTable) -> dict[str, Any]:
         "preset": table.preset,
         "options": table.options,
         "parameters": component.starts,
+        "tolerance": component.tolerance,
         "source": component.source,
         "calls": component.calls,
         "seconds": component.seconds,

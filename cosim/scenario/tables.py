@@ -22,6 +22,18 @@ def _start(value: Any) -> Any:
 
 Start = Annotated[Any, PlainValidator(_start)]
 """A number, truth value, text or item of an enumeration, bytes in hexadecimal; a list of them for a vector, nested for arrays."""
+
+
+def _tolerance(value: Any) -> float | str:
+    if value == "none":
+        return str(value)
+    if isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value < math.inf:
+        return float(value)
+    raise ValueError("expected a relative tolerance above 0, or 'none' to tell none")
+
+
+Tolerance = Annotated[float | Literal["none"], PlainValidator(_tolerance)]
+"""Relative tolerance of the solvers in FMUs."""
 Realisation = Literal["fmu3", "fmu2", "block3", "block2"]
 
 
@@ -44,6 +56,7 @@ class ComponentTable(Table):
     preset: str | None = None
     options: dict[str, str | int | float | bool] = {}
     parameters: dict[str, Start] = {}
+    tolerance: Tolerance | None = None
     late_policy: LatePolicy = "replay"
     replay_horizon: Annotated[float, Field(gt=0.0)] = 10.0
     record: list[str] = []
@@ -62,6 +75,8 @@ class ComponentTable(Table):
             )
         if given == ["fmu"] and (self.preset or self.options or self.realisation):
             raise ValueError("'preset', 'options' and 'as' belong to shipped models; an FMU takes 'parameters' only")
+        if given != ["fmu"] and self.tolerance is not None:
+            raise ValueError("'tolerance' belongs to an FMU; shipped models have the parameter 'internal_step' instead")
         if given != ["recording"] and {"component", "interpolation"} & self.model_fields_set:
             raise ValueError("'component' and 'interpolation' belong to a recording")
         if given == ["recording"] and (self.preset or self.options or self.realisation or self.parameters):

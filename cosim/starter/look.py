@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import fmpy
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from cosim.components.component import Component
 from cosim.components.described import NUMERIC_TYPES
 from cosim.components.elements import elements_of
-from cosim.components.loading import describe_fmu, read_description
+from cosim.components.loading import describe_fmu, read_description, runs_here
 from cosim.errors import FmuLoadError
 from cosim.starter.guess import Signal
 from plant_models.hybrid.units import UnitError
@@ -68,8 +67,7 @@ def look_into(path: Path) -> Look:
         found[variable.causality] += signals
         if not signals and variable.causality in ("input", "output"):
             unread.append(_unread(variable))
-    platforms = set(fmpy.supported_platforms(str(path)))
-    here = bool({fmpy.platform, fmpy.platform_tuple} & platforms)
+    here = runs_here(path) == "yes"
     return Look(path, component, found["input"], found["output"], found["parameter"], found["local"], unread, here)
 
 

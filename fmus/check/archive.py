@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import posixpath
 import zipfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -10,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 
-import fmpy
 from fmpy.model_description import ModelDescription
 
+from fmus.check.binaries import platform_folder, platforms_with, why_not_here
 from fmus.check.description import FILE, read_description, why_unreadable
 from fmus.check.sense import nonsense, tell_apart
 
@@ -34,12 +33,12 @@ class Archive:
     Args:
         path: the file.
         description: its model description.
-        platforms: platforms it has a library for, as the folders in ``binaries/`` are named.
+        names: of the files in it.
     """
 
     path: Path
     description: ModelDescription
-    platforms: tuple[str, ...]
+    names: tuple[str, ...]
 
     @property
     def interfaces(self) -> list[str]:
@@ -47,20 +46,35 @@ class Archive:
         return [name for name in INTERFACES if getattr(self.description, name) is not None]
 
     @property
+    def platforms(self) -> tuple[str, ...]:
+        """Platforms it has a library for, as the folders in ``binaries/`` are named."""
+        return platforms_with(self._identifiers(*self.interfaces), self.names)
+
+    @property
     def here(self) -> list[str]:
         """Those of its platforms that are this one."""
         return [name for name in self.platforms if name == platform_folder(self.description)]
 
-    def demand_this_platform(self) -> None:
-        """Refuse an FMU without a library for this platform.
+    def why_not_here(self, *interfaces: str) -> str:
+        """Why its library cannot be run on this machine, in words that go on after its name; empty where it can.
+
+        Args:
+            interfaces: types of which the library must offer one, by default all that are declared.
+        """
+        return why_not_here(self.description, self._identifiers(*(interfaces or self.interfaces)), self.names)
+
+    def demand_this_platform(self, *interfaces: str) -> None:
+        """Refuse an FMU without a library for this platform; arguments as for `why_not_here`.
 
         Raises:
             NotAnFmuError: there is none; the message says what there is and what was needed.
         """
-        if not self.here:
-            has = ", ".join(self.platforms) or "none"
-            needed = f"binaries/{platform_folder(self.description)}"
-            raise NotAnFmuError(f"{self.path} has no library for this platform ({needed} is needed); it offers: {has}.")
+        reason = self.why_not_here(*interfaces)
+        if reason:
+            raise NotAnFmuError(f"{self.path} {reason}")
+
+    def _identifiers(self, *interfaces: str) -> set[str]:
+        return {getattr(self.description, name).modelIdentifier for name in interfaces}
 
     @contextmanager
     def unpacked(self) -> Iterator[Path]:
@@ -76,11 +90,6 @@ class Archive:
             except Exception as error:  # each compression throws its own: zlib.error, lzma.LZMAError
                 raise NotAnFmuError(f"{self.path} is a corrupt archive: {error or type(error).__name__}") from error
             yield Path(name)
-
-
-def platform_folder(description: ModelDescription) -> str:
-    """Name of this platform's folder in ``binaries/``."""
-    return str(fmpy.platform_tuple if str(description.fmiVersion).startswith("3") else fmpy.platform)
 
 
 def open_archive(path: Path, max_bytes: int = MAX_UNPACKED_BYTES, versions: Sequence[str] = ("2.0", "3.0")) -> Archive:
@@ -104,7 +113,7 @@ def open_archive(path: Path, max_bytes: int = MAX_UNPACKED_BYTES, versions: Sequ
         raise NotAnFmuError(f"{path} is not a readable FMU: not a zip archive, or a broken one ({error}).") from error
     demand_harmless(path, entries, max_bytes)
     description = _description(path, [entry.filename for entry in entries], versions)
-    return Archive(path, description, _platforms(description, entries))
+    return Archive(path, description, tuple(entry.filename for entry in entries))
 
 
 def demand_harmless(path: Path, entries: list[zipfile.ZipInfo], max_bytes: int = MAX_UNPACKED_BYTES) -> None:
@@ -146,15 +155,3 @@ def _description(path: Path, names: list[str], versions: Sequence[str]) -> Model
     if fault is not None:
         raise NotAnFmuError(f"{path} cannot be used: modelDescription.xml: {fault}")
     return description
-
-
-def _platforms(description: ModelDescription, entries: list[zipfile.ZipInfo]) -> tuple[str, ...]:
-    """Folders in ``binaries/`` that hold a library with a model identifier's name."""
-    declared = [getattr(description, name) for name in INTERFACES]
-    identifiers = {interface.modelIdentifier for interface in declared if interface is not None}
-    found = set()
-    for entry in entries:
-        parts = PurePosixPath(entry.filename).parts
-        if len(parts) == 3 and parts[0] == "binaries" and posixpath.splitext(parts[2])[0] in identifiers:
-            found.add(parts[1])
-    return tuple(sorted(found))

@@ -48,6 +48,10 @@ class Bench:
         self._best = 0, 0.0, 0.0  # outputs that moved, amplitude, spread
         self._started = False
 
+    def fresh(self) -> Steppable:
+        """A fresh component, not yet instantiated."""
+        return self._make()
+
     def twin(self, make: Callable[[], Steppable] | None = None) -> Bench:
         """A second bench with an instance of its own and the same inputs."""
         other = Bench(make or self._make, self.starts, self.t0, self.h, until=self.end)

@@ -67,6 +67,7 @@ class FmuInstance:
     def __init__(self, folder: Path, description: ModelDescription, name: str = "checked", *, logging: bool = False) -> None:
         self.name, self.description, self.logging = name, description, logging
         self.version = fmi_version(description)
+        self.tolerance = declared_tolerance(description)
         self.variables: dict[str, ModelVariable] = {n: v for v in description.modelVariables for n in (v.name, *element_names(v))}
         self.messages: deque[str] = deque(maxlen=MESSAGES_KEPT)
         self.terminated = False
@@ -79,11 +80,6 @@ class FmuInstance:
     def declared(self) -> Any:
         """The element of the model description that holds the capabilities."""
         return getattr(self.description, self.interface)
-
-    @property
-    def tolerance(self) -> float | None:
-        """Relative tolerance that it is told at set-up: the declared one."""
-        return declared_tolerance(self.description)
 
     @property
     def can_save(self) -> bool:

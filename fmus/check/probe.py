@@ -14,7 +14,8 @@ import numpy as np
 
 from fmus.check.behaviour import ends_of_divided_steps, honest_step, repeatable
 from fmus.check.bench import Bench
-from fmus.check.restoring import Restores, Restoring, largest, restoring
+from fmus.check.drift import drift
+from fmus.check.restoring import ROUNDING, Restores, Restoring, largest, restoring
 from fmus.check.steppable import FAILURES, Steppable
 
 
@@ -34,6 +35,7 @@ class ProbeReport:
         remarks: what failed, in words.
         spread: by output, in its own unit: how far results lay apart that differ by the solver's steps alone, after restoring
             and between a step and its parts. Empty where that was not measured.
+        drift: by output, in its own unit for each second: how fast it leaves what a finer tolerance gives. Empty likewise.
     """
 
     component: str
@@ -46,6 +48,7 @@ class ProbeReport:
     excited: bool
     remarks: tuple[str, ...] = ()
     spread: Mapping[str, float] = field(default_factory=dict)
+    drift: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def exact_state(self) -> bool:
@@ -54,7 +57,8 @@ class ProbeReport:
 
     def to_dict(self) -> dict[str, Any]:
         """For the summary."""
-        return asdict(self) | {"remarks": list(self.remarks), "spread": {n: s for n, s in self.spread.items() if s > 0.0}}
+        numbers = {key: {n: x for n, x in getattr(self, key).items() if x > 0.0} for key in ("spread", "drift")}
+        return asdict(self) | {"remarks": list(self.remarks)} | numbers
 
 
 def probe(make: Callable[[], Steppable], starts: Mapping[str, Any], start_time: float, h: float) -> ProbeReport:
@@ -97,10 +101,11 @@ def _seen(bench: Bench, declares: Mapping[str, bool], remarks: list[str]) -> dic
     repeats = _attempt(bench, "reset and re-run", repeatable, remarks)
     honest = declares["declares_variable_step"] and _attempt(bench, "steps of other lengths", honest_step, remarks)
     found = _restoring(bench, remarks) if declares["declares_state"] else None
+    spread = _spread(bench, found) if honest else {}
     return {
         "honest_step": honest, "repeatable": repeats, "excited": excited,
         "restores": found.restores if found else "no", "restore_mismatch": found.mismatch if found else None,
-        "spread": _spread(bench, found) if honest else {},
+        "spread": spread, "drift": _drift(bench) if any(spread.values()) else {},
     }  # fmt: skip
 
 
@@ -124,7 +129,16 @@ def _spread(bench: Bench, found: Restoring | None) -> dict[str, float]:
     except FAILURES:
         return {}
     apart = largest(whole, np.array(divided)) + (found.apart if found and found.restores == "within_tolerance" else 0.0)
+    apart = np.where(apart <= ROUNDING * np.maximum(np.abs(whole), 1.0), 0.0, apart)
     return dict(zip(bench.output_names, apart.tolist(), strict=True))
+
+
+def _drift(bench: Bench) -> dict[str, float]:
+    """By output: what the solver's own errors add up to; empty where the FMU cannot be asked."""
+    try:
+        return dict(zip(bench.output_names, drift(bench).tolist(), strict=True))
+    except FAILURES:
+        return {}
 
 
 def _attempt(bench: Bench, what: str, check: Callable[[Bench], str], remarks: list[str]) -> bool:

@@ -27,14 +27,12 @@ class Steppable(Protocol):
     name: str
     description: ModelDescription
     terminated: bool
+    tolerance: float | None
+    """Relative tolerance of its solver that it is told at set-up; None where it is told none."""
 
     @property
     def variables(self) -> Mapping[str, Any]:
         """Variables of the model description by name."""
-
-    @property
-    def tolerance(self) -> float | None:
-        """Relative tolerance that it is told at set-up; None where nobody knows one."""
 
     @property
     def can_save(self) -> bool:

@@ -145,15 +145,16 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
     return (fmi3Status)status;
 }
 
-/* Time begins to run; a warning where the importer has given away the only way to tell events. */
+/* Time begins to run. Where the importer has given away the only way to tell events, the log says so; nothing went wrong, and
+   some importers end a run at a status other than OK. */
 static Status start(Instance *instance) {
     if (instance->exchange)
         return exchange_start(instance);
     Status status = instance_start(instance, instance->event_mode_used ? MODE_EVENT : MODE_STEP);
-    if (status != STATUS_OK || instance->event_mode_used || model.triggered_count == 0 || model.counts_events)
-        return status;
-    return instance_warn(instance, "eventModeUsed is false, but the events of this model (%s, ...) are announced by clocks: none can be told; "
+    if (status == STATUS_OK && !instance->event_mode_used && model.triggered_count > 0 && !model.counts_events)
+        instance_warn(instance, "eventModeUsed is false, but the events of this model (%s, ...) are announced by clocks: none can be told; "
                          "an FMU built with `--events counts` is for importers without event mode", model.triggered[0].name);
+    return status;
 }
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance instance) {

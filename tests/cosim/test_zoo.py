@@ -79,14 +79,15 @@ def test_the_sources_compile_without_warnings(folder: Path) -> None:
     others = {
         "INTERVAL": 0.1, "SHIFT": 0.0, "LEVEL_START": 1.0, "JUMPS": 1, "INSTANTS": (1.0,), "LEVELS": (1.0,), "FIRST_LEVEL": 1.0,
         "DELAY_START": 1.0, "ARM_START": 1.0, "KICK_START": 1.0, "ADD_START": 1.0, "LIMIT_START": 1.0, "AT": 1.0,
-        "LONGEST_STEP": 1.0, "EVERY": 1.0, "SAYS_EARLY": 1, "INNER_LINEAR": 0, "CAN_RETURN_EARLY": 1,
+        "W": 1.0, "MIDDLE": 0.0, "USUAL_TOLERANCE": 1e-4, "FINEST": 0.0, "FORGETS": False,
+        "LONGEST_STEP": 1.0, "EVERY": 1.0, "INNER_LINEAR": 0, "CAN_RETURN_EARLY": 1,
     }  # fmt: skip
     defines = DEFAULTS | numbers | others
     flags = ["-std=c11", "-fsyntax-only", "-Werror", "-Wall", "-Wextra", "-Wconversion", "-Wno-sign-conversion", "-Wshadow"]
     for version in (1, 2, 3):
         for source in sorted(SOURCES.glob("*.c")):
             can = {key: source.name == "linear.c" for key in DEFAULTS if key.startswith("HAS_")}
-            for behaviour in range(1, 10) if source.name == "awkward.c" else (0,):
+            for behaviour in range(1, 11) if source.name == "awkward.c" else (0,):
                 place = folder / f"warnings_{version}_{source.stem}_{behaviour}"
                 place.mkdir()
                 here = {"HAS_EVENT_MODE": version == 3, "BEHAVIOUR": behaviour, "INNER_INSTANTS": 2 * (version == 3)}
@@ -634,9 +635,10 @@ def test_coming_short(folder: Path) -> None:
     with plain(awkward(folder, "short", 3)) as one:
         one.initialize()
         assert one.step(0.1) == (False, False, True, 0.04)
-    with plain(awkward(folder, "short-unsaid", 3)) as one:
+    with plain(awkward(folder, "own-steps", 3)) as one:
         one.initialize()
-        assert one.step(0.1) == (False, False, False, 0.04)
+        assert one.step(0.1) == (False, False, False, pytest.approx(0.08))
+        assert one.get("y") == pytest.approx(0.08)
     with plain(awkward(folder, "short", 2)) as one:
         one.initialize()
         one.step(0.1)

@@ -14,6 +14,8 @@ from fmpy.fmi3 import FMU3ScheduledExecution
 
 pytestmark = pytest.mark.compiler
 
+OK, WARNING = 0, 1  # status
+
 
 def refused(made: Any, words: str, call: Callable[[], Any]) -> None:
     """The call fails, the log says why, and the values are what they were."""
@@ -213,3 +215,17 @@ def test_no_instance_is_no_crash(version: int, component: Callable[..., Any]) ->
     ):
         with pytest.raises(FMICallException):
             call()
+
+
+def test_without_event_mode_the_log_warns_and_initialisation_is_ok(component: Callable[..., Any]) -> None:
+    """Strict masters end a run at a status other than OK."""
+    made = component("tracker", 3)
+    slave = made.slave
+    slave.instantiate(
+        loggingOn=True, eventModeUsed=False, logMessage=lambda _e, status, _c, text: made.log.append((status, text))
+    )
+    slave.enterInitializationMode()
+    leave = slave.dll.fmi3ExitInitializationMode
+    assert leave(slave.component) == OK
+    assert [(status, b"eventModeUsed is false" in text) for status, text in made.log] == [(WARNING, True)]
+    assert slave.doStep(0.0, 0.1)[0] is False

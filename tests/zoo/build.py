@@ -136,6 +136,7 @@ def capability_flags(
 DEFAULTS: dict[str, Define] = {
     "CAN_SAVE": True, "HAS_EVENT_MODE": False, "HAS_INPUT_DERIVATIVES": False, "HAS_OUTPUT_DERIVATIVES": False,
     "HAS_DIRECTIONAL": False, "FROZEN_OUTPUTS": False, "HIDES_LAST_TIME": False, "MIGHT_RETURN_EARLY": True,
+    "TAKES_TOLERANCE": False,
 }  # fmt: skip
 """Of every model, unless it says otherwise."""
 
@@ -143,7 +144,7 @@ DEFAULTS: dict[str, Define] = {
 def build_fmu(
     folder: Path, name: str, source: str, version: Version, variables: Sequence[Variable], flags: Mapping[str, str],
     defines: Mapping[str, Define], enumerations: Mapping[str, Sequence[str]] | None = None,
-    categories: Sequence[str] = CATEGORIES, beside: Path | None = None,
+    categories: Sequence[str] = CATEGORIES, beside: Path | None = None, tolerance: float | None = None,
 ) -> Path:  # fmt: skip
     """An FMU of one of the C sources.
 
@@ -152,6 +153,7 @@ def build_fmu(
         variables: the time first. flags: see `capability_flags`. defines: macros of ``config.h``; sequences become arrays of
             double. enumerations: items by type name. categories: log categories.
         beside: a shared library, named ``lib....so``, that it is linked to and brings along.
+        tolerance: of the default experiment.
     """
     token = hashlib.sha256(f"{name} {source} {version} {variables!r} {sorted(flags.items())}".encode()).hexdigest()[:32]
     defines = DEFAULTS | dict(defines)
@@ -162,7 +164,7 @@ def build_fmu(
     library = compiled(source, config, name, linked)
     platform = host_platform()
     place = platform.fmi2_folder if version < 3 else platform.name
-    model = Model(name, token, variables, flags, enumerations or {}, categories)
+    model = Model(name, token, variables, flags, enumerations or {}, categories, tolerance)
     content = {
         "modelDescription.xml": description_xml(model, version).encode(),
         f"binaries/{place}/{library_name(name)}": library,

@@ -65,7 +65,7 @@ class Model:
     Args:
         name: model identifier. token: GUID or instantiation token. variables: all of them; the time first, reference 0, which
             appears in FMI 3.0 only. flags: capabilities as attributes of the interface. enumerations: items by type name.
-        categories: log categories.
+        categories: log categories. tolerance: of the default experiment.
     """
 
     name: str
@@ -74,6 +74,7 @@ class Model:
     flags: Mapping[str, str]
     enumerations: Mapping[str, Sequence[str]] = field(default_factory=dict)
     categories: Sequence[str] = ()
+    tolerance: float | None = None
 
 
 def description_xml(model: Model, version: Version) -> str:
@@ -153,7 +154,7 @@ def _fmi1(model: Model) -> str:
         ' variableNamingConvention="structured" numberOfContinuousStates="0" numberOfEventIndicators="0">\n'
         + (f"  <UnitDefinitions>\n{units}  </UnitDefinitions>\n" if units else "")
         + (f"  <TypeDefinitions>\n{types}  </TypeDefinitions>\n" if types else "")
-        + '  <DefaultExperiment startTime="0.0" stopTime="1.0"/>\n'
+        + f'  <DefaultExperiment startTime="0.0" stopTime="1.0"{attributes(tolerance=model.tolerance)}/>\n'
         + f"  <ModelVariables>\n{variables}  </ModelVariables>\n"
         + f"  <Implementation><CoSimulation_StandAlone><Capabilities{flags}/></CoSimulation_StandAlone></Implementation>\n"
         + "</fmiModelDescription>\n"
@@ -195,7 +196,7 @@ def _fmi2(model: Model) -> str:
         + _unit_definitions(model)
         + (f"  <TypeDefinitions>\n{types}  </TypeDefinitions>\n" if types else "")
         + _categories(model)
-        + '  <DefaultExperiment startTime="0.0" stopTime="1.0"/>\n'
+        + f'  <DefaultExperiment startTime="0.0" stopTime="1.0"{attributes(tolerance=model.tolerance)}/>\n'
         + f"  <ModelVariables>\n{''.join(_fmi2_variable(v) for v in kept)}  </ModelVariables>\n  <ModelStructure>\n"
         + (f"    <Outputs>{outputs}</Outputs>\n" if outputs else "")
         + (f"    <InitialUnknowns>{initial}</InitialUnknowns>\n" if initial else "")
@@ -231,7 +232,7 @@ def _fmi3(model: Model) -> str:
         + _unit_definitions(model)
         + (f"  <TypeDefinitions>\n{types}  </TypeDefinitions>\n" if types else "")
         + _categories(model)
-        + '  <DefaultExperiment startTime="0.0" stopTime="1.0"/>\n'
+        + f'  <DefaultExperiment startTime="0.0" stopTime="1.0"{attributes(tolerance=model.tolerance)}/>\n'
         + f"  <ModelVariables>\n{''.join(_fmi3_variable(v) for v in model.variables)}  </ModelVariables>\n"
         + f"  <ModelStructure>\n{structure}  </ModelStructure>\n</fmiModelDescription>\n"
     )

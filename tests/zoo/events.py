@@ -245,11 +245,11 @@ def bouncing_pair(folder: Path, rounds: float = ROUNDS, kick_time: float = KICK_
 # -- awkward ---------------------------------------------------------------------------------------------------------------
 
 Behaviour = Literal[
-    "quit", "quit-in-event", "discard", "discard-silently", "short", "short-unsaid", "chatty", "warns", "fails", "dies", "waits"
+    "quit", "quit-in-event", "discard", "discard-silently", "short", "own-steps", "chatty", "warns", "fails", "dies", "waits"
 ]
 _CODES = {
-    "quit": 1, "quit-in-event": 2, "discard": 3, "discard-silently": 3, "short": 4, "short-unsaid": 4, "chatty": 5, "warns": 6,
-    "fails": 7, "dies": 8, "waits": 9,
+    "quit": 1, "quit-in-event": 2, "discard": 3, "discard-silently": 3, "short": 4, "chatty": 5, "warns": 6,
+    "fails": 7, "dies": 8, "waits": 9, "own-steps": 10,
 }  # fmt: skip
 
 
@@ -263,8 +263,9 @@ def awkward_fmu(
         behaviour: ``quit`` asks for the end of the run at `at` (FMI 1.0, 2.0: discard), ``quit-in-event`` does so from an event
             (3.0); ``discard`` refuses a step over `at` longer than `longest_step`: FMI 1.0 and 2.0 come to `at` and say so, or
             stay where they were (``discard-silently``); FMI 3.0 stays where it was; ``short`` comes no further than
-            `longest_step` in a step: FMI 3.0 with earlyReturn, ``short-unsaid`` without (only lastSuccessfulTime tells; FMI 1.0,
-            2.0: nothing tells); ``chatty`` logs at `at`, `at` + `every`, ..., see `chatter`; ``warns``: every step returns a
+            `longest_step` in a step (FMI 3.0 with earlyReturn; FMI 1.0, 2.0: nothing tells); ``own-steps`` moves in steps of its
+            own of that length, stays at the last one within a step, which is FMI 3.0's lastSuccessfulTime, and does not return
+            early; ``chatty`` logs at `at`, `at` + `every`, ..., see `chatter`; ``warns``: every step returns a
             warning; ``fails``, ``dies``: error or fatal in the step over `at`; ``waits``: pending there (FMI 1.0, 2.0).
         early: it may return early.
     """
@@ -276,7 +277,7 @@ def awkward_fmu(
     variables = [TIME, Variable("u", 1, "input", start=1.0), Variable("y", 2, "output")]
     defines: dict[str, Define] = {
         "BEHAVIOUR": _CODES[behaviour], "AT": at, "LONGEST_STEP": longest_step, "EVERY": every,
-        "SAYS_EARLY": behaviour == "short", "HIDES_LAST_TIME": behaviour == "discard-silently",
+        "HIDES_LAST_TIME": behaviour == "discard-silently",
         "HAS_EVENT_MODE": event_mode, "MIGHT_RETURN_EARLY": early,
     }  # fmt: skip
     return build_fmu(folder, name, "awkward.c", version, variables, flags, defines)

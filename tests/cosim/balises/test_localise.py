@@ -310,10 +310,10 @@ def test_early_return_needs_a_clock_and_event_mode() -> None:
 
 
 def test_choice_of_the_method() -> None:
-    assert choose(True, True, None)[0] == "rollback"
-    assert choose(True, False, None)[0] == "predict"
-    assert choose(False, True, None)[0] == "interpolate"
-    assert choose(False, False, "clock")[0] == "early-return"
+    assert choose(True, "exact", None)[0] == "rollback"
+    assert choose(True, "within_tolerance", None)[0] == choose(True, "no", None)[0] == "predict"
+    assert choose(False, "exact", None)[0] == "interpolate"
+    assert choose(False, "no", "clock")[0] == "early-return"
 
 
 def test_methods_that_a_plant_cannot_serve_are_refused() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import tempfile
 import zipfile
 from pathlib import Path
@@ -12,9 +13,13 @@ import fmpy
 import pytest
 from coupled_runs import Pushed
 
+from cosim.cli import main as cosim_main
 from cosim.components import loading
 from cosim.components.loading import load_fmu, read_description
 from cosim.errors import FmuLoadError
+from cosim.starter.look import look_into
+from fmus.cli import main as fmus_main
+from fmus.report import describe_file
 
 
 def xml(version: str = "3.0", interface: str = '<CoSimulation modelIdentifier="toy"/>') -> str:
@@ -88,6 +93,24 @@ def test_what_is_no_archive(tmp_path: Path) -> None:
 )
 def test_archives_that_are_no_usable_fmu(tmp_path: Path, files: dict[str, str | bytes], match: str) -> None:
     refused(zipped(tmp_path, files), match)
+
+
+@pytest.mark.parametrize("version", ["1.0", "2.0", "3.0"])
+def test_a_library_under_another_name_is_named(tmp_path: Path, version: str, capfd: pytest.CaptureFixture[str]) -> None:
+    """Which file is there and which one is wanted; nobody says that such an FMU runs here."""
+    there, wanted = library(version).replace("toy", "Toy_1"), library(version)
+    described = xml(version, "<Implementation/>") if version == "1.0" else xml(version)
+    path = zipped(tmp_path, {"modelDescription.xml": described, there: b"x"})
+    words = rf"under another name than its model identifier: it holds {there} where {wanted} is wanted"
+    refused(path, words)
+    assert cosim_main(["info", str(path)]) == 0
+    assert re.search(rf"runs here +no, .*{words}", capfd.readouterr().out)
+    assert not look_into(path).runs_here
+    if version == "1.0":
+        return
+    assert re.search(rf"this machine .*: no, .*{words}", "\n".join(describe_file(path)))
+    assert fmus_main(["check", str(path)]) == 2
+    assert re.search(words, capfd.readouterr().err)
 
 
 def test_an_archive_that_unpacks_to_too_much_is_not_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,32 +13,44 @@ from zoo.events import awkward_fmu
 
 from cosim.components.loading import load_fmu
 from cosim.errors import RunError
+from fmus.check.probe import probe
 
 
 @pytest.mark.compiler
-@pytest.mark.parametrize("behaviour", ["short", "short-unsaid"])
-def test_who_comes_less_far_is_asked_again(tmp_path: Path, behaviour: Any) -> None:
-    """y' = u comes 0.04 s far in a step of 0.1 s: three calls for each, and y = u t to rounding; whether it says so by
-    earlyReturn and lastSuccessfulTime or by the latter alone."""
-    parts = [load_fmu(awkward_fmu(tmp_path, behaviour, version=3), "short")]
+def test_who_comes_less_far_is_asked_again(tmp_path: Path) -> None:
+    """y' = u comes 0.04 s far in a step of 0.1 s, and says so by an early return: three calls for each, and y = u t."""
+    parts = [load_fmu(awkward_fmu(tmp_path, "short", version=3), "short")]
     ran = run(parts, [], 0.1, 20, starts={"short": {"u": 3.0}})
     np.testing.assert_allclose(ran["short.y"], 3.0 * ran["time"], rtol=1e-14, atol=1e-15)
     assert parts[0].calls == 60
 
 
-@pytest.mark.parametrize(("reached", "asked_again"), [(0.0, False), (-1.0, False), (0.05, True), (7.0, False)])
-def test_a_last_time_outside_of_the_step_counts_only_with_an_early_return(reached: float, asked_again: bool) -> None:
-    """A slave that never fills in lastSuccessfulTime leaves there what was there."""
+@pytest.mark.compiler
+@pytest.mark.parametrize("version", [1, 2, 3])
+@pytest.mark.parametrize("step", [0.03, 0.1, 0.15, 0.3])
+def test_the_last_successful_time_is_not_the_time_reached_without_an_early_return(
+    tmp_path: Path, step: float, version: Any
+) -> None:
+    """y' = u in steps of its own of 0.1 s, as the Reference FMUs take them: y is held at the last one of them."""
+    fmu = awkward_fmu(tmp_path, "own-steps", version=version, longest_step=0.1)
+    parts = [load_fmu(fmu, "own")]
+    ran = run(parts, [], step, 40, starts={"own": {"u": 3.0}})
+    np.testing.assert_allclose(ran["own.y"], 0.3 * np.floor(ran["time"] / 0.1 + 1e-9), rtol=1e-13)
+    assert parts[0].calls == 40
+    report = probe(lambda: load_fmu(fmu, "own"), {}, 0.0, step)
+    assert report.restores == ("exact" if version > 1 else "no"), report.remarks
 
+
+@pytest.mark.parametrize("said", [0.0, -1.0, 0.05, 7.0])
+def test_without_an_early_return_a_slave_may_say_any_last_time(said: float) -> None:
     class Careless(Counter):
         def doStep(self, t: float, h: float) -> tuple[bool, bool, bool, float]:
-            end = reached if t == 0.0 and reached == 0.05 else t + h
-            super().doStep(t, end - t)
-            return False, False, False, reached if t == 0.0 else end
+            super().doStep(t, h)
+            return False, False, False, said
 
     made = started(Careless())
     made.advance(0.0, 0.1)
-    assert (made.calls, made.time) == (2 if asked_again else 1, 0.1)
+    assert (made.calls, made.time) == (1, 0.1)
     assert made.slave.x["total"] == pytest.approx(0.1, rel=1e-15)
 
 

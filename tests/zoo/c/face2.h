@@ -27,6 +27,12 @@ void fmi2FreeInstance(fmi2Component c) {
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance, fmi2Real start,
                                fmi2Boolean stop_defined, fmi2Real stop) {
     Instance *instance = c;
+#if TAKES_TOLERANCE
+    if (!model_tolerance(&instance->now.model, tolerance_defined ? tolerance : 0.0)) {
+        SAY(&instance->host, ERROR, "logStatusError", "a tolerance of %g is too fine", tolerance);
+        return fmi2Error;
+    }
+#endif
     instance->now.time = start;
     return STATUS(may(instance, INSTANTIATED, __func__));
 }

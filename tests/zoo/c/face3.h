@@ -71,7 +71,14 @@ fmi3Status fmi3ExitConfigurationMode(fmi3Instance c) {
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerance_defined, fmi3Float64 tolerance, fmi3Float64 start,
                                        fmi3Boolean stop_defined, fmi3Float64 stop) {
-    ((Instance *)c)->now.time = start;
+    Instance *instance = c;
+#if TAKES_TOLERANCE
+    if (!model_tolerance(&instance->now.model, tolerance_defined ? tolerance : 0.0)) {
+        SAY(&instance->host, ERROR, "logStatusError", "a tolerance of %g is too fine", tolerance);
+        return fmi3Error;
+    }
+#endif
+    instance->now.time = start;
     return go(c, INSTANTIATED, INITIALIZATION, __func__);
 }
 
@@ -246,7 +253,7 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 t, fmi3Float64 h, fmi3Boolean 
     *event = outcome.event;
     *terminate = outcome.terminate;
     *early = outcome.early;
-    *reached = outcome.reached;
+    *reached = outcome.reached - outcome.lag;
     return (fmi3Status)(outcome.status > FATAL ? ERROR : outcome.status);
 }
 

@@ -12,7 +12,9 @@
  *   Update model_update(Model *, const Host *, double t) one super-dense instant of an event
  *
  * Optional, announced by HAS_...: model_slope (INPUT_DERIVATIVES), model_rate (OUTPUT_DERIVATIVES), model_sensitivity
- * (DIRECTIONAL), model_interval (INTERVALS), model_resize (STRUCTURE).
+ * (DIRECTIONAL), model_interval (INTERVALS), model_resize (STRUCTURE). With TAKES_TOLERANCE:
+ *
+ *   bool model_tolerance(Model *, double tolerance)      told at set-up, 0 where none is; false refuses it
  */
 #ifndef ZOO_H
 #define ZOO_H
@@ -56,6 +58,7 @@ typedef struct {
     bool event;      /* event mode is needed at `reached` */
     bool terminate;
     bool early;      /* what the model says; the faces pass it on */
+    double lag;      /* FMI 3: by how much lastSuccessfulTime, without an early return, lies before `reached` */
 } Outcome;
 
 typedef struct {
