@@ -31,6 +31,7 @@ from cosim.master.algorithms.choose import AlgorithmChoice, choose_algorithm
 from cosim.master.axis import TimeAxis
 from cosim.master.lines.draw import draw_lines
 from cosim.master.master import Master, close
+from cosim.report.doubts import result_doubts
 from cosim.report.spec import Phase, ReportSpec
 from cosim.results.recorder import Recorder
 from cosim.results.result import BaliseRecord, Result, SignalInfo
@@ -191,13 +192,14 @@ class _Setup:
             self._warn(warning)
         summary = run_summary(self.name, self.table, self.plan, master, self.setup_seconds)
         events = [] if self.service is None else self._all_telegrams(self.service)
+        spec, (table, signals) = self._report_spec(), self._in_si()
+        for warning in result_doubts(Result(table, signals, failure=failure), spec):
+            self._warn(warning)
         self._warn_of_rejections()
         self._warn_of_logs()
         summary |= self._balise_summary([e.stamp for e in events if e.kind == "true"])
         summary |= {"certificates": self.certificates, "premises": premises} | {"warnings": self.warnings, "notes": self.notes}
-        spec = self._report_spec()
         summary["report"] = asdict(spec)  # so that the folder tells which signal plays which role
-        table, signals = self._in_si()
         messages = in_order(component.messages for component in self.components.values())
         result = Result(table, signals, events, summary, failure, messages)
         outcome = Outcome(result, spec, tuple(self.table.report.tables))
@@ -330,11 +332,11 @@ class _Setup:
         """Method, probe, and the gaps that really occurred against what is certified."""
         if self.choice is None or self.service is None:
             return {"localisation": None, "probe": None, "redo_differences": None, "largest_gap": None, "undelivered": 0}
-        gap = max((b - a for a, b in pairwise([self.axis.start, *sorted(stamps)])), default=0.0)
+        gap = max((b - a for a, b in pairwise([self.axis.start, *sorted(stamps)])), default=None)
         for name, certificate in self.certificates.items():
             limit = certificate["aperiodic_limit"]
             certificate["largest_gap_seen"] = gap
-            if limit is not None and gap > limit and certificate["holds"] is not False:
+            if limit is not None and gap is not None and gap > limit and certificate["holds"] is not False:
                 self._warn(f"{name}: the longest gap between balises was {gap:.3g} s, certified are {limit:.3g} s.")
         return {
             "localisation": {"method": self.choice.method, "reason": self.choice.reason},
