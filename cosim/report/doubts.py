@@ -84,10 +84,10 @@ def _worse_than_none(result: Result, spec: ReportSpec, speed: np.ndarray) -> Ite
             continue
         largest = judged_size(result.time[settled], error[settled]).max_abs
         if largest > max(fastest, STANDSTILL):
-            size = f"{number(largest)} m/s" if np.isfinite(largest) else "without bound"
+            size = f"up to {number(largest)} m/s" if np.isfinite(largest) else "without bound"
             yield (
-                f"{label(spec, observer)}: its speed error is up to {size}, more than the speed of the train, "
-                f"{number(fastest)} m/s at most: it says nothing of this train. Look at its gains, its inputs and the balise gaps."
+                f"{label(spec, observer)}: its speed error is {size}, more than the speed of the train ({number(fastest)} m/s at "
+                "most): it says nothing of this train. Look at its gains, its inputs and the gaps between balises."
             )
 
 
