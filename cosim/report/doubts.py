@@ -61,7 +61,7 @@ def _empty_phases(result: Result, spec: ReportSpec) -> Iterator[str]:
         yield f"Not reached, since the run ends at {_given(reached)} s: {_named(unreached, spec)}."
     for phase in empty:
         if phase not in unreached:
-            yield f"Too few rows to judge ({counts[phase]}, at least {FEWEST_INSTANTS} instants are needed): {_named([phase], spec)}."
+            yield f"Too few rows to judge ({counts[phase]} of the {FEWEST_INSTANTS} instants needed): {_named([phase], spec)}."
 
 
 def _after_the_journey(result: Result, spec: ReportSpec, moving: np.ndarray) -> Iterator[str]:

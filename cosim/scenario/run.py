@@ -46,7 +46,7 @@ from cosim.scenario.models import component_factories, protocol_parameters
 from cosim.scenario.outcome import INTERRUPTED, Outcome
 from cosim.scenario.premises import premise_findings
 from cosim.scenario.remarks import coupling_remarks, late_telegram_doubts, lines_note
-from cosim.scenario.roles import ROLES, check_roles, signals_to_record
+from cosim.scenario.roles import ROLES, check_roles, inferred_roles, signals_to_record, with_roles
 from cosim.scenario.schema import ScenarioTable, step_count
 from cosim.scenario.starts import start_values
 from cosim.scenario.summary import first_summary, run_summary
@@ -146,6 +146,9 @@ class _Setup:
         connections = self.connections = connect(pairs, self.components)
         receivers, plant = self._balise_roles()
         check_roles(table, self.components, self.where)
+        roles = inferred_roles(table, self.components, connections, plant)
+        table = with_roles(table, roles)
+        self.notes += [f"Roles that the report was not told: {', '.join(map(' = '.join, roles.items()))}."] if roles else []
         table = self.table = check_expectations(table, self.components, receivers, self.where)
         groups = execution_groups(slow_last(self.components, table), connections, self._before(plant, receivers))
         self.algorithm = choose_algorithm(table.master.algorithm, groups, self.components)
