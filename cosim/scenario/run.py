@@ -22,6 +22,7 @@ from cosim.coupling.connection import Connection, connect
 from cosim.coupling.graph import execution_groups
 from cosim.coupling.plan import Plan, make_plan
 from cosim.diagnostics.call_log import CallLog
+from cosim.diagnostics.divergence import explained_failure
 from cosim.diagnostics.logged_slave import log_calls
 from cosim.diagnostics.messages import in_order
 from cosim.errors import CosimError
@@ -185,7 +186,7 @@ class _Setup:
         try:
             master.run()
         except CosimError as error:
-            failure = str(error)
+            failure = explained_failure(error, self.plan, self._as_recorded())
         except KeyboardInterrupt:
             failure = INTERRUPTED
         if master.ended_early is not None:
