@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from cosim.report.figures.drawing import FAR, legend_above
-from cosim.report.figures.scales import bounded, error_scale
+from cosim.report.figures.scales import BOUND, bounded, error_scale
 from cosim.report.figures.style import ALARM_COLOUR, ZONE_COLOUR, new_figure, observer_line, styled
 from cosim.report.moments import Moment
 from cosim.report.roles import estimate, estimation_error, label, recorded
@@ -84,8 +84,8 @@ def _rows(time: np.ndarray, moment: Moment) -> np.ndarray:
 
 
 def _reach(curves: list[np.ndarray], own: np.ndarray | None) -> float:
-    """Largest size on the axis: that of the curves which work or, where the picture is about one, all of that one."""
-    largest = 0.0 if own is None else float(np.max(np.abs(own[np.isfinite(own)]), initial=0.0))
+    """Largest size on the axis: of the curves which work or, where it is about one, that one while it is a number."""
+    largest = 0.0 if own is None else float(np.max(np.abs(own[np.abs(own) < BOUND]), initial=0.0))
     return max(error_scale(curves).limit, largest)
 
 

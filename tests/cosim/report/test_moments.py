@@ -167,7 +167,16 @@ def test_the_picture_of_the_worst_point_shows_it() -> None:
     worst = next(m for m in notable_moments(result, spec) if m.about == "obs")
     _, high = zoom_figure(result, spec, worst).axes[0].get_ylim()
     assert worst.start < 70.0 < worst.end
-    assert high > 5e4
+    assert 5e4 < high < 1e5
+
+
+def test_the_picture_of_an_error_without_bound_shows_how_it_grew() -> None:
+    result = synthetic_result(diverged="multirate_cdo")
+    worst = next(m for m in notable_moments(result, synthetic_spec()) if m.about == "multirate_cdo")
+    error = result["multirate_cdo.speed"] - result["locomotive.speed"]
+    before = np.abs(error[(result.time >= worst.start) & np.isfinite(error)]).max()
+    low, high = zoom_figure(result, synthetic_spec(), worst).axes[0].get_ylim()
+    assert before < high - low < 3.0 * before
 
 
 @given(st.integers(0, 20), st.floats(0.0, 60.0), st.sampled_from(OBSERVERS))
