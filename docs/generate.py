@@ -11,6 +11,7 @@ import re
 import tomllib
 from collections.abc import Callable, Mapping
 from functools import cache
+from math import isfinite
 from pathlib import Path
 from typing import Any, get_args, get_origin
 
@@ -113,7 +114,8 @@ def certificate_table() -> str:
         source = system.source.removeprefix("Bouchama 2024, ")
         for preset in list(system.presets) or [None]:
             certificate = system.certify(0.1, preset=preset)
-            limits = [f"{limit:.3g} s" for limit in (certificate.aperiodic_limit, certificate.constant_limit)]
+            mixed, constant = certificate.aperiodic_limit, certificate.constant_limit
+            limits = [f"{mixed:.3g} s" if isfinite(mixed) else "any gap", f"{constant:.3g} s" if isfinite(constant) else "none"]
             preset_cell = _preset(system, preset)
             rows.append(f"| {number} | `{name}` | {system.description} | {source} | {preset_cell} | {limits[0]} | {limits[1]} |")
     return "\n".join([*rows, ""])

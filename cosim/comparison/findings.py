@@ -62,7 +62,7 @@ def _value_finding(
         where = f"{count} points outside the tube, at worst {side} at {at:.9g} s {limit}"
     text = f"{name}: {_when(begin, end)} {where}"
     return Finding(
-        "value", begin, end, float(points.reference[worst]), float(points.result[worst]), abs(error), allowed.value, text
+        "value", begin, end, float(points.reference[worst]), float(points.result[worst]), abs(error), allowed.value, text, at
     )  # fmt: skip
 
 
@@ -82,7 +82,7 @@ def _shift_findings(name: str, unit: str, jumps: MatchedJumps, allowed: Allowed)
             text = f"{name}: {span} {b - a} jumps at other instants, at worst {amount} at {one:.9g} s"
         last = float(max(jumps.reference.end[b - 1], jumps.result.end[b - 1]))
         begin = float(min(jumps.reference.end[a], jumps.result.end[a]))
-        found.append(Finding("jump_time", begin, last, one, two, float(size[worst]), allowed.time, text))
+        found.append(Finding("jump_time", begin, last, one, two, float(size[worst]), allowed.time, text, min(one, two)))
     return found
 
 
@@ -107,8 +107,8 @@ def _lone_findings(
             span = _when(float(jumps.end[a]), float(jumps.end[b - 1]))
             text = f"{name}: {span} {b - a} jumps are {whose}, the largest {step}"
         values = (after, np.nan) if kind == "jump_missing" else (np.nan, after)
-        begin, end = float(jumps.end[a]), float(jumps.end[b - 1])
-        found.append(Finding(kind, begin, end, *values, float(size[worst - a]), allowed.value, text))
+        begin, end, at = (float(jumps.end[row]) for row in (a, b - 1, worst))
+        found.append(Finding(kind, begin, end, *values, float(size[worst - a]), allowed.value, text, at))
     return found
 
 

@@ -40,6 +40,7 @@ class Finding:
         size: how large it is: in the unit of the signal, in seconds for times.
         allowed: how large it may be.
         text: one line for people, with numbers and units.
+        worst: where it is largest [s]; NaN where that is where it begins.
     """
 
     kind: Kind
@@ -50,6 +51,7 @@ class Finding:
     size: float
     allowed: float
     text: str
+    worst: float = float("nan")
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,7 @@ def judge_off(item: OffExpectation, run: Run) -> list[Judged]:
     name = f"{item.signal} off{span(item.start, item.end)}"
     values, threshold, window = run.recorded(item.signal), _threshold(item), run.window(item.start, item.end)
     common: dict[str, Any] = {"check": item.check, "limit": 0.0, "unit": "s"}
-    if window.reached < window.start:
+    if window.reached < window.start or window.reached == window.start < window.end:
         return [Judged(name, passed=False, text=window.unreached, **common)]
     time, shown = _held(run.result.time, values, window.start, window.end)
     bad = np.isnan(shown)

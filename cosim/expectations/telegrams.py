@@ -24,6 +24,9 @@ def judge_telegrams(item: TelegramsExpectation, run: Run) -> list[Judged]:
     within = [e for e in run.result.events if window.holds(e.stamp)]
     receivers = [item.of] if item.of is not None else sorted({name for e in run.result.events for name in e.outcomes})
     where = span(item.start, item.end)
+    if not within:
+        text = f"nothing to judge: no balise was passed{where or ' in this run'}"
+        return [Judged("telegrams", "telegrams", passed=False, measured=0.0, text=text)]
     found = []
     for key in OF_THE_TRACK:
         if getattr(item, key) is not None:

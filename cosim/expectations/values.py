@@ -11,7 +11,7 @@ import numpy as np
 from cosim.expectations.judged import Judged, at, given, with_unit
 from cosim.expectations.run import NotRecordedError, Run, span
 from cosim.expectations.window import Window
-from cosim.report.metrics import error_size
+from cosim.report.metrics import error_size, instants
 
 if TYPE_CHECKING:
     from cosim.scenario.expectation_tables import DifferenceExpectation, ErrorExpectation, SignalExpectation
@@ -86,7 +86,7 @@ def _judge_sizes(name: str, item: Any, window: Window, error: np.ndarray, unit: 
         if limit is None:
             continue
         judged: dict[str, Any] = {"name": name.format(f", {what}"), "check": item.check, "limit": limit, "unit": unit}
-        nothing = _nothing_measured(window, time, shown)
+        nothing = _nothing_measured(window, time, shown, window.fewest)
         if nothing is not None:
             found.append(Judged(passed=False, **judged, **nothing))
             continue
@@ -104,7 +104,7 @@ def _bounded(
 ) -> Judged:  # fmt: skip
     """Whether values lie between two bounds, one of which may be infinite."""
     unit = base["unit"]
-    nothing = _nothing_measured(window, time, values)
+    nothing = _nothing_measured(window, time, values, 1 if last else window.fewest)
     if nothing is not None:
         return Judged(name, passed=False, limit=low if high == inf else high, **base, **nothing)
     excess = np.maximum(values - high, low - values)
@@ -122,10 +122,12 @@ def _bounded(
     return Judged(name, passed=passed and not window.broken, measured=measured, limit=limit, when=when, text=text, **base)
 
 
-def _nothing_measured(window: Window, time: np.ndarray, values: np.ndarray) -> dict[str, Any] | None:
-    """What to say where there are no values, or some that are no finite numbers; None where all is well."""
-    if not len(time):
-        between = f"nothing measured: no row between {given(window.start)} and {given(window.end)} s"
+def _nothing_measured(window: Window, time: np.ndarray, values: np.ndarray, fewest: int) -> dict[str, Any] | None:
+    """What to say where there are fewer than `fewest` instants, or values that are no finite numbers; None where all is well."""
+    count = instants(time)
+    if count < fewest:
+        rows = f"only {count} instant{'s' * (count > 1)}, too few to judge:" if count else "nothing measured: no row"
+        between = f"{rows} between {given(window.start)} and {given(min(window.end, window.reached))} s"
         return {"text": window.unreached if window.reached < window.start else between}
     bad = np.flatnonzero(~np.isfinite(values))
     if not len(bad):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.expectations.judged import given
+from cosim.report.metrics import FEWEST_INSTANTS
 from cosim.results.result import Result
 
 ROUNDING = 1e-9  # relative; times closer than this are the same
@@ -19,6 +20,7 @@ class Window:
     Args:
         result: the run. start, end: what the expectation speaks of [s]. reached: when the run ended [s].
         broken: whether the run ended before `end` and the expectation asked for more: it failed, or `end` was given.
+        fewest: instants that it must hold to be judged; one is enough where the expectation says when it ends.
     """
 
     result: Result
@@ -26,6 +28,7 @@ class Window:
     end: float
     reached: float
     broken: bool
+    fewest: int = FEWEST_INSTANTS
 
     @property
     def rows(self) -> np.ndarray:
@@ -58,6 +61,6 @@ def window_of(result: Result, start: float | None, end: float | None, first: flo
     until = last if end is None else end
     reached = float(result.time[-1]) if len(result.time) else float("-inf")
     short = reached < until - ROUNDING * max(1.0, abs(until))
-    return Window(
-        result, first if start is None else start, until, reached, short and (end is not None or result.failure is not None)
-    )
+    broken = short and (end is not None or result.failure is not None)
+    fewest = FEWEST_INSTANTS if end is None else 1
+    return Window(result, first if start is None else start, until, reached, broken, fewest)

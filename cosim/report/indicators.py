@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cosim.report.metrics import FEWEST_INSTANTS, instants
 from cosim.report.roles import estimate
 from cosim.report.spec import ReportSpec
 from cosim.results.result import Result
@@ -20,7 +21,7 @@ class IndicatorStatistics:
 
     Args:
         observer: component name.
-        on: share of the time it was on [1].
+        on: share of the time it was on [1]; NaN with too few rows.
         on_outside: share of the time outside the low-adhesion zones it was on [1]; NaN where no time is outside.
         delays: for each zone the time from its start to the first indication within it [s], or None without any.
     """
@@ -84,7 +85,7 @@ def _one(time: np.ndarray, values: np.ndarray, observer: str, spec: ReportSpec) 
     total = _overlap(intervals, start, end)
     return IndicatorStatistics(
         observer,
-        total / (end - start) if end > start else float("nan"),
+        total / (end - start) if instants(time[time >= start]) >= FEWEST_INSTANTS else float("nan"),
         max(total - inside, 0.0) / outside_time if outside_time > 0 else float("nan"),
         tuple(_delay(intervals, a, b) for a, b in spec.zones),
     )

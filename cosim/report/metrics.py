@@ -11,10 +11,13 @@ from cosim.report.roles import estimation_error, phases
 from cosim.report.spec import Phase, ReportSpec
 from cosim.results.result import Result
 
+FEWEST_INSTANTS = 5
+"""Of a stretch that is judged; what a run shows at fewer instants says nothing of it."""
+
 
 @dataclass(frozen=True, slots=True)
 class ErrorSize:
-    """Size of an error over a stretch of time, in the unit of the error; NaN without rows, infinite once diverged.
+    """Size of an error over a stretch of time, in the unit of the error; NaN with too few rows, infinite once diverged.
 
     Args:
         max_abs: largest absolute value. rms: time-weighted root mean square.
@@ -71,6 +74,16 @@ def error_size(time: np.ndarray, error: np.ndarray) -> ErrorSize:
     return ErrorSize(largest, largest * float(np.sqrt(mean)))
 
 
+def instants(time: np.ndarray) -> int:
+    """How many different times there are among times that do not decrease [s], shape (rows,)."""
+    return int(np.count_nonzero(np.diff(time) > 0.0)) + 1 if len(time) else 0
+
+
+def judged_size(time: np.ndarray, error: np.ndarray) -> ErrorSize:
+    """As `error_size`; NaN where there are fewer than `FEWEST_INSTANTS` instants."""
+    return error_size(time, error) if instants(time) >= FEWEST_INSTANTS else ErrorSize(nan, nan)
+
+
 def within(time: np.ndarray, phase: Phase, evaluate_after: float) -> np.ndarray:
     """Rows of a phase that are evaluated, shape (rows,): ``start <= t <= end`` and ``t >= evaluate_after``."""
     return np.asarray((time >= max(phase.start, evaluate_after)) & (time <= phase.end))
@@ -95,8 +108,8 @@ def _one(result: Result, spec: ReportSpec, observer: str, phase: Phase) -> Phase
     return PhaseMetrics(
         observer,
         phase.name,
-        None if speed is None else error_size(result.time[rows], speed[rows]),
-        None if position is None else error_size(result.time[rows], position[rows]),
+        None if speed is None else judged_size(result.time[rows], speed[rows]),
+        None if position is None else judged_size(result.time[rows], position[rows]),
         spec.published.get(observer, {}).get(phase.name),
         spec.independent.get(observer, {}).get(phase.name),
     )

@@ -13,7 +13,7 @@ from cosim.report.event_counts import accepted_stamps
 from cosim.report.facts import number_entry
 from cosim.report.figures.scales import error_scale
 from cosim.report.indicators import on_intervals
-from cosim.report.metrics import error_size
+from cosim.report.metrics import FEWEST_INSTANTS, error_size, instants
 from cosim.report.numbers import number
 from cosim.report.roles import Quantity, estimate, estimation_error, label
 from cosim.report.spec import ReportSpec
@@ -34,6 +34,7 @@ class Moment:
     Args:
         time: what it is about [s]. start, end: of the window [s]. reasons: why, the first one the title.
         view: what to draw: both errors, or the speed error and the slip.
+        about: the observer whose error is shown whole, however large; None where the scale follows those that work.
     """
 
     time: float
@@ -41,6 +42,7 @@ class Moment:
     end: float
     reasons: tuple[str, ...]
     view: View = "errors"
+    about: str | None = None
 
 
 def notable_moments(result: Result, spec: ReportSpec, most: int = MOST) -> list[Moment]:
@@ -52,7 +54,7 @@ def notable_moments(result: Result, spec: ReportSpec, most: int = MOST) -> list[
     Returns:
         Windows of which none holds another's moment; where two would, they are one with both reasons.
     """
-    if len(result.time) < FEWEST_ROWS or not (_errors(result, spec, "speed") or _errors(result, spec, "position")):
+    if len(result.time) < FEWEST_ROWS or not (_all_errors(result, spec, "speed") or _all_errors(result, spec, "position")):
         return []
     chosen: list[Moment] = []
     for moment in _candidates(result, spec, _Scale(result)):
@@ -86,6 +88,7 @@ class _Scale:
 def _candidates(result: Result, spec: ReportSpec, scale: _Scale) -> Iterator[Moment]:
     """Windows, the most telling first."""
     yield from _largest_error(result, spec, scale, "speed")
+    yield from _largest_error(result, spec, scale, "position")
     yield from _telegrams(result, spec, scale)
     zone = _worst_zone(result, spec)
     if zone is not None:
@@ -94,29 +97,48 @@ def _candidates(result: Result, spec: ReportSpec, scale: _Scale) -> Iterator[Mom
     yield from _largest_jump(result, spec, scale)
     if zone is not None:
         yield from _edge(scale, zone, 1, "A low-adhesion zone ends")
-    yield from _largest_error(result, spec, scale, "position")
+
+
+def _all_errors(result: Result, spec: ReportSpec, quantity: Quantity) -> dict[str, np.ndarray]:
+    """Errors by observer, 0 in the start-up; none where too little is judged."""
+    settled = result.time >= spec.evaluate_after
+    if instants(result.time[settled]) < FEWEST_INSTANTS:
+        return {}
+    found = {o: estimation_error(result, spec, o, quantity) for o in spec.observers}
+    return {o: np.where(settled, e, 0.0) for o, e in found.items() if e is not None}
 
 
 def _errors(result: Result, spec: ReportSpec, quantity: Quantity) -> dict[str, np.ndarray]:
-    """Errors by observer after the start-up; without those of observers that have diverged."""
+    """As `_all_errors`, without those of observers that have diverged."""
+    errors = _all_errors(result, spec, quantity)
     settled = result.time >= spec.evaluate_after
-    found = {o: estimation_error(result, spec, o, quantity) for o in spec.observers if settled.any()}
-    errors = {o: e for o, e in found.items() if e is not None}
     limit = SPIKE * error_scale([e[settled] for e in errors.values()]).limit
-    kept = [o for o, e in errors.items() if error_size(result.time[settled], e[settled]).max_abs <= limit]
-    return {o: np.where(settled, errors[o], 0.0) for o in kept}
+    return {o: e for o, e in errors.items() if error_size(result.time, e).max_abs <= limit}
 
 
 def _largest_error(result: Result, spec: ReportSpec, scale: _Scale, quantity: Quantity) -> Iterator[Moment]:
-    errors = _errors(result, spec, quantity)
-    if not errors:
-        return
-    observer = max(errors, key=lambda o: float(np.max(np.abs(errors[o]))))
-    row = int(np.argmax(np.abs(errors[observer])))
-    size = f"{number(float(errors[observer][row]))} {UNITS[quantity]}"
-    if errors[observer][row] != 0.0:
-        reason = f"Largest {quantity} error, {size} ({label(spec, observer)})"
-        yield scale.window(float(result.time[row]), 1.5 * scale.half, 1.5 * scale.half, reason)
+    """The worst point of all observers; where that one has diverged, the worst of the others after it."""
+    errors, working = _all_errors(result, spec, quantity), _errors(result, spec, quantity)
+    sizes = {o: error_size(result.time, e).max_abs for o, e in errors.items()}
+    worst = max(sizes, key=lambda o: sizes[o], default=None)
+    if worst is not None and worst not in working:
+        yield _worst_point(result, spec, scale, quantity, worst, errors[worst])
+    others = max(working, key=lambda o: sizes[o], default=None)
+    if others is not None and sizes[others] != 0.0:
+        moment = _worst_point(result, spec, scale, quantity, others, errors[others])
+        among = "" if worst in working else " of the others"
+        yield replace(moment, reasons=(moment.reasons[0].replace(" error", f" error{among}", 1),), about=None)
+
+
+def _worst_point(
+    result: Result, spec: ReportSpec, scale: _Scale, quantity: Quantity, observer: str, error: np.ndarray
+) -> Moment:  # fmt: skip
+    """Where an error is largest, or the last row before it is no number any more."""
+    lost = np.flatnonzero(~np.isfinite(error))
+    row = max(int(lost[0]) - 1, 0) if len(lost) else int(np.argmax(np.abs(error)))
+    size = "then without bound" if len(lost) else f"{number(float(error[row]))} {UNITS[quantity]}"
+    reason = f"Largest {quantity} error, {size} ({label(spec, observer)})"
+    return replace(scale.window(float(result.time[row]), 1.5 * scale.half, 1.5 * scale.half, reason), about=observer)
 
 
 def _telegrams(result: Result, spec: ReportSpec, scale: _Scale) -> Iterator[Moment]:

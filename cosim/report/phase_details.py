@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from math import isnan
 
 import numpy as np
 
 from cosim.report.corrections import Corrections, corrections, used_by
 from cosim.report.indicators import on_share
-from cosim.report.metrics import error_size, within
+from cosim.report.metrics import FEWEST_INSTANTS, error_size, instants, judged_size, within
 from cosim.report.roles import coupler_force, estimate, phases, recorded
 from cosim.report.spec import Phase, ReportSpec
 from cosim.results.result import Result
@@ -16,7 +17,7 @@ from cosim.results.result import Result
 
 @dataclass(frozen=True, slots=True)
 class PhaseDetails:
-    """What one observer did in one phase; None where it was not recorded or there was nothing to measure.
+    """What one observer did in one phase; None where it was not recorded or there was too little to measure.
 
     Args:
         observer: component name. phase: name of the phase.
@@ -58,6 +59,8 @@ def _one(
     result: Result, spec: ReportSpec, observer: str, phase: Phase, speed: Corrections, position: Corrections
 ) -> PhaseDetails:
     start, end = max(phase.start, spec.evaluate_after), phase.end
+    if instants(result.time[within(result.time, phase, spec.evaluate_after)]) < FEWEST_INSTANTS:
+        return PhaseDetails(observer, phase.name, *[None] * (len(fields(PhaseDetails)) - 2))
     force = coupler_force(result, spec.true_speed)
     indicator = estimate(result, observer, "slip_indicator")
     used = [e for e in result.events if used_by(e, observer)]
@@ -79,7 +82,8 @@ def _rms(result: Result, spec: ReportSpec, phase: Phase, true: np.ndarray | None
         return None
     rows = within(result.time, phase, spec.evaluate_after)
     with np.errstate(invalid="ignore", over="ignore"):  # inf - inf: diverged
-        return error_size(result.time[rows], believed[rows] - true[rows]).rms
+        rms = judged_size(result.time[rows], believed[rows] - true[rows]).rms
+    return None if isnan(rms) else rms
 
 
 def _around(made: Corrections, start: float, end: float) -> tuple[float | None, float | None]:

@@ -37,6 +37,8 @@ class ExpectedGap:
 
 NO_BALISES = ExpectedGap(None, "no balise instant lies within the run")
 
+WALKING = 1.0
+"""Who is certified for the gaps of a train at this speed [m/s] is certified for all that a moving train meets."""
 ROUNDING = 1e-9  # relative, of distances between positions
 ASKED_FOR_LIMITS_ONLY = 0.5
 """A gap to ask for [s] where only the limits of a certificate are of interest; they do not depend on it."""
@@ -102,6 +104,10 @@ def _judge(name: str, table: ComponentTable, system: Any, gap: ExpectedGap) -> t
     asked = ASKED_FOR_LIMITS_ONLY if gap.seconds is None else gap.seconds
     in_use = {"parameters": given_parameters(table), "preset": table.preset}
     certificate = system.certify(asked, **in_use)
+    if gap.seconds is None and gap.distance is not None and certificate.aperiodic_limit == inf:
+        certificate = system.certify(max(asked, gap.distance / WALKING), **in_use)  # no limit so far: ask for gaps like these
+        if certificate.holds:
+            return certificate.to_dict() | {"explanation": certificate.explain()}, []
     data: dict[str, Any] = certificate.to_dict() | {"explanation": certificate.explain()}
     if gap.seconds is None:
         known = f"its gains are certified up to {certificate.aperiodic_limit:.3g} s"

@@ -1,13 +1,14 @@
-"""Roles: the signals a report is told to use exist, and are what they are said to be."""
+"""Roles: which signals a report uses. Those it is told exist and are what they should be; others follow from the coupling."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from cosim.components.component import Component
-from cosim.coupling.connection import split_name
-from cosim.errors import ScenarioError, nearest
+from cosim.coupling.connection import Connection, split_name
+from cosim.errors import CosimError, ScenarioError, nearest
 from cosim.scenario.schema import ScenarioTable
+from cosim.scenario.tables import BalisesTable
 from plant_models.hybrid.units import UnitError, conversion, parse_unit
 
 ROLES = {
@@ -18,6 +19,60 @@ ROLES = {
     "odometer": "m/s",
     "speed_reference": "m/s",
 }
+
+
+OF_THE_PLANT = {"true_slip": "slip", "true_adhesion_force": "adhesion_force"}
+"""Outputs of the watched plant that have a role where they have this name and the unit of the role."""
+ODOMETER, REFERENCE = "odometer", "speed_reference"
+
+
+def roles_of_balises(balises: BalisesTable | None) -> dict[str, str]:
+    """What balises are found by is the true position and speed, and what telegrams carry is the odometer's reading."""
+    if balises is None:
+        return {}
+    found = {"true_position": balises.position, "true_speed": balises.speed, "odometer": balises.odometer}
+    return {role: name for role, name in found.items() if name is not None}
+
+
+def inferred_roles(
+    table: ScenarioTable, components: Mapping[str, Component], connections: Sequence[Connection], plant: str
+) -> dict[str, str]:  # fmt: skip
+    """The roles that the report table leaves open, as far as balises and connections tell them.
+
+    Args:
+        table: the scenario. components: by name. connections: checked. plant: that passes the balises; empty for none.
+
+    Returns:
+        Signals by role: true position, true speed and odometer from the balises; slip and adhesion force from outputs of the
+        plant that are called so; the odometer from what all observers listen to; the reference from the one output called so.
+    """
+    of_the_plant = {role: f"{plant}.{signal}" for role, signal in OF_THE_PLANT.items()} if plant else {}
+    references = (f"{name}.{REFERENCE}" for name, component in components.items() if REFERENCE in component.names("output"))
+    listening = {(name, ODOMETER) for name, component in table.components.items() if component.observer is not None}
+    heard = {".".join(connection.source) for connection in connections if connection.target in listening}
+    told = of_the_plant | {REFERENCE: _only(references), ODOMETER: _only(heard)} | roles_of_balises(table.balises)
+    free = {role: name for role, name in told.items() if name is not None and getattr(table.report, role) is None}
+    return {role: name for role, name in free.items() if _fits(name, role, components)}
+
+
+def with_roles(table: ScenarioTable, roles: Mapping[str, str]) -> ScenarioTable:
+    """The scenario whose report has these roles too."""
+    return table.model_copy(update={"report": table.report.model_copy(update=dict(roles))}) if roles else table
+
+
+def _only(names: Iterable[str]) -> str | None:
+    """The name, where there is but one."""
+    found = list(names)
+    return found[0] if len(found) == 1 else None
+
+
+def _fits(name: str, role: str, components: Mapping[str, Component]) -> bool:
+    try:
+        _check_signal(name, ROLES[role], components, role)
+    except CosimError:
+        return False
+    component, _, signal = name.partition(".")
+    return len(components[component].elements(signal)) == 1
 
 
 def signals_to_record(table: ScenarioTable) -> dict[str, list[str]]:

@@ -22,6 +22,7 @@ from cosim.coupling.clocks import connect_clocks
 from cosim.coupling.connection import Connection, connect
 from cosim.coupling.plan import Plan, make_plan
 from cosim.diagnostics.call_log import CallLog
+from cosim.diagnostics.divergence import explained_failure
 from cosim.diagnostics.logged_slave import log_calls
 from cosim.diagnostics.messages import in_order
 from cosim.errors import CosimError
@@ -33,6 +34,7 @@ from cosim.master.lines.draw import draw_lines
 from cosim.master.master import Master, close
 from cosim.process.interruption import Interruption
 from cosim.process.sentinel import limited_calls
+from cosim.report.doubts import result_doubts
 from cosim.report.spec import Phase, ReportSpec
 from cosim.results.recorder import Recorder
 from cosim.results.result import BaliseRecord, Result, SignalInfo
@@ -47,7 +49,7 @@ from cosim.scenario.models import component_factories, protocol_parameters
 from cosim.scenario.outcome import INTERRUPTED, Outcome
 from cosim.scenario.premises import premise_findings
 from cosim.scenario.remarks import coupling_remarks, late_telegram_doubts, lines_note
-from cosim.scenario.roles import ROLES, check_roles, signals_to_record
+from cosim.scenario.roles import ROLES, check_roles, inferred_roles, signals_to_record, with_roles
 from cosim.scenario.schema import ScenarioTable, step_count
 from cosim.scenario.starts import start_values
 from cosim.scenario.summary import first_summary, run_summary
@@ -162,6 +164,9 @@ class _Setup:
         connections = self.connections = connect(pairs, self.components)
         receivers, plant = self._balise_roles()
         check_roles(table, self.components, self.where)
+        roles = inferred_roles(table, self.components, connections, plant)
+        table = with_roles(table, roles)
+        self.notes += [f"Roles that the report was not told: {', '.join(map(' = '.join, roles.items()))}."] if roles else []
         table = self.table = check_expectations(table, self.components, receivers, self.where)
         groups = stepping_groups(table, self.components, connections, plant, receivers)
         self.algorithm = choose_algorithm(table.master.algorithm, groups, self.components)
@@ -205,7 +210,7 @@ class _Setup:
         try:
             master.run()
         except CosimError as error:
-            failure = str(error)
+            failure = explained_failure(error, self.plan, self._as_recorded())
         except KeyboardInterrupt:
             failure = INTERRUPTED
         self._warn_of_trespasses(surroundings.finish())
@@ -216,14 +221,15 @@ class _Setup:
             self._warn(warning)
         summary = run_summary(self.name, self.table, self.plan, master, self.setup_seconds)
         events = [] if self.service is None else self._all_telegrams(self.service)
+        spec, (table, signals) = self._report_spec(), self._in_si()
+        for warning in result_doubts(Result(table, signals, failure=failure), spec):
+            self._warn(warning)
         self._warn_of_rejections()
         self._warn_of_doubts(events)
         self._warn_of_logs()
         summary |= self._balise_summary([e.stamp for e in events if e.kind == "true"])
         summary |= {"certificates": self.certificates, "premises": premises} | {"warnings": self.warnings, "notes": self.notes}
-        spec = self._report_spec()
         summary["report"] = asdict(spec)  # so that the folder tells which signal plays which role
-        table, signals = self._in_si()
         if interruption.came:
             failure = failure or INTERRUPTED
         messages = in_order(component.messages for component in self.components.values())
@@ -377,11 +383,11 @@ class _Setup:
         """Method, probe, and the gaps that really occurred against what is certified."""
         if self.choice is None or self.service is None:
             return {"localisation": None, "probe": None, "redo_differences": None, "largest_gap": None, "undelivered": 0}
-        gap = max((b - a for a, b in pairwise([self.axis.start, *sorted(stamps)])), default=0.0)
+        gap = max((b - a for a, b in pairwise([self.axis.start, *sorted(stamps)])), default=None)
         for name, certificate in self.certificates.items():
             limit = certificate["aperiodic_limit"]
             certificate["largest_gap_seen"] = gap
-            if limit is not None and gap > limit and certificate["holds"] is not False:
+            if limit is not None and gap is not None and gap > limit and certificate["holds"] is not False:
                 self._warn(f"{name}: the longest gap between balises was {gap:.3g} s, certified are {limit:.3g} s.")
         return {
             "localisation": self.choice.to_dict(),

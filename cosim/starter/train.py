@@ -18,14 +18,8 @@ HORIZON, STEP, SHORTEST, LONGEST = 60.0, 0.01, 1e-3, 0.5
 RADIUS = 0.5
 ASSUMED = {"position": "m", "true_position": "m", "speed": "m/s", "true_speed": "m/s", "true_adhesion_force": "N"}
 ODOMETER = ("[components.odometer]", 'model = "odometer"', "parameters = { noise_std = 0.01, seed = 1 }  # [m/s]", "")
-GAINS = {
-    "innovation_decay": 3.0,
-    "balise_gain_position": 2.4,
-    "balise_gain_speed": 0.0,
-    "odometer_gain_position": 0.7,
-    "odometer_gain_speed": 1.6,
-}
-"""Of the Takagi-Sugeno observer: they trust the odometer between balises that are far apart."""
+PRESETS = {DEFAULT_OBSERVER: "long_gaps"}
+"""What is offered beside balises laid by distance, whose gaps nobody knows beforehand: gains that no gap makes unstable."""
 
 
 def train(look: Look, fmu: str, roles: PlantRoles, observer: str) -> list[str]:
@@ -166,13 +160,15 @@ def _driver(roles: PlantRoles) -> list[str]:
 def observer_table(observer: str, mass: Guess | None) -> list[str]:
     """The table of a shipped observer, with the mass of the train where it wants one."""
     system = OBSERVERS[observer]()
-    known = {p.name: p.start for p in system.parameters}
-    lines = [f"[components.{OBSERVER}]", entry("observer", observer), "", f"[components.{OBSERVER}.parameters]"]
+    known = {s.name: s.start for s in (*system.parameters, *system.states)}
+    lines = [f"[components.{OBSERVER}]", entry("observer", observer)]
+    if observer in PRESETS:
+        lines.append(f"{entry('preset', PRESETS[observer])}  # trusts the odometer between balises: stable at any gap")
+    lines += ["", f"[components.{OBSERVER}.parameters]"]
     if "mass" in known:
         lines.append(_mass(mass, known["mass"]))
-    if observer == DEFAULT_OBSERVER:
-        lines += comment("These trust the odometer between balises: certified for gaps up to 100 s.")
-        lines += [entry(name, value) for name, value in GAINS.items()]
+    if "estimated_speed" in known:
+        lines.append(f"{entry('estimated_speed', 0.0)}  # [m/s] what it believes at the start")
     return [*lines, ""]
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.report.metrics import error_size, within
+from cosim.report.metrics import judged_size, within
 from cosim.report.roles import Quantity, estimation_error
 from cosim.report.spec import Phase
 from cosim.scenario.outcome import Outcome
@@ -22,7 +22,7 @@ def error_measures(outcome: Outcome) -> dict[str, float]:
 
     Returns:
         ``observer.speed_error_max``, ``observer.speed_error_rms`` [m/s] and the same of the position [m], where recorded;
-        NaN for a run that failed, whose errors are those of another stretch of time.
+        NaN for a run that failed, whose errors are those of another stretch of time, and where too few rows are judged.
     """
     result, spec = outcome.result, outcome.spec
     measures: dict[str, float] = {}
@@ -35,7 +35,7 @@ def error_measures(outcome: Outcome) -> dict[str, float]:
             error = estimation_error(result, spec, observer, quantity)
             if error is None:
                 continue
-            size = error_size(result.time[rows], error[rows])
+            size = judged_size(result.time[rows], error[rows])
             failed = outcome.failure is not None
             measures[f"{observer}.{quantity}_error_max"] = nan if failed else size.max_abs
             measures[f"{observer}.{quantity}_error_rms"] = nan if failed else size.rms

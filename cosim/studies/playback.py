@@ -18,7 +18,7 @@ from cosim.scenario import Scenario
 from cosim.scenario.balise_service import BALISE_EVENT
 from cosim.scenario.connections import parse_connections
 from cosim.scenario.models import make_system
-from cosim.scenario.roles import ROLES
+from cosim.scenario.roles import ROLES, roles_of_balises
 from cosim.scenario.schema import ScenarioTable
 from cosim.scenario.structure import describe_component
 from cosim.scenario.tables import ComponentTable
@@ -192,6 +192,7 @@ def _roles(table: ScenarioTable, observers: Iterable[str]) -> dict[str, Any]:
     kept = {*ROLES, "phases", "zones", "evaluate_after"}
     given = {key: value for key, value in _table(table.report).items() if key in kept}
     given = {key: value for key, value in given.items() if key not in ROLES or value is not None}
+    given = roles_of_balises(table.balises) | given
     return given | {"observers": list(observers)}
 
 

@@ -194,3 +194,19 @@ def test_rounding_down_never_rounds_up(value: float) -> None:
     rounded = rounded_down(value)
     assert value * (1.0 - 1e-2) <= rounded <= value
     assert float(f"{rounded:.2e}") == rounded
+
+
+@settings(max_examples=15)
+@given(gap=st.floats(0.01, 90.0))
+def test_the_gains_for_a_stranger_are_stable_at_any_gap(gap: float) -> None:
+    """The error of the speed decays by itself, and a balise takes a share between 0 and 0.8 of that of the position."""
+    certificate = OBSERVERS["takagi_sugeno_cdo"]().certify(gap, preset="long_gaps")
+    assert certificate.holds
+    expected = max(0.2 + 0.8 * np.exp(-3.0 * gap), np.exp(-1.6 * gap))
+    assert certificate.spectral_radius == pytest.approx(expected, abs=1e-3)  # the drag damps a little more
+
+
+def test_the_preset_for_long_gaps_is_the_design_that_trusts_the_odometer() -> None:
+    designed = design_takagi_sugeno(spacing=100.0, speeds=(5.0, 14.0), trust="odometer").parameters
+    for name, value in OBSERVERS["takagi_sugeno_cdo"].presets["long_gaps"].items():
+        np.testing.assert_allclose(value, designed[name], rtol=1e-12)

@@ -9,10 +9,13 @@ import subprocess
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 from pages import PACKAGES, PAGES, README, ROOT, blocks, generator
 
+import fmus.cli
 from cosim import shipped_scenarios
+from cosim.studies.measures import error_measures
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 PACKAGE_NAME = re.compile(r"^[A-Za-z0-9-]+")
@@ -78,6 +81,24 @@ def _is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+@pytest.mark.compiler
+def test_the_first_example_makes_sense_from_the_first_balise_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the FMU that one command builds: no warning, errors that slip explains, roles without a report table."""
+    monkeypatch.chdir(tmp_path)
+    assert fmus.cli.main(["build", "locomotive", "--fmi", "2", "-o", "vendor.fmu"]) == 0
+    code = next(b.code for b in blocks(README) if b.language == "python" and "vendor.fmu" in b.code)
+    exec(compile(code.partition("s.run()")[0] + "outcome = s.run()", str(README), "exec"), names := {})
+    outcome = names["outcome"]
+    assert outcome.warnings == []
+    measures = error_measures(outcome)
+    slip = np.abs(outcome["train.wheel_speed"] - outcome["train.speed"]).max()
+    assert 0.0 < measures["observer.speed_error_max"] < 1.2 * slip < 0.5
+    assert measures["observer.position_error_max"] < 5.0
+    assert np.abs(outcome["observer.slip"]).max() < 0.1
+    assert len(outcome.result.events) >= 5
+    assert outcome.spec.odometer == "train.wheel_speed"
 
 
 # -- dependencies ---------------------------------------------------------------------------------------------------

@@ -10,14 +10,12 @@ import sysconfig
 from pathlib import Path
 
 import pytest
-from foreign_fmu import foreign_fmu
 from pages import TUTORIALS, Block, blocks
 
 import fmus
 
 FILE = re.compile(r"# (?P<name>[\w.-]+\.(?:py|toml|csv))\n")
 """The first line of a block that is a file."""
-SEALED = "2_your_own_train.md"
 
 
 def exits(page: Path, block: Block) -> int:
@@ -69,14 +67,11 @@ def follow(page: Path, folder: Path) -> None:
 def test_a_tutorial_from_start_to_end(page: Path, tmp_path: Path) -> None:
     folder = tmp_path / "reader"
     folder.mkdir()
-    if page.name == SEALED:
-        foreign_fmu("Mass_Damper", tmp_path / "foreign").rename(folder / "vendor.fmu")
     follow(page, folder)
 
 
-def test_there_are_tutorials_and_the_sealed_one_is_among_them() -> None:
+def test_there_are_tutorials() -> None:
     assert len(TUTORIALS) >= 5
-    assert SEALED in {page.name for page in TUTORIALS}
 
 
 @pytest.mark.parametrize("command", ["false", "cosim run no_such_scenario", "no_such_program"])

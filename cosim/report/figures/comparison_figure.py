@@ -119,17 +119,22 @@ def worst_window(signal: SignalComparison) -> tuple[float, float] | None:
         return None
     begin, end = _span(curves)
     finding = worst_finding(signal)
-    centre, stretch = (signal.max_error_at, 0.0) if finding is None else (finding.time, finding.end - finding.time)
+    centre, stretch = (signal.max_error_at, 0.0) if finding is None else _centre(finding)
     if not np.isfinite(centre) or not end > begin:
         return None
-    if finding is not None and finding.kind == "value" and finding.time <= signal.max_error_at <= finding.end:
-        centre, stretch = signal.max_error_at, 0.0
     steps = np.diff(np.unique(curves.reference_time))
     step = float(np.median(steps)) if len(steps) else 0.0
     allowed = signal.allowed_time if np.isfinite(signal.allowed_time) else 0.0
     half = max(0.5 * SHARE * (end - begin), ROWS * step, SHIFTS * allowed)
     half = min(half, 0.5 * LARGEST_SHARE * (end - begin)) if len(steps) > 2 * ROWS else 0.5 * (end - begin)
     return max(begin, centre - half), min(end, centre + min(stretch, half) + half)
+
+
+def _centre(finding: Finding) -> tuple[float, float]:
+    """Where a finding is largest and how far a late jump reaches from there [s]; else where it begins, and its length [s]."""
+    if not np.isfinite(finding.worst):
+        return finding.time, finding.end - finding.time
+    return finding.worst, finding.size if finding.kind == "jump_time" else 0.0
 
 
 def worst_finding(signal: SignalComparison) -> Finding | None:

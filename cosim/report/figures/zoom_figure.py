@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from cosim.report.figures.drawing import FAR, legend_above
-from cosim.report.figures.scales import bounded, error_scale
+from cosim.report.figures.scales import BOUND, bounded, error_scale
 from cosim.report.figures.style import ALARM_COLOUR, ZONE_COLOUR, new_figure, observer_line, styled
 from cosim.report.moments import Moment
 from cosim.report.roles import estimate, estimation_error, label, recorded
@@ -49,8 +49,11 @@ def zoom_figure(result: Result, spec: ReportSpec, moment: Moment) -> Figure:
         if true is not None:
             ax.plot(result.time[rows], true[rows], **TRUE)
             axes[0].plot([], [], label="true", **TRUE)  # for the legend
-        _draw(ax, result.time[rows], {o: values[rows] for o, values in curves.items()}, spec)
-        _limits(ax, [*(v[rows] for v in curves.values()), *([] if true is None else [true[rows]])], zero=true is None)
+        shown = {o: values[rows] for o, values in curves.items()}
+        own = None if moment.about is None else shown.get(moment.about)
+        _draw(ax, result.time[rows], shown, spec, _reach(list(shown.values()), own))
+        others = [] if true is None else [true[rows]]
+        _limits(ax, [*shown.values(), *others], _reach([*shown.values(), *others], own), zero=true is None)
         ax.set_ylabel(text)
     axes[-1].set_xlabel("Time [s]")
     axes[-1].set_xlim(moment.start, moment.end)
@@ -80,11 +83,17 @@ def _rows(time: np.ndarray, moment: Moment) -> np.ndarray:
     return np.arange(max(int(first), 0), min(int(beyond), len(time)))
 
 
-def _draw(ax: Axes, time: np.ndarray, curves: Curves, spec: ReportSpec) -> None:
+def _reach(curves: list[np.ndarray], own: np.ndarray | None) -> float:
+    """Largest size on the axis: of the curves which work or, where it is about one, that one while it is a number."""
+    largest = 0.0 if own is None else float(np.max(np.abs(own[np.abs(own) < BOUND]), initial=0.0))
+    return max(error_scale(curves).limit, largest)
+
+
+def _draw(ax: Axes, time: np.ndarray, curves: Curves, spec: ReportSpec, reach: float) -> None:
     pairs = np.flatnonzero(np.diff(time) == 0.0)
     for observer, values in curves.items():
         line = observer_line(spec.observers, observer)
-        shown = _cut(values, curves)
+        shown = _cut(values, reach)
         ax.plot(time, shown, label=label(spec, observer), **line)
         moved = pairs[shown[pairs] != shown[pairs + 1]]
         mark: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 3.2, "color": line["color"], "zorder": 3.0}
@@ -92,15 +101,13 @@ def _draw(ax: Axes, time: np.ndarray, curves: Curves, spec: ReportSpec) -> None:
         ax.plot(time[moved], shown[moved + 1], **mark)
 
 
-def _cut(values: np.ndarray, curves: Curves) -> np.ndarray:
+def _cut(values: np.ndarray, reach: float) -> np.ndarray:
     """Values without those that are not finite, and without heights no picture can hold."""
-    reach = FAR * error_scale(list(curves.values())).limit
-    return np.clip(np.where(np.isfinite(values), values, np.nan), -reach, reach)
+    return np.clip(np.where(np.isfinite(values), values, np.nan), -FAR * reach, FAR * reach)
 
 
-def _limits(ax: Axes, curves: list[np.ndarray], zero: bool) -> None:
+def _limits(ax: Axes, curves: list[np.ndarray], reach: float, *, zero: bool) -> None:
     """Limits that hold all curves but those which left the scale."""
-    reach = error_scale(curves).limit
     finite = [c[np.isfinite(c) & (np.abs(c) <= reach)] for c in curves]
     ends = [(float(np.min(c)), float(np.max(c))) for c in finite if len(c)]
     if zero:
@@ -137,4 +144,4 @@ def _instants(event: BaliseRecord) -> list[tuple[float, str, dict[str, Any]]]:
     kind = "false telegram" if false else "balise"
     if not event.delivered_at > event.stamp:
         return [(event.stamp, kind, STAMP | false)]
-    return [(event.stamp, f"{kind}, passed", STAMP | false), (event.delivered_at, f"{kind}, told", DELIVERY | false)]
+    return [(event.stamp, f"{kind}, passed", STAMP | false), (event.delivered_at, f"{kind}, delivered", DELIVERY | false)]

@@ -86,7 +86,7 @@ def _telegrams(result: Result) -> dict[str, str]:
     delays = [e.delivered_at - e.stamp for e in result.events if e.kind != "missed" and e.delivered_at >= e.stamp]
     return {
         "balises located by": _text(method),
-        "telegrams told": str(counts.told),
+        "telegrams delivered": str(counts.delivered),
         "telegrams missed": str(counts.missed),
         "telegrams false": str(counts.false),
         "longest delay of a telegram": f"{number(max(delays, default=0.0))} s",

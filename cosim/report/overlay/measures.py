@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, isnan
 
 from cosim.report.metrics import PhaseMetrics, phase_metrics
 from cosim.report.numbers import DASH, error_number, number
@@ -77,7 +77,8 @@ def difference(value: float, first: float) -> str:
 
 
 def _sizes(m: PhaseMetrics) -> Values:
-    return tuple(size for e in (m.speed, m.position) for size in ((e.max_abs, e.rms) if e else (None, None)))
+    sizes = (size for e in (m.speed, m.position) for size in ((e.max_abs, e.rms) if e else (None, None)))
+    return tuple(None if size is None or isnan(size) else size for size in sizes)
 
 
 def _scaled(value: float | None, field: str) -> float | None:

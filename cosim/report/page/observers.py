@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cosim.errors import OutputError
-from cosim.report.event_counts import OUTCOMES
+from cosim.report.event_counts import outcome_columns
 from cosim.report.figures.error_figures import speed_error_figure
 from cosim.report.figures.observers_figure import observers_picture
 from cosim.report.numbers import DASH, number
@@ -119,8 +119,9 @@ def _certificates(benchmark: ObserverBenchmark) -> str:
 
 
 def _telegrams(benchmark: ObserverBenchmark) -> str:
-    rows = [[s.label, *(str(s.telegrams.get(outcome, 0)) for outcome in OUTCOMES)] for s in benchmark.scores if s.telegrams]
-    return simple_table(["Observer", *OUTCOMES], rows, range(1, len(OUTCOMES) + 1))
+    chosen = outcome_columns(score.telegrams for score in benchmark.scores)
+    rows = [[s.label, *(str(s.telegrams.get(outcome, 0)) for outcome in chosen)] for s in benchmark.scores if s.telegrams]
+    return simple_table(["Observer", *chosen.values()], rows, range(1, len(chosen) + 1))
 
 
 def _over_time(benchmark: ObserverBenchmark) -> str:

@@ -7,7 +7,8 @@ from html import escape
 from pathlib import Path
 
 from cosim.errors import OutputError
-from cosim.report.event_counts import OUTCOMES, count_events
+from cosim.report.doubts import all_warnings
+from cosim.report.event_counts import count_events, outcome_columns
 from cosim.report.facts import list_entry, mapping_entry, statement
 from cosim.report.figures.panels import PANELS, Panel, draw_all
 from cosim.report.figures.zooms import ZOOM_KEYS, Zoom, draw_zooms
@@ -99,7 +100,7 @@ def report_page(result: Result, spec: ReportSpec, figures: Mapping[Panel, bytes]
     Args:
         result: the run. spec: roles. figures: PNG by panel, from `draw_all`. zooms: from `draw_zooms`.
     """
-    warnings = list_entry(result, "warnings")
+    warnings = all_warnings(result, spec)
     return page(
         spec.title,
         [
@@ -202,9 +203,13 @@ def _events(result: Result, spec: ReportSpec) -> list[str]:
     if not result.events:
         return []
     counts = count_events(result.events)
-    text = f"{counts.told} telegrams were told, {counts.false} of them false; {counts.missed} balises were missed."
-    rows = [[label(spec, name), *(str(count[o]) for o in OUTCOMES)] for name, count in counts.outcomes.items()]
-    return [paragraph(text), simple_table(["Receiver", *OUTCOMES], rows, range(1, len(OUTCOMES) + 1))]
+    text = (
+        f"{counts.delivered} telegrams were delivered, {counts.missed} balises were missed; {counts.false} telegrams were false."
+    )
+    text += f" {counts.undelivered} were on their way when the run ended." if counts.undelivered else ""
+    chosen = outcome_columns(counts.outcomes.values())
+    rows = [[label(spec, name), *(str(count[o]) for o in chosen)] for name, count in counts.outcomes.items()]
+    return [paragraph(text), simple_table(["Receiver", *chosen.values()], rows, range(1, len(chosen) + 1))]
 
 
 def _indicators(result: Result, spec: ReportSpec) -> str:

@@ -6,10 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from cosim.report.doubts import all_warnings, result_doubts
 from cosim.report.event_counts import count_events
 from cosim.report.facts import list_entry, mapping_entry, number_entry
-from cosim.report.metrics import error_size
-from cosim.report.numbers import error_number, number
+from cosim.report.metrics import judged_size
+from cosim.report.numbers import DASH, error_number, number
 from cosim.report.roles import Quantity, estimation_error, label
 from cosim.report.spec import ReportSpec
 from cosim.results.result import Result
@@ -24,17 +25,19 @@ def verdict_facts(result: Result, spec: ReportSpec) -> list[Fact]:
     Args:
         result: the run. spec: roles.
     """
-    facts: list[Fact | None] = [_ending(result), _expectations(result)]
+    facts: list[Fact | None] = [_ending(result, spec), _expectations(result)]
     facts += [_error(result, spec, "speed", "m/s"), _error(result, spec, "position", "m")]
-    facts += [_telegrams(result), _certificates(result), _warnings(result)]
+    facts += [_telegrams(result), _certificates(result), _warnings(result, spec)]
     return [fact for fact in facts if fact is not None]
 
 
-def _ending(result: Result) -> Fact:
+def _ending(result: Result, spec: ReportSpec) -> Fact:
     reached = number(float(result.time[-1])) if len(result.time) else "0"
     if result.failure:
         stop = number_entry(result.summary, "stop")
         return "Run", "ended early", f"at {reached} s" + (f" of {number(stop)} s" if stop is not None else ""), "bad"
+    if result_doubts(result, spec):
+        return "Run", "complete", f"to {reached} s, but it shows little: see the warnings", "doubt"
     return "Run", "complete", f"to {reached} s", "good"
 
 
@@ -47,16 +50,20 @@ def _expectations(result: Result) -> Fact | None:
 
 
 def _error(result: Result, spec: ReportSpec, quantity: Quantity, unit: str) -> Fact | None:
-    """The largest error of the best observer, which says what is possible here."""
+    """The largest error of all observers, after the start-up."""
     settled = result.time >= spec.evaluate_after
     found = {o: e for o in spec.observers if (e := estimation_error(result, spec, o, quantity)) is not None}
-    sizes = {o: error_size(result.time[settled], e[settled]).max_abs for o, e in found.items()} if settled.any() else {}
+    sizes = {o: judged_size(result.time[settled], e[settled]).max_abs for o, e in found.items()}
     if not sizes:
         return None
-    best = min(sizes, key=lambda o: sizes[o])
-    among = f", the best of {len(sizes)}" if len(sizes) > 1 else ""
-    value = f"{error_number(sizes[best])} {unit}" if np.isfinite(sizes[best]) else error_number(sizes[best])
-    return f"Largest {quantity} error", value, label(spec, best) + among, ""
+    name = f"Largest {quantity} error"
+    worst = max(sizes, key=lambda o: sizes[o])
+    if np.isnan(sizes[worst]):  # the rows judged are those of all observers
+        return name, DASH, "too few rows to judge", "doubt"
+    among = f", the worst of {len(sizes)}" if len(sizes) > 1 else ""
+    if np.isinf(sizes[worst]):
+        return name, error_number(sizes[worst]), label(spec, worst) + among, "bad"
+    return name, f"{error_number(sizes[worst])} {unit}", label(spec, worst) + among, ""
 
 
 def _telegrams(result: Result) -> Fact | None:
@@ -65,7 +72,7 @@ def _telegrams(result: Result) -> Fact | None:
     counts = count_events(result.events)
     wrong = counts.false + counts.missed
     remark = f"{counts.false} false, {counts.missed} missed"
-    return "Balise telegrams", f"{counts.told} told", remark, "doubt" if wrong else ""
+    return "Balise telegrams", f"{counts.delivered} delivered", remark, "doubt" if wrong else ""
 
 
 def _certificates(result: Result) -> Fact | None:
@@ -82,6 +89,6 @@ def _certificates(result: Result) -> Fact | None:
     )
 
 
-def _warnings(result: Result) -> Fact | None:
-    count = len(list_entry(result, "warnings"))
+def _warnings(result: Result, spec: ReportSpec) -> Fact | None:
+    count = len(all_warnings(result, spec))
     return ("Warnings", str(count), "see below", "doubt") if count else None

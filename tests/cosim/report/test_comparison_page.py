@@ -12,7 +12,10 @@ import browser
 import numpy as np
 import pytest
 from hand_made_comparison import ALLOWED, curves, different, differing, equal, missing, passing
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from cosim.comparison.compare import compare_results
 from cosim.comparison.verdict import Comparison, Curves, EventComparison, Finding, SignalComparison
 from cosim.errors import OutputError
 from cosim.report.figures.comparison_figure import (
@@ -24,6 +27,7 @@ from cosim.report.figures.comparison_figure import (
 from cosim.report.figures.panels import png
 from cosim.report.figures.style import new_figure
 from cosim.report.page.comparison import comparison_page, draw_pictures, write_comparison, write_page, write_pictures
+from cosim.results.result import Result, SignalInfo
 
 # -- pictures -----------------------------------------------------------------------------------------------------------
 
@@ -87,6 +91,26 @@ def test_the_zoom_shows_a_shifted_jump_and_what_may_be_shifted() -> None:
     assert window is not None
     assert window[0] <= 30.0 - 4 * 0.5
     assert window[1] >= 30.0 + 4 * 0.5
+
+
+@settings(max_examples=20)
+@given(
+    late=st.lists(st.sampled_from([0.05, 0.3, 0.6]), min_size=4, max_size=4).flatmap(
+        lambda others: st.permutations([0.9, *others])
+    )
+)
+def test_the_zoom_of_several_late_jumps_holds_the_latest(late: list[float]) -> None:
+    time = np.round(np.arange(0.0, 60.0, 0.05), 9)
+    begins = np.array([5.0, 15.0, 25.0, 35.0, 45.0])
+    steps = [np.searchsorted(b, time, "right").astype(float) for b in (begins, begins + np.array(late))]
+    table = [np.array(list(zip(time, v, strict=True)), [("time", float), ("a.b", float)]) for v in steps]
+    results = [Result(rows, [SignalInfo("a.b", variability="discrete")]) for rows in table]
+    (signal,) = compare_results(*results).signals
+    window = worst_window(signal)
+    assert window is not None
+    assert signal.findings[0].kind == "jump_time"
+    latest = begins[int(np.argmax(late))]
+    assert window[0] <= latest < latest + max(late) <= window[1]
 
 
 def without_curves() -> SignalComparison:

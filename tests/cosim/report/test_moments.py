@@ -150,11 +150,33 @@ def test_what_happens_together_is_one_window() -> None:
 
 
 @pytest.mark.parametrize("rows_left_out", [0, 40])  # it ends in infinity, or well before
-def test_a_diverged_observer_is_no_moment(rows_left_out: int) -> None:
+def test_the_worst_point_is_that_of_all_observers_and_then_that_of_those_that_work(rows_left_out: int) -> None:
     whole = synthetic_result(diverged="multirate_cdo")
     wild = replace(whole, table=whole.table[: len(whole.table) - rows_left_out])
-    assert not any("two CDOs" in reason for reason in reasons(wild, synthetic_spec()) if "error" in reason)
-    assert any("discrete_uio" in reason for reason in reasons(wild, synthetic_spec()))
+    found = [reason for reason in reasons(wild, synthetic_spec()) if "error" in reason]
+    worst = {reason.partition(",")[0] for reason in found if "(two CDOs)" in reason}
+    assert worst == {"Largest speed error", "Largest position error"}
+    assert any("(discrete_uio)" in reason for reason in found if reason.startswith("Largest speed error of the others"))
+
+
+def test_the_picture_of_the_worst_point_shows_it() -> None:
+    speed = np.zeros(1001)
+    speed[700:720] = 5e4
+    result = hand_made((), None, speed, other__speed=np.full(1001, 0.1), other__position=np.full(1001, 0.1))
+    spec = replace(SPEC, observers=["other", "obs"])
+    worst = next(m for m in notable_moments(result, spec) if m.about == "obs")
+    _, high = zoom_figure(result, spec, worst).axes[0].get_ylim()
+    assert worst.start < 70.0 < worst.end
+    assert 5e4 < high < 1e5
+
+
+def test_the_picture_of_an_error_without_bound_shows_how_it_grew() -> None:
+    result = synthetic_result(diverged="multirate_cdo")
+    worst = next(m for m in notable_moments(result, synthetic_spec()) if m.about == "multirate_cdo")
+    error = result["multirate_cdo.speed"] - result["locomotive.speed"]
+    before = np.abs(error[(result.time >= worst.start) & np.isfinite(error)]).max()
+    low, high = zoom_figure(result, synthetic_spec(), worst).axes[0].get_ylim()
+    assert before < high - low < 3.0 * before
 
 
 @given(st.integers(0, 20), st.floats(0.0, 60.0), st.sampled_from(OBSERVERS))
@@ -187,7 +209,7 @@ def test_zoom_shows_jumps_stamp_and_delivery() -> None:
     assert [line.get_ydata().tolist() for line in marks] == [[3.0], [-1.0]]  # type: ignore[union-attr]
     assert to_hex(marks[0].get_markerfacecolor()) == "#ffffff"
     upright = {line.get_label(): line.get_xdata()[0] for line in axes[0].lines if str(line.get_label()).startswith("balise")}
-    assert upright == pytest.approx({"balise, passed": 20.03, "balise, told": 20.23})
+    assert upright == pytest.approx({"balise, passed": 20.03, "balise, delivered": 20.23})
     low, high = axes[1].get_ylim()
     assert low < -1.0 < 3.0 < high
 

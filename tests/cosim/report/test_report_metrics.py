@@ -78,8 +78,8 @@ def test_one_row_and_no_row() -> None:
 
 
 def test_phases_and_start_of_the_evaluation_choose_the_rows() -> None:
-    time = [0.0, 1.0, 2.0, 3.0, 4.0]
-    result = small_result(time, true__v=[0.0] * 5, obs__speed=[9.0, 5.0, -1.0, 2.0, 7.0])
+    time = [0.0, 1.0, 2.0, 2.25, 2.5, 2.75, 3.0, 4.0, 4.0, 5.0, 6.0, 7.0]  # four instants from 4 s on, one of them with an event
+    result = small_result(time, true__v=[0.0] * 12, obs__speed=[9.0, 5.0, -1.0, 2.0, 2.0, 2.0, 2.0, 7.0, 7.0, 7.0, 7.0, 7.0])
     spec = ReportSpec(
         true_speed="true.v",
         observers=["obs"],
@@ -90,16 +90,16 @@ def test_phases_and_start_of_the_evaluation_choose_the_rows() -> None:
     first, second, third = phase_metrics(result, spec)
     assert first.speed is not None
     assert first.speed.max_abs == 2.0
-    assert_allclose(first.speed.rms, math.sqrt(2.5), rtol=EXACT)  # trapezoid of 1 and 4 over one second
+    assert_allclose(first.speed.rms, math.sqrt(0.25 * 2.5 + 0.75 * 4), rtol=EXACT)  # trapezoids over one second
     assert (first.published, first.independent, first.position) == (0.5, None, None)
-    assert second.speed is not None
-    assert second.speed.max_abs == 7.0
-    assert third.speed is not None
-    assert math.isnan(third.speed.max_abs)
+    for entry in (second, third):  # too few rows, and none
+        assert entry.speed is not None
+        assert math.isnan(entry.speed.max_abs)
+        assert math.isnan(entry.speed.rms)
 
 
 def test_without_phases_the_whole_run_is_judged() -> None:
-    result = small_result([0.0, 1.0], true__p=[1.0, 1.0], obs__position=[2.0, 2.0])
+    result = small_result(range(5), true__p=[1.0] * 5, obs__position=[2.0] * 5)
     (entry,) = phase_metrics(result, ReportSpec(true_position="true.p", observers=["obs"]))
     assert (entry.phase, entry.speed) == ("whole run", None)
     assert entry.position is not None
