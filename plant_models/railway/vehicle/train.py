@@ -105,6 +105,8 @@ class Train(HybridSystem):
         self.outputs = _outputs(wagons, axles)
         self.parameters = (*_parameters(wagons, axles), *self._law.parameters, *self._track.parameters)
         self.events = (self._pipe.event,)
+        along_track = [f"axle[{k + 1}].{edge}" for k in range(axles) for edge in self._track.edges]
+        self.switchings = tuple(along_track) if zones == "position" else self._track.edges
         self.presets = {
             "table_4_2": {},
             "table_4_2_one_axle": {"wheel_inertia": ONE_WHEEL / axles},
@@ -123,7 +125,7 @@ class Train(HybridSystem):
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Derivatives of the continuous states without dry friction, shape (nc,) or (nc, members)."""
         now = _Now(self, x)
-        wheelsets = self._wheelsets(t, now, u, p)
+        wheelsets = self._wheelsets(self.switches(t, x, u, p), now, u, p)
         pushes = self._pushes(now, wheelsets, p)
         accelerations = [push / mass for push, mass in zip(pushes, self._masses(p), strict=True)]
         elongating = [now.speeds[i] - now.speeds[i + 1] for i in range(self.wagons)]
@@ -133,10 +135,19 @@ class Train(HybridSystem):
     def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Dry friction on the speeds [m/s2] and on the wheel rates [rad/s2], shape (1 + wagons + axles,)."""
         now = _Now(self, x)
-        wheelsets = self._wheelsets(t, now, u, p)
+        wheelsets = self._wheelsets(self.switches(t, x, u, p), now, u, p)
         limits = [davis + other for davis, other in self._dry_limits(now, wheelsets, p)]
         decelerations = [limit / mass for limit, mass in zip(limits, self._masses(p), strict=True)]
         return vector(*decelerations, *(w.friction(p) for w in wheelsets))
+
+    def switching(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """How far beyond the edges of the zones: each axle along the track, all at once by time."""
+        places = [x[0] - p.axle_position[k] for k in range(self.axles)] if self._track.zones == "position" else [x[0]]
+        return vector(*(distance for place in places for distance in self._track.beyond_edges(t, place, p)))
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """Zones have a length and do not overlap."""
+        return self._track.requirements(p)
 
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """The brake demand is read, and all earlier readings move down the pipe; shape (n,) or (n, members)."""
@@ -146,7 +157,7 @@ class Train(HybridSystem):
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """The declared outputs; at rest the forces are those that hold the vehicles."""
         now = _Now(self, x)
-        wheelsets = self._wheelsets(t, now, u, p)
+        wheelsets = self._wheelsets(self.switches(t, x, u, p), now, u, p)
         pushes = self._pushes(now, wheelsets, p)
         limits = self._dry_limits(now, wheelsets, p)
         dry = [_resolved(push, limit[0], v) for push, limit, v in zip(pushes, limits, now.speeds, strict=True)]
@@ -176,13 +187,15 @@ class Train(HybridSystem):
 
     # -- forces, all against the motion but those of rail and couplers ------------------------------------------------
 
-    def _wheelsets(self, t: Array, now: _Now, u: Any, p: Any) -> list[Wheelset]:
+    def _wheelsets(self, passed: Array, now: _Now, u: Any, p: Any) -> list[Wheelset]:
         weight = p.mass * p.gravity / self.axles
         pneumatic = brake_force(now.cylinders[0], p.braked_mass, p) / self.axles
         wheelsets = []
         for k, rate in enumerate(now.rates):
             effort = u.effort[k] if self.effort_per_axle else u.effort / self.axles
-            degraded = p.axle_degraded[k] * self._track.degraded(t, now.position - p.axle_position[k], p)
+            edges = len(self._track.edges)
+            own = k * edges if self._track.zones == "position" else 0
+            degraded = p.axle_degraded[k] * self._track.degraded([passed[own + i] for i in range(edges)])
             brake = np.maximum(-effort, 0.0) + pneumatic
             wheelsets.append(Wheelset(self._law, rate, now.speeds[0], np.maximum(effort, 0.0), brake, weight, degraded))
         return wheelsets
