@@ -103,8 +103,8 @@ class TracedSystem:
     def derivative(self) -> ca.Function:
         """Derivatives of the continuous states, dry friction resolved: ``(t, x, u, p, s) -> dx``.
 
-        `s` is what a solver holds between events: signs (-1, 0, 1) of the states with dry friction, then the switches (0, 1), shape
-        (len(frictions) + len(switchings),).
+        `s` is what a solver holds between events: signs (-1, 0, 1) of the states with dry friction, then the switches (0, 1),
+        shape (len(frictions) + len(switchings),).
         """
         s = self._symbols
         return ca.Function("derivative", [s.t, s.x, s.u, s.p, s.held], [self._derivative_expression()])

@@ -63,7 +63,7 @@ def reference(train: Train, x0: np.ndarray, phases: list, times: np.ndarray, **c
     rows, x, begin = [x0], np.array(x0), 0.0
     radau = _Radau(train, p)
     for i, (end, inputs) in enumerate([*arrivals, *phases]):
-        x[train.continuous_count : train.continuous_count + 5 * i + 1] = demand  # the wave has reached i vehicles more
+        x[train.continuous_count : train.continuous_count + 5 * i] = demand  # the wave has reached i vehicles more
         inside = times[(times > begin + 1e-9) & (times < end + 1e-9)]
         found = radau.solve(begin, end, x, np.array(inputs), np.append(inside, end))
         rows.extend(found[:-1])
@@ -106,13 +106,12 @@ class _Radau:
             inside = (at > t) & (at <= found.t[-1])
             if inside.any():
                 rows[inside, : self._count] = found.sol(at[inside]).T
-            x[: self._count] = found.y[:, -1]
+            t, x[: self._count] = float(found.t[-1]), found.y[:, -1]
             for j, hits in enumerate(found.t_events):
-                if len(hits) and j >= len(sign):
-                    switches[j - len(sign)] = 1.0 - switches[j - len(sign)]
+                if len(hits) and j >= len(sign):  # this edge, and those at the same place
+                    switches = np.where(self._switching(t, x, u, self._p) >= -1e-9, 1.0, 0.0)
                 elif len(hits) and sign[j] != 0.0:
                     x[self._indices[j]] = 0.0
-            t = float(found.t[-1])
         rows[:, self._count :] = memory
         return rows
 

@@ -86,10 +86,10 @@ class Track:
         used = [np.where(starts[i] == 0.0, np.where(ends[i] == 0.0, 0.0, 1.0), 1.0) for i in zones]
         needed: dict[str, Array] = {}
         for i in zones:
-            text = f"zone {i + 1} has no length: zone_to[{i + 1}] must lie behind zone_from[{i + 1}]; both are 0 if unused"
+            text = f"zone {i + 1} has no length: zone_to[{i + 1}] must lie behind zone_from[{i + 1}]; if unused, both are 0"
             needed[text] = np.where(ends[i] > starts[i], 1.0, 1.0 - used[i])
         for i in zones[1:]:
-            text = f"zone {i + 1} overlaps one before it in the list: move zone_from[{i + 1}] or zone_to[{i + 1}], or join the two"
+            text = f"zone {i + 1} overlaps one before it in the list: move zone_from[{i + 1}] or zone_to[{i + 1}]"
             overlaps = [np.where(starts[i] < ends[j], np.where(starts[j] < ends[i], used[j], 0.0), 0.0) for j in zones[:i]]
             needed[text] = 1.0 - used[i] * np.where(sum(overlaps) > 0.0, 1.0, 0.0)
         return needed

@@ -200,6 +200,15 @@ def test_energy_is_conserved(name: str) -> None:
         assert spent["gradient"] == pytest.approx(166e3 * 9.81 * 0.008 * 300.0, rel=2e-3)
 
 
+@pytest.mark.parametrize("observer", OBSERVERS)
+def test_the_observers_know_of_the_indirect_brake(observer: str) -> None:
+    outcome = run("freight_sc3")
+    braking = (rows(outcome, "controller.brake_demand") > 0.01) & (rows(outcome, "train.speed") > 0.5)
+    rail = rows(outcome, "train.adhesion_force")[braking]
+    assert rail.mean() < -30e3
+    assert np.abs(rows(outcome, f"{observer}.adhesion_force")[braking] - rail).mean() < 4e3  # 29e3 where they are not told
+
+
 def test_soapy_water_has_the_peak_that_the_files_claim() -> None:
     starts = {name: dict(Scenario.load(name).table().components["train"].parameters) for name in ALL}
     assert "polach_degraded_mu0" not in starts["freight_sc1"]
