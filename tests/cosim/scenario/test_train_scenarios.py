@@ -183,9 +183,10 @@ def test_energy_is_conserved(name: str) -> None:
 
     speed, wheels, creep = rows(outcome, "train.speed"), axles(outcome, "axle_speed"), axles(outcome, "axle_creep_force")
     wagons = np.array([rows(outcome, f"train.wagon_speed[{i}]") for i in range(1, 5)])
-    effort = rows(outcome, "anti_slip.effort")[:-1]  # held over the step that follows
     turned = 0.5 * (np.abs(wheels)[:, 1:] + np.abs(wheels)[:, :-1]).mean(axis=0) * steps
     air = 80e3 * np.maximum(rows(outcome, "train.cylinder_pressure[1]") - 0.3e5, 0.0) / 3.2e5  # 1 N per kg at full service
+    # The effort that acted in the step before each row: told at the rims, without the air brake.
+    effort = (rows(outcome, "train.rim_effort") + np.sign(speed) * air)[1:]
     spent = {
         "electric brake": float(np.maximum(-effort, 0.0) @ turned),
         "air brake, locomotive": work(air, np.abs(wheels).mean(axis=0)),
