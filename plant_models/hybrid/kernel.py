@@ -72,13 +72,15 @@ class NumpyKernel(_Arrays):
         self._traced = TracedSystem(system) if system.method == "rosenbrock" else None
         self._x_next = self.x
 
-    def attempt(self, t: float, h: float) -> bool:  # noqa: D102 - see Trial
+    def attempt(self, t: float, h: float) -> bool:
+        """See `Trial`."""
         jacobian = None if self._traced is None else self._jacobian
         self._x_next = integration.step(self.system, t, h, self.x, self.u, self.p, jacobian)
         now, then = (self.system.switch_vector(*at, self.u, self.p) for at in ((t, self.x), (t + h, self._x_next)))
         return not np.array_equal(now, then)
 
-    def accept(self) -> None:  # noqa: D102 - see Trial
+    def accept(self) -> None:
+        """See `Trial`."""
         self.x[:] = self._x_next
 
     def step(self, t: float, h: float) -> None:  # noqa: D102 - see Kernel
@@ -118,12 +120,14 @@ class TracedKernel(_Arrays):
         }
         self._flows = system.continuous_count > 0
 
-    def attempt(self, t: float, h: float) -> bool:  # noqa: D102 - see Trial
+    def attempt(self, t: float, h: float) -> bool:
+        """See `Trial`."""
         self._t[0], self._h[0] = t, h
         self._step()
         return bool(self._switched[0])
 
-    def accept(self) -> None:  # noqa: D102 - see Trial
+    def accept(self) -> None:
+        """See `Trial`."""
         self.x[:] = self._x_next
 
     def step(self, t: float, h: float) -> None:  # noqa: D102 - see Kernel
