@@ -74,7 +74,7 @@ class VariableTable:
         protocol: first of `late_policy` and `replay_horizon`; both are missing where there is no triggered event.
         outcomes: first of the counts of what became of events, see `OUTCOME_VARIABLES`; missing there too.
         derivatives: first of the derivatives of the continuous states.
-        indicators: first of the event indicators, one for each state with dry friction.
+        indicators: first of the event indicators: one for each state with dry friction, then one for each switching function.
         end: first value reference that is not used.
     """
 
@@ -96,7 +96,7 @@ class VariableTable:
         triggered = len(system.triggered_events)
         counts = [1, width(exposed_inputs(system)), width(system.outputs), system.state_count, width(system.parameter_signals)]
         counts += [2 * triggered, *((2, len(OUTCOME_VARIABLES)) if triggered else (0, 0))]
-        counts += [system.continuous_count, len(system.frictions)]
+        counts += [system.continuous_count, len(system.frictions) + len(system.switchings)]
         return cls(*(FIRST_REFERENCE + sum(counts[:i]) for i in range(len(counts) + 1)))
 
 
@@ -269,7 +269,7 @@ def _outcome_variables(reference: int, integer: str) -> list[ModelVariable]:
 
 
 def _rate_variables(system: HybridSystem, variables: list[ModelVariable], real: str) -> list[ModelVariable]:
-    """Derivatives of the continuous states, then the event indicators of the states with dry friction."""
+    """Derivatives of the continuous states, then the event indicators of dry friction and of switching functions."""
     table = VariableTable.of(system)
     states = referenced(variables, table.states, system.continuous_count)
     rates = []
@@ -278,8 +278,9 @@ def _rate_variables(system: HybridSystem, variables: list[ModelVariable], real: 
         rate = _variable(f"der({state.name})", table.derivatives + i, real, "local", "continuous", "calculated", unit, None, text)
         rate.derivative, state.reinit = state, bool(system.events or system.frictions)
         rates.append(rate)
-    for i, name in enumerate(system.frictions):
-        text = f"Changes its sign when {name} comes to rest or breaks away"
+    texts = {name: f"Changes its sign when {name} comes to rest or breaks away" for name in system.frictions}
+    texts |= {name: f"Changes its sign where {name} is passed" for name in system.switchings}
+    for i, (name, text) in enumerate(texts.items()):
         kind = ("local", "continuous", "calculated", None, None, text)
         rates.append(_variable(f"event_indicator.{name}", table.indicators + i, real, *kind))
     return rates

@@ -67,8 +67,8 @@ class Sensitivity:
         return TracedSystem(self.system)
 
     def _tangent(self, runtime: Runtime, seeds: Sequence[np.ndarray]) -> np.ndarray:
-        signs = np.sign(runtime.x[self.system.friction_indices()]) if self.system.frictions else np.zeros(0)
-        tangent = self._traced.tangent(runtime.t, runtime.x, runtime.u, runtime.p, signs, *seeds)
+        now = (runtime.t, runtime.x, runtime.u, runtime.p)
+        tangent = self._traced.tangent(*now, self.system.held_vector(*now), *seeds)
         return np.asarray(tangent, dtype=float).reshape(-1)
 
     def _row(self, reference: int) -> int:

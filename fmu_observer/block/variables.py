@@ -75,7 +75,8 @@ class Variables:
     def __init__(self, system: HybridSystem, runtime: Runtime, events: Events, counts_events: bool) -> None:
         self.table = VariableTable.of(system)
         self._runtime = runtime
-        self.derivatives, self.indicators = np.zeros(system.continuous_count), np.zeros(len(system.frictions))
+        self.derivatives = np.zeros(system.continuous_count)
+        self.indicators = np.zeros(len(system.frictions) + len(system.switchings))
         self._places = [Place("time", "time", None, 0), *_system_places(system, runtime)]
         for number, event in enumerate(system.triggered_events):
             count, stamp = event.implied_names
@@ -104,7 +105,7 @@ class Variables:
             self.derivatives[:] = self._runtime.derivatives()
             self._stale.discard(role)
         else:
-            self.indicators[:] = self._runtime.friction_indicators()
+            self.indicators[:] = self._runtime.indicators()
             self._stale.discard(role)
 
     def place(self, reference: int) -> Place:
@@ -195,7 +196,8 @@ def _system_places(system: HybridSystem, runtime: Runtime) -> list[Place]:
 def _rate_places(system: HybridSystem, derivatives: np.ndarray, indicators: np.ndarray) -> list[Place]:
     states = scalar_names(system.states)[: system.continuous_count]
     places = [Place(f"der({name})", "derivative", derivatives, i) for i, name in enumerate(states)]
-    return places + [Place(f"event_indicator.{name}", "indicator", indicators, i) for i, name in enumerate(system.frictions)]
+    named = enumerate((*system.frictions, *system.switchings))
+    return places + [Place(f"event_indicator.{name}", "indicator", indicators, i) for i, name in named]
 
 
 def _places(signals: Sequence[Signal], values: Any, role: Callable[[int], Role]) -> list[Place]:

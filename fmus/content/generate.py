@@ -30,29 +30,34 @@ class Equations:
     """The traced, densified functions of a system.
 
     Args:
-        step: ``(t, h, x, u, p) -> x``, the continuous states of it, or None where nothing flows.
+        step: ``(t, h, x, u, p) -> x, switched``, the continuous states of x, or None where nothing flows.
         output: ``(t, x, u, p) -> y``, or None without outputs.
         jumps: by event name, ``(t, x, u, p) -> x``.
         derivative: ``(t, x, u, p, s) -> derivatives``, or None where nothing flows.
-        friction_balance: ``(t, x, u, p) -> flows, frictions``, or None without dry friction.
+        balance: ``(t, x, u, p, s) -> flows, frictions, switching functions``, or None where all are empty.
         tangent: ``(t, x, u, p, s, dt, dx, du, dp) -> dy, d derivative``, or None where both are empty.
+        requirements: ``(p) -> 1 for each that is fulfilled``, or None without any.
+        requirement_texts: what is said where one is not.
     """
 
     step: ca.Function | None
     output: ca.Function | None
     jumps: dict[str, ca.Function]
     derivative: ca.Function | None
-    friction_balance: ca.Function | None
+    balance: ca.Function | None
     tangent: ca.Function | None
+    requirements: ca.Function | None
+    requirement_texts: tuple[str, ...]
 
     def functions(self) -> list[ca.Function]:
         """All of them, in a fixed order."""
-        single = (self.step, self.output, self.derivative, self.friction_balance, self.tangent)
+        single = (self.step, self.output, self.derivative, self.balance, self.tangent, self.requirements)
         return [f for f in (*single, *self.jumps.values()) if f is not None]
 
     def digest(self) -> str:
         """A digest that changes with any of the equations, much cheaper than generating their C."""
-        return hashlib.sha256("\n".join(f.serialize() for f in self.functions()).encode()).hexdigest()
+        parts = [*(f.serialize() for f in self.functions()), *self.requirement_texts]
+        return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
 def trace_equations(system: HybridSystem) -> Equations:
@@ -77,13 +82,16 @@ def trace_equations(system: HybridSystem) -> Equations:
     jumps = {f"jump_{event.name}": traced.jump(event.name) for event in system.events}
     check_payloads(system, {"step": traced.step} | jumps if system.continuous_count else jumps)
     prefix, flows, outputs = system.name, bool(system.continuous_count), bool(width(system.outputs))
+    events, required = system.frictions or system.switchings, _requirement_texts(system)
     return Equations(
         step=_dense(traced.step, f"{prefix}_step", system.continuous_count) if flows else None,
         output=_dense(traced.output, f"{prefix}_output") if outputs else None,
         jumps={event.name: _dense(jumps[f"jump_{event.name}"], f"{prefix}_jump_{event.name}") for event in system.events},
         derivative=_dense(traced.derivative, f"{prefix}_derivative") if flows else None,
-        friction_balance=_dense(traced.friction_balance, f"{prefix}_friction") if system.frictions else None,
+        balance=_dense(traced.balance, f"{prefix}_balance") if events else None,
         tangent=_dense(traced.tangent, f"{prefix}_tangent") if flows or outputs else None,
+        requirements=_dense(traced.requirements, f"{prefix}_requirements") if required else None,
+        requirement_texts=required,
     )
 
 
@@ -115,7 +123,12 @@ def generate_model(system: HybridSystem, equations: Equations, description: Mode
 
 def _dense(function: ca.Function, name: str, rows: int | None = None) -> ca.Function:
     arguments = [ca.SX.sym(function.name_in(i), *function.size_in(i)) for i in range(function.n_in())]
-    return ca.Function(name, arguments, [ca.cse(ca.densify(function(*arguments)[:rows]))])
+    results = [ca.densify(result) for result in function.call(arguments)]
+    return ca.Function(name, arguments, ca.cse([results[0][:rows], *results[1:]]))
+
+
+def _requirement_texts(system: HybridSystem) -> tuple[str, ...]:
+    return tuple(system.requirements(system.unpack_parameters(system.start_parameters())))
 
 
 def _equations_source(name: str, equations: Equations) -> str:
@@ -162,6 +175,7 @@ def _event_tables(system: HybridSystem, equations: Equations) -> str:
         ("Resource", "resources", _resource_rows(system)),
         ("Bounded", "bounded", _bounded_rows(system)),
         ("int", "frictions", [str(i) for i in system.friction_indices()]),
+        ("char *const", "requirement_texts", [_text(text) for text in equations.requirement_texts]),
     )
     return "".join(_table(*table) for table in tables)
 
@@ -251,10 +265,14 @@ def _model_table(system: HybridSystem, equations: Equations, description: ModelD
         "resources": "resources",
         "friction_count": len(system.frictions),
         "frictions": "frictions",
-        "friction_balance": _name(equations.friction_balance),
+        "switching_count": len(system.switchings),
+        "balance": _name(equations.balance),
         "derivative": _name(equations.derivative),
         "tangent": _name(equations.tangent),
         "first_reference": FIRST_REFERENCE,
+        "requirement_count": len(equations.requirement_texts),
+        "requirements": _name(equations.requirements),
+        "requirement_texts": "requirement_texts",
         "variable_count": len(description.modelVariables),
         "variables": "variables",
     }
@@ -278,7 +296,7 @@ def _name(function: ca.Function | None) -> str:
 
 def _table(kind: str, name: str, rows: Iterable[str]) -> str:
     """A constant array; C knows no empty one, so it gets one row of zeros that nobody reads."""
-    opened, closed = ("", "") if kind in ("int", "ModelFunction") else ("{", "}")
+    opened, closed = ("", "") if kind in ("int", "ModelFunction", "char *const") else ("{", "}")
     lines = "".join(f"    {opened}{row}{closed},\n" for row in rows) or f"    {opened}0{closed},\n"
     return f"static const {kind} {name}[] = {{\n{lines}}};\n\n"
 

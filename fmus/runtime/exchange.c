@@ -10,7 +10,7 @@
 #define JUST_POSITIVE 1e-100 /* products with other indicators are still far from underflow */
 #define NOMINAL 1.0 /* of every continuous state; the model description gives none */
 
-/* -- dry friction ------------------------------------------------------------------------------------------------ */
+/* -- state events ------------------------------------------------------------------------------------------------ */
 
 static double sign_of(double value) {
     return (double)((value > 0.0) - (value < 0.0));
@@ -21,22 +21,27 @@ static double sign_of(double value) {
 static void settle(Runtime *runtime) {
     runtime_update_balance(runtime);
     for (int i = 0; i < model.friction_count; i++) {
-        double *state = &runtime->x[model.frictions[i]], sign = runtime->signs[i], flow = runtime->balance[i];
+        double *state = &runtime->x[model.frictions[i]], sign = runtime->held[i], flow = runtime->balance[i];
         bool creeps = fabs(flow) > runtime->balance[model.friction_count + i] && flow * *state > 0.0;
         if (sign != 0.0 ? sign * *state <= 0.0 : !creeps) {
             *state = 0.0;
-            runtime->signs[i] = 0.0;
+            runtime->held[i] = 0.0;
         }
     }
 }
 
-/* What is not zero moves; what is breaks away where the flow is more than the friction can hold. */
-static void resolve_signs(Runtime *runtime) {
+/* What is not zero moves; what is breaks away where the flow is more than the friction can hold. The switches come first, for the
+   flow depends on them. */
+static void resolve(Runtime *runtime) {
     runtime_update_balance(runtime);
+    for (int i = 0; i < model.switching_count; i++)
+        runtime->held[model.friction_count + i] = runtime_switching(runtime)[i] >= 0.0;
+    if (model.switching_count > 0)
+        runtime_update_balance(runtime);
     for (int i = 0; i < model.friction_count; i++) {
         double state = runtime->x[model.frictions[i]];
         double flow = runtime->balance[i], friction = runtime->balance[model.friction_count + i];
-        runtime->signs[i] = state != 0.0 ? sign_of(state) : fabs(flow) > friction ? sign_of(flow) : 0.0;
+        runtime->held[i] = state != 0.0 ? sign_of(state) : fabs(flow) > friction ? sign_of(flow) : 0.0;
     }
     *runtime->resolved = 1.0;
 }
@@ -106,20 +111,20 @@ PRIVATE Status exchange_get_derivatives(Instance *instance, const char *function
     return STATUS_OK;
 }
 
-/* Zero is still on this side of a change: a state moves on unless it goes beyond, and rests while the friction just holds it. An
-   importer that sees a zero could take it for either side. */
+/* Zero is still on this side of a change: a state moves on unless it goes beyond, and rests while the friction just holds it. A
+   switch is on where its function is zero. An importer that sees a zero could take it for either side. */
 static double unchanged(double indicator) {
     return indicator == 0.0 ? JUST_POSITIVE : indicator;
 }
 
 PRIVATE Status exchange_get_indicators(Instance *instance, const char *function, double *indicators, size_t count) {
-    if (check_length(instance, function, indicators, count, model.friction_count) != STATUS_OK)
+    if (check_length(instance, function, indicators, count, runtime_held_count()) != STATUS_OK)
         return STATUS_ERROR;
     instance_refresh(instance, OUTDATED_INDICATORS);
-    int broken = first_broken(instance->runtime.indicators, model.friction_count);
+    int broken = first_broken(instance->runtime.indicators, runtime_held_count());
     if (broken >= 0)
-        return instance_discard(instance, "%s: the event indicator of %s is not a finite number at %.17g s; check states, inputs and parameters",
-                                function, variables_name(ROLES(ROLE_STATE), model.frictions[broken]), instance->runtime.clock.t);
+        return instance_discard(instance, "%s: %s is not a finite number at %.17g s; check states, inputs and parameters",
+                                function, variables_name(ROLES(ROLE_INDICATOR), broken), instance->runtime.clock.t);
     for (size_t i = 0; i < count; i++)
         indicators[i] = unchanged(instance->runtime.indicators[i]);
     return STATUS_OK;
@@ -156,7 +161,7 @@ PRIVATE Status exchange_update(Instance *instance, EventReport *report) {
     settle(runtime); /* before jumps, which may turn a motion round without stopping it */
     Status status = model.counts_events ? events_poll_counts(instance) : events_poll_clocks(instance);
     happen(instance);
-    resolve_signs(runtime);
+    resolve(runtime);
     instance->outdated = OUTDATED_ALL;
     report->states_changed = model.continuous > 0 && memcmp(runtime->x_before, runtime->x, (size_t)model.continuous * sizeof(double)) != 0;
     report_next(runtime, report);
@@ -174,6 +179,6 @@ PRIVATE Status exchange_check_model(const Instance *instance, const char *functi
 PRIVATE Status exchange_start(Instance *instance) {
     if (instance_start(instance, MODE_EVENT) != STATUS_OK)
         return STATUS_ERROR;
-    resolve_signs(&instance->runtime);
+    resolve(&instance->runtime);
     return STATUS_OK;
 }

@@ -1,8 +1,8 @@
 /* Model exchange: the importer's solver moves time and continuous states; the model gives derivatives and event indicators, and
    says what happens at events. Knows no FMI version.
 
-   Dry friction is resolved for the signs of the moving states (-1, 0, 1). They are discrete states of the instance: set at
-   the end of initialisation and at events, constant in between, so that a solver sees smooth equations. */
+   Dry friction is resolved for the signs of the moving states (-1, 0, 1); on which side of a switching function the model is, is
+   held as its switch (0, 1). Both are discrete states of the instance: set at the end of initialisation and at events, constant in between, so that a solver sees smooth equations. */
 #ifndef EXCHANGE_H
 #define EXCHANGE_H
 

@@ -573,7 +573,7 @@ static fmi3Status count(Instance *instance, const char *function, size_t *place,
 }
 
 fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventIndicators) {
-    return count(instance, __func__, nEventIndicators, model.friction_count);
+    return count(instance, __func__, nEventIndicators, runtime_held_count());
 }
 
 fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nContinuousStates) {

@@ -96,6 +96,9 @@ PRIVATE Status instance_start(Instance *instance, Mode next) {
     double horizon = *instance->runtime.horizon;
     if (!(horizon >= 0.0 && isfinite(horizon)))
         return cannot_run(instance, "replay_horizon", horizon);
+    const char *unfulfilled = runtime_unfulfilled(&instance->runtime);
+    if (unfulfilled != NULL)
+        return instance_fail(instance, "time cannot run with these parameters: %s", unfulfilled);
     int refused = runtime_start(&instance->runtime, instance->start_time);
     if (refused >= 0)
         return cannot_run(instance, variables_name(ROLES(ROLE_FIXED) | ROLES(ROLE_TUNABLE), refused), instance->runtime.p[refused]);

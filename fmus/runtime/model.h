@@ -62,7 +62,7 @@ typedef enum {
     ROLE_HORIZON,    /* how far back late events can be replayed [s] */
     ROLE_OUTCOME,    /* integer: how many events have come to an `Outcome` so far */
     ROLE_DERIVATIVE, /* of a continuous state */
-    ROLE_INDICATOR   /* event indicator of a state with dry friction */
+    ROLE_INDICATOR   /* event indicator of a state with dry friction, or switching function */
 } Role;
 
 typedef struct {
@@ -100,7 +100,8 @@ typedef struct {
     const double *start_x;
     const double *start_u;
     const double *start_p;
-    ModelFunction step;   /* (t, h, x, u, p) -> continuous states, or NULL where nothing flows */
+    ModelFunction step;   /* (t, h, x, u, p) -> continuous states, and how many switches change on the way; or NULL where nothing
+                             flows */
     ModelFunction output; /* (t, x, u, p) -> y, or NULL without outputs */
     int periodic_count;
     const PeriodicEvent *periodic;
@@ -115,11 +116,15 @@ typedef struct {
     const Resource *resources;
     int friction_count;
     const int *frictions;           /* positions in x of the states with dry friction */
-    ModelFunction friction_balance; /* (t, x, u, p) -> what drives them, then what holds them; or NULL */
-    ModelFunction derivative; /* (t, x, u, p, s) -> derivatives of the continuous states, s the signs of the states with
-                                 dry friction; or NULL where nothing flows */
+    int switching_count;    /* switching functions: the switch of one is 1 where it is not negative, else 0 */
+    ModelFunction balance;  /* (t, x, u, p, s) -> what drives the states with dry friction, what holds them, then the switching
+                               functions; s the signs of these states, then the switches; or NULL where there are none */
+    ModelFunction derivative; /* (t, x, u, p, s) -> derivatives of the continuous states; or NULL where nothing flows */
     ModelFunction tangent;    /* (t, x, u, p, s, dt, dx, du, dp) -> dy, then d derivative; or NULL where both are empty */
     unsigned first_reference; /* value reference of the first variable; the others count up from there */
+    int requirement_count;
+    ModelFunction requirements;         /* (p) -> 1 for each that the parameters fulfil; or NULL without any */
+    const char *const *requirement_texts; /* what is said where they do not */
     unsigned variable_count;
     const Variable *variables;
 } Model;

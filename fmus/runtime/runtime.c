@@ -8,6 +8,7 @@
 #include "noise.h"
 
 #define GRID_TOLERANCE 1e-9 /* of an internal step: closer to a grid point than this is on it */
+#define MOST_SWITCHES 100 /* in one internal step; what chatters more is no longer divided */
 
 /* -- places ------------------------------------------------------------------------------------------------------ */
 
@@ -23,9 +24,17 @@ static size_t queue_size(void) {
     return model.triggered_count > 0 ? QUEUE_CAPACITY * runtime_queue_stride() : 0;
 }
 
+static int balance_length(void) {
+    return 2 * model.friction_count + model.switching_count;
+}
+
+PRIVATE int runtime_held_count(void) {
+    return model.friction_count + model.switching_count;
+}
+
 PRIVATE size_t runtime_memory_length(void) {
     size_t length = (size_t)model.states + (size_t)model.inputs + (size_t)model.parameters;
-    length += 3 * (size_t)model.periodic_count + 1 + (size_t)model.friction_count;
+    length += 3 * (size_t)model.periodic_count + 1 + (size_t)runtime_held_count();
     return length + 4 * (size_t)model.triggered_count + 3 + OUTCOMES + queue_size();
 }
 
@@ -39,8 +48,9 @@ PRIVATE size_t runtime_seed_length(void) {
 }
 
 PRIVATE size_t runtime_total_length(void) {
-    size_t results = (size_t)model.outputs + (size_t)model.states + (size_t)model.continuous + 4 * (size_t)model.friction_count;
-    results += 2 * (size_t)model.continuous + runtime_seed_length() + (size_t)model.outputs;
+    size_t results = (size_t)model.outputs + (size_t)model.states + (size_t)model.continuous;
+    results += 2 * (size_t)runtime_held_count() + (size_t)balance_length();
+    results += 2 * (size_t)model.continuous + runtime_seed_length() + (size_t)model.outputs + (size_t)model.requirement_count;
     return runtime_memory_length() + results + (size_t)model.real_work;
 }
 
@@ -61,7 +71,7 @@ static double *place_memory(Runtime *runtime, double *numbers) {
     runtime->offsets = take(&place, (size_t)model.periodic_count);
     runtime->ticks = take(&place, (size_t)model.periodic_count);
     runtime->resolved = take(&place, 1);
-    runtime->signs = take(&place, (size_t)model.friction_count);
+    runtime->held = take(&place, (size_t)runtime_held_count());
     runtime->active = take(&place, (size_t)model.triggered_count);
     runtime->raised = take(&place, (size_t)model.triggered_count);
     runtime->seen = take(&place, (size_t)model.triggered_count);
@@ -79,9 +89,10 @@ PRIVATE void runtime_place(Runtime *runtime, double *numbers, int *integers) {
     runtime->y = take(&place, (size_t)model.outputs);
     runtime->x_next = take(&place, (size_t)model.states);
     runtime->derivatives = take(&place, (size_t)model.continuous);
-    runtime->indicators = take(&place, (size_t)model.friction_count);
-    runtime->signs_now = take(&place, (size_t)model.friction_count);
-    runtime->balance = take(&place, 2 * (size_t)model.friction_count);
+    runtime->indicators = take(&place, (size_t)runtime_held_count());
+    runtime->held_now = take(&place, (size_t)runtime_held_count());
+    runtime->balance = take(&place, (size_t)balance_length());
+    runtime->required = take(&place, (size_t)model.requirement_count);
     runtime->x_before = take(&place, (size_t)model.continuous);
     runtime->seeds = take(&place, runtime_seed_length());
     runtime->tangent = take(&place, (size_t)model.outputs + (size_t)model.continuous);
@@ -110,13 +121,53 @@ PRIVATE void runtime_reset(Runtime *runtime) {
 
 /* -- evaluation (the kernel of `kernel.py`) ------------------------------------------------------------------------ */
 
+/* Compute the state after an internal step; whether a switch changes on the way. */
+static bool attempt(Runtime *runtime, double t, double h) {
+    double switched = 0.0;
+    const double *arguments[] = {&t, &h, runtime->x, runtime->u, runtime->p};
+    double *results[] = {runtime->x_next, &switched};
+    model.step(arguments, results, runtime->integer_work, runtime->real_work, 0);
+    return switched != 0.0;
+}
+
+static void accept(Runtime *runtime) {
+    copy(runtime->x, runtime->x_next, model.continuous); /* memory changes in jumps only */
+}
+
+/* The distance to the next larger number. */
+static double resolution(double t) {
+    double magnitude = fabs(t);
+    return nextafter(magnitude, INFINITY) - magnitude;
+}
+
+/* The shortest step after which a switch has changed, to the resolution of time, where one has after h. */
+static double until_switch(Runtime *runtime, double t, double h) {
+    double before = 0.0, after = h, narrow = 4.0 * resolution(t + h);
+    while (after - before > narrow) {
+        double middle = 0.5 * (before + after);
+        if (attempt(runtime, t, middle))
+            after = middle;
+        else
+            before = middle;
+    }
+    return after;
+}
+
+/* One internal step, divided where switches change. Mirrors `divided_step` of `switching.py`. */
 static void step(Runtime *runtime, double t, double h) {
     if (model.step == NULL)
         return;
-    const double *arguments[] = {&t, &h, runtime->x, runtime->u, runtime->p};
-    double *results[] = {runtime->x_next};
-    model.step(arguments, results, runtime->integer_work, runtime->real_work, 0);
-    copy(runtime->x, runtime->x_next, model.continuous); /* memory changes in jumps only */
+    double end = t + h;
+    for (int i = 0; i < MOST_SWITCHES && attempt(runtime, t, h); i++) {
+        h = until_switch(runtime, t, h);
+        attempt(runtime, t, h);
+        accept(runtime);
+        t += h;
+        h = end - t;
+        if (h <= 0.0)
+            return;
+    }
+    accept(runtime);
 }
 
 static void grid_steps(Runtime *runtime, double t0, double k, double count, double h) {
@@ -139,46 +190,58 @@ PRIVATE void runtime_update_outputs(Runtime *runtime) {
     model.output(arguments, results, runtime->integer_work, runtime->real_work, 0);
 }
 
-PRIVATE const double *runtime_signs(Runtime *runtime) {
+static void evaluate_balance(Runtime *runtime, const double *held) {
+    if (model.balance == NULL)
+        return;
+    const double *arguments[] = {&runtime->clock.t, runtime->x, runtime->u, runtime->p, held};
+    double *results[] = {runtime->balance};
+    model.balance(arguments, results, runtime->integer_work, runtime->real_work, 0);
+}
+
+PRIVATE const double *runtime_switching(const Runtime *runtime) {
+    return runtime->balance + 2 * model.friction_count;
+}
+
+PRIVATE const double *runtime_held(Runtime *runtime) {
     if (*runtime->resolved != 0.0)
-        return runtime->signs;
+        return runtime->held;
     for (int i = 0; i < model.friction_count; i++) {
         double value = runtime->x[model.frictions[i]];
-        runtime->signs_now[i] = (double)((value > 0.0) - (value < 0.0));
+        runtime->held_now[i] = (double)((value > 0.0) - (value < 0.0));
     }
-    return runtime->signs_now;
+    if (model.switching_count > 0)
+        evaluate_balance(runtime, runtime->held_now); /* the switching functions do not ask for switches */
+    for (int i = 0; i < model.switching_count; i++)
+        runtime->held_now[model.friction_count + i] = runtime_switching(runtime)[i] >= 0.0;
+    return runtime->held_now;
 }
 
 PRIVATE void runtime_update_derivatives(Runtime *runtime) {
     if (model.derivative == NULL)
         return;
-    const double *arguments[] = {&runtime->clock.t, runtime->x, runtime->u, runtime->p, runtime_signs(runtime)};
+    const double *arguments[] = {&runtime->clock.t, runtime->x, runtime->u, runtime->p, runtime_held(runtime)};
     double *results[] = {runtime->derivatives};
     model.derivative(arguments, results, runtime->integer_work, runtime->real_work, 0);
 }
 
 PRIVATE void runtime_update_balance(Runtime *runtime) {
-    if (model.friction_balance == NULL)
-        return;
-    const double *arguments[] = {&runtime->clock.t, runtime->x, runtime->u, runtime->p};
-    double *results[] = {runtime->balance};
-    model.friction_balance(arguments, results, runtime->integer_work, runtime->real_work, 0);
+    evaluate_balance(runtime, runtime_held(runtime));
 }
 
 PRIVATE void runtime_update_indicators(Runtime *runtime) {
-    const double *signs = runtime_signs(runtime);
-    runtime_update_balance(runtime);
+    const double *signs = runtime_held(runtime);
+    evaluate_balance(runtime, signs);
     for (int i = 0; i < model.friction_count; i++) {
         double left = runtime->balance[model.friction_count + i] - fabs(runtime->balance[i]);
         runtime->indicators[i] = signs[i] == 0.0 ? left : signs[i] * runtime->x[model.frictions[i]];
     }
+    copy(runtime->indicators + model.friction_count, runtime_switching(runtime), model.switching_count);
 }
 
 /* -- periodic events --------------------------------------------------------------------------------------------- */
 
 PRIVATE double runtime_tolerance(const Runtime *runtime, double t) {
-    double magnitude = fabs(t);
-    return GRID_TOLERANCE * runtime->clock.h + 4.0 * (nextafter(magnitude, INFINITY) - magnitude);
+    return GRID_TOLERANCE * runtime->clock.h + 4.0 * resolution(t);
 }
 
 static double instant(const Runtime *runtime, int i) {
@@ -218,6 +281,28 @@ static bool is_positive(double value) {
     return isfinite(value) && value > 0.0;
 }
 
+PRIVATE const char *runtime_unfulfilled(Runtime *runtime) {
+    if (model.requirements == NULL)
+        return NULL;
+    const double *arguments[] = {runtime->p};
+    double *results[] = {runtime->required};
+    model.requirements(arguments, results, runtime->integer_work, runtime->real_work, 0);
+    for (int i = 0; i < model.requirement_count; i++)
+        if (runtime->required[i] == 0.0)
+            return model.requirement_texts[i];
+    return NULL;
+}
+
+/* The place of a parameter with which time does not run, or -1. */
+static int beyond_bounds(const Runtime *runtime) {
+    for (int i = 0; i < model.bounded_count; i++) {
+        double value = runtime->p[model.bounded[i].parameter];
+        if (!(isfinite(value) && value >= model.bounded[i].min && value <= model.bounded[i].max))
+            return model.bounded[i].parameter;
+    }
+    return -1;
+}
+
 PRIVATE int runtime_start(Runtime *runtime, double t0) {
     if (!is_positive(runtime->p[model.internal_step]))
         return model.internal_step;
@@ -231,11 +316,9 @@ PRIVATE int runtime_start(Runtime *runtime, double t0) {
         if (!isfinite(runtime->offsets[i]))
             return offset;
     }
-    for (int i = 0; i < model.bounded_count; i++) {
-        double value = runtime->p[model.bounded[i].parameter];
-        if (!(isfinite(value) && value >= model.bounded[i].min && value <= model.bounded[i].max))
-            return model.bounded[i].parameter;
-    }
+    int beyond = beyond_bounds(runtime);
+    if (beyond >= 0)
+        return beyond;
     if (model.seed >= 0 && !(runtime->p[model.seed] >= 0.0 && runtime->p[model.seed] < LARGEST_WHOLE))
         return model.seed;
     runtime->clock.t = runtime->clock.t0 = t0;
@@ -345,11 +428,8 @@ static bool timing_is_sane(const Runtime *runtime) {
     for (int i = 0; i < model.periodic_count; i++)
         if (!is_positive(runtime->periods[i]) || !isfinite(runtime->offsets[i]) || !is_whole(runtime->ticks[i], 0.0, LARGEST_WHOLE - 1.0))
             return false;
-    for (int i = 0; i < model.bounded_count; i++) {
-        double value = runtime->p[model.bounded[i].parameter];
-        if (!(isfinite(value) && value >= model.bounded[i].min && value <= model.bounded[i].max))
-            return model.bounded[i].parameter;
-    }
+    if (beyond_bounds(runtime) >= 0)
+        return false;
     if (model.seed >= 0 && !(runtime->p[model.seed] >= 0.0 && runtime->p[model.seed] < LARGEST_WHOLE))
         return false;
     bool horizon = *runtime->horizon >= 0.0 && isfinite(*runtime->horizon);
@@ -363,8 +443,8 @@ PRIVATE bool runtime_is_sane(const Clock *clock, const double *memory, bool star
     view.clock = *clock;
     if (!isfinite(clock->t) || !isfinite(clock->t0) || !is_positive(clock->h))
         return false;
-    for (int i = 0; i < model.friction_count; i++)
-        if (!is_whole(view.signs[i], -1.0, 1.0))
+    for (int i = 0; i < runtime_held_count(); i++)
+        if (!is_whole(view.held[i], -1.0, 1.0))
             return false;
     if (!is_whole(*view.resolved, 0.0, started ? 1.0 : 0.0) || !events_are_sane(&view))
         return false;

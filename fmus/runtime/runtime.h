@@ -26,7 +26,8 @@ typedef struct {
     double *memory; /* `runtime_memory_length()` numbers; the arrays down to `queue` lie in it */
     double *x, *u, *p;
     double *periods, *offsets, *ticks; /* by periodic event; a tick is a whole number */
-    double *resolved, *signs;          /* model exchange: 1 once dry friction is resolved; then signs of the states that have it */
+    double *resolved, *held;           /* model exchange: 1 once state events are resolved; then signs of the states with dry friction,
+                                          and switches */
     double *active, *raised, *seen;    /* by triggered event: clock active (FMI 3), count (FMI 2), count handled */
     double *stamps;                    /* by triggered event: instant [s] of the next announcement */
     double *late_policy, *horizon;     /* parameters: a LatePolicy, and how far back late events can be replayed [s] */
@@ -34,7 +35,8 @@ typedef struct {
     double *queue_length, *queue;      /* events announced and not yet applied; see events.c */
     double *y, *x_next;                /* results; decide nothing */
     double *derivatives, *indicators;  /* results */
-    double *signs_now, *balance;       /* of the states with dry friction: sign, then what drives and what holds them */
+    double *held_now, *balance;        /* what `held` would be now; what decides on state events, see model.h */
+    double *required;                  /* results */
     double *x_before;                  /* continuous states before an event */
     double *seeds, *tangent;           /* of a directional derivative: of t, x, u and p; then by outputs and derivatives */
     double *real_work;
@@ -59,6 +61,9 @@ PRIVATE void runtime_place(Runtime *runtime, double *numbers, int *integers);
 
 /* Back to the start values, at time zero. */
 PRIVATE void runtime_reset(Runtime *runtime);
+
+/* The first requirement that the parameters do not fulfil, in words, or NULL. */
+PRIVATE const char *runtime_unfulfilled(Runtime *runtime);
 
 /* Begin at t0 [s], fire the periodic events due there, then the communication events. Returns -1, or the position in p of a
    parameter with which time cannot run: a step or period that is not positive, an offset that is not finite, a seed outside [0, 2^53). */
@@ -86,16 +91,21 @@ PRIVATE void runtime_update_outputs(Runtime *runtime);
 PRIVATE void runtime_fire_due(Runtime *runtime);
 PRIVATE double runtime_next_due(const Runtime *runtime);
 
-/* Signs by which dry friction is resolved now: those of the last event in model exchange, else those of the states. */
-PRIVATE const double *runtime_signs(Runtime *runtime);
+/* Doubles in `held`, and event indicators. */
+PRIVATE int runtime_held_count(void);
 
-/* Compute what drives the states with dry friction and, after that, what holds them, into `balance`. */
+/* Signs by which dry friction is resolved, and switches: those of the last event in model exchange, else those of the states now. */
+PRIVATE const double *runtime_held(Runtime *runtime);
+
+/* Compute what decides on state events into `balance`, and its part that holds the switching functions. */
 PRIVATE void runtime_update_balance(Runtime *runtime);
+PRIVATE const double *runtime_switching(const Runtime *runtime);
 
 /* Compute the derivatives of the continuous states, dry friction resolved. */
 PRIVATE void runtime_update_derivatives(Runtime *runtime);
 
-/* Compute how far each state with dry friction is from a change: its magnitude while it moves, the friction left at rest. */
+/* Compute how far each state with dry friction is from a change (its magnitude while it moves, the friction left at rest), then
+   the switching functions. */
 PRIVATE void runtime_update_indicators(Runtime *runtime);
 
 /* Closer in time than this [s] is the same instant. */

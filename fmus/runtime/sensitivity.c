@@ -43,7 +43,7 @@ static void evaluate_tangent(Instance *instance) {
     Runtime *runtime = &instance->runtime;
     if (model.tangent == NULL)
         return;
-    const double *arguments[] = {&runtime->clock.t, runtime->x, runtime->u, runtime->p, runtime_signs(runtime),
+    const double *arguments[] = {&runtime->clock.t, runtime->x, runtime->u, runtime->p, runtime_held(runtime),
                                  runtime->seeds, seeds_of_x(runtime), seeds_of_u(runtime), seeds_of_p(runtime)};
     double *results[] = {runtime->tangent};
     model.tangent(arguments, results, runtime->integer_work, runtime->real_work, 0);

@@ -2,7 +2,8 @@
 
 `rk4` for smooth equations, `rosenbrock` (linearly implicit, L-stable) for stiff ones, `euler` for discontinuous ones of sampled
 signals (a sliding-mode differentiator), which ask for one evaluation a step; dry friction is set-valued and
-resolved inside the step. The functions trace like the system does; they know nothing of events or of who calls them.
+resolved inside the step, and all stages of a step see the switches as they are at its start. The functions trace like the
+system does; they know nothing of events or of who calls them.
 """
 
 from __future__ import annotations
@@ -27,7 +28,9 @@ HOLD_TOLERANCE = 1e-12
 """Share of a dry friction by which a push may exceed it and not move what is at rest: such an excess is rounding."""
 
 
-def effective_flow(system: HybridSystem, t: Array, x: Array, u: Array, p: Array, sign: Array | None) -> Array:
+def effective_flow(
+    system: HybridSystem, t: Array, x: Array, u: Array, p: Array, sign: Array | None, switches: Array | None = None
+) -> Array:
     """Derivative with dry friction resolved for one direction of motion.
 
     A state that moves (sign +1 or -1) feels the full friction against its motion. A state at rest (sign 0) feels just
@@ -36,14 +39,15 @@ def effective_flow(system: HybridSystem, t: Array, x: Array, u: Array, p: Array,
     Args:
         t: time [s]. x: state, shape (n,). u: inputs, shape (m,). p: parameters, shape (k,).
         sign: signs of the states with friction at the start of the step, shape (nf,), or None without friction.
+        switches: of the system at the start of the step, shape (ns,); None for those that hold now.
 
     Returns:
         Derivatives of the continuous states, shape (nc,).
     """
-    derivative = system.state_derivative(t, x, u, p)
+    derivative = system.state_derivative(t, x, u, p, switches)
     if sign is None:
         return derivative
-    friction = system.friction_vector(t, x, u, p)
+    friction = system.friction_vector(t, x, u, p, switches)
     parts = [derivative[i] for i in range(system.continuous_count)]
     for j, i in enumerate(system.friction_indices()):
         pushed = np.abs(parts[i]) >= friction[j] * (1.0 + HOLD_TOLERANCE)  # a friction of zero holds nothing
@@ -69,11 +73,12 @@ def step(system: HybridSystem, t: Array, h: Array, x: Array, u: Array, p: Array,
     if count == 0:
         return x
     sign = _friction_sign(system, x)
+    switches = system.switch_vector(t, x, u, p)
     rest = [x[i] for i in range(count, system.state_count)]
 
     def derivative(time: Array, continuous: Array) -> Array:
         whole = _stack([*(continuous[i] for i in range(count)), *rest]) if rest else continuous
-        return effective_flow(system, time, whole, u, p, sign)
+        return effective_flow(system, time, whole, u, p, sign, switches)
 
     if system.method == "rk4":
         moved = rk4_step(derivative, t, h, x[:count])

@@ -15,6 +15,7 @@ import numpy as np
 
 from plant_models.hybrid import integration
 from plant_models.hybrid.signal import scalar_names
+from plant_models.hybrid.switching import divided_step
 from plant_models.hybrid.system import HybridSystem
 from plant_models.hybrid.tracing import TracedSystem
 
@@ -36,7 +37,7 @@ class Kernel(Protocol):
     memory: np.ndarray
 
     def step(self, t: float, h: float) -> None:
-        """Advance `x` by one internal step of length `h` [s] from `t` [s]."""
+        """Advance `x` by one internal step of length `h` [s] from `t` [s], divided where switches change."""
 
     def grid_steps(self, t0: float, k: int, count: int, h: float) -> None:
         """Advance `x` by `count` full internal steps from grid point ``t0 + k*h``."""
@@ -69,10 +70,21 @@ class NumpyKernel(_Arrays):
         super().__init__(system)
         self.system = system
         self._traced = TracedSystem(system) if system.method == "rosenbrock" else None
+        self._x_next = self.x
+
+    def attempt(self, t: float, h: float) -> bool:
+        """See `Trial`."""
+        jacobian = None if self._traced is None else self._jacobian
+        self._x_next = integration.step(self.system, t, h, self.x, self.u, self.p, jacobian)
+        now, then = (self.system.switch_vector(*at, self.u, self.p) for at in ((t, self.x), (t + h, self._x_next)))
+        return not np.array_equal(now, then)
+
+    def accept(self) -> None:
+        """See `Trial`."""
+        self.x[:] = self._x_next
 
     def step(self, t: float, h: float) -> None:  # noqa: D102 - see Kernel
-        jacobian = None if self._traced is None else self._jacobian
-        self.x[:] = integration.step(self.system, t, h, self.x, self.u, self.p, jacobian)
+        divided_step(self, t, h)
 
     def grid_steps(self, t0: float, k: int, count: int, h: float) -> None:  # noqa: D102 - see Kernel
         for i in range(count):
@@ -97,21 +109,30 @@ class TracedKernel(_Arrays):
         super().__init__(system)
         functions = _traced_functions(system)
         self._t, self._h, self._t0, self._k = (np.zeros(1) for _ in range(4))
-        self._x_next = np.zeros_like(self.x)
+        self._x_next, self._switched = np.zeros_like(self.x), np.zeros(1)
         x, u, p = self.x, self.u, self.p
-        self._step = _buffered(functions["step"], [self._t, self._h, x, u, p], self._x_next)
-        self._steps = _buffered(functions["steps"], [self._t0, self._k, self._h, x, u, p], self._x_next)
+        stepped = (self._x_next, self._switched)
+        self._step = _buffered(functions["step"], [self._t, self._h, x, u, p], *stepped)
+        self._steps = _buffered(functions["steps"], [self._t0, self._k, self._h, x, u, p], *stepped)
         self._output = _buffered(functions["output"], [self._t, x, u, p], self.y)
         self._jumps = {
             event.name: _buffered(functions[f"jump_{event.name}"], [self._t, x, u, p], self._x_next) for event in system.events
         }
         self._flows = system.continuous_count > 0
 
+    def attempt(self, t: float, h: float) -> bool:
+        """See `Trial`."""
+        self._t[0], self._h[0] = t, h
+        self._step()
+        return bool(self._switched[0])
+
+    def accept(self) -> None:
+        """See `Trial`."""
+        self.x[:] = self._x_next
+
     def step(self, t: float, h: float) -> None:  # noqa: D102 - see Kernel
         if self._flows:
-            self._t[0], self._h[0] = t, h
-            self._step()
-            self.x[:] = self._x_next
+            divided_step(self, t, h)
 
     def grid_steps(self, t0: float, k: int, count: int, h: float) -> None:  # noqa: D102 - see Kernel
         if not self._flows:
@@ -119,7 +140,11 @@ class TracedKernel(_Arrays):
         while count >= BATCH_OF_STEPS:
             self._t0[0], self._k[0], self._h[0] = t0, k, h
             self._steps()
-            self.x[:] = self._x_next
+            if self._switched[0]:
+                for i in range(BATCH_OF_STEPS):
+                    self.step(t0 + (k + i) * h, h)
+            else:
+                self.x[:] = self._x_next
             k += BATCH_OF_STEPS
             count -= BATCH_OF_STEPS
         for i in range(count):
@@ -135,14 +160,16 @@ class TracedKernel(_Arrays):
         self.x[:] = self._x_next
 
 
-def _buffered(function: ca.Function, arguments: list[np.ndarray], result: np.ndarray) -> Callable[[], Any]:
-    if function.numel_out(0) != result.size:  # CasADi would write past the end of the array
-        raise ValueError(f"{function.name()} returns {function.numel_out(0)} values, expected {result.size}.")
+def _buffered(function: ca.Function, arguments: list[np.ndarray], *results: np.ndarray) -> Callable[[], Any]:
+    for i, result in enumerate(results):
+        if function.numel_out(i) != result.size:  # CasADi would write past the end of the array
+            raise ValueError(f"{function.name()} returns {function.numel_out(i)} values, expected {result.size}.")
     buffer: Any  # CasADi's stubs ask for a size that its functions do not take
     buffer, evaluate = function.buffer()
     for i, array in enumerate(arguments):
         buffer.set_arg(i, array.data)
-    buffer.set_res(0, result.data)
+    for i, result in enumerate(results):
+        buffer.set_res(i, result.data)
 
     def call(_alive: Any = (buffer, function)) -> None:  # the buffer and its function must outlive the call
         evaluate()
@@ -188,4 +215,4 @@ def check_payloads(system: HybridSystem, functions: dict[str, ca.Function]) -> N
 
 def _dense(function: ca.Function) -> ca.Function:
     arguments = [ca.SX.sym(function.name_in(i), function.size1_in(i), function.size2_in(i)) for i in range(function.n_in())]
-    return ca.Function(function.name(), arguments, [ca.densify(function(*arguments))])
+    return ca.Function(function.name(), arguments, [ca.densify(result) for result in function.call(arguments)])

@@ -73,9 +73,11 @@ class Runtime:
         """Begin at `t0` [s] with the values that stand in `x`, `u`, `p`, and fire the events due there.
 
         Raises:
-            ValueError: time cannot run with a parameter: the internal step, a period, an offset or the seed.
+            ValueError: time cannot run with a parameter: the internal step, a period, an offset or the seed; or the parameters do
+                not fulfil what the system requires.
         """
         self._check_timing()
+        self._check_requirements()
         self.t = self.t0 = t0
         self.ticks = [0] * len(self.ticks)
         self._read_timing()
@@ -115,17 +117,17 @@ class Runtime:
         signs = np.sign(self.x[self.system.friction_indices()]) if self.system.frictions else None
         return np.asarray(effective_flow(self.system, self.t, self.x, self.u, self.p, signs), dtype=float)
 
-    def friction_indicators(self) -> np.ndarray:
-        """How far each state with dry friction is from a change, shape (len(frictions),): its magnitude while it moves, the
-        friction it has left at rest."""
+    def indicators(self) -> np.ndarray:
+        """Event indicators, shape (len(frictions) + len(switchings),): how far each state with dry friction is from a change (its
+        magnitude while it moves, the friction it has left at rest), then the switching functions."""
         system = self.system
         values = self.x[system.friction_indices()]
-        if not len(values):
-            return values
-        flow = np.asarray(system.state_derivative(self.t, self.x, self.u, self.p))[system.friction_indices()]
-        left = np.asarray(system.friction_vector(self.t, self.x, self.u, self.p)) - np.abs(flow)
-        indicators: np.ndarray = np.where(values == 0.0, left, np.abs(values))
-        return indicators
+        now = (self.t, self.x, self.u, self.p)
+        if len(values):
+            flow = np.asarray(system.state_derivative(*now))[system.friction_indices()]
+            left = np.asarray(system.friction_vector(*now)) - np.abs(flow)
+            values = np.where(values == 0.0, left, np.abs(values))
+        return np.concatenate([values, np.asarray(system.switching_vector(*now), dtype=float)])
 
     def snapshot(self) -> Snapshot:
         """A copy of everything that decides the future."""
@@ -154,6 +156,11 @@ class Runtime:
                 raise ValueError(self._illegal(signal.name, signal.bounds))
         if self.system.noises and not 0.0 <= self._timing("seed") < LARGEST_SEED:
             raise ValueError(self._illegal("seed", "a whole number from 0 to 2**53"))
+
+    def _check_requirements(self) -> None:
+        for text, fulfilled in self.system.requirements(self.system.unpack_parameters(self.p)).items():
+            if not fulfilled:
+                raise ValueError(f"{self.system.name}: time cannot run with these parameters: {text}.")
 
     def _illegal(self, name: str, expected: str) -> str:
         return f"{self.system.name}: time cannot run with parameter {name} = {self._timing(name)!r}; expected {expected}."

@@ -21,7 +21,7 @@ from plant_models.hybrid.signal import Signal, parameter, scalar_names, width
 Array = Any  # a NumPy array, or a symbolic array with NumPy's shapes and broadcasting
 Method = Literal["rk4", "rosenbrock", "euler"]
 
-RESERVED_NAMES = frozenset({"time", "internal_step", "seed", "late_policy", "replay_horizon"})
+RESERVED_NAMES = frozenset({"time", "internal_step", "seed", "late_policy", "replay_horizon", "held_switches"})
 
 
 def vector(*components: Array) -> Array:
@@ -54,12 +54,15 @@ class HybridSystem:
     5. Dry friction is declared, not regularised: a state named in `frictions` feels a resistance of magnitude
        `friction(...)` against its sign. The integrator lets it stop exactly at zero and stay there while the flow is
        smaller than the friction.
-    6. Numbers that shape the equations themselves (an order, a mode) are constructor arguments, listed in `options`.
-    7. A vector parameter that an exported model reads from a file of its own is listed in `resources`.
-    8. Where only some states are stiff, `stiff` names all of these and `rosenbrock` treats them alone implicitly. The step
+    6. Equations that change at a place or an instant are declared too: `switchings` names switching functions, `switching(...)`
+       computes them, and `flow`, `friction` and `output` ask `switches(...)` on which side of each they are. The integrator
+       holds the sides during a step and ends it where one changes its sign: the edge is an exact event, seen by no stage early.
+    7. Numbers that shape the equations themselves (an order, a mode) are constructor arguments, listed in `options`.
+    8. A vector parameter that an exported model reads from a file of its own is listed in `resources`.
+    9. Where only some states are stiff, `stiff` names all of these and `rosenbrock` treats them alone implicitly. The step
        keeps its order; with all states that carry a conserved sum among them, momentum say, it stays conserved.
-    9. Time does not run with a scalar parameter of `bounded` that is not finite or lies outside its `min` and `max`.
-    10. A system that cannot be traced says ``traceable = False`` and may then use any Python.
+    10. Time does not run with a scalar parameter of `bounded` that is not finite or lies outside its `min` and `max`.
+    11. A system that cannot be traced says ``traceable = False`` and may then use any Python.
     """
 
     name: str = ""
@@ -72,6 +75,7 @@ class HybridSystem:
     events: tuple[Event, ...] = ()
     frictions: tuple[str, ...] = ()
     bounded: tuple[str, ...] = ()
+    switchings: tuple[str, ...] = ()
     stiff: tuple[str, ...] = ()
     resources: tuple[Resource, ...] = ()
     presets: Mapping[str, Mapping[str, Any]] = {}
@@ -102,6 +106,23 @@ class HybridSystem:
     def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Magnitudes of the dry frictions in units of the derivatives, shape (len(frictions),)."""
         return np.zeros(len(self.frictions))
+
+    def switching(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Switching functions, continuous in `t` and `x`: a change of sign switches the equations; shape (len(switchings),)."""
+        return np.zeros((len(self.switchings), *x.shape[1:]))
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """What the parameters must fulfil: 1 where they do, by what is said where they do not; checked before time runs."""
+        return {}
+
+    # -- for those who write these functions ------------------------------------------------------------------------
+
+    def switches(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """1 where a switching function is not negative, else 0: as held over the integration step, if one is on its way,
+        otherwise now; shape (len(switchings),)."""
+        if u.held_switches is not None:
+            return u.held_switches
+        return np.where(self.switching(t, x, u, p) >= 0.0, 1.0, 0.0)
 
     # -- what follows from the declarations -------------------------------------------------------------------------
 
@@ -148,9 +169,9 @@ class HybridSystem:
         seed = parameter("seed", "1", 0.0, "Seed of the noise, a whole number", min=0.0)
         return (*self.parameters, step, *((seed,) if self.noises else ()))
 
-    def unpack_inputs(self, values: Array) -> Any:
-        """Named tuple `u` from the flat array, shape (m,) or (m, members)."""
-        return self._input_type(*_split(values, self.input_signals))
+    def unpack_inputs(self, values: Array, held_switches: Array | None = None) -> Any:
+        """Named tuple `u` from the flat array, shape (m,) or (m, members), with the switches that an integration step holds."""
+        return self._input_type(*_split(values, self.input_signals), held_switches)
 
     def unpack_parameters(self, values: Array) -> Any:
         """Named tuple `p` from the flat array, shape (k,) or (k, members)."""
@@ -194,9 +215,9 @@ class HybridSystem:
             values.update(zip(signals[name].scalar_names, map(float, elements), strict=True))
         return values
 
-    def state_derivative(self, t: Array, x: Array, u: Array, p: Array) -> Array:
+    def state_derivative(self, t: Array, x: Array, u: Array, p: Array, held_switches: Array | None = None) -> Array:
         """`flow` on flat arrays: derivatives of the continuous states, shape (nc,)."""
-        derivative = self.flow(t, x, self.unpack_inputs(u), self.unpack_parameters(p))
+        derivative = self.flow(t, x, self.unpack_inputs(u, held_switches), self.unpack_parameters(p))
         return self._checked("flow()", derivative, self.continuous_count)
 
     def output_vector(self, t: Array, x: Array, u: Array, p: Array) -> Array:
@@ -219,9 +240,28 @@ class HybridSystem:
         after = self.jump(event, t, x, self.unpack_inputs(u), self.unpack_parameters(p))
         return self._checked(f"jump({event!r})", after, self.state_count)
 
-    def friction_vector(self, t: Array, x: Array, u: Array, p: Array) -> Array:
+    def friction_vector(self, t: Array, x: Array, u: Array, p: Array, held_switches: Array | None = None) -> Array:
         """`friction` on flat arrays, shape (len(frictions),)."""
-        return self.friction(t, x, self.unpack_inputs(u), self.unpack_parameters(p))
+        return self.friction(t, x, self.unpack_inputs(u, held_switches), self.unpack_parameters(p))
+
+    def switching_vector(self, t: Array, x: Array, u: Array, p: Array) -> Array:
+        """`switching` on flat arrays, shape (len(switchings),)."""
+        values = self.switching(t, x, self.unpack_inputs(u), self.unpack_parameters(p))
+        return self._checked("switching()", values, len(self.switchings))
+
+    def requirement_vector(self, p: Array) -> Array:
+        """Values of `requirements` in the declared order, stacked."""
+        values = list(self.requirements(self.unpack_parameters(p)).values())
+        return vector(*values) if values else np.zeros(0)
+
+    def switch_vector(self, t: Array, x: Array, u: Array, p: Array) -> Array:
+        """`switches` on flat arrays, now, shape (len(switchings),); None for a system without any."""
+        return self.switches(t, x, self.unpack_inputs(u), self.unpack_parameters(p)) if self.switchings else None
+
+    def held_vector(self, t: float, x: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """What a solver holds between events, as it is now: signs of the states with friction, then the switches."""
+        switches = self.switch_vector(t, x, u, p)
+        return np.concatenate([np.sign(x[self.friction_indices()]), np.zeros(0) if switches is None else switches])
 
     def friction_indices(self) -> list[int]:
         """Positions in `x` of the states with dry friction."""
@@ -248,7 +288,7 @@ class HybridSystem:
 
     @cached_property
     def _input_type(self) -> Any:
-        return namedtuple("Inputs", [s.name for s in self.input_signals])
+        return namedtuple("Inputs", [*(s.name for s in self.input_signals), "held_switches"], defaults=[None])
 
     @cached_property
     def _parameter_type(self) -> Any:

@@ -43,7 +43,7 @@ class _Symbols:
     x: ca.SX
     u: ca.SX
     p: ca.SX
-    signs: ca.SX
+    held: ca.SX
 
 
 class TracedSystem:
@@ -66,23 +66,26 @@ class TracedSystem:
             ca.SX.sym("x", system.state_count),
             ca.SX.sym("u", len(system.start_inputs())),
             ca.SX.sym("p", len(system.start_parameters())),
-            ca.SX.sym("s", len(system.frictions)),
+            ca.SX.sym("s", len(system.frictions) + len(system.switchings)),
         )
 
     @cached_property
     def step(self) -> ca.Function:
-        """One internal step: ``(t, h, x, u, p) -> x``."""
+        """One internal step: ``(t, h, x, u, p) -> x, switched``; `switched` counts the switches that change on the way."""
         s = self._symbols
-        return ca.Function("step", [s.t, s.h, s.x, s.u, s.p], [self._step_expression()], ["t", "h", "x", "u", "p"], ["x_next"])
+        x_next = self._step_expression()
+        results = [x_next, self._switched_expression(x_next)]
+        return ca.Function("step", [s.t, s.h, s.x, s.u, s.p], results, ["t", "h", "x", "u", "p"], ["x_next", "switched"])
 
     def steps(self, count: int) -> ca.Function:
-        """`count` full internal steps on the grid ``t0 + k*h`` in one call: ``(t0, k, h, x, u, p) -> x``."""
+        """`count` full internal steps on the grid ``t0 + k*h`` in one call: ``(t0, k, h, x, u, p) -> x, switched``."""
         s = self._symbols
         start, index = ca.SX.sym("t0"), ca.SX.sym("k")
-        x = s.x
+        x, switched = s.x, ca.SX(0.0)
         for i in range(count):
-            x = self.step(start + (index + i) * s.h, s.h, x, s.u, s.p)
-        return ca.Function(f"steps_{count}", [start, index, s.h, s.x, s.u, s.p], [x], {"cse": True})
+            x, more = self.step(start + (index + i) * s.h, s.h, x, s.u, s.p)
+            switched += more
+        return ca.Function(f"steps_{count}", [start, index, s.h, s.x, s.u, s.p], [x, switched], {"cse": True})
 
     @cached_property
     def output(self) -> ca.Function:
@@ -100,21 +103,34 @@ class TracedSystem:
     def derivative(self) -> ca.Function:
         """Derivatives of the continuous states, dry friction resolved: ``(t, x, u, p, s) -> dx``.
 
-        `s` holds the signs (-1, 0, 1) of the states with dry friction, shape (len(frictions),).
+        `s` is what a solver holds between events: signs (-1, 0, 1) of the states with dry friction, then the switches (0, 1),
+        shape (len(frictions) + len(switchings),).
         """
         s = self._symbols
-        return ca.Function("derivative", [s.t, s.x, s.u, s.p, s.signs], [self._derivative_expression()])
+        return ca.Function("derivative", [s.t, s.x, s.u, s.p, s.held], [self._derivative_expression()])
 
     @cached_property
-    def friction_balance(self) -> ca.Function:
-        """What drives and what holds each state with dry friction: ``(t, x, u, p) -> (flows, frictions)``, stacked.
-
-        Only for a system that declares dry friction.
-        """
+    def balance(self) -> ca.Function:
+        """What decides on state events: ``(t, x, u, p, s) -> (flows, frictions, switching functions)``, stacked: what drives and
+        what holds each state with dry friction, then the switching functions; `s` as in `derivative`."""
         s = self._symbols
-        flows = ca.SX(self._trace("state_derivative"))[self.system.friction_indices()]
-        frictions = ca.SX(self._trace("friction_vector"))
-        return ca.Function("friction_balance", [s.t, s.x, s.u, s.p], [ca.vertcat(flows, frictions)])
+        _, switches = self._held()
+        t, _, x, u, p = self._arrays()
+        parts = []
+        if self.system.frictions:
+            flows = self._guarded("flow", lambda: self.system.state_derivative(t, x, u, p, switches))
+            parts = [flows[self.system.friction_indices()]]
+            parts.append(self._guarded("friction", lambda: self.system.friction_vector(t, x, u, p, switches)))
+        if self.system.switchings:
+            parts.append(self._trace("switching_vector"))
+        return ca.Function("balance", [s.t, s.x, s.u, s.p, s.held], [ca.vertcat(*parts)])
+
+    @cached_property
+    def requirements(self) -> ca.Function:
+        """What the parameters must fulfil, in the declared order: ``(p) -> 1 where they do``."""
+        _, _, _, _, p = self._arrays()
+        values = self._guarded("requirements", lambda: self.system.requirement_vector(p))
+        return ca.Function("requirements", [self._symbols.p], [values])
 
     @cached_property
     def tangent(self) -> ca.Function:
@@ -124,7 +140,7 @@ class TracedSystem:
         seeds = [ca.SX.sym(name, *k.shape) for name, k in zip(("dt", "dx", "du", "dp"), knowns, strict=True)]
         unknowns = ca.vertcat(ca.SX(self._trace("output_vector")), self._derivative_expression())
         direction = ca.jtimes(unknowns, ca.vertcat(*knowns), ca.vertcat(*seeds))
-        return ca.Function("tangent", [s.t, s.x, s.u, s.p, s.signs, *seeds], [ca.densify(direction)])
+        return ca.Function("tangent", [s.t, s.x, s.u, s.p, s.held, *seeds], [ca.densify(direction)])
 
     def jump(self, event: str) -> ca.Function:
         """State after an event: ``(t, x, u, p) -> x``."""
@@ -150,6 +166,7 @@ class TracedSystem:
         """A digest that changes with any of the equations."""
         s = self._symbols
         names = ["state_derivative", "output_vector", *(["friction_vector"] if self.system.frictions else [])]
+        names += ["switching_vector"] if self.system.switchings else []
         parts = [self._trace(name) for name in names]
         parts += [self._trace("jump_vector", event.name) for event in self.system.events]
         function = ca.Function("equations", [s.t, s.x, s.u, s.p], [ca.SX(part) for part in parts])
@@ -200,12 +217,29 @@ class TracedSystem:
 
         return self._guarded("flow", lambda: integration.step(self.system, t, h, x, u, p, jacobian))
 
+    def _switched_expression(self, x_next: ca.SX) -> ca.SX:
+        """How many switches are not at the end of a step what they are at its start."""
+        if not self.system.switchings:
+            return ca.SX(0.0)
+        t, h, x, u, p = self._arrays()
+        after = SYMBOLIC(x_next, shape=(x_next.numel(),))
+        switch = self.system.switch_vector
+        changed = self._guarded("switching", lambda: np.abs(switch(t + h, after, u, p) - switch(t, x, u, p)))
+        return ca.sum1(changed)
+
+    def _held(self) -> tuple[Any, Any]:
+        """Signs and switches as symbols; None where there are none."""
+        count, held = len(self.system.frictions), self._symbols.held
+        signs = SYMBOLIC(held[:count], shape=(count,)) if count else None
+        switches = SYMBOLIC(held[count:], shape=(held.numel() - count,)) if self.system.switchings else None
+        return signs, switches
+
     def _derivative_expression(self) -> ca.SX:
         t, _, x, u, p = self._arrays()
-        signs = SYMBOLIC(self._symbols.signs, shape=(len(self.system.frictions),)) if self.system.frictions else None
+        signs, switches = self._held()
         if not self.system.continuous_count:
             return ca.SX(0, 1)
-        return self._guarded("flow", lambda: integration.effective_flow(self.system, t, x, u, p, signs))
+        return self._guarded("flow", lambda: integration.effective_flow(self.system, t, x, u, p, signs, switches))
 
     def _effective_jacobian_expression(self) -> tuple[ca.SX, ca.SX]:
         t, _, x, u, p = self._arrays()

@@ -20,7 +20,7 @@ from plant_models.railway.vehicle import Train
 
 pytestmark = pytest.mark.compiler
 
-SMALL = ("oscillator", "slider", "sampler", "tracker", "gain")
+SMALL = ("oscillator", "slider", "sampler", "tracker", "gain", "booster")
 EXCHANGED = (*SMALL, *(name for name in RECIPES if can_exchange(recipe(name))))
 """Everything that has model exchange; the balise reader, which works on communication steps, has none."""
 

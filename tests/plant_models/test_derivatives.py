@@ -32,40 +32,41 @@ def test_dry_friction_opposes_motion_and_holds_at_rest(speed: float, push: float
 def test_the_indicator_is_the_way_to_the_next_change(speed: float, push: float, expected: float) -> None:
     runtime = Runtime(Slider())
     runtime.x[:], runtime.u[0] = (0.0, speed), push
-    assert runtime.friction_indicators().tolist() == pytest.approx([expected], abs=1e-15)  # one rounding
-    assert Runtime(Clockwork()).friction_indicators().size == 0
+    assert runtime.indicators().tolist() == pytest.approx([expected], abs=1e-15)  # one rounding
+    assert Runtime(Clockwork()).indicators().size == 0
 
 
 def _point(system: HybridSystem, seed: int) -> tuple[float, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """A time, state, input and parameters at which the system moves, with the signs of the states with dry friction."""
+    """A time, state, input and parameters at which the system moves, with what a solver holds there."""
     rng = np.random.default_rng(seed)
     x = system.start_state() + rng.uniform(0.5, 3.0, system.state_count)
     scale = 2e4 if isinstance(system, Locomotive) else 2.0
     u = system.start_inputs() + scale * rng.uniform(0.2, 1.0, len(system.start_inputs()))
-    return 0.7, x, u, system.start_parameters(), np.sign(x[system.friction_indices()])
+    p = system.start_parameters()
+    return 0.7, x, u, p, system.held_vector(0.7, x, u, p)
 
 
 @pytest.mark.parametrize("system", SYSTEMS, ids=lambda s: f"{s.name}-{sorted(s.options.items())}")
 @given(seed=st.integers(0, 10_000))
 def test_the_traced_derivative_is_that_of_the_runtime(system: HybridSystem, seed: int) -> None:
-    t, x, u, p, signs = _point(system, seed)
+    t, x, u, p, held = _point(system, seed)
     runtime = Runtime(system, NumpyKernel(system))
     runtime.t, runtime.x[:], runtime.u[:], runtime.p[:] = t, x, u, p
-    traced = np.asarray(TracedSystem(system).derivative(t, x, u, p, signs)).ravel()[: system.continuous_count]
+    traced = np.asarray(TracedSystem(system).derivative(t, x, u, p, held)).ravel()[: system.continuous_count]
     np.testing.assert_allclose(traced, runtime.derivatives(), rtol=1e-12, atol=1e-12)  # the same operations, reordered
 
 
 @pytest.mark.parametrize("system", SYSTEMS, ids=lambda s: f"{s.name}-{sorted(s.options.items())}")
 def test_the_tangent_agrees_with_central_differences(system: HybridSystem) -> None:
-    t, x, u, p, signs = _point(system, 5)
+    t, x, u, p, held = _point(system, 5)
     traced = TracedSystem(system)
     rng = np.random.default_rng(6)
     direction = [1.0, rng.normal(size=x.size), rng.normal(size=u.size), 1e-3 * p * rng.normal(size=p.size)]
-    exact = np.asarray(traced.tangent(t, x, u, p, signs, *direction)).ravel()
+    exact = np.asarray(traced.tangent(t, x, u, p, held, *direction)).ravel()
 
     def unknowns(step: float) -> np.ndarray:
         point = [a + step * d for a, d in zip((t, x, u, p), direction, strict=True)]
-        derivative = np.asarray(traced.derivative(*point, signs)).ravel()[: system.continuous_count]
+        derivative = np.asarray(traced.derivative(*point, held)).ravel()[: system.continuous_count]
         return np.concatenate([np.asarray(traced.output(*point)).ravel()[: exact.size - derivative.size], derivative])
 
     h = 1e-5  # truncation h^2 ~ 1e-10, rounding 1e-16 / h ~ 1e-11 of the values

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from railway_runs import started
-from toy_systems import Clockwork, ImplicitClockwork, ImplicitSlider, Slider
+from toy_systems import Booster, Clockwork, ImplicitBooster, ImplicitClockwork, ImplicitSlider, Slider
 
 from plant_models import Driver, Locomotive, Odometer
 from plant_models.hybrid import HybridSystem, NumpyKernel, Runtime, TracedKernel, TracedSystem
@@ -16,6 +16,8 @@ SYSTEMS = [
     ImplicitClockwork(),
     Slider(),
     ImplicitSlider(),
+    Booster(),
+    ImplicitBooster(),
     Locomotive(),
     Locomotive(adhesion="polach", zones="position", gradient_shape="linear"),
     Odometer(),

@@ -21,7 +21,7 @@ WET = {**NO_ZONES, "zone_from[1]": -1.0, "zone_to[1]": 99.0}
 RUNS = {
     "traction": ([(8.0, 60e3)], 1.0, NO_ZONES, (1e-7, 1e-9, 1e-8)),
     "from rest": ([(8.0, 60e3)], 0.0, NO_ZONES, (4e-3, 5e-4, 6e-4)),  # the step that lets go is of first order
-    "zone": ([(8.0, 60e3)], 5.0, ZONE, (1e-6, 5e-4, 6e-2)),  # at the edge itself, one step is half in and half out
+    "zone": ([(8.0, 60e3)], 5.0, ZONE, (1e-6, 1.5e-6, 2e-4)),  # its edges are exact events
     "braking to a stop": ([(16.0, -60e3)], 10.0, NO_ZONES, (2e-7, 1e-8, 1e-6)),
     "lock": ([(12.0, -250e3)], 10.0, WET, (4e-3, 1e-3, 8e-2)),
     "lock to a stop": ([(9.0, -250e3)], 4.0, WET, (4e-3, 1.5e-3, 8e-2)),

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from plant_models import Locomotive
-from plant_models.railway.track.table import inside_any, piecewise_constant, piecewise_linear
+from plant_models.railway.track.table import piecewise_constant, piecewise_linear
 from plant_models.railway.track.track import Track
 from plant_models.railway.vehicle.resistance import davis_from_vehicle, gradient_resistance, moving_resistance
 
@@ -71,12 +71,6 @@ def test_padded_points_and_jumps_of_a_broken_line() -> None:
 def test_a_staircase_holds_the_last_point(points: tuple[np.ndarray, np.ndarray], at: float) -> None:
     x, y = points
     assert piecewise_constant(at, x, y) == y[max(np.searchsorted(x, at, side="right") - 1, 0)]
-
-
-def test_zones_are_half_open_may_overlap_and_may_be_empty() -> None:
-    starts, ends = np.array([1.0, 2.0, 7.0]), np.array([3.0, 4.0, 7.0])
-    at = np.array([0.99, 1.0, 2.5, 3.5, 4.0, 7.0])
-    assert list(inside_any(at, starts, ends)) == [0.0, 1.0, 1.0, 1.0, 0.0, 0.0]
 
 
 def test_a_track_lies_along_time_or_position() -> None:

@@ -45,14 +45,14 @@ def _worst(train: Train, x0: np.ndarray, phases: list, times: np.ndarray, step: 
 
 @pytest.mark.parametrize("run", RUNS)
 def test_the_default_step_is_accurate(run: str) -> None:
-    train = Train(wagons=2, adhesion="polach" if run == "from rest" else "burckhardt")
+    train = Train(wagons=2, zone_count=1, adhesion="polach" if run == "from rest" else "burckhardt")
     errors = _errors(train, run, train.internal_step)
     assert (errors < RUNS[run][3]).all(), errors
 
 
 def test_halving_the_step_quarters_the_error_of_a_ringing_train() -> None:
     """Elongations explicit, speeds and wheels implicit: of order 2 all together."""
-    train, times = Train(wagons=2), np.round(np.arange(0.0, 2.0001, 0.02), 10)
+    train, times = Train(wagons=2, zone_count=1), np.round(np.arange(0.0, 2.0001, 0.02), 10)
     x0, phases = start(train, 15.0, **{"elongation[1]": 0.01, "elongation[2]": -0.005}), [(2.0, (0.0, 0.0))]
     coarse, fine = (_worst(train, x0, phases, times, h, {}) for h in (2e-3, 1e-3))
     assert np.log2(coarse / fine) == pytest.approx([2.0] * 4, abs=0.05)

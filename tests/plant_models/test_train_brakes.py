@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from railway_runs import outputs
+from railway_runs import outputs, started
 from train_runs import DELAY, NO_DRAG, column, recorded, running
 
 from plant_models.railway.vehicle.train import Train
@@ -19,7 +19,7 @@ STEP_AT = 0.2  # [s], an instant of reading
 def _stepped(train: Train, until: float, demand: float = 1.0, **changes: float):
     """A running train whose brake demand steps at `STEP_AT`."""
     runtime = running(train, 15.0, **changes)
-    runtime.advance(STEP_AT - 0.005)
+    runtime.advance(STEP_AT)  # a communication step ends here, and the reading at its end knows nothing of the next one
     runtime.u[1] = demand
     runtime.advance(until)
     return runtime
@@ -28,14 +28,15 @@ def _stepped(train: Train, until: float, demand: float = 1.0, **changes: float):
 @pytest.mark.parametrize("delay_samples", [1, 5])
 def test_the_wave_reaches_vehicle_i_exactly_i_minus_one_delays_after_the_first(delay_samples: int) -> None:
     train = Train(wagons=3, delay_samples=delay_samples)
-    runtime = _stepped(train, STEP_AT - 1e-6)
+    runtime = _stepped(train, STEP_AT)
     for i in range(4):
         due = STEP_AT + i * 0.01 * delay_samples
-        runtime.advance(due - 1e-6)
-        assert outputs(runtime)[f"pipe_pressure[{i + 1}]"] == 5.0 * BAR
-        assert outputs(runtime)[f"cylinder_pressure[{i + 1}]"] == 0.0
+        if i > 0:
+            runtime.advance(due - 1e-6)
+            assert outputs(runtime)[f"pipe_pressure[{i + 1}]"] == 5.0 * BAR
+            assert outputs(runtime)[f"cylinder_pressure[{i + 1}]"] == 0.0
         runtime.advance(due)
-        assert outputs(runtime)[f"pipe_pressure[{i + 1}]"] == 3.5 * BAR
+        assert outputs(runtime)[f"pipe_pressure[{i + 1}]"] == pytest.approx(3.5 * BAR, rel=1e-14)
         runtime.advance(due + 1e-6)
         assert outputs(runtime)[f"cylinder_pressure[{i + 1}]"] > 0.0
 
@@ -48,8 +49,8 @@ def test_cylinders_fill_and_vent_as_lags_of_first_order(demand: float) -> None:
     assert runtime.x[14:19] == pytest.approx(full, rel=1e-6)  # the step is of second order: (1 ms / 1.3 s)^2
     runtime.u[1] = 0.0
     runtime.advance(10.0)
-    venting = 10.0 - 3.01 - DELAY * np.arange(5)  # read at 3.01 s: at 3.00 s the demand was still there
-    filled = [3.5 * BAR * demand * (1.0 - np.exp(-(3.01 - STEP_AT) / 1.3))] * 5
+    venting = 10.0 - 3.0 - DELAY * np.arange(5)
+    filled = [3.5 * BAR * demand * (1.0 - np.exp(-(3.0 - STEP_AT) / 1.3))] * 5
     assert runtime.x[14:19] == pytest.approx(filled * np.exp(-venting / 8.0), rel=1e-6)
 
 
@@ -121,3 +122,51 @@ def _mechanical(x: np.ndarray, gradient: float) -> float:
     positions = x[0] - np.concatenate([[0.0], np.cumsum(x[1:3])])
     kinetic = 0.5 * masses @ x[3:6] ** 2 + 0.5 * 225.0 * (x[6:10] ** 2).sum()
     return float(kinetic + 0.5 * 2.5e6 * (x[1:3] ** 2).sum() + masses @ positions * 9.81 * gradient)
+
+
+def _demanded(t: float) -> float:
+    """A demand on the grid of readings."""
+    return 0.2 * (int(t / 0.02 + 1e-6) % 6)
+
+
+@pytest.mark.parametrize("step", [0.01, 0.02])
+def test_a_demand_on_the_grid_of_readings_reaches_every_vehicle_at_its_time_and_no_period_late(step: float) -> None:
+    """The cylinders against their lag of first order under the demand of `(i - 1) tau` ago, in exact pieces."""
+    runtime = running(SHORT, 15.0)
+    for k in range(round(0.4 / step)):
+        runtime.u[1] = _demanded(k * step)
+        runtime.advance((k + 1) * step)
+    for i in range(3):
+        pressure = 0.0
+        for k in range(40):
+            asked = 3.5 * BAR * _demanded(k * 0.01 - DELAY * i) if k * 0.01 - DELAY * i > -1e-9 else 0.0
+            time = 1.3 if asked > pressure else 8.0
+            pressure = asked + (pressure - asked) * np.exp(-0.01 / time)
+        found = outputs(runtime)[f"cylinder_pressure[{i + 1}]"]
+        assert found == pytest.approx(pressure, rel=1e-4)  # a pressure that passes what is asked changes its time
+
+
+def test_a_change_between_readings_reaches_the_vehicles_behind_as_the_mean_of_its_period() -> None:
+    runtime = running(Train(wagons=1), 15.0)
+    runtime.advance(0.1025)
+    runtime.u[1] = 0.8
+    runtime.advance(0.11)
+    runtime.advance(0.15)
+    assert outputs(runtime)["pipe_pressure[1]"] == pytest.approx(5.0 * BAR - 0.8 * 1.5 * BAR)
+    assert outputs(runtime)["pipe_pressure[2]"] == pytest.approx(5.0 * BAR - 0.6 * 1.5 * BAR)
+
+
+def test_the_effort_at_the_rims_holds_the_indirect_brake_of_the_locomotive() -> None:
+    runtime = _stepped(TRAIN, 3.0, 0.5)
+    runtime.u[0] = -20e3
+    now = outputs(runtime)
+    air = 80e3 * (now["cylinder_pressure[1]"] - 0.3 * BAR) / (3.2 * BAR)
+    assert air > 20e3
+    assert now["rim_effort"] == pytest.approx(-20e3 - air)
+    runtime.u[0] = 0.0
+    runtime.advance(3.5)
+    now, rotating = outputs(runtime), 4 * 225.0 / 0.575**2
+    # The rail carries it, less what slows the wheels down.
+    assert now["adhesion_force"] == pytest.approx(now["rim_effort"] - rotating * now["acceleration"], rel=2e-3)
+    each = started(Train(wagons=1, effort_per_axle=True), u0=[1e3, 2e3, 3e3, -4e3, 0.0])
+    assert outputs(each)["rim_effort"] == 2e3

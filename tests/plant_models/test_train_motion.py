@@ -117,7 +117,7 @@ def test_trains_of_one_and_of_many_wagons_run(wagons: int) -> None:
     rows = recorded(runtime, np.array([1.0, 2.0]))
     assert np.isfinite(rows).all()
     assert outputs(runtime)["speed"] > 0.1
-    assert len(runtime.x) == 2 + 2 * wagons + 4 + wagons + 1 + 5 * wagons + 1
+    assert len(runtime.x) == 2 + 2 * wagons + 4 + wagons + 1 + 1 + 5 * wagons
 
 
 @pytest.mark.parametrize(

@@ -44,16 +44,3 @@ def piecewise_constant(at: Array, abscissae: Array, ordinates: Array) -> Array:
     for i in range(1, ordinates.shape[0]):
         value = np.where(at >= abscissae[i], ordinates[i], value)
     return value
-
-
-def inside_any(at: Array, starts: Array, ends: Array) -> Array:
-    """1 inside any of the half-open intervals ``[start, end)``, else 0.
-
-    Args:
-        at: where to ask, a scalar or shape (members,).
-        starts: shape (n,) or (n, members). ends: the same shape; an interval with ``end <= start`` is empty.
-    """
-    inside = 0.0 * at
-    for i in range(starts.shape[0]):
-        inside = np.where(at >= starts[i], np.where(at < ends[i], 1.0, inside), inside)
-    return inside

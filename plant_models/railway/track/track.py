@@ -5,12 +5,15 @@ Brings the parameters and reads the tables; knows the signal vocabulary and the 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Literal
+
+import numpy as np
 
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.signal import Signal, parameter
 from plant_models.hybrid.system import Array
-from plant_models.railway.track.table import inside_any, piecewise_constant, piecewise_linear
+from plant_models.railway.track.table import piecewise_constant, piecewise_linear
 
 ZoneAxis = Literal["time", "position"]
 GradientShape = Literal["constant", "linear"]
@@ -23,7 +26,8 @@ PUBLISHED_ZONES = ((10.0, 20.0), (40.0, 50.0), (70.0, 80.0))
 class Track:
     """Adhesion zones by time or by position, and a gradient by position.
 
-    A zone is the half-open interval ``[zone_from, zone_to)``; equal ends switch it off. The gradient is the sine of the slope
+    A zone is the half-open interval ``[zone_from, zone_to)``; one that is not used has both ends at 0. Its edges are switching
+    functions of the plant, so that they are passed exactly. The gradient is the sine of the slope
     angle, positive uphill; before its first point and after its last it stays at their values. By default only the first
     point is on the track, so setting ``gradient[1]`` alone tilts the whole of it.
 
@@ -32,6 +36,9 @@ class Track:
         zone_count: number of zones.
         gradient_shape: ``constant`` between the points (each point starts a section) or ``linear``.
         gradient_count: number of gradient points.
+
+    Attributes:
+        edges: names of the edges of the zones, all starts before all ends.
 
     Raises:
         ValueError: an unknown option, or a count below one.
@@ -49,15 +56,43 @@ class Track:
         self.zones = zones
         self.gradient_shape = gradient_shape
         self.parameters = _parameters(zones, zone_count, gradient_count)
+        self.zone_count = zone_count
+        self.edges = tuple(f"zone_{end}[{i + 1}]" for end in ("from", "to") for i in range(zone_count))
 
-    def degraded(self, t: Array, position: Array, p: Any) -> Array:
+    def beyond_edges(self, t: Array, position: Array, p: Any) -> list[Array]:
+        """How far beyond each of the `edges` [m], or for how long [s].
+
+        Args:
+            t: time [s]. position: on the track [m], a scalar or shape (members,). p: the plant's parameters.
+        """
+        at = position if self.zones == "position" else t + 0.0 * position
+        return [at - ends[i] for ends in (p.zone_from, p.zone_to) for i in range(self.zone_count)]
+
+    def degraded(self, passed: Sequence[Array]) -> Array:
         """1 in a zone of degraded adhesion, else 0 [1].
 
         Args:
-            t: time [s]. position: of the train [m], a scalar or shape (members,). p: the plant's parameters.
+            passed: for each of the `edges` 1 where it has been passed, else 0; scalars or shape (members,).
         """
-        at = position if self.zones == "position" else t + 0.0 * position
-        return inside_any(at, p.zone_from, p.zone_to)
+        n = self.zone_count
+        inside = passed[0] * (1.0 - passed[n])
+        for i in range(1, n):
+            inside = np.maximum(inside, passed[i] * (1.0 - passed[n + i]))
+        return inside
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """What the ends of the zones must fulfil, see `HybridSystem.requirements`."""
+        starts, ends, zones = p.zone_from, p.zone_to, range(self.zone_count)
+        used = [np.where(starts[i] == 0.0, np.where(ends[i] == 0.0, 0.0, 1.0), 1.0) for i in zones]
+        needed: dict[str, Array] = {}
+        for i in zones:
+            text = f"zone {i + 1} has no length: zone_to[{i + 1}] must lie behind zone_from[{i + 1}]; if unused, both are 0"
+            needed[text] = np.where(ends[i] > starts[i], 1.0, 1.0 - used[i])
+        for i in zones[1:]:
+            text = f"zone {i + 1} overlaps one before it in the list: move zone_from[{i + 1}] or zone_to[{i + 1}]"
+            overlaps = [np.where(starts[i] < ends[j], np.where(starts[j] < ends[i], used[j], 0.0), 0.0) for j in zones[:i]]
+            needed[text] = 1.0 - used[i] * np.where(sum(overlaps) > 0.0, 1.0, 0.0)
+        return needed
 
     def gradient(self, position: Array, p: Any) -> Array:
         """Sine of the slope angle at the position [m], positive uphill [1]."""

@@ -100,6 +100,7 @@ class Locomotive(HybridSystem):
             raise ValueError(f"Unknown adhesion {adhesion!r}; choose one of: {', '.join(ADHESION_LAWS)}.")
         self._law = ADHESION_LAWS[adhesion]()
         self._track = Track(zones, zone_count, gradient_shape, gradient_count)
+        self.switchings = self._track.edges
         self.parameters = (*_VEHICLE, *self._law.parameters, *self._track.parameters)
         super().__init__(
             adhesion=adhesion, zones=zones, zone_count=zone_count, gradient_shape=gradient_shape, gradient_count=gradient_count
@@ -108,7 +109,7 @@ class Locomotive(HybridSystem):
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Derivatives of position, speed and wheel rate without dry friction, shape (3,) or (3, members)."""
         position, speed, wheel_rate = x[0], x[1], x[2]
-        creep = self._creep_force(t, x, p)
+        creep = self._creep_force(t, x, u, p)
         resistance = moving_resistance(speed, p.davis_b, p.davis_c) + self._gradient_force(position, p)
         traction = np.maximum(u.effort, 0.0)
         return vector(
@@ -128,7 +129,7 @@ class Locomotive(HybridSystem):
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """The declared outputs; at rest the forces are those that hold the train."""
         position, speed, wheel_rate = x[0], x[1], x[2]
-        creep = self._creep_force(t, x, p)
+        creep = self._creep_force(t, x, u, p)
         gradient = self._gradient_force(position, p)
         moving = moving_resistance(speed, p.davis_b, p.davis_c)
         direction = np.sign(speed)
@@ -145,18 +146,28 @@ class Locomotive(HybridSystem):
             "adhesion_force": creep - held,
             "resistance_force": moving + dry,
             "gradient_force": gradient,
-            "adhesion_degraded": self._track.degraded(t, position, p),
+            "adhesion_degraded": self._degraded(t, x, u, p),
         }
+
+    def switching(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """How far beyond the edges of the zones."""
+        return vector(*self._track.beyond_edges(t, x[0], p))
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """Zones have a length and do not overlap."""
+        return self._track.requirements(p)
 
     # -- forces -----------------------------------------------------------------------------------------------------
 
     def _slip(self, x: Array, p: Any) -> Array:
         return (p.wheel_radius * x[2] - x[1]) / np.maximum(np.abs(x[1]), p.slip_floor)
 
-    def _creep_force(self, t: Array, x: Array, p: Any) -> Array:
+    def _degraded(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        return self._track.degraded(self.switches(t, x, u, p))
+
+    def _creep_force(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         reference = np.maximum(np.abs(x[1]), p.slip_floor)
-        degraded = self._track.degraded(t, x[0], p)
-        return self._law.coefficient(self._slip(x, p), reference, degraded, p) * _adhesive_weight(p)
+        return self._law.coefficient(self._slip(x, p), reference, self._degraded(t, x, u, p), p) * _adhesive_weight(p)
 
     def _gradient_force(self, position: Array, p: Any) -> Array:
         return gradient_resistance(p.mass, p.gravity, self._track.gradient(position, p))
@@ -164,8 +175,8 @@ class Locomotive(HybridSystem):
     def _standing_hold(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Force [N] by which a standing braked wheel holds the train beyond what the creep curve does already."""
         brake = np.maximum(-u.effort, 0.0)
-        limit = self._law.limit(self._track.degraded(t, x[0], p), p) * _adhesive_weight(p)
-        missing = np.maximum(np.minimum(brake, limit) - np.abs(self._creep_force(t, x, p)), 0.0)
+        limit = self._law.limit(self._degraded(t, x, u, p), p) * _adhesive_weight(p)
+        missing = np.maximum(np.minimum(brake, limit) - np.abs(self._creep_force(t, x, u, p)), 0.0)
         fading = np.clip(2.0 - 2.0 * np.abs(self._slip(x, p)), 0.0, 1.0)
         return np.where(x[2] == 0.0, missing * fading, 0.0)
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from plant_models.hybrid.event import PeriodicEvent
-from plant_models.hybrid.signal import Signal, memory, parameter
+from plant_models.hybrid.signal import Signal, memory, parameter, state
 from plant_models.hybrid.system import Array
 
 BAR = 1e5  # [Pa]
@@ -23,8 +23,8 @@ BRAKE_PARAMETERS: tuple[Signal, ...] = (
     parameter("filling_time", "s", 1.3, "Time constant of a filling cylinder; 95 % after three of them", min=1e-3),
     parameter("venting_time", "s", 8.0, "Time constant of a venting cylinder", min=1e-3),
     parameter("brake_ratio", "m/s2", 1.0, "Brake force on a braked mass under the full service brake", min=0.0),
-    parameter("brake_sample_period", "s", 0.01, "Time between two readings of the demand; the wave takes brake_delay_samples of "
-              "them from vehicle to vehicle", min=1e-6),
+    parameter("brake_sample_period", "s", 0.01, "Time between two readings of the demand; the wave takes delay_samples of them "
+              "from vehicle to vehicle", min=1e-6),
 )  # fmt: skip
 
 
@@ -58,12 +58,14 @@ def brake_force(cylinder: Array, braked_mass: Array, p: Any) -> Array:
 
 
 class BrakePipe:
-    """The delay of the brake pipe: vehicle i is told the demand ``(i - 1) tau`` after the first one.
+    """The delay of the brake pipe: the first vehicle feels the demand at once, vehicle i ``(i - 1) tau`` later.
 
-    A shift register of readings, taken every `brake_sample_period`, with ``delay_samples`` places from vehicle to vehicle:
-    ``tau = delay_samples * brake_sample_period``. For a demand that changes at the reading instants, as that of a controller
-    with this period or a multiple of it, the delay is exact, since readings are hit exactly inside steps. A change in between is
-    read by the first vehicle up to one period late, and runs on exactly from there.
+    A shift register of readings, one every `brake_sample_period`, with ``delay_samples`` places from vehicle to vehicle:
+    ``tau = delay_samples * brake_sample_period``. A reading is the mean demand of the period that ends with it, so it holds what
+    acted in that period, whether the input changes just before or just after the instant of reading: co-simulation changes it
+    after, an importer of model exchange before. For a demand that changes at these instants, as that of a controller with this
+    period or a multiple of it, the delay is exact, since they are hit exactly inside steps. A change within a period reaches
+    the vehicles behind as the mean of that period.
 
     Args:
         vehicles: number of vehicles. delay_samples: readings from vehicle to vehicle, one at least.
@@ -74,14 +76,22 @@ class BrakePipe:
 
     def __init__(self, vehicles: int, delay_samples: int) -> None:
         self.delay_samples = delay_samples
-        self.length = (vehicles - 1) * delay_samples + 1
-        self.memory = memory("pipe_demand", "1", 0.0, "Readings of the brake demand, the newest first", size=self.length)
-        self.event = PeriodicEvent("brake_reading", "brake_sample_period", description="The brake demand is read")
+        self.state = state("demand_integral", "s", 0.0, "Brake demand, integrated since it was read last")
+        length = (vehicles - 1) * delay_samples
+        self.memory = memory("pipe_demand", "1", 0.0, "Readings of the brake demand, the newest first", size=length)
+        period = "brake_sample_period"
+        self.event = PeriodicEvent("brake_reading", period, period, description="The brake demand is read")
 
-    def shifted(self, readings: list[Array], demand: Array) -> list[Array]:
-        """The register after a new reading of the demand [1], limited to 0 .. 1."""
-        return [np.clip(demand, 0.0, 1.0), *readings[:-1]]
+    def shifted(self, readings: list[Array], integral: Array, p: Any) -> list[Array]:
+        """The register after a new reading: of a demand with this integral [s] over the last period."""
+        return [integral / p.brake_sample_period, *readings[:-1]]
 
-    def pressure(self, readings: list[Array], vehicle: int, p: Any) -> Array:
-        """Pressure in the pipe [Pa] at a vehicle; 0 is the first one."""
-        return p.pipe_pressure_released - readings[vehicle * self.delay_samples] * p.pipe_depression_full
+    def pressure(self, demand: Array, readings: list[Array], vehicle: int, p: Any) -> Array:
+        """Pressure in the pipe [Pa] at a vehicle, 0 is the first one, for the demand [1] at the first one now."""
+        there = limited(demand) if vehicle == 0 else readings[vehicle * self.delay_samples - 1]
+        return p.pipe_pressure_released - there * p.pipe_depression_full
+
+
+def limited(demand: Array) -> Array:
+    """A brake demand within 0 .. 1."""
+    return np.clip(demand, 0.0, 1.0)

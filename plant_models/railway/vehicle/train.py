@@ -15,7 +15,7 @@ from plant_models.hybrid.system import Array
 from plant_models.railway.adhesion import ADHESION_LAWS
 from plant_models.railway.track.track import GradientShape, Track, ZoneAxis
 from plant_models.railway.vehicle.coupler import COUPLER_PARAMETERS, coupler_force
-from plant_models.railway.vehicle.pneumatic_brake import BRAKE_PARAMETERS, BrakePipe, brake_force, filling
+from plant_models.railway.vehicle.pneumatic_brake import BRAKE_PARAMETERS, BrakePipe, brake_force, filling, limited
 from plant_models.railway.vehicle.resistance import GRAVITY, gradient_resistance, moving_resistance
 from plant_models.railway.vehicle.wheelset import Wheelset
 
@@ -98,13 +98,15 @@ class Train(HybridSystem):
         self._law = ADHESION_LAWS[adhesion]()
         self._track = Track(zones, zone_count, gradient_shape, gradient_count)
         self._pipe = BrakePipe(wagons + 1, delay_samples)
-        self.states = (*_states(wagons, axles), self._pipe.memory)
+        self.states = (*_states(wagons, axles), self._pipe.state, self._pipe.memory)
         self.frictions = ("train_speed", *(f"wagon_velocity[{i + 1}]" for i in range(wagons)),
                           *(f"axle_rate[{k + 1}]" for k in range(axles)))  # fmt: skip
         self.inputs = _inputs(axles if effort_per_axle else None)
         self.outputs = _outputs(wagons, axles)
         self.parameters = (*_parameters(wagons, axles), *self._law.parameters, *self._track.parameters)
         self.events = (self._pipe.event,)
+        along_track = [f"axle[{k + 1}].{edge}" for k in range(axles) for edge in self._track.edges]
+        self.switchings = tuple(along_track) if zones == "position" else self._track.edges
         self.presets = {
             "table_4_2": {},
             "table_4_2_one_axle": {"wheel_inertia": ONE_WHEEL / axles},
@@ -123,30 +125,40 @@ class Train(HybridSystem):
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Derivatives of the continuous states without dry friction, shape (nc,) or (nc, members)."""
         now = _Now(self, x)
-        wheelsets = self._wheelsets(t, now, u, p)
+        wheelsets = self._wheelsets(self.switches(t, x, u, p), now, u, p)
         pushes = self._pushes(now, wheelsets, p)
         accelerations = [push / mass for push, mass in zip(pushes, self._masses(p), strict=True)]
         elongating = [now.speeds[i] - now.speeds[i + 1] for i in range(self.wagons)]
-        fillings = [filling(now.cylinders[i], self._pipe.pressure(now.readings, i, p), p) for i in range(self.wagons + 1)]
-        return vector(now.speeds[0], *elongating, *accelerations, *(w.acceleration(p) for w in wheelsets), *fillings)
+        fillings = [filling(c, pipe, p) for c, pipe in zip(now.cylinders, self._pipe_pressures(now, u, p), strict=True)]
+        spinning = [w.acceleration(p) for w in wheelsets]
+        return vector(now.speeds[0], *elongating, *accelerations, *spinning, *fillings, limited(u.brake_demand))
 
     def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Dry friction on the speeds [m/s2] and on the wheel rates [rad/s2], shape (1 + wagons + axles,)."""
         now = _Now(self, x)
-        wheelsets = self._wheelsets(t, now, u, p)
+        wheelsets = self._wheelsets(self.switches(t, x, u, p), now, u, p)
         limits = [davis + other for davis, other in self._dry_limits(now, wheelsets, p)]
         decelerations = [limit / mass for limit, mass in zip(limits, self._masses(p), strict=True)]
         return vector(*decelerations, *(w.friction(p) for w in wheelsets))
 
+    def switching(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """How far beyond the edges of the zones: each axle along the track, all at once by time."""
+        places = [x[0] - p.axle_position[k] for k in range(self.axles)] if self._track.zones == "position" else [x[0]]
+        return vector(*(distance for place in places for distance in self._track.beyond_edges(t, place, p)))
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """Zones have a length and do not overlap."""
+        return self._track.requirements(p)
+
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """The brake demand is read, and all earlier readings move down the pipe; shape (n,) or (n, members)."""
-        count = self.continuous_count
-        return vector(*(x[i] for i in range(count)), *self._pipe.shifted(_Now(self, x).readings, u.brake_demand))
+        now, kept = _Now(self, x), self.continuous_count - 1
+        return vector(*(x[i] for i in range(kept)), 0.0, *self._pipe.shifted(now.readings, now.demand_integral, p))
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """The declared outputs; at rest the forces are those that hold the vehicles."""
         now = _Now(self, x)
-        wheelsets = self._wheelsets(t, now, u, p)
+        wheelsets = self._wheelsets(self.switches(t, x, u, p), now, u, p)
         pushes = self._pushes(now, wheelsets, p)
         limits = self._dry_limits(now, wheelsets, p)
         dry = [_resolved(push, limit[0], v) for push, limit, v in zip(pushes, limits, now.speeds, strict=True)]
@@ -161,6 +173,7 @@ class Train(HybridSystem):
             "wheel_speed": rims[0],
             "slip": slips[0],
             "adhesion_force": _sum(creeps) - other[0],
+            "rim_effort": self._rim_effort(now, u, p),
             "resistance_force": _sum([r + d for r, d in zip(self._resistances(now, p), dry, strict=True)]),
             "gradient_force": _sum(self._gradients(now, p)),
             "wagon_brake_force": _sum(other[1:]),
@@ -170,19 +183,31 @@ class Train(HybridSystem):
             "axle_creep_force": vector(*creeps),
             "wagon_speed": vector(*now.speeds[1:]),
             "coupler_force": vector(*self._couplers(now, p)),
-            "pipe_pressure": vector(*(self._pipe.pressure(now.readings, i, p) for i in range(self.wagons + 1))),
+            "pipe_pressure": vector(*self._pipe_pressures(now, u, p)),
             "cylinder_pressure": vector(*now.cylinders),
         }
 
+    # -- the brake ----------------------------------------------------------------------------------------------------
+
+    def _pipe_pressures(self, now: _Now, u: Any, p: Any) -> list[Array]:
+        return [self._pipe.pressure(u.brake_demand, now.readings, i, p) for i in range(self.wagons + 1)]
+
+    def _rim_effort(self, now: _Now, u: Any, p: Any) -> Array:
+        """What the drive and the indirect brake do at the locomotive's rims [N]; at rest the brake pushes nothing."""
+        drive = _sum([u.effort[k] for k in range(self.axles)]) if self.effort_per_axle else u.effort
+        return drive - np.sign(now.speeds[0]) * brake_force(now.cylinders[0], p.braked_mass, p)
+
     # -- forces, all against the motion but those of rail and couplers ------------------------------------------------
 
-    def _wheelsets(self, t: Array, now: _Now, u: Any, p: Any) -> list[Wheelset]:
+    def _wheelsets(self, passed: Array, now: _Now, u: Any, p: Any) -> list[Wheelset]:
         weight = p.mass * p.gravity / self.axles
         pneumatic = brake_force(now.cylinders[0], p.braked_mass, p) / self.axles
         wheelsets = []
         for k, rate in enumerate(now.rates):
             effort = u.effort[k] if self.effort_per_axle else u.effort / self.axles
-            degraded = p.axle_degraded[k] * self._track.degraded(t, now.position - p.axle_position[k], p)
+            edges = len(self._track.edges)
+            own = k * edges if self._track.zones == "position" else 0
+            degraded = p.axle_degraded[k] * self._track.degraded([passed[own + i] for i in range(edges)])
             brake = np.maximum(-effort, 0.0) + pneumatic
             wheelsets.append(Wheelset(self._law, rate, now.speeds[0], np.maximum(effort, 0.0), brake, weight, degraded))
         return wheelsets
@@ -225,11 +250,11 @@ class _Now:
 
     def __init__(self, train: Train, x: Array) -> None:
         n, axles = train.wagons, train.axles
-        ends = np.cumsum([1, n, n + 1, axles, n + 1])
-        position, self.elongations, self.speeds, self.rates, self.cylinders, self.readings = (
+        ends = np.cumsum([1, n, n + 1, axles, n + 1, 1])
+        position, self.elongations, self.speeds, self.rates, self.cylinders, integral, self.readings = (
             [x[i] for i in range(low, high)] for low, high in zip([0, *ends], [*ends, x.shape[0]], strict=True)
         )
-        self.position = position[0]
+        self.position, self.demand_integral = position[0], integral[0]
 
 
 def _resolved(push: Array, limit: Array, speed: Array) -> Array:
@@ -279,6 +304,7 @@ def _outputs(wagons: int, axles: int) -> tuple[Any, ...]:
         output_signal("wheel_speed", "m/s", "Circumferential speed of the first axle, r*w", display_unit="km/h"),
         output_signal("slip", "1", "Slip ratio of the first axle (r*w - v) / max(|v|, slip_floor), (3.13)"),
         output_signal("adhesion_force", "N", "Force of the rail on all wheels of the locomotive"),
+        output_signal("rim_effort", "N", "Effort at the rims of the locomotive, drive less its indirect brake"),
         output_signal("resistance_force", "N", "Running resistance of the train, against the motion"),
         output_signal("gradient_force", "N", "Downhill pull on the train as a resistance, uphill > 0"),
         output_signal("wagon_brake_force", "N", "Force of the wagons' brakes, against the motion"),

@@ -187,9 +187,10 @@ def test_energy_is_conserved(name: str) -> None:
 
     speed, wheels, creep = rows(outcome, "train.speed"), axles(outcome, "axle_speed"), axles(outcome, "axle_creep_force")
     wagons = np.array([rows(outcome, f"train.wagon_speed[{i}]") for i in range(1, 5)])
-    effort = rows(outcome, "anti_slip.effort")[:-1]  # held over the step that follows
     turned = 0.5 * (np.abs(wheels)[:, 1:] + np.abs(wheels)[:, :-1]).mean(axis=0) * steps
     air = 80e3 * np.maximum(rows(outcome, "train.cylinder_pressure[1]") - 0.3e5, 0.0) / 3.2e5  # 1 N per kg at full service
+    # The effort that acted in the step before each row: told at the rims, without the air brake.
+    effort = (rows(outcome, "train.rim_effort") + np.sign(speed) * air)[1:]
     spent = {
         "electric brake": float(np.maximum(-effort, 0.0) @ turned),
         "air brake, locomotive": work(air, np.abs(wheels).mean(axis=0)),
@@ -202,6 +203,15 @@ def test_energy_is_conserved(name: str) -> None:
     assert sum(spent.values()) == pytest.approx(traction, rel=1e-3)  # trapezoids at 20 ms; the train stands at both ends
     if name in WITH_ESTIMATES:  # over the hill, 300 m of it: no potential energy but that of 2.4 m
         assert spent["gradient"] == pytest.approx(166e3 * 9.81 * 0.008 * 300.0, rel=2e-3)
+
+
+@pytest.mark.parametrize("observer", OBSERVERS)
+def test_the_observers_know_of_the_indirect_brake(observer: str) -> None:
+    outcome = run("freight_sc3")
+    braking = (rows(outcome, "controller.brake_demand") > 0.01) & (rows(outcome, "train.speed") > 0.5)
+    rail = rows(outcome, "train.adhesion_force")[braking]
+    assert rail.mean() < -30e3
+    assert np.abs(rows(outcome, f"{observer}.adhesion_force")[braking] - rail).mean() < 4e3  # 29e3 where they are not told
 
 
 def test_soapy_water_has_the_peak_that_the_files_claim() -> None:

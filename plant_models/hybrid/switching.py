@@ -1,0 +1,48 @@
+"""Steps divided at switches: an internal step ends where a switching function changes its sign, and the next begins there.
+
+Mirrored by `step` of the C runtime; change the two together. Knows kernels, and nothing of grids and events.
+"""
+
+from __future__ import annotations
+
+from math import ulp
+from typing import Protocol
+
+MOST_SWITCHES = 100  # in one internal step; what chatters more is no longer divided
+
+
+class Trial(Protocol):
+    """A kernel that can try an internal step."""
+
+    def attempt(self, t: float, h: float) -> bool:
+        """Compute the state after an internal step of length `h` [s] from `t` [s]; whether a switch changes on the way."""
+
+    def accept(self) -> None:
+        """Take the state computed last."""
+
+
+def divided_step(kernel: Trial, t: float, h: float) -> None:
+    """Advance by one internal step of length `h` [s] from `t` [s], divided where switches change."""
+    end = t + h
+    for _ in range(MOST_SWITCHES):
+        if not kernel.attempt(t, h):
+            break
+        h = _until_switch(kernel, t, h)
+        kernel.attempt(t, h)
+        kernel.accept()
+        t, h = t + h, end - (t + h)
+        if h <= 0.0:
+            return
+    kernel.accept()
+
+
+def _until_switch(kernel: Trial, t: float, h: float) -> float:
+    """The shortest step [s] after which a switch has changed, to the resolution of time, where one has after `h` [s]."""
+    before, after, resolution = 0.0, h, 4.0 * ulp(t + h)
+    while after - before > resolution:
+        middle = 0.5 * (before + after)
+        if kernel.attempt(t, middle):
+            after = middle
+        else:
+            before = middle
+    return after
