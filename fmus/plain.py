@@ -9,13 +9,13 @@ UNSEEN = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
 
 
 def plain(text: str, keep: str = "\n\t") -> str:
-    r"""Text in which every control character is shown in place of acting, as ``\x1b``.
+    r"""Text in which every control character is shown in place of acting, as ``\x1b``; ends of lines are made ``\n`` first.
 
     Args:
         text: of anyone.
         keep: control characters that stay.
     """
-    return "".join(c if c in keep or category(c) not in UNSEEN else _shown(c) for c in text)
+    return "".join(c if c in keep or category(c) not in UNSEEN else _shown(c) for c in text.replace("\r\n", "\n"))
 
 
 def one_line(text: str) -> str:

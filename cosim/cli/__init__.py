@@ -15,7 +15,7 @@ from importlib import import_module
 from cosim.errors import CosimError
 from cosim.process.interruption import ends_like_ctrl_c
 from cosim.process.watch import can_watch, watched
-from fmus.terminal_text import printable
+from fmus.plain import plain
 
 __all__ = ["main"]
 
@@ -56,7 +56,7 @@ def _main(arguments: Sequence[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return ERROR
     except CosimError as error:
-        print(f"cosim: {printable(str(error))}", file=sys.stderr)
+        print(f"cosim: {plain(str(error))}", file=sys.stderr)
         return ERROR
     except KeyboardInterrupt:
         print("cosim: interrupted.", file=sys.stderr)

@@ -16,7 +16,7 @@ from cosim.errors import OutputError
 from cosim.process.last_call import LAST_CALL
 from cosim.results.unfinished import SPARE
 from cosim.scenario import Outcome, Scenario
-from fmus.terminal_text import printable
+from fmus.plain import plain
 
 DONE, NOT_AS_ASKED, ERROR = 0, 1, 2
 CALL_LOG = "calls.log"
@@ -152,7 +152,7 @@ def _ignore(_: str) -> None: ...
 
 
 def _warn(text: str) -> None:
-    print(f"warning: {printable(text)}", file=sys.stderr, flush=True)
+    print(f"warning: {plain(text)}", file=sys.stderr, flush=True)
 
 
 def _study(scenario: Scenario, options: argparse.Namespace) -> Any:
@@ -191,7 +191,7 @@ def _tell(outcome: Outcome, study: Any, paths: dict[str, Path], options: argpars
     for kind, path in paths.items():
         print(f"{kind:>10}: {path}")
     if outcome.failure is not None:
-        print(f"cosim: the run ended early: {printable(outcome.failure)}", file=sys.stderr)
+        print(f"cosim: the run ended early: {plain(outcome.failure)}", file=sys.stderr)
 
 
 def _headline(summary: Any) -> str:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal
 
-from fmus.terminal_text import printable
+from fmus.plain import plain
 
 FIRST_KEPT = LAST_KEPT = 200
 LONGEST_TEXT = 2000  # letters
@@ -158,7 +158,7 @@ def _from_row(row: Sequence[str], path: str | Path) -> Message:
 def _decoded(text: Any) -> str:
     if isinstance(text, bytes):
         text = text.decode("utf-8", "replace")
-    return printable(str(text or "").replace("\0", ""))
+    return plain(str(text or "").replace("\0", ""))
 
 
 def _status(status: int | str) -> str:

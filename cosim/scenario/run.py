@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from itertools import pairwise
 from pathlib import Path
@@ -39,6 +39,7 @@ from cosim.report.spec import Phase, ReportSpec
 from cosim.results.recorder import Recorder
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 from cosim.results.si import InFormerUnits, in_si
+from cosim.scenario.after_run import warnings_after
 from cosim.scenario.balise_service import Choice, choose_method, find_receivers, make_service, watched_plant
 from cosim.scenario.certificates import check_certificates, expected_gap
 from cosim.scenario.connections import parse_connections
@@ -61,9 +62,6 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger("cosim")
 CALL_LOG = Path("calls.log")
-DOUBTS = {"doubted": "used what it doubted", "ignored": "ignored what it doubted"}
-NAMED_DOUBTS = 5
-LOGGED_FAULTS = frozenset({"discard", "error", "fatal"})
 Progress = Callable[[float, float], None]
 Warn = Callable[[str], None]
 Streaming = tuple[Path, Callable[[], None]]
@@ -144,22 +142,7 @@ class _Setup:
             self._warn(text)
         layout = None if table.balises is None else make_layout(table.balises, table.start, table.stop, self.folder, self.where)
         pairs = parse_connections(table.connections, self.where)
-        span = table.start, table.stop
-        self.factories, notes = component_factories(
-            table.components, self.folder, self.where, self._tell_of_builds, span, table.tolerance
-        )
-        self.notes += notes
-        files = {name: (self.folder / t.fmu).resolve() for name, t in table.components.items() if t.fmu is not None}
-        check_instances(files, self.where)
-        for name, factory in self.factories.items():
-            self.components[name] = factory()
-            self.components[name].configure(table.components[name].parameters)
-            warning = tool_warning(name, self.components[name].description)
-            if warning is not None:
-                self._warn(warning)
-            doubled = doubled_names(self.components[name].description)
-            if doubled is not None and not any(doubled in told for told in self.warnings):
-                self._warn(f"{name}: {doubled}")
+        self._load_components()
         clocks, pairs = connect_clocks(pairs, self.components)
         connections = self.connections = connect(pairs, self.components)
         receivers, plant = self._balise_roles()
@@ -194,6 +177,25 @@ class _Setup:
         self._begin_stream(self.master)
         self.setup_seconds = perf_counter() - begin
 
+    def _load_components(self) -> None:
+        """The components, with what their descriptions give reason to doubt."""
+        table, span = self.table, (self.table.start, self.table.stop)
+        self.factories, notes = component_factories(
+            table.components, self.folder, self.where, self._tell_of_builds, span, table.tolerance
+        )
+        self.notes += notes
+        files = {name: (self.folder / t.fmu).resolve() for name, t in table.components.items() if t.fmu is not None}
+        check_instances(files, self.where)
+        for name, factory in self.factories.items():
+            self.components[name] = factory()
+            self.components[name].configure(table.components[name].parameters)
+            warning = tool_warning(name, self.components[name].description)
+            if warning is not None:
+                self._warn(warning)
+            doubled = doubled_names(self.components[name].description)
+            if doubled is not None and not any(doubled in told for told in self.warnings):
+                self._warn(f"{name}: {doubled}")
+
     def execute(self, interruption: Interruption) -> Outcome:
         """Run the master and gather what came out."""
         assert self.plan is not None
@@ -213,7 +215,7 @@ class _Setup:
             failure = explained_failure(error, self.plan, self._as_recorded())
         except KeyboardInterrupt:
             failure = INTERRUPTED
-        self._warn_of_trespasses(surroundings.finish())
+        changed_in_steps = surroundings.finish()
         if master.ended_early is not None:
             self._warn(master.ended_early)
         premises, left = premise_findings(self._as_recorded(), self.table.components, self.connections)
@@ -224,9 +226,10 @@ class _Setup:
         spec, (table, signals) = self._report_spec(), self._in_si()
         for warning in result_doubts(Result(table, signals, failure=failure), spec):
             self._warn(warning)
-        self._warn_of_rejections()
-        self._warn_of_doubts(events)
-        self._warn_of_logs()
+        for warning in warnings_after(self.components, events, changed_in_steps):
+            self._warn(warning)
+        if self.call_log is not None and self.call_log.broken is not None:
+            self._warn(self.call_log.broken)
         summary |= self._balise_summary([e.stamp for e in events if e.kind == "true"])
         summary |= {"certificates": self.certificates, "premises": premises} | {"warnings": self.warnings, "notes": self.notes}
         summary["report"] = asdict(spec)  # so that the folder tells which signal plays which role
@@ -337,47 +340,6 @@ class _Setup:
         names = [r.planned.component.name for r in service.receivers]
         waiting = [replace(e, outcomes=dict.fromkeys(names, "undelivered")) for e in service.mailbox.waiting]
         return [*service.mailbox.log, *waiting]
-
-    def _warn_of_rejections(self) -> None:
-        for name, component in self.components.items():
-            rejected = (component.outcomes() or {}).get("rejected", 0)
-            if rejected:
-                self._warn(f"{name}: {rejected} telegrams were rejected: stamped in the past, and beyond what it replays.")
-
-    def _warn_of_trespasses(self, in_steps: Set[str]) -> None:
-        """What was changed for everybody in this process, and put back."""
-        for name, component in self.components.items():
-            for changed, call in component.trespasses.items():
-                self._warn(f"{name}: {call} changed {changed} of the whole program; it was put back.")
-        native = [name for name, component in self.components.items() if component.kind == "FMU"]
-        for changed in sorted(in_steps):
-            self._warn(
-                f"{' or '.join(native)}: its steps change {changed} of the whole program; it was put back, but not after "
-                "every step: other components, and their numbers, may have been touched."
-            )
-
-    def _warn_of_doubts(self, telegrams: list[BaliseRecord]) -> None:
-        """Which telegrams the observers did not believe."""
-        for name in self.components:
-            for outcome, what in DOUBTS.items():
-                found = [e for e in telegrams if e.outcomes.get(name) == outcome]
-                if found:
-                    first = ", ".join(f"{e.stamp:.6g} s" for e in found[:NAMED_DOUBTS])
-                    more = ", ..." if len(found) > NAMED_DOUBTS else ""
-                    plural = "telegram" if len(found) == 1 else "telegrams"
-                    self._warn(
-                        f"{name} doubted {len(found)} {plural} (stamped {first}{more}) and {what}; see docs/telegram_gate.md."
-                    )
-
-    def _warn_of_logs(self) -> None:
-        """What the components logged of things gone wrong, in numbers; and a call log that could not be finished."""
-        for name, component in self.components.items():
-            wrong = {status: count for status, count in component.messages.counts.items() if status in LOGGED_FAULTS}
-            if wrong:
-                counts = ", ".join(f"{count} of status {status}" for status, count in wrong.items())
-                self._warn(f"{name} logged {counts}; the last says: {component.messages.reason}")
-        if self.call_log is not None and self.call_log.broken is not None:
-            self._warn(self.call_log.broken)
 
     def _balise_summary(self, stamps: list[float]) -> dict[str, Any]:
         """Method, probe, and the gaps that really occurred against what is certified."""

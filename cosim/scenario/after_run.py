@@ -1,0 +1,58 @@
+"""Warnings after a run: what became of telegrams, what components logged and changed for the whole program. Changes nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence, Set
+
+from cosim.components.component import Component
+from cosim.results.result import BaliseRecord
+
+DOUBTS = {"doubted": "used what it doubted", "ignored": "ignored what it doubted"}
+NAMED_DOUBTS = 5
+LOGGED_FAULTS = frozenset({"discard", "error", "fatal"})
+
+
+def warnings_after(
+    components: Mapping[str, Component], telegrams: Sequence[BaliseRecord], changed_in_steps: Set[str]
+) -> Iterator[str]:
+    """Texts that warn of what happened on the way.
+
+    Args:
+        components: by name. telegrams: everything that was passed. changed_in_steps: what FMUs changed for the whole program.
+    """
+    yield from _trespasses(components, changed_in_steps)
+    for name, component in components.items():
+        rejected = (component.outcomes() or {}).get("rejected", 0)
+        if rejected:
+            yield f"{name}: {rejected} telegrams were rejected: stamped in the past, and beyond what it replays."
+    for name in components:
+        yield from _doubted(name, telegrams)
+    for name, component in components.items():
+        wrong = {status: count for status, count in component.messages.counts.items() if status in LOGGED_FAULTS}
+        if wrong:
+            counts = ", ".join(f"{count} of status {status}" for status, count in wrong.items())
+            yield f"{name} logged {counts}; the last says: {component.messages.reason}"
+
+
+def _trespasses(components: Mapping[str, Component], in_steps: Set[str]) -> Iterator[str]:
+    """What was changed for everybody in this process, and put back."""
+    for name, component in components.items():
+        for changed, call in component.trespasses.items():
+            yield f"{name}: {call} changed {changed} of the whole program; it was put back."
+    native = [name for name, component in components.items() if component.kind == "FMU"]
+    for changed in sorted(in_steps):
+        yield (
+            f"{' or '.join(native)}: its steps change {changed} of the whole program; it was put back, but not after "
+            "every step: other components, and their numbers, may have been touched."
+        )
+
+
+def _doubted(name: str, telegrams: Sequence[BaliseRecord]) -> Iterator[str]:
+    """Which telegrams an observer did not believe."""
+    for outcome, what in DOUBTS.items():
+        found = [e for e in telegrams if e.outcomes.get(name) == outcome]
+        if found:
+            first = ", ".join(f"{e.stamp:.6g} s" for e in found[:NAMED_DOUBTS])
+            more = ", ..." if len(found) > NAMED_DOUBTS else ""
+            plural = "telegram" if len(found) == 1 else "telegrams"
+            yield f"{name} doubted {len(found)} {plural} (stamped {first}{more}) and {what}; see docs/telegram_gate.md."
