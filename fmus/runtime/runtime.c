@@ -153,12 +153,10 @@ static double until_switch(Runtime *runtime, double t, double h) {
     return after;
 }
 
-/* One internal step, divided where switches change. Mirrors `divided_step` of `switching.py`. */
-static void step(Runtime *runtime, double t, double h) {
-    if (model.step == NULL)
-        return;
+/* An internal step on which a switch changes, as was just tried: in parts that end where one does. */
+static void divided_step(Runtime *runtime, double t, double h) {
     double end = t + h;
-    for (int i = 0; i < MOST_SWITCHES && attempt(runtime, t, h); i++) {
+    for (int i = 0; i < MOST_SWITCHES; i++) {
         h = until_switch(runtime, t, h);
         attempt(runtime, t, h);
         accept(runtime);
@@ -166,8 +164,20 @@ static void step(Runtime *runtime, double t, double h) {
         h = end - t;
         if (h <= 0.0)
             return;
+        if (!attempt(runtime, t, h))
+            break;
     }
     accept(runtime);
+}
+
+/* One internal step, divided where switches change. Mirrors `divided_step` of `switching.py`. */
+static inline void step(Runtime *runtime, double t, double h) {
+    if (model.step == NULL)
+        return;
+    if (attempt(runtime, t, h) && model.switching_count > 0)
+        divided_step(runtime, t, h);
+    else
+        accept(runtime);
 }
 
 static void grid_steps(Runtime *runtime, double t0, double k, double count, double h) {

@@ -23,16 +23,17 @@ class Trial(Protocol):
 
 def divided_step(kernel: Trial, t: float, h: float) -> None:
     """Advance by one internal step of length `h` [s] from `t` [s], divided where switches change."""
-    end = t + h
-    for _ in range(MOST_SWITCHES):
-        if not kernel.attempt(t, h):
-            break
-        h = _until_switch(kernel, t, h)
-        kernel.attempt(t, h)
-        kernel.accept()
-        t, h = t + h, end - (t + h)
-        if h <= 0.0:
-            return
+    if kernel.attempt(t, h):
+        end = t + h
+        for _ in range(MOST_SWITCHES):
+            h = _until_switch(kernel, t, h)
+            kernel.attempt(t, h)
+            kernel.accept()
+            t, h = t + h, end - (t + h)
+            if h <= 0.0:
+                return
+            if not kernel.attempt(t, h):
+                break
     kernel.accept()
 
 
