@@ -126,11 +126,6 @@ PRIVATE double runtime_resolution(double t) {
     return nextafter(magnitude, INFINITY) - magnitude;
 }
 
-static void grid_steps(Runtime *runtime, double t0, double k, double count, double h) {
-    for (double i = 0.0; i < count; i += 1.0)
-        switching_step(runtime, t0 + (k + i) * h, h);
-}
-
 static void jump(Runtime *runtime, ModelFunction function) {
     const double *arguments[] = {&runtime->clock.t, runtime->x, runtime->u, runtime->p};
     double *results[] = {runtime->x_next};
@@ -295,7 +290,8 @@ static void integrate(Runtime *runtime, double target) {
     }
     double whole = floor((target - t0) / h + tolerance / h) - k;
     if (whole > 0.0) {
-        grid_steps(runtime, t0, k, whole, h);
+        for (double i = 0.0; i < whole; i += 1.0)
+            switching_step(runtime, t0 + (k + i) * h, h);
         k += whole;
     }
     double rest = target - (t0 + k * h);
