@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -96,11 +97,18 @@ def test_late_telegrams_are_judged_as_those_in_time(pair: list[Any]) -> None:
         assert outcomes(one)["replayed"] > 0
 
 
-@pytest.mark.parametrize("starts", [{"gate_floor": 0.0}, {"gate_floor": -1.0}, {"gate_drift": float("nan")}, {"gate": 3.0}])
-def test_a_gate_that_cannot_be_is_refused(starts: dict[str, float], pair: list[Any]) -> None:
-    for one in pair:
-        with pytest.raises(FMICallException):
-            begin(one, **starts)
+@pytest.mark.parametrize(("name", "value", "expected"), [
+    ("gate_floor", 0.0, "at least 0.001 m"), ("gate_floor", -1.0, "at least 0.001 m"), ("gate_drift", float("nan"), "at least 0"),
+    ("gate_drift", float("inf"), "at least 0"), ("gate", 3.0, "at least 0 and at most 2"),
+])  # fmt: skip
+def test_a_gate_that_cannot_be_is_refused_in_words(name: str, value: float, expected: str, pair: list[Any]) -> None:
+    sealed, block = pair
+    with pytest.raises(FMICallException):
+        begin(sealed, **{name: value})
+    said = f"time cannot run with these parameters: {name} must be a finite number, {expected} ({name} ="
+    assert said in sealed.log[-1]
+    with pytest.raises(FMICallException, match=re.escape(said)):
+        begin(block, **{name: value})
 
 
 def test_names_of_the_memory_are_local_variables(pair: list[Any]) -> None:
