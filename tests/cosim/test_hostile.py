@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mmap
 import os
 import signal
 import subprocess
@@ -16,8 +17,11 @@ from zoo.events import DEEDS, hostile_fmu
 
 from cosim import CosimError, Scenario, load_result
 from cosim.cli import main
+from cosim.compiled import library
 from cosim.compiled.library import cached_library
-from cosim.process.last_call import LAST_CALL, TEXTS, USED, make_page
+from cosim.process import sentinel, watch
+from cosim.process.interruption import STOPPING, ends_like_ctrl_c
+from cosim.process.last_call import LAST_CALL, PAGE, TEXTS, USED, LastCall, make_page
 from cosim.studies.workers import Died, in_processes
 from fmus import cache
 from fmus.toolchain.compile import find_compiler
@@ -100,13 +104,58 @@ def test_a_call_past_its_limit_ends_the_run_in_words(fmu: Path, tmp_path: Path) 
     assert len(load_result(tmp_path / "out").table) == 25
 
 
-def test_ctrl_c_works_while_an_fmu_hangs(fmu: Path, tmp_path: Path) -> None:
-    process = start(fmu, tmp_path, "hangs")
+def test_a_limit_is_for_one_call_and_not_for_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As the watch looks: the same call three times 0.2 s, then others, then one that stays."""
+    page = LastCall(mmap.mmap(-1, PAGE))
+    monkeypatch.setattr(watch, "LAST_CALL", page)
+    page.limit(0.5)
+    looking, ended = watch._Watch(0), []
+    monkeypatch.setattr(looking, "_end", ended.append)
+    for call, time_of_call in ((1, 0.0), (1, 0.0), (1, 0.0), (2, 0.0), (2, 0.1), (2, 0.2), (0, 0.2), (0, 0.2), (0, 0.2), (0, 0.2)):
+        page.call[0], page.time[0] = call, time_of_call
+        looking._look(0.2)
+    assert ended == []
+    page.call[0] = 1
+    for _ in range(4):
+        looking._look(0.2)
+    assert ended == ["has not returned for 0.5 s, the limit that master.call_timeout sets"]
+
+
+def test_a_limit_holds_in_a_script_that_nobody_watches(monkeypatch: pytest.MonkeyPatch) -> None:
+    ended: list[str] = []
+    monkeypatch.setattr(sentinel, "_give_up", ended.append)
+    with sentinel.limited_calls(0.1):
+        for number in range(1, 6):
+            LAST_CALL.call[0] = number
+            time.sleep(0.05)
+        assert ended == []
+        time.sleep(0.3)
+    LAST_CALL.call[0] = 0
+    assert ended[0] == "has not returned for 0.1 s, the limit that master.call_timeout sets"
+
+
+@pytest.mark.parametrize("number", STOPPING[1:], ids=lambda n: n.name)
+def test_other_signals_do_what_ctrl_c_does_unless_they_are_ignored(number: signal.Signals) -> None:
+    before = signal.getsignal(number)
+    with pytest.raises(KeyboardInterrupt), ends_like_ctrl_c():
+        signal.raise_signal(number)
+    assert signal.getsignal(number) == before
+    signal.signal(number, signal.SIG_IGN)  # under nohup
+    try:
+        with ends_like_ctrl_c():
+            signal.raise_signal(number)
+    finally:
+        signal.signal(number, before)
+
+
+@pytest.mark.parametrize("number", STOPPING[1:], ids=lambda n: n.name)
+def test_ctrl_c_works_while_an_fmu_hangs(fmu: Path, tmp_path: Path, number: signal.Signals) -> None:
+    process = start(fmu, tmp_path, "hangs", stepper="python")
     block = tmp_path / "out" / ".unfinished" / "table.npy"
     while not block.exists() and process.poll() is None:
         time.sleep(0.05)
     time.sleep(0.5)
-    process.send_signal(signal.SIGTERM)
+    process.send_signal(number)
     assert "component 'bad' in doStep at t = 0.24 s does not return; the run was interrupted" in told(process)
     assert len(load_result(tmp_path / "out").table) == 25
 
@@ -146,10 +195,13 @@ def run_it(scenario: Scenario) -> Any:
     return scenario.run().failure
 
 
-def test_a_worker_tells_who_took_it_along(fmu: Path) -> None:
-    ((_, answer),) = in_processes(run_it, [hostile(fmu, "exits")], workers=1)
+@pytest.mark.parametrize(
+    ("deed", "words"), [("exits", ": its process ended with exit code 0"), ("hangs", " has not returned for 0.3 s")]
+)
+def test_a_worker_tells_who_took_it_along(fmu: Path, deed: str, words: str) -> None:
+    ((_, answer),) = in_processes(run_it, [hostile(fmu, deed, call_timeout=0.3)], workers=1)
     assert isinstance(answer, Died)
-    assert "component 'bad' in doStep at t = 0.24 s" in answer.reason
+    assert answer.reason.startswith(f"component 'bad' in doStep at t = 0.24 s{words}")
 
 
 def test_words_run_out_without_harm(tmp_path: Path) -> None:
@@ -234,9 +286,18 @@ class FakeDraft:
         return "to be built"
 
 
-def test_a_damaged_stepper_in_the_cache_is_built_again(tmp_path: Path) -> None:
+def test_a_damaged_stepper_in_the_cache_is_built_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    built: list[Path] = []
+
+    def compiled(_compiler: Any, folder: Path, _sources: Any, name: str) -> Path:
+        built.append(folder)
+        (folder / name).write_bytes(b"a library" * 1000)
+        return folder / name
+
+    monkeypatch.setattr(library, "compile_library", compiled)
     path = cached_library(find_compiler(), tmp_path)
-    content = path.read_bytes()
-    path.write_bytes(content[:5000])
-    assert cached_library(find_compiler(), tmp_path).read_bytes()[:4] == b"\x7fELF"
-    assert len(path.read_bytes()) == len(content)
+    assert cached_library(find_compiler(), tmp_path) == path
+    assert len(built) == 1
+    path.write_bytes(path.read_bytes()[:5000])
+    assert len(cached_library(find_compiler(), tmp_path).read_bytes()) == 9000
+    assert len(built) == 2

@@ -205,9 +205,11 @@ def test_a_balise_that_does_not_act_is_not_judged() -> None:
     system = OBSERVERS["augmented_high_gain_cdo"]()
     bench = Bench(system, preset="gps", gate=REJECT)
     bench.set("u", {"effort": MOTION.effort(0.0), "odometer": MOTION.speed})
+    bench.set("x", {"gate_settled": 3.0})
     bench.runtime.start(0.0)
     before = float(bench.runtime.x[0])
     assert run(bench, 8, dict.fromkeys(range(8), 500.0)) == [USED] * 8
+    assert (bench.state("gate_settled"), bench.state("gate_doubted"), bench.state("gate_recent")) == (3.0, 0.0, 0.0)
     assert abs(float(bench.runtime.x[0]) - before) < 100.0
 
 
