@@ -231,6 +231,13 @@ def test_what_an_fmu_changes_for_all_is_put_back_and_told(
     assert [w for w in warnings if w.startswith(f"bad: its steps change {what}")]
 
 
+def test_it_is_put_back_while_the_run_goes_on(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    seen: list[Path] = []
+    hostile(fmu, "moves", stepper="python").set("stop", 1.0).run(progress=lambda *_: seen.append(Path.cwd()), warn=lambda _: None)
+    assert seen[-1] == tmp_path  # told before the run is over
+
+
 def test_escape_sequences_never_reach_the_terminal(fmu: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", saved(fmu, tmp_path, "paints"), "--out", str(tmp_path / "out"), "--no-report", "--quiet"]) == 0
     shown = "".join(capsys.readouterr())
