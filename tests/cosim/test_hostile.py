@@ -51,12 +51,17 @@ def saved(fmu: Path, folder: Path, deed: str, **master: Any) -> str:
 def start(fmu: Path, folder: Path, deed: str, *options: str, **master: Any) -> subprocess.Popen[str]:
     what = saved(fmu, folder, deed, **master)
     command = [sys.executable, "-m", "cosim.cli", "run", what, "--out", "out", "--no-report", "--quiet", *options]
-    return subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+    streams: Any = {"stderr": subprocess.PIPE, "stdout": subprocess.DEVNULL, "text": True}
+    return subprocess.Popen(command, cwd=folder, start_new_session=True, **streams)
 
 
 def told(process: subprocess.Popen[str]) -> str:
     """What a command that is to end with 2 wrote to its error stream."""
-    _, error = process.communicate(timeout=60)
+    try:
+        _, error = process.communicate(timeout=60)
+    except subprocess.TimeoutExpired:  # what hangs is not left behind
+        os.killpg(process.pid, signal.SIGKILL)
+        raise
     assert process.returncode == 2, error
     assert "Traceback" not in error
     return error
@@ -111,7 +116,8 @@ def test_a_limit_is_for_one_call_and_not_for_many(monkeypatch: pytest.MonkeyPatc
     page = LastCall(mmap.mmap(-1, PAGE))
     monkeypatch.setattr(watch, "LAST_CALL", page)
     page.limit(0.5)
-    looking, ended = watch._Watch(0), []
+    ended: list[str] = []
+    looking = watch._Watch(0)
     monkeypatch.setattr(looking, "_end", ended.append)
     for now in [(1, 0.0)] * 3 + [(2, 0.0), (2, 0.1), (2, 0.2)] + [(0, 0.2)] * 4:
         page.call[0], page.time[0] = now

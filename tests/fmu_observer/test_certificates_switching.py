@@ -67,7 +67,7 @@ def test_no_changes_within_a_certified_gap_raise_the_lyapunov_function(
 
 @pytest.mark.parametrize("rate", [0.1, 1.0, 2.0])
 def test_the_growth_of_a_scalar_error_is_what_can_really_happen(rate: float) -> None:
-    """``de/dt = d(t) e``, d within the rate, half of it left by a sample: ``V+ / V`` rises by ``(exp(2 rate h) - 1) / 4`` at most."""
+    """``de/dt = d(t) e``, d within the rate, a sample leaves half: at most ``(exp(2 rate h) - 1) / 4`` of V comes on top."""
     vertices = [ImpulsiveError.of(np.array([[slope]]), np.array([[0.5]])) for slope in (rate, -rate)]
     gaps = np.linspace(0.05, 1.0, 20)
     found = SwitchingError.between(vertices).growth(np.eye(1), 1.0, gaps) * gaps
