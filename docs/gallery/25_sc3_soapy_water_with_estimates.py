@@ -9,7 +9,10 @@ from sheet import Sheet
 from shipped import run
 from train_scenarios import NOT_PRINTED, SOURCE, figure, instant, lowest_limit, mean_speed_error, sanding_time, slide, yes
 
-SEEDS = "over 20 seeds of the receiver an axle passes 15 % in 14 (largest slip 13 to 25 %), and sand is asked for in 5, for 1.8 s at most"
+SEEDS = (
+    "over 20 seeds of the receiver an axle passes 15 % in 14 (largest slip 13 to 25 %), and sand is asked for in 5, for 1.8 s at "
+    "most"
+)
 
 if __name__ == "__main__":
     sheet = Sheet(__file__, "Sc3: observer-based control, 35 km/h, soapy water", SOURCE)

@@ -1,7 +1,7 @@
 """Scenarios Sc1 to Sc4 of Table 4.4: what comes out of their stories, energy is conserved, and fixes count at their own instants.
 
-The runs are those of the shipped seed. What is asked of them holds for all 20 seeds of docs/studies/stories.py; what holds for some
-only (an axle beyond 15 % and sand in Sc3, an axle beyond 15 % in Sc4) is not asked for.
+The runs are those of the shipped seed. What is asked of them holds for all 20 seeds of docs/studies/stories.py; what holds for
+some only (an axle beyond 15 % and sand in Sc3, an axle beyond 15 % in Sc4) is not asked for.
 """
 
 from __future__ import annotations
@@ -165,7 +165,7 @@ def test_spinning_wheels_count_a_way_that_the_train_has_not_run() -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_speed_errors_are_those_of_the_published_size(name: str) -> None:
-    # Published 0.14 to 0.33 km/h; five seeds of the receiver: 0.20 to 0.26 without, 0.32 to 0.53 in lasting slip.
+    # Published 0.14 to 0.33 km/h; 20 seeds of the receiver: 0.17 to 0.25 without, 0.28 to 0.51 in lasting slip.
     errors = [mean_error(run(name), observer) for observer in OBSERVERS]
     assert max(errors) < (0.6 if name == "freight_sc2" else 0.3)
 
