@@ -21,6 +21,7 @@ from cosim.cli import main
 from cosim.compiled import library
 from cosim.compiled.library import cached_library
 from cosim.components import surroundings
+from cosim.components.fmi2 import FMI2Component
 from cosim.process import sentinel, watch
 from cosim.process.interruption import STOPPING, ends_like_ctrl_c
 from cosim.process.last_call import LAST_CALL, PAGE, TEXTS, USED, LastCall, make_page
@@ -94,6 +95,16 @@ def test_what_was_streamed_is_whole(fmu: Path, tmp_path: Path) -> None:
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
         "events.csv", "made_from", "messages.csv", "summary.json", "table.npy",
     ]  # fmt: skip
+
+
+def test_results_are_written_before_anything_is_closed(fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In this process, where nobody dies; the next test is the whole of it."""
+    order: list[str] = []
+    for closing in ("terminate", "free"):
+        monkeypatch.setattr(FMI2Component, closing, lambda _self, what=closing: order.append(what))
+    hostile(fmu, "nothing").run(finished=lambda _outcome: order.append("written"))
+    assert order[0] == "written"
+    assert {"terminate", "free"} <= set(order)
 
 
 @pytest.mark.parametrize("deed", ["crashes-when-freed", "crashes-when-terminated"])
