@@ -152,7 +152,7 @@ def describe(
     # A master that is told nothing of these takes each to depend on every input, and sees algebraic loops where there are none.
     description.initialUnknowns = [*outputs, *derivatives]
     description.outputs, description.derivatives = ([_running(system, u) for u in group] for group in (outputs, derivatives))
-    indicators = referenced(variables, table.indicators, len(system.frictions))
+    indicators = referenced(variables, table.indicators, len(system.frictions) + len(system.switchings))
     description.eventIndicators = [Unknown(index=v.valueReference, variable=v) for v in indicators]
     description.numberOfContinuousStates, description.numberOfEventIndicators = system.continuous_count, len(indicators)
     description.instantiationToken = _token(system, description)

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
+import fmus.toolchain.compile as compiling
+
 settings.register_profile("here", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "here")
 
+QUICK = "-O0"
 SECOND_TIER = Path(__file__).with_name("second_tier.txt")
 KEPT = "! "
 
@@ -20,6 +24,15 @@ def second_tier() -> dict[str, bool]:
     """Beginnings of test names, and whether what begins so belongs to the second tier."""
     lines = [line for line in SECOND_TIER.read_text(encoding="utf-8").splitlines() if line and not line.startswith("#")]
     return {line.removeprefix(KEPT): not line.startswith(KEPT) for line in lines}
+
+
+@pytest.fixture(scope="session", autouse=True)
+def quick_builds(request: pytest.FixtureRequest) -> Iterator[None]:
+    """The first tier builds FMUs without optimisation: the same numbers in a third of the compiler's time."""
+    with pytest.MonkeyPatch.context() as patch:
+        if "not slow" in request.config.option.markexpr:
+            patch.setattr(compiling, "FLAGS", tuple(QUICK if flag == "-O3" else flag for flag in compiling.FLAGS))
+        yield
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -23,7 +23,7 @@ BURSTS = (
 )
 SAND = (
     "asked for as the axles leave the slippery rail one by one; before, all four spin alike and the device is blind. A chance: "
-    "20 ms more of delay in the loop, and none is asked for"
+    "over 10 draws of the rail's peak and of the odometer's phase it is asked for in 3 (docs/multi_vehicle_train.md)"
 )
 
 if __name__ == "__main__":

@@ -17,8 +17,11 @@ EXAMPLES = {  # plant, longest gap [s], instant of the first drop-outs [s]
 STOP = 20.0
 
 
-def followed(example: str, premise: Any, **options: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Times and errors of the Takagi-Sugeno observer with the printed gains; noise on the continuous output by `options`."""
+def followed(example: str, premise: Any, seed: int = 0, **options: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Times and errors of the Takagi-Sugeno observer with the printed gains; noise on the continuous output by `options`.
+
+    The seed is that of the instants and of the noise.
+    """
     plant, gap, loss = EXAMPLES[example]
     observer = GeneralTakagiSugenoCdo(example, premise)
 
@@ -28,7 +31,7 @@ def followed(example: str, premise: Any, **options: Any) -> tuple[np.ndarray, np
         return named | {f"sample_{s.name}": values[s.name] for s in observer.model.sampled}
 
     pair = Together(plant(), observer, seen, preset="as_published")
-    return errors(pair, STOP, {observer.model.event: sampling(gap, STOP, 0, loss)}, **options)
+    return errors(pair, STOP, {observer.model.event: sampling(gap, STOP, seed, loss)}, seed=seed, **options)
 
 
 def final_quarter(t: np.ndarray, found: np.ndarray) -> tuple[float, float]:

@@ -18,6 +18,7 @@ from cosim import Outcome, Scenario
 Array = NDArray[np.float64]
 SOURCE = "Bouchama 2024, section 4.5, Table 4.4, Figures 4.18-4.37"
 DEPARTURE, TARGET, JUDGED_FROM, EXCESSIVE = 20.0, 850.0, 2.8, 0.15  # [s], [m], [m/s], [1]
+WATER, EFFORT_LIMIT = (20.0, 250.0), 350e3  # [m], [N]
 AXLES = range(1, 5)
 EFFORTS = {"command": "controller.effort", "let through": "anti_slip.effort", "adhesion": "train.adhesion_force"}
 NOT_PRINTED = (
@@ -81,6 +82,13 @@ def indicated(outcome: Outcome) -> tuple[float, float]:
     return (float(t[on][0] - DEPARTURE) if on.any() else np.nan), float(np.trapezoid(on.astype(float), t))
 
 
+def lowest_limit(outcome: Outcome) -> float:
+    """Share of the locomotive's effort that the MDPE controller allows itself at least on the slippery rail [1]."""
+    place, speed = outcome["train.position"], outcome["train.speed"]
+    on_water = (place > WATER[0]) & (place < WATER[1]) & (speed > JUDGED_FROM)
+    return float(outcome["controller.effort_available"][on_water].min() / EFFORT_LIMIT)
+
+
 def sanding_time(outcome: Outcome) -> float:
     """Time for which the anti-slip device or the controller ask for sand [s]."""
     asked = outcome["anti_slip.sanding_request"] > 0.5
@@ -93,6 +101,11 @@ def stopped(outcome: Outcome) -> tuple[float, float]:
     """Time from departure to stop [s], and place of the stop beyond the stopping point [m]."""
     moving = outcome["time"][outcome["train.speed"] > 0.0]
     return float(moving[-1] - DEPARTURE), float(outcome["train.position"][-1] - TARGET)
+
+
+def instant(time: float) -> float | str:
+    """An instant [s] for a table, in words where nothing happens."""
+    return float(time) if np.isfinite(time) else "none beyond 15 %"
 
 
 def yes(holds: bool) -> str:

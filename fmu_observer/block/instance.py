@@ -250,7 +250,7 @@ class Instance:
         horizon = state.protocol[1]
         started = state.mode not in BEFORE_TIME
         if started and not (isfinite(horizon) and horizon >= 0.0 and self._timing.can_run(state.runtime)):
-            raise BlockError("time cannot run on from this state: its step, periods, offsets, seed or horizon are damaged.")
+            raise BlockError("time cannot run on from this state: its parameters, its clock or its horizon are damaged.")
         return state
 
     def load(self, state: BlockState) -> None:

@@ -11,6 +11,7 @@ from math import inf, isfinite, ulp
 import numpy as np
 
 from plant_models.hybrid import HybridSystem, Snapshot, scalar_names
+from plant_models.hybrid.requirements import unfulfilled
 from plant_models.hybrid.runtime import GRID_TOLERANCE
 
 MOST_INTERNAL_STEPS = 1e9
@@ -28,6 +29,7 @@ class Timing:
 
     def __init__(self, system: HybridSystem) -> None:
         names = list(scalar_names(system.parameter_signals))
+        self._system = system
         self.step_position = names.index("internal_step")
         self._offset = -len(names)  # of the parameters in a snapshot's memory
         self._seed = names.index("seed") if system.noises else None
@@ -63,5 +65,7 @@ class Timing:
         if not all(offset is None or isfinite(p[offset]) for _, offset in self._periodic):
             return False
         if self._seed is not None and not 0.0 <= p[self._seed] < LARGEST_WHOLE:
+            return False
+        if unfulfilled(self._system, snapshot.memory[self._offset :]) is not None:
             return False
         return self.count_steps(snapshot.t, snapshot.t, snapshot.t0, p, snapshot.ticks) <= MOST_INTERNAL_STEPS

@@ -8,7 +8,6 @@ from typing import Any, TypeGuard
 import numpy as np
 
 from fmu_observer.observers.innovation_gate import (
-    GATE_BOUNDED,
     GATE_MEMORY,
     GATE_PARAMETERS,
     REJECT,
@@ -18,6 +17,7 @@ from fmu_observer.observers.innovation_gate import (
     judge,
 )
 from plant_models.hybrid import Event, HybridSystem, Signal, TriggeredEvent, input_signal, vector, width
+from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
 GATED_EVENT = "balise"
@@ -52,7 +52,6 @@ class GatedObserver(HybridSystem):
                 *self.parameters,
                 *(replace(s, start=self.gate_start) if s.name == "gate" else s for s in GATE_PARAMETERS),
             )
-            self.bounded = (*self.bounded, *GATE_BOUNDED)
             self.events = tuple(_judged(event) if _is_gated(event) else event for event in self.events)
         super().__init__(**options)
 
@@ -75,6 +74,10 @@ class GatedObserver(HybridSystem):
         return 1.0
 
     # -- what follows -----------------------------------------------------------------------------------------------
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """Bounds of the gate's parameters, see `HybridSystem.requirements`."""
+        return super().requirements(p) | (within_bounds(GATE_PARAMETERS, p) if self.gated else {})
 
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """`update`, where the gate lets the telegram pass; shape (n,)."""
@@ -107,4 +110,4 @@ def _judged(event: TriggeredEvent) -> TriggeredEvent:
 
 def is_gate_parameter(signal: Signal) -> bool:
     """Whether a parameter is one of the gate, which no question of stability depends on."""
-    return signal.name in GATE_BOUNDED
+    return signal.name in {s.name for s in GATE_PARAMETERS}

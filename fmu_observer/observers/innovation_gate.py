@@ -56,7 +56,6 @@ GATE_MEMORY = (
     memory("gate_doubted_time", "s", 0.0, "Its stamp"),
     memory("gate_doubted_odometer", "m/s", 0.0, "Odometer at it"),
 )
-GATE_BOUNDED = tuple(s.name for s in GATE_PARAMETERS)
 
 
 class GateMemory(NamedTuple):

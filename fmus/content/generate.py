@@ -19,6 +19,10 @@ from fmu_observer.description import FIRST_REFERENCE, VariableTable, exposed_inp
 from fmus.content.casadi_source import private_source
 from plant_models.hybrid import HybridSystem, TracedSystem, scalar_names, width
 from plant_models.hybrid.kernel import check_payloads
+from plant_models.hybrid.requirements import named_parameters
+
+MOST_NAMED = 4
+"""Parameters named by one requirement whose values the C runtime tells, as in `runtime/model.h`."""
 
 
 class GenerationError(ValueError):
@@ -173,9 +177,8 @@ def _event_tables(system: HybridSystem, equations: Equations) -> str:
         ("TriggeredEvent", "triggered", triggered),
         ("ModelFunction", "communications", communications),
         ("Resource", "resources", _resource_rows(system)),
-        ("Bounded", "bounded", _bounded_rows(system)),
         ("int", "frictions", [str(i) for i in system.friction_indices()]),
-        ("char *const", "requirement_texts", [_text(text) for text in equations.requirement_texts]),
+        ("Requirement", "requirements", _requirement_rows(system, equations)),
     )
     return "".join(_table(*table) for table in tables)
 
@@ -186,14 +189,9 @@ def _resource_rows(system: HybridSystem) -> list[str]:
     return [f"{_text(r.file)}, {_text(r.column)}, {first[r.parameter]}, {sizes[r.parameter]}" for r in system.resources]
 
 
-def _bounded_rows(system: HybridSystem) -> list[str]:
-    positions = {name: i for i, name in enumerate(scalar_names(system.parameter_signals))}
-    signals = [s for s in system.parameters if s.name in system.bounded]
-    return [f"{positions[s.name]}, {_bound(s.min, '-')}, {_bound(s.max, '')}" for s in signals]
-
-
-def _bound(limit: float | None, sign: str) -> str:
-    return f"{sign}HUGE_VAL" if limit is None else repr(float(limit))
+def _requirement_rows(system: HybridSystem, equations: Equations) -> list[str]:
+    named = [(text, named_parameters(system, text)[:MOST_NAMED]) for text in equations.requirement_texts]
+    return [f"{_text(text)}, {len(places)}, {{{', '.join(map(str, places or [0]))}}}" for text, places in named]
 
 
 def _variable_table(system: HybridSystem, description: ModelDescription) -> str:
@@ -244,8 +242,6 @@ def _model_table(system: HybridSystem, equations: Equations, description: ModelD
         "outputs": width(system.outputs),
         "parameters": len(parameters),
         "internal_step": parameters.index("internal_step"),
-        "bounded_count": len(system.bounded),
-        "bounded": "bounded",
         "seed": parameters.index("seed") if "seed" in parameters else -1,
         "integer_work": max((f.sz_iw() for f in functions), default=0),
         "real_work": max((f.sz_w() for f in functions), default=0),
@@ -271,13 +267,13 @@ def _model_table(system: HybridSystem, equations: Equations, description: ModelD
         "tangent": _name(equations.tangent),
         "first_reference": FIRST_REFERENCE,
         "requirement_count": len(equations.requirement_texts),
-        "requirements": _name(equations.requirements),
-        "requirement_texts": "requirement_texts",
+        "requirements": "requirements",
+        "fulfilled": _name(equations.requirements),
         "variable_count": len(description.modelVariables),
         "variables": "variables",
     }
     rows = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
-    return f"#include <math.h>\n#include <stddef.h>\n\nPRIVATE const Model model = {{\n{rows}}};\n"
+    return f"#include <stddef.h>\n\nPRIVATE const Model model = {{\n{rows}}};\n"
 
 
 def _protocol(system: HybridSystem, description: ModelDescription) -> dict[str, str]:
@@ -296,7 +292,7 @@ def _name(function: ca.Function | None) -> str:
 
 def _table(kind: str, name: str, rows: Iterable[str]) -> str:
     """A constant array; C knows no empty one, so it gets one row of zeros that nobody reads."""
-    opened, closed = ("", "") if kind in ("int", "ModelFunction", "char *const") else ("{", "}")
+    opened, closed = ("", "") if kind in ("int", "ModelFunction") else ("{", "}")
     lines = "".join(f"    {opened}{row}{closed},\n" for row in rows) or f"    {opened}0{closed},\n"
     return f"static const {kind} {name}[] = {{\n{lines}}};\n\n"
 

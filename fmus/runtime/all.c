@@ -3,6 +3,7 @@
 #include "model.c"
 
 #include "noise.c"
+#include "switching.c"
 #include "runtime.c"
 #include "log.c"
 #include "journal.c"

@@ -88,20 +88,35 @@ PRIVATE Status instance_require(const Instance *instance, const char *function, 
 
 /* -- the beginning of time --------------------------------------------------------------------------------------- */
 
+static const char *parameter_name(int position) {
+    return variables_name(ROLES(ROLE_FIXED) | ROLES(ROLE_TUNABLE), position);
+}
+
 static Status cannot_run(const Instance *instance, const char *name, double value) {
     return instance_fail(instance, "time cannot run with parameter %s = %.17g; set it to a legal value", name, value);
+}
+
+/* With the values of the parameters that the requirement names. */
+static Status not_fulfilled(const Instance *instance, const Requirement *requirement) {
+    char values[MOST_NAMED * 128] = "";
+    for (int i = 0; i < requirement->named_count; i++) {
+        size_t used = strlen(values);
+        const char *name = parameter_name(requirement->named[i]);
+        snprintf(values + used, sizeof values - used, "%s%s = %.17g", used ? ", " : " (", name, instance->runtime.p[requirement->named[i]]);
+    }
+    return instance_fail(instance, "time cannot run with these parameters: %s%s%s", requirement->text, values, values[0] ? ")" : "");
 }
 
 PRIVATE Status instance_start(Instance *instance, Mode next) {
     double horizon = *instance->runtime.horizon;
     if (!(horizon >= 0.0 && isfinite(horizon)))
         return cannot_run(instance, "replay_horizon", horizon);
-    const char *unfulfilled = runtime_unfulfilled(&instance->runtime);
+    const Requirement *unfulfilled = runtime_unfulfilled(&instance->runtime);
     if (unfulfilled != NULL)
-        return instance_fail(instance, "time cannot run with these parameters: %s", unfulfilled);
+        return not_fulfilled(instance, unfulfilled);
     int refused = runtime_start(&instance->runtime, instance->start_time);
     if (refused >= 0)
-        return cannot_run(instance, variables_name(ROLES(ROLE_FIXED) | ROLES(ROLE_TUNABLE), refused), instance->runtime.p[refused]);
+        return cannot_run(instance, parameter_name(refused), instance->runtime.p[refused]);
     instance->mode = next;
     instance->outdated = OUTDATED_ALL;
     return STATUS_OK;

@@ -30,12 +30,13 @@ typedef struct {
     int verdict;        /* position in x of what the model made of it, see `Verdict`; -1 where it uses every one */
 } TriggeredEvent;
 
-/* A parameter that must be finite and within its bounds. */
+/* What parameters must fulfil. */
+#define MOST_NAMED 4
 typedef struct {
-    int parameter; /* position in p */
-    double min;
-    double max;
-} Bounded;
+    const char *text; /* what is said where they do not */
+    int named_count;
+    int named[MOST_NAMED]; /* positions in p of the parameters that it names */
+} Requirement;
 
 /* A vector parameter that is read from a column of a CSV file among the FMU's resources. */
 typedef struct {
@@ -92,8 +93,6 @@ typedef struct {
     int outputs;       /* length of y */
     int parameters;    /* length of p */
     int internal_step; /* position in p */
-    int bounded_count;
-    const Bounded *bounded; /* parameters that time does not run with outside their bounds */
     int seed;          /* position in p, or -1 where there is no noise */
     int integer_work;  /* length of iw */
     int real_work;     /* length of w */
@@ -123,8 +122,8 @@ typedef struct {
     ModelFunction tangent;    /* (t, x, u, p, s, dt, dx, du, dp) -> dy, then d derivative; or NULL where both are empty */
     unsigned first_reference; /* value reference of the first variable; the others count up from there */
     int requirement_count;
-    ModelFunction requirements;         /* (p) -> 1 for each that the parameters fulfil; or NULL without any */
-    const char *const *requirement_texts; /* what is said where they do not */
+    const Requirement *requirements;
+    ModelFunction fulfilled; /* (p) -> 1 for each requirement that the parameters fulfil; or NULL without any */
     unsigned variable_count;
     const Variable *variables;
 } Model;

@@ -6,9 +6,9 @@
 #include <string.h>
 
 #include "noise.h"
+#include "switching.h"
 
 #define GRID_TOLERANCE 1e-9 /* of an internal step: closer to a grid point than this is on it */
-#define MOST_SWITCHES 100 /* in one internal step; what chatters more is no longer divided */
 
 /* -- places ------------------------------------------------------------------------------------------------------ */
 
@@ -121,68 +121,9 @@ PRIVATE void runtime_reset(Runtime *runtime) {
 
 /* -- evaluation (the kernel of `kernel.py`) ------------------------------------------------------------------------ */
 
-/* Compute the state after an internal step; whether a switch changes on the way. */
-static bool attempt(Runtime *runtime, double t, double h) {
-    double switched = 0.0;
-    const double *arguments[] = {&t, &h, runtime->x, runtime->u, runtime->p};
-    double *results[] = {runtime->x_next, &switched};
-    model.step(arguments, results, runtime->integer_work, runtime->real_work, 0);
-    return switched != 0.0;
-}
-
-static void accept(Runtime *runtime) {
-    copy(runtime->x, runtime->x_next, model.continuous); /* memory changes in jumps only */
-}
-
-/* The distance to the next larger number. */
-static double resolution(double t) {
+PRIVATE double runtime_resolution(double t) {
     double magnitude = fabs(t);
     return nextafter(magnitude, INFINITY) - magnitude;
-}
-
-/* The shortest step after which a switch has changed, to the resolution of time, where one has after h. */
-static double until_switch(Runtime *runtime, double t, double h) {
-    double before = 0.0, after = h, narrow = 4.0 * resolution(t + h);
-    while (after - before > narrow) {
-        double middle = 0.5 * (before + after);
-        if (attempt(runtime, t, middle))
-            after = middle;
-        else
-            before = middle;
-    }
-    return after;
-}
-
-/* An internal step on which a switch changes, as was just tried: in parts that end where one does. */
-static void divided_step(Runtime *runtime, double t, double h) {
-    double end = t + h;
-    for (int i = 0; i < MOST_SWITCHES; i++) {
-        h = until_switch(runtime, t, h);
-        attempt(runtime, t, h);
-        accept(runtime);
-        t += h;
-        h = end - t;
-        if (h <= 0.0)
-            return;
-        if (!attempt(runtime, t, h))
-            break;
-    }
-    accept(runtime);
-}
-
-/* One internal step, divided where switches change. Mirrors `divided_step` of `switching.py`. */
-static inline void step(Runtime *runtime, double t, double h) {
-    if (model.step == NULL)
-        return;
-    if (attempt(runtime, t, h) && model.switching_count > 0)
-        divided_step(runtime, t, h);
-    else
-        accept(runtime);
-}
-
-static void grid_steps(Runtime *runtime, double t0, double k, double count, double h) {
-    for (double i = 0.0; i < count; i += 1.0)
-        step(runtime, t0 + (k + i) * h, h);
 }
 
 static void jump(Runtime *runtime, ModelFunction function) {
@@ -251,7 +192,7 @@ PRIVATE void runtime_update_indicators(Runtime *runtime) {
 /* -- periodic events --------------------------------------------------------------------------------------------- */
 
 PRIVATE double runtime_tolerance(const Runtime *runtime, double t) {
-    return GRID_TOLERANCE * runtime->clock.h + 4.0 * resolution(t);
+    return GRID_TOLERANCE * runtime->clock.h + 4.0 * runtime_resolution(t);
 }
 
 static double instant(const Runtime *runtime, int i) {
@@ -291,26 +232,16 @@ static bool is_positive(double value) {
     return isfinite(value) && value > 0.0;
 }
 
-PRIVATE const char *runtime_unfulfilled(Runtime *runtime) {
-    if (model.requirements == NULL)
+PRIVATE const Requirement *runtime_unfulfilled(const Runtime *runtime) {
+    if (model.fulfilled == NULL)
         return NULL;
     const double *arguments[] = {runtime->p};
     double *results[] = {runtime->required};
-    model.requirements(arguments, results, runtime->integer_work, runtime->real_work, 0);
+    model.fulfilled(arguments, results, runtime->integer_work, runtime->real_work, 0);
     for (int i = 0; i < model.requirement_count; i++)
         if (runtime->required[i] == 0.0)
-            return model.requirement_texts[i];
+            return &model.requirements[i];
     return NULL;
-}
-
-/* The place of a parameter with which time does not run, or -1. */
-static int beyond_bounds(const Runtime *runtime) {
-    for (int i = 0; i < model.bounded_count; i++) {
-        double value = runtime->p[model.bounded[i].parameter];
-        if (!(isfinite(value) && value >= model.bounded[i].min && value <= model.bounded[i].max))
-            return model.bounded[i].parameter;
-    }
-    return -1;
 }
 
 PRIVATE int runtime_start(Runtime *runtime, double t0) {
@@ -326,9 +257,6 @@ PRIVATE int runtime_start(Runtime *runtime, double t0) {
         if (!isfinite(runtime->offsets[i]))
             return offset;
     }
-    int beyond = beyond_bounds(runtime);
-    if (beyond >= 0)
-        return beyond;
     if (model.seed >= 0 && !(runtime->p[model.seed] >= 0.0 && runtime->p[model.seed] < LARGEST_WHOLE))
         return model.seed;
     runtime->clock.t = runtime->clock.t0 = t0;
@@ -353,21 +281,22 @@ static void integrate(Runtime *runtime, double target) {
         double boundary = t0 + (k + 1.0) * h;
         if (boundary >= target - tolerance) {
             /* a target on the boundary but for rounding is the boundary */
-            step(runtime, t, (boundary <= target + tolerance ? boundary : target) - t);
+            switching_step(runtime, t, (boundary <= target + tolerance ? boundary : target) - t);
             runtime->clock.t = target;
             return;
         }
-        step(runtime, t, boundary - t);
+        switching_step(runtime, t, boundary - t);
         k += 1.0;
     }
     double whole = floor((target - t0) / h + tolerance / h) - k;
     if (whole > 0.0) {
-        grid_steps(runtime, t0, k, whole, h);
+        for (double i = 0.0; i < whole; i += 1.0)
+            switching_step(runtime, t0 + (k + i) * h, h);
         k += whole;
     }
     double rest = target - (t0 + k * h);
     if (rest > tolerance)
-        step(runtime, t0 + k * h, rest);
+        switching_step(runtime, t0 + k * h, rest);
     runtime->clock.t = target;
 }
 
@@ -438,7 +367,7 @@ static bool timing_is_sane(const Runtime *runtime) {
     for (int i = 0; i < model.periodic_count; i++)
         if (!is_positive(runtime->periods[i]) || !isfinite(runtime->offsets[i]) || !is_whole(runtime->ticks[i], 0.0, LARGEST_WHOLE - 1.0))
             return false;
-    if (beyond_bounds(runtime) >= 0)
+    if (runtime_unfulfilled(runtime) != NULL)
         return false;
     if (model.seed >= 0 && !(runtime->p[model.seed] >= 0.0 && runtime->p[model.seed] < LARGEST_WHOLE))
         return false;
@@ -446,9 +375,8 @@ static bool timing_is_sane(const Runtime *runtime) {
     return horizon && runtime_count_steps(runtime, runtime->clock.t) <= MOST_INTERNAL_STEPS;
 }
 
-PRIVATE bool runtime_is_sane(const Clock *clock, const double *memory, bool started) {
-    Runtime view;
-    memset(&view, 0, sizeof view);
+PRIVATE bool runtime_is_sane(const Runtime *runtime, const Clock *clock, const double *memory, bool started) {
+    Runtime view = *runtime;
     place_memory(&view, (double *)memory); /* only read */
     view.clock = *clock;
     if (!isfinite(clock->t) || !isfinite(clock->t0) || !is_positive(clock->h))

@@ -62,8 +62,8 @@ PRIVATE void runtime_place(Runtime *runtime, double *numbers, int *integers);
 /* Back to the start values, at time zero. */
 PRIVATE void runtime_reset(Runtime *runtime);
 
-/* The first requirement that the parameters do not fulfil, in words, or NULL. */
-PRIVATE const char *runtime_unfulfilled(Runtime *runtime);
+/* The first requirement that the parameters do not fulfil, or NULL. */
+PRIVATE const Requirement *runtime_unfulfilled(const Runtime *runtime);
 
 /* Begin at t0 [s], fire the periodic events due there, then the communication events. Returns -1, or the position in p of a
    parameter with which time cannot run: a step or period that is not positive, an offset that is not finite, a seed outside [0, 2^53). */
@@ -108,12 +108,15 @@ PRIVATE void runtime_update_derivatives(Runtime *runtime);
    the switching functions. */
 PRIVATE void runtime_update_indicators(Runtime *runtime);
 
+/* The distance [s] from t to the next larger number. */
+PRIVATE double runtime_resolution(double t);
+
 /* Closer in time than this [s] is the same instant. */
 PRIVATE double runtime_tolerance(const Runtime *runtime, double t);
 
 /* Whether a clock and a `memory` that came from outside are such that time can run from there, or, before it has `started`, begin;
-   whatever serves as an index or a count is within its bounds. */
-PRIVATE bool runtime_is_sane(const Clock *clock, const double *memory, bool started);
+   whatever serves as an index or a count is within its bounds. Computes in the results of `runtime`, whose own memory stays. */
+PRIVATE bool runtime_is_sane(const Runtime *runtime, const Clock *clock, const double *memory, bool started);
 
 /* Position in x of the first state that is not a finite number, or -1. */
 PRIVATE int runtime_first_broken_state(const Runtime *runtime);

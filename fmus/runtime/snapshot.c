@@ -132,7 +132,7 @@ PRIVATE Status instance_serialize(const Instance *instance, const char *function
 
 /* Bytes that come from outside: everything that later serves as an index or decides how time runs is checked, the lengths before
    all else. */
-static bool is_sane(const Snapshot *snapshot, size_t size) {
+static bool is_sane(const Instance *instance, const Snapshot *snapshot, size_t size) {
     JournalMark past = snapshot->past;
     bool within = past.first >= 0 && past.first < JOURNAL_SPACING && past.end >= past.first && past.end - past.first <= JOURNAL_CAPACITY;
     if (!within || (past.end > 0 && model.triggered_count == 0) || snapshot->size != size || !is_own(snapshot))
@@ -141,7 +141,7 @@ static bool is_sane(const Snapshot *snapshot, size_t size) {
     bool known = mode > 0 && mode <= MODE_ANY && (mode & (mode - 1)) == 0;
     if (!known || !isfinite(snapshot->start_time))
         return false;
-    return runtime_is_sane(&snapshot->clock, snapshot->memory, !(mode & BEFORE_TIME)) &&
+    return runtime_is_sane(&instance->runtime, &snapshot->clock, snapshot->memory, !(mode & BEFORE_TIME)) &&
            journal_is_sane(past, snapshot->memory + runtime_memory_length(), &snapshot->clock);
 }
 
@@ -152,7 +152,7 @@ PRIVATE Status instance_deserialize(const Instance *instance, const char *functi
     if (snapshot == NULL)
         return instance_fail(instance, "%s: out of memory", function);
     memcpy(snapshot, bytes, size);
-    if (!is_sane(snapshot, size)) {
+    if (!is_sane(instance, snapshot, size)) {
         free(snapshot);
         return not_own(instance, function);
     }

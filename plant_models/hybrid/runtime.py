@@ -15,6 +15,7 @@ from plant_models.hybrid.event import USED
 from plant_models.hybrid.integration import effective_flow
 from plant_models.hybrid.kernel import Kernel, make_kernel
 from plant_models.hybrid.noise import standard_normal
+from plant_models.hybrid.requirements import unfulfilled
 from plant_models.hybrid.signal import scalar_names
 from plant_models.hybrid.system import HybridSystem
 
@@ -151,16 +152,13 @@ class Runtime:
         for event in self.system.periodic_events:
             if event.offset is not None and not isfinite(self._timing(event.offset)):
                 raise ValueError(self._illegal(event.offset, "a finite number of seconds"))
-        for signal in self.system.parameters:
-            if signal.name in self.system.bounded and not signal.allows(self._timing(signal.name)):
-                raise ValueError(self._illegal(signal.name, signal.bounds))
         if self.system.noises and not 0.0 <= self._timing("seed") < LARGEST_SEED:
             raise ValueError(self._illegal("seed", "a whole number from 0 to 2**53"))
 
     def _check_requirements(self) -> None:
-        for text, fulfilled in self.system.requirements(self.system.unpack_parameters(self.p)).items():
-            if not fulfilled:
-                raise ValueError(f"{self.system.name}: time cannot run with these parameters: {text}.")
+        broken = unfulfilled(self.system, self.p)
+        if broken is not None:
+            raise ValueError(f"{self.system.name}: time cannot run with these parameters: {broken}.")
 
     def _illegal(self, name: str, expected: str) -> str:
         return f"{self.system.name}: time cannot run with parameter {name} = {self._timing(name)!r}; expected {expected}."

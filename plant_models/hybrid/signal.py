@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from keyword import iskeyword
-from math import isfinite
 from typing import Literal
 
 Causality = Literal["input", "output", "parameter", "local"]
@@ -77,10 +76,6 @@ class Signal:
         if self.size is None:
             return (self.name,)
         return tuple(f"{self.name}[{i + 1}]" for i in range(self.size))
-
-    def allows(self, value: float) -> bool:
-        """Whether a value is finite and lies within `min` and `max`."""
-        return isfinite(value) and (self.min is None or value >= self.min) and (self.max is None or value <= self.max)
 
     @property
     def bounds(self) -> str:

@@ -1,6 +1,6 @@
 """Steps divided at switches: an internal step ends where a switching function changes its sign, and the next begins there.
 
-Mirrored by `step` of the C runtime; change the two together. Knows kernels, and nothing of grids and events.
+Mirrored by `switching.c` of the C runtime; change the two together. Knows kernels, and nothing of grids and events.
 """
 
 from __future__ import annotations
@@ -23,17 +23,16 @@ class Trial(Protocol):
 
 def divided_step(kernel: Trial, t: float, h: float) -> None:
     """Advance by one internal step of length `h` [s] from `t` [s], divided where switches change."""
-    if kernel.attempt(t, h):
-        end = t + h
-        for _ in range(MOST_SWITCHES):
-            h = _until_switch(kernel, t, h)
-            kernel.attempt(t, h)
-            kernel.accept()
-            t, h = t + h, end - (t + h)
-            if h <= 0.0:
-                return
-            if not kernel.attempt(t, h):
-                break
+    end = t + h
+    divisions = 0
+    while kernel.attempt(t, h) and divisions < MOST_SWITCHES:
+        divisions += 1
+        h = _until_switch(kernel, t, h)
+        kernel.attempt(t, h)
+        kernel.accept()
+        t, h = t + h, end - (t + h)
+        if h <= 0.0:
+            return
     kernel.accept()
 
 

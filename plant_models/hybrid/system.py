@@ -61,7 +61,8 @@ class HybridSystem:
     8. A vector parameter that an exported model reads from a file of its own is listed in `resources`.
     9. Where only some states are stiff, `stiff` names all of these and `rosenbrock` treats them alone implicitly. The step
        keeps its order; with all states that carry a conserved sum among them, momentum say, it stays conserved.
-    10. Time does not run with a scalar parameter of `bounded` that is not finite or lies outside its `min` and `max`.
+    10. Time does not run with parameters that break one of the `requirements`: bounds to be kept (`within_bounds`), or what
+        several must fulfil together. They are checked before time runs, so they are about fixed parameters.
     11. A system that cannot be traced says ``traceable = False`` and may then use any Python.
     """
 
@@ -74,7 +75,6 @@ class HybridSystem:
     parameters: tuple[Signal, ...] = ()
     events: tuple[Event, ...] = ()
     frictions: tuple[str, ...] = ()
-    bounded: tuple[str, ...] = ()
     switchings: tuple[str, ...] = ()
     stiff: tuple[str, ...] = ()
     resources: tuple[Resource, ...] = ()
@@ -112,7 +112,7 @@ class HybridSystem:
         return np.zeros((len(self.switchings), *x.shape[1:]))
 
     def requirements(self, p: Any) -> dict[str, Array]:
-        """What the parameters must fulfil: 1 where they do, by what is said where they do not; checked before time runs."""
+        """What the parameters must fulfil, by what is said where they do not (it names them): 1 where they do, else 0."""
         return {}
 
     # -- for those who write these functions ------------------------------------------------------------------------

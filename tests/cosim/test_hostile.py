@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+import mmap
 import os
 import signal
 import subprocess
@@ -16,8 +18,13 @@ from zoo.events import DEEDS, hostile_fmu
 
 from cosim import CosimError, Scenario, load_result
 from cosim.cli import main
+from cosim.compiled import library
 from cosim.compiled.library import cached_library
-from cosim.process.last_call import LAST_CALL, TEXTS, USED, make_page
+from cosim.components import surroundings
+from cosim.components.fmi2 import FMI2Component
+from cosim.process import sentinel, watch
+from cosim.process.interruption import STOPPING, ends_like_ctrl_c
+from cosim.process.last_call import LAST_CALL, PAGE, TEXTS, USED, LastCall, make_page
 from cosim.studies.workers import Died, in_processes
 from fmus import cache
 from fmus.toolchain.compile import find_compiler
@@ -45,12 +52,17 @@ def saved(fmu: Path, folder: Path, deed: str, **master: Any) -> str:
 def start(fmu: Path, folder: Path, deed: str, *options: str, **master: Any) -> subprocess.Popen[str]:
     what = saved(fmu, folder, deed, **master)
     command = [sys.executable, "-m", "cosim.cli", "run", what, "--out", "out", "--no-report", "--quiet", *options]
-    return subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+    streams: Any = {"stderr": subprocess.PIPE, "stdout": subprocess.DEVNULL, "text": True}
+    return subprocess.Popen(command, cwd=folder, start_new_session=True, **streams)
 
 
 def told(process: subprocess.Popen[str]) -> str:
     """What a command that is to end with 2 wrote to its error stream."""
-    _, error = process.communicate(timeout=60)
+    try:
+        _, error = process.communicate(timeout=60)
+    except subprocess.TimeoutExpired:  # what hangs is not left behind
+        os.killpg(process.pid, signal.SIGKILL)
+        raise
     assert process.returncode == 2, error
     assert "Traceback" not in error
     return error
@@ -85,10 +97,20 @@ def test_what_was_streamed_is_whole(fmu: Path, tmp_path: Path) -> None:
     ]  # fmt: skip
 
 
+def test_results_are_written_before_anything_is_closed(fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In this process, where nobody dies; the next test is the whole of it."""
+    order: list[str] = []
+    for closing in ("terminate", "free"):
+        monkeypatch.setattr(FMI2Component, closing, lambda _self, what=closing: order.append(what))
+    hostile(fmu, "nothing").run(finished=lambda _outcome: order.append("written"))
+    assert order[0] == "written"
+    assert {"terminate", "free"} <= set(order)
+
+
 @pytest.mark.parametrize("deed", ["crashes-when-freed", "crashes-when-terminated"])
 def test_a_crash_at_the_end_loses_nothing(fmu: Path, tmp_path: Path, deed: str) -> None:
     error = told(start(fmu, tmp_path, deed))
-    assert "The results were written before" in error
+    assert f"The results were written before: {tmp_path / 'out'}" in error  # absolute, though it was not given so
     result = load_result(tmp_path / "out")
     assert (len(result.table), result.failure) == (51, None)
     assert not (tmp_path / "out" / ".unfinished").exists()
@@ -100,13 +122,59 @@ def test_a_call_past_its_limit_ends_the_run_in_words(fmu: Path, tmp_path: Path) 
     assert len(load_result(tmp_path / "out").table) == 25
 
 
-def test_ctrl_c_works_while_an_fmu_hangs(fmu: Path, tmp_path: Path) -> None:
-    process = start(fmu, tmp_path, "hangs")
+def test_a_limit_is_for_one_call_and_not_for_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As the watch looks: the same call three times 0.2 s, then others, then one that stays."""
+    page = LastCall(mmap.mmap(-1, PAGE))
+    monkeypatch.setattr(watch, "LAST_CALL", page)
+    page.limit(0.5)
+    ended: list[str] = []
+    looking = watch._Watch(0)
+    monkeypatch.setattr(looking, "_end", ended.append)
+    for now in [(1, 0.0)] * 3 + [(2, 0.0), (2, 0.1), (2, 0.2)] + [(0, 0.2)] * 4:
+        page.call[0], page.time[0] = now
+        looking._look(0.2)
+    assert ended == []
+    page.call[0] = 1
+    for _ in range(4):
+        looking._look(0.2)
+    assert ended == ["has not returned for 0.5 s, the limit that master.call_timeout sets"]
+
+
+def test_a_limit_holds_in_a_script_that_nobody_watches(monkeypatch: pytest.MonkeyPatch) -> None:
+    ended: list[str] = []
+    monkeypatch.setattr(sentinel, "_give_up", ended.append)
+    with sentinel.limited_calls(0.1):
+        for number in range(1, 6):
+            LAST_CALL.call[0] = number
+            time.sleep(0.05)
+        assert ended == []
+        time.sleep(0.3)
+    LAST_CALL.call[0] = 0
+    assert ended[0] == "has not returned for 0.1 s, the limit that master.call_timeout sets"
+
+
+@pytest.mark.parametrize("number", STOPPING[1:], ids=lambda n: n.name)
+def test_other_signals_do_what_ctrl_c_does_unless_they_are_ignored(number: signal.Signals) -> None:
+    before = signal.getsignal(number)
+    with pytest.raises(KeyboardInterrupt), ends_like_ctrl_c():
+        signal.raise_signal(number)
+    assert signal.getsignal(number) == before
+    signal.signal(number, signal.SIG_IGN)  # under nohup
+    try:
+        with ends_like_ctrl_c():
+            signal.raise_signal(number)
+    finally:
+        signal.signal(number, before)
+
+
+@pytest.mark.parametrize("number", STOPPING[1:], ids=lambda n: n.name)
+def test_ctrl_c_works_while_an_fmu_hangs(fmu: Path, tmp_path: Path, number: signal.Signals) -> None:
+    process = start(fmu, tmp_path, "hangs", stepper="python")
     block = tmp_path / "out" / ".unfinished" / "table.npy"
     while not block.exists() and process.poll() is None:
         time.sleep(0.05)
     time.sleep(0.5)
-    process.send_signal(signal.SIGTERM)
+    process.send_signal(number)
     assert "component 'bad' in doStep at t = 0.24 s does not return; the run was interrupted" in told(process)
     assert len(load_result(tmp_path / "out").table) == 25
 
@@ -146,10 +214,13 @@ def run_it(scenario: Scenario) -> Any:
     return scenario.run().failure
 
 
-def test_a_worker_tells_who_took_it_along(fmu: Path) -> None:
-    ((_, answer),) = in_processes(run_it, [hostile(fmu, "exits")], workers=1)
+@pytest.mark.parametrize(
+    ("deed", "words"), [("exits", ": its process ended with exit code 0"), ("hangs", " has not returned for 0.3 s")]
+)
+def test_a_worker_tells_who_took_it_along(fmu: Path, deed: str, words: str) -> None:
+    ((_, answer),) = in_processes(run_it, [hostile(fmu, deed, call_timeout=0.3)], workers=1)
     assert isinstance(answer, Died)
-    assert "component 'bad' in doStep at t = 0.24 s" in answer.reason
+    assert answer.reason.startswith(f"component 'bad' in doStep at t = 0.24 s{words}")
 
 
 def test_words_run_out_without_harm(tmp_path: Path) -> None:
@@ -177,6 +248,25 @@ def test_what_an_fmu_changes_for_all_is_put_back_and_told(
     assert 0.1 + 0.2 == 0.30000000000000004 and -0.1 - 0.2 == -0.30000000000000004  # noqa: PT018 - rounded to nearest
     warnings = load_result(tmp_path / "out").summary["warnings"]
     assert [w for w in warnings if w.startswith(f"bad: its steps change {what}")]
+
+
+@pytest.mark.skipif(not surroundings._has_mxcsr(), reason="x86-64 with glibc")
+def test_flushing_small_numbers_to_zero_is_put_back() -> None:
+    """Of the modes of floating-point numbers the one that no function of C tells."""
+    before, library = surroundings.Surroundings(), surroundings._library()
+    environment = (ctypes.c_uint32 * (surroundings.ENVIRONMENT_BYTES // 4))()
+    library.fegetenv(environment)
+    environment[surroundings.MXCSR_AT // 4] |= 0x8040
+    library.fesetenv(environment)
+    assert before.put_back() == [surroundings.FLOATS]
+    assert float("2.5e-308") / 4.0 > 0.0
+
+
+def test_it_is_put_back_while_the_run_goes_on(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    seen: list[Path] = []
+    hostile(fmu, "moves", stepper="python").set("stop", 1.0).run(progress=lambda *_: seen.append(Path.cwd()), warn=lambda _: None)
+    assert seen[-1] == tmp_path  # told before the run is over
 
 
 def test_escape_sequences_never_reach_the_terminal(fmu: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -217,14 +307,16 @@ def test_parts_of_steps_below_the_resolution_of_time_are_refused() -> None:
 def test_a_damaged_fmu_in_the_cache_is_built_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damage: bytes | None) -> None:
     monkeypatch.setattr(cache, "Draft", FakeDraft)
     monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path)
-    entry = cache.cache_entry(PLANTS["odometer"](), 2)
+    system, first_byte = PLANTS["odometer"](), 30 + len("modelDescription.xml")  # that of the compressed content
+    entry = cache.cache_entry(system, 2)
     assert entry.draft is not None
     entry.path.parent.mkdir(parents=True)
-    with zipfile.ZipFile(entry.path, "w") as archive:
+    with zipfile.ZipFile(entry.path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("modelDescription.xml", "words " * 100)
-    assert cache.cache_entry(PLANTS["odometer"](), 2).draft is None
+    assert cache.cache_entry(system, 2).draft is None
     whole = entry.path.read_bytes()
-    entry.path.write_bytes(whole[:60] + b"\xff" + whole[61:] if damage is None else damage)
+    entry.path.write_bytes(whole[:first_byte] + b"\xff" + whole[first_byte + 1 :] if damage is None else damage)
+    assert cache.cache_entry(system, 2).draft is not None
     assert cache.cache_entry(PLANTS["odometer"](), 2).draft is not None
 
 
@@ -234,9 +326,18 @@ class FakeDraft:
         return "to be built"
 
 
-def test_a_damaged_stepper_in_the_cache_is_built_again(tmp_path: Path) -> None:
+def test_a_damaged_stepper_in_the_cache_is_built_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    built: list[Path] = []
+
+    def compiled(_compiler: Any, folder: Path, _sources: Any, name: str) -> Path:
+        built.append(folder)
+        (folder / name).write_bytes(b"a library" * 1000)
+        return folder / name
+
+    monkeypatch.setattr(library, "compile_library", compiled)
     path = cached_library(find_compiler(), tmp_path)
-    content = path.read_bytes()
-    path.write_bytes(content[:5000])
-    assert cached_library(find_compiler(), tmp_path).read_bytes()[:4] == b"\x7fELF"
-    assert len(path.read_bytes()) == len(content)
+    assert cached_library(find_compiler(), tmp_path) == path
+    assert len(built) == 1
+    path.write_bytes(path.read_bytes()[:5000])
+    assert len(cached_library(find_compiler(), tmp_path).read_bytes()) == 9000
+    assert len(built) == 2

@@ -14,6 +14,7 @@ from fmu_observer import OBSERVERS
 from fmu_observer.certificates import ImpulsiveError, SampledError, certify_sampled_error
 from fmu_observer.certificates.aperiodic import MARGIN, common_decrease
 from fmu_observer.certificates.riccati_error import RiccatiError
+from fmu_observer.certificates.switching import SwitchingError
 from fmu_observer.observers.parameter_values import parameter_values
 from fmu_observer.observers.train.takagi_sugeno_cdo import TakagiSugenoCdo
 from plant_models.hybrid import Runtime
@@ -62,6 +63,17 @@ def test_no_changes_within_a_certified_gap_raise_the_lyapunov_function(
     for order in (vertices, vertices[::-1]):
         F = transition(order, [turn * gap for turn in turns], gap)
         assert np.linalg.eigvals(np.linalg.solve(P, F.T @ P @ F)).real.max() < 1.0
+
+
+@pytest.mark.parametrize("rate", [0.1, 1.0, 2.0])
+def test_the_growth_of_a_scalar_error_is_what_can_really_happen(rate: float) -> None:
+    """``de/dt = d(t) e``, d within the rate, a sample leaves half: at most ``(exp(2 rate h) - 1) / 4`` of V comes on top."""
+    vertices = [ImpulsiveError.of(np.array([[slope]]), np.array([[0.5]])) for slope in (rate, -rate)]
+    gaps = np.linspace(0.05, 1.0, 20)
+    found = SwitchingError.between(vertices).growth(np.eye(1), 1.0, gaps) * gaps
+    exact = 0.25 * np.expm1(2.0 * rate * gaps)
+    assert (found >= exact).all()
+    assert (found <= 1.03 * exact).all()
 
 
 def test_constant_equations_that_stand_up_alone_may_grow_where_they_take_turns() -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache, partial
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +15,7 @@ from observer_bench import Bench, SteadyMotion
 
 from fmu_observer import OBSERVERS
 from fmu_observer.observers.gated_observer import GatedObserver
-from fmu_observer.observers.innovation_gate import OFF, REJECT, WARN
+from fmu_observer.observers.innovation_gate import OFF, REJECT, WARN, GateMemory, Judgement, Told, judge
 from fmu_observer.observers.sampled import ExponentialGain, HeldInnovation, HybridImpulsive, OutputPredictor
 from fmu_observer.observers.train import SYSTEMS
 from plant_models.hybrid import NumpyKernel, Runtime, scalar_names
@@ -57,6 +59,57 @@ def run(bench: Bench, count: int, offsets: dict[int, float] | None = None) -> li
 
 def error(bench: Bench, off: float = 0.0) -> float:
     return abs(float(bench.runtime.x[0]) - MOTION.position(bench.runtime.t) - off)
+
+
+# -- the judgement alone ------------------------------------------------------------------------------------------------
+
+GATE = SimpleNamespace(gate=REJECT, gate_floor=0.5, gate_drift=0.05, gate_spread=3.0, gate_recover=3.0)
+SETTLED = GateMemory(*np.zeros(9))._replace(settled=3.0, recent=0.4, reference=60.0)
+LIMIT = 0.5 + 0.2 + 0.3 + 0.05 * 40.0 + 3.0 * 0.4
+"""Of `SETTLED` and `judged`: floor, accuracy, own bound, a share of the way since 60 m, and of the recent innovation [m]."""
+
+
+def judged(innovation: float, before: GateMemory = SETTLED, **told: Any) -> Judgement:
+    """The judgement on a position so far from an estimate of 100 m."""
+    return judge(before, Told(100.0 - innovation, 0.2, 100.0, 0.3, None, 1.0)._replace(**told), GATE)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_limit_is_the_sum_of_its_terms(sign: float) -> None:
+    for limit, told in ((LIMIT, {}), (LIMIT - 0.2, {"accuracy": -1.0}), (LIMIT - 0.3, {"bound": 0.0})):
+        assert [float(judged(sign * (limit + beyond), **told).used) for beyond in (-1e-9, 1e-9)] == [1.0, 0.0]
+
+
+def test_what_is_remembered_of_a_telegram() -> None:
+    """One within the limit, a larger one within it, one that is refused, one beyond it before the gate has settled."""
+    unsettled = SETTLED._replace(settled=2.0)
+    kept = [judged(0.1), judged(1.0), judged(50.0), judged(50.0, unsettled)]
+    assert [float(j.used) for j in kept] == [1.0, 1.0, 0.0, 1.0]
+    assert [float(j.memory.settled) for j in kept] == [4.0, 4.0, 3.0, 0.0]
+    assert [float(j.memory.recent) for j in kept] == [0.2, 1.0, 0.4, 50.0]  # halved, unless this one is larger
+    assert [float(j.memory.reference) for j in kept] == [99.9, 99.0, 60.0, 50.0]
+    assert [float(j.memory.doubted) for j in kept] == [0.0, 0.0, 1.0, 0.0]
+    assert [float(j.memory.verdict) for j in kept] == [USED, USED, IGNORED, USED]
+
+
+@pytest.mark.parametrize(("told", "count"), [
+    ({"estimate": 100.0, "position": 220.0, "odometer": 30.0}, 2.0),  # the way of the odometer, its mean of 10 and 30 m/s
+    ({"estimate": 100.0, "position": 220.0, "odometer": 10.0}, 1.0),
+    ({"estimate": 120.0, "position": 220.0, "odometer": 90.0}, 2.0),  # the way of the estimate
+    ({"estimate": 100.0, "position": 200.0, "odometer": 90.0}, 1.0),  # told twice
+    ({"estimate": 100.0, "position": 260.0, "odometer": 90.0}, 1.0),
+])  # fmt: skip
+def test_doubted_telegrams_agree_by_either_way(told: dict[str, float], count: float) -> None:
+    first = judged(-100.0, odometer=10.0).memory
+    second = judge(first, Told(told["position"], 0.2, told["estimate"], 0.3, told["odometer"], 2.0), GATE)
+    assert float(second.memory.doubted) == count
+    third = judge(first._replace(doubted=2.0), Told(told["position"], 0.2, told["estimate"], 0.3, told["odometer"], 2.0), GATE)
+    believed = count == 2.0
+    assert (float(third.restart), float(third.used)) == (believed, believed)
+    assert float(third.memory.doubted) == (0.0 if believed else count if told["position"] != 200.0 else 2.0)
+
+
+# -- in every observer --------------------------------------------------------------------------------------------------
 
 
 def test_every_observer_of_balises_has_the_gate() -> None:
@@ -152,9 +205,11 @@ def test_a_balise_that_does_not_act_is_not_judged() -> None:
     system = OBSERVERS["augmented_high_gain_cdo"]()
     bench = Bench(system, preset="gps", gate=REJECT)
     bench.set("u", {"effort": MOTION.effort(0.0), "odometer": MOTION.speed})
+    bench.set("x", {"gate_settled": 3.0})
     bench.runtime.start(0.0)
     before = float(bench.runtime.x[0])
     assert run(bench, 8, dict.fromkeys(range(8), 500.0)) == [USED] * 8
+    assert (bench.state("gate_settled"), bench.state("gate_doubted"), bench.state("gate_recent")) == (3.0, 0.0, 0.0)
     assert abs(float(bench.runtime.x[0]) - before) < 100.0
 
 
@@ -181,5 +236,6 @@ def _in_python(bench: Bench) -> Runtime:
 ])  # fmt: skip
 def test_a_gate_that_cannot_be_is_refused(name: str, value: float, expected: str) -> None:
     bench = Bench(OBSERVERS["differentiator_cdo"](), **{name: value})
-    with pytest.raises(ValueError, match=rf"differentiator_cdo: time cannot run with parameter {name} = .*{expected}"):
+    said = rf"differentiator_cdo: time cannot run with these parameters: {name} must be .*{expected}.* \({name} = {value}\)"
+    with pytest.raises(ValueError, match=said):
         bench.runtime.start(0.0)

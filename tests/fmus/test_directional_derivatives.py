@@ -66,7 +66,8 @@ def _point(system: HybridSystem, draw: Callable[[], float]) -> dict[str, float]:
     size = {"effort": 2.0e4, "force": 4.0, "wheel_rate": 20.0, "signal": 12.0}
     names = [*scalar_names(system.inputs), *scalar_names(system.states)[: system.continuous_count]]
     starts = {name: size.get(name, 9.0) * (1.0 + 0.05 * draw()) for name in names}
-    return starts | {name: 0.01 * (1.5 + draw()) for name in names if name.startswith(("filter_", "filtered_slip"))}
+    filtered = [name for name in names if name.startswith(("filter_", "filtered_slip"))]
+    return starts | {name: 0.015 + 0.004 * draw() for name in filtered}  # below the limit of 0.02 at which indicators switch
 
 
 def _values_at(one: Exchange, unknowns: list[str], values: dict[str, float], states: list[str]) -> np.ndarray:

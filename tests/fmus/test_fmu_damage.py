@@ -29,12 +29,12 @@ def tracker_words() -> dict[int, tuple[float, ...]]:
     periods = MEMORY + x + u + p
     offsets, ticks, resolved, active = periods + 1, periods + 2, periods + 3, periods + 4
     raised, seen, policy = active + 2, active + 4, active + 8
-    horizon, outcomes, queue_length, queue = policy + 1, policy + 2, policy + 7, policy + 8
+    horizon, outcomes, queue_length, queue = policy + 1, policy + 2, policy + 9, policy + 10
     return {
         T: NO_TIME, T0: NO_TIME, START: NO_TIME, STEP: (*NOT_POSITIVE, 1e300),
         periods: NOT_POSITIVE, offsets: (*NO_TIME, -1e300), ticks: NO_TICK, resolved: (nan, 0.5, 2.0, -1.0),
         active: (nan, 0.5, -1.0), raised: NO_COUNT, seen + 1: NO_COUNT,
-        policy: (*NO_TIME, 0.0, 4.0, 1.5), horizon: (*NO_TIME, -1.0), outcomes: NO_TICK, outcomes + 4: NO_TICK,
+        policy: (*NO_TIME, 0.0, 4.0, 1.5), horizon: (*NO_TIME, -1.0), outcomes: NO_TICK, outcomes + 6: NO_TICK,
         queue_length: (*NO_TIME, -1.0, 0.5, 65.0), queue: (nan, -1.0, 2.0, 0.5), queue + 1: NO_TIME,
     }  # fmt: skip
 

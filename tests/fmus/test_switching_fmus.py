@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 from exchange_importer import Exchange, Importer
+from fmpy.fmi1 import FMICallException
+
+from fmu_observer.block import make_block
+from plant_models.hybrid import HybridSystem, output_signal, parameter, state, vector
 
 pytestmark = pytest.mark.compiler
 
@@ -49,6 +54,68 @@ def test_zones_moved_a_little_change_little(component: Callable[..., Any], excha
             change = np.abs(after - before).max(axis=0)
             assert (change > 0.0).all()
             assert (change <= shift * SHARPEST + 1e-10).all(), (shift, change)  # the solver's own tolerance
+
+
+class Chattering(HybridSystem):
+    """Pushed back wherever it goes: its switch changes without end, beside a clock."""
+
+    name = "chattering"
+    states = (state("place", "m"), state("elapsed", "s"))
+    outputs = (output_signal("clock", "s"),)
+    parameters = (parameter("middle", "m", 0.1), parameter("left", "m", 0.0), parameter("right", "m", 0.2))
+    switchings = ("side",)
+    internal_step = 0.01
+
+    def switching(self, t: Any, x: Any, u: Any, p: Any) -> Any:
+        return x[:1] - p.middle
+
+    def requirements(self, p: Any) -> dict[str, Any]:
+        between = np.where(p.middle > p.left, np.where(p.middle < p.right, 1.0, 0.0), 0.0)
+        return {"middle must lie between left and right": between}
+
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
+        push = 50.0 - 100.0 * self.switches(t, x, u, p)[0]
+        return vector(push, 1.0 + 0.0 * push)
+
+    def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"clock": x[1]}
+
+
+def test_switches_that_chatter_do_not_stop_time(component: Callable[..., Any]) -> None:
+    made = component(Chattering(), 3)
+    made.initialize()
+    made.step(0.0, 0.1)
+    assert made.get("clock")[0] == pytest.approx(0.1, abs=1e-12)
+
+
+def test_what_parameters_must_fulfil_together_is_refused_with_their_values(component: Callable[..., Any]) -> None:
+    made = component(Chattering(), 3)
+    with pytest.raises(Exception, match="xitInitializationMode"):
+        made.initialize(middle=0.25)
+    said = "these parameters: middle must lie between left and right (middle = 0.25, left = 0, right = 0.20000000000000001)"
+    assert said in made.log[-1]
+
+
+def test_states_with_parameters_with_which_time_cannot_run_are_refused(component: Callable[..., Any]) -> None:
+    """In the FMU and in the block: the state is that of a run, but for one parameter."""
+    made, block = component(Chattering(), 3), make_block(Chattering(), 3)
+    made.initialize()
+    made.step(0.0, 0.1)
+    saved = made.save()
+    content = made.serialize(saved)
+    made.free(saved)
+    legal, broken = struct.pack("<3d", 0.1, 0.0, 0.2), struct.pack("<3d", 0.25, 0.0, 0.2)
+    assert content.count(legal) == 1
+    made.free(made.deserialize(content))
+    with pytest.raises(FMICallException):
+        made.deserialize(content.replace(legal, broken))
+    block.instantiate()
+    block.enterInitializationMode(startTime=0.0)
+    block.exitInitializationMode()
+    block.deserializeFMUState(block.serializeFMUState(block.getFMUState()))
+    block.instance.runtime.p[0] = 0.25
+    with pytest.raises(FMICallException, match="time cannot run on from this state"):
+        block.deserializeFMUState(block.serializeFMUState(block.getFMUState()))
 
 
 def test_zones_without_length_are_refused_in_words(component: Callable[..., Any], version: int) -> None:

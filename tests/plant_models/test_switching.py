@@ -14,7 +14,7 @@ from toy_systems import Booster, ImplicitBooster
 from train_runs import start
 
 from plant_models import Locomotive
-from plant_models.hybrid import HybridSystem, Runtime
+from plant_models.hybrid import HybridSystem, Runtime, state
 from plant_models.railway.vehicle import Train
 
 STOP, STEP, EFFORT = 3.0, 0.01, 80e3
@@ -98,6 +98,7 @@ def test_a_stretch_shorter_than_a_step_and_switches_that_coincide_are_not_missed
 class Chattering(Booster):
     """A body that is pushed back wherever it goes: its switch changes without end."""
 
+    states = (*Booster.states, state("elapsed", "s"))
     switchings = ("middle",)
 
     def switching(self, t: Any, x: Any, u: Any, p: Any) -> Any:
@@ -108,7 +109,7 @@ class Chattering(Booster):
 
     def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
         push = self._push(t, x, u, p)
-        return np.stack([push, push])
+        return np.stack([push, push, 1.0 + 0.0 * push])
 
 
 def test_switches_that_chatter_do_not_stop_time() -> None:
@@ -116,6 +117,7 @@ def test_switches_that_chatter_do_not_stop_time() -> None:
     runtime.advance(0.1)
     assert runtime.t == 0.1
     assert abs(runtime.x[0] - 0.1) < 0.6
+    assert runtime.x[2] == pytest.approx(0.1, abs=1e-12)  # what is left of a step after its last division is integrated too
 
 
 @pytest.mark.parametrize(

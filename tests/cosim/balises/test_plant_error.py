@@ -37,11 +37,15 @@ def off_and_told(outcome: Outcome) -> tuple[np.ndarray, np.ndarray]:
     return np.abs(np.array([e.stamp for e in events]) - true), np.array([e.time_bound for e in events])
 
 
+@pytest.fixture(scope="module", params=[2, 3])
+def fmu(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return adaptive_fmu(tmp_path_factory.mktemp("adaptive"), version=request.param)
+
+
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-6])
-@pytest.mark.parametrize("version", [2, 3])
-def test_a_plant_with_a_solver_is_off_by_less_than_told(tmp_path: Path, version: Any, tolerance: float, method: str) -> None:
-    outcome = ran(adaptive_fmu(tmp_path, version=version), method, tolerance=tolerance)
+def test_a_plant_with_a_solver_is_off_by_less_than_told(fmu: Path, tolerance: float, method: str) -> None:
+    outcome = ran(fmu, method, tolerance=tolerance)
     off, told = off_and_told(outcome)
     assert np.all(off <= told)
     assert np.median(told) <= 200.0 * tolerance + 1e-2 * (method == "interpolate")  # and it is no bound that says nothing

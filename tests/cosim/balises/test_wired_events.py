@@ -30,7 +30,7 @@ def wired(fields: tuple[str, ...] = FIELDS, **balises: Any) -> Scenario:
     scenario.connect(
         "driver.effort -> locomotive.effort, observer.effort",
         "locomotive.wheel_speed -> odometer.wheel_speed",
-        "odometer.reading -> driver.odometer, observer.odometer",
+        "odometer.reading -> observer.odometer",  # no loop, in which what is held would depend on the other connections
         "locomotive.position -> reader.position",
         "locomotive.speed -> reader.speed",
         *(f"reader.balise_{field} -> observer.balise_{field}" for field in fields),
@@ -45,7 +45,7 @@ def run(scenario: Scenario) -> Outcome:
 
 
 def test_the_wiring_that_other_masters_need_runs_here() -> None:
-    ours, theirs = run(small().balises(**LAYOUT, method="interpolate")), run(wired())
+    ours, theirs = run(wired((), **LAYOUT, method="interpolate")), run(wired())
     assert theirs["reader.balise_count"][-1] == 3.0
     stamps = [event.stamp for event in ours.result.events]
     np.testing.assert_allclose(np.unique(theirs["reader.balise_time"])[1:], stamps, rtol=0.0, atol=1e-12)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,7 @@ from zoo.events import hostile_fmu
 
 from cosim import Scenario
 from cosim.components.elf import read_linkage
+from cosim.components.shared_libraries import _own_needs
 from cosim.errors import CosimError
 from fmus.toolchain.compile import find_compiler
 
@@ -48,6 +50,22 @@ def test_the_names_are_read_from_the_file(tmp_path: Path) -> None:
 def test_different_libraries_of_one_name_are_refused(tmp_path: Path) -> None:
     with pytest.raises(CosimError, match=r"part1: .*bringer1\.fmu and .*bringer0\.fmu each bring a library libtwo_kinds\.so"):
         pair(tmp_path, "libtwo_kinds.so", 1, 2).run()
+
+
+def test_a_library_that_the_program_has_loaded_is_nobodys(tmp_path: Path) -> None:
+    ctypes.CDLL(str(helper(tmp_path / "program", 5, "libof_the_program.so")))
+    assert pair(tmp_path, "libof_the_program.so", 1).run().failure is None
+
+
+def test_what_an_fmu_brings_is_found_by_its_soname_and_through_others(tmp_path: Path) -> None:
+    """The library asks for one of another file name, and that one for a third; libc is nobody's."""
+    last = helper(tmp_path / "fmu", 1, "liblast.so.1")
+    compiler, own = list(find_compiler().command), tmp_path / "fmu"
+    for name, needed in (("libmiddle.so.2", last), ("main.so", own / "libmiddle.so.2")):
+        flags = ["-shared", "-fPIC", "-Wl,--no-as-needed", "-Wl,--allow-shlib-undefined", f"-Wl,-soname,{name}"]
+        subprocess.run([*compiler, *flags, str(own / "helper.c"), str(needed), "-o", str(own / name)], check=True)
+    renamed = last.rename(own / "last.so")
+    assert _own_needs(own / "main.so") == {"libmiddle.so.2": own / "libmiddle.so.2", "liblast.so.1": renamed}
 
 
 def test_one_library_may_come_twice(tmp_path: Path) -> None:
