@@ -80,17 +80,18 @@ static bool called_step(Program *program, const Slave *slave, double t, double h
     return false;
 }
 
-static void about_to(const Program *program, int64_t which, int64_t what) {
-    *program->last_call = program->slaves[which].numbers + what;
+static void about_to(const Program *program, const Slave *slave, int64_t what) {
+    *program->last_call = slave->numbers + what;
 }
 
 /* True where the step was taken as asked and nothing is to be seen to. */
 static bool do_step(Program *program, int64_t which, double t, double h) {
-    about_to(program, which, LAST_STEP);
-    bool ordinary = called_step(program, &program->slaves[which], t, h);
+    const Slave *slave = &program->slaves[which];
+    about_to(program, slave, LAST_STEP);
+    bool ordinary = called_step(program, slave, t, h);
     if (program->journal.on) {
         Note *made = note(program, which, CALL_STEP, 0); /* nothing said: as far as it was asked to go */
-        if (!ordinary && program->slaves[which].fmi_version == 3) {
+        if (!ordinary && slave->fmi_version == 3) {
             made->flags[0] = program->event;
             made->flags[1] = program->terminate;
             made->flags[2] = program->early;
@@ -217,7 +218,7 @@ static bool send_inputs(Program *program, int64_t which) {
     for (int64_t i = 0; i < slave->write_count; i++) /* first of all, so that a refused value touches nothing */
         if (slave->writes[i].places != NULL && !pack(&slave->writes[i]))
             return stopped(program, STOP_REFUSED, which, i);
-    about_to(program, which, LAST_WRITE);
+    about_to(program, slave, LAST_WRITE);
     for (int64_t i = 0; i < slave->write_count; i++) {
         program->status = transfer(slave, &slave->writes[i]);
         if (program->journal.on)
@@ -230,7 +231,7 @@ static bool send_inputs(Program *program, int64_t which) {
 
 static bool read_outputs(Program *program, int64_t which) {
     const Slave *slave = &program->slaves[which];
-    about_to(program, which, LAST_READ);
+    about_to(program, slave, LAST_READ);
     for (int64_t i = 0; i < slave->read_count; i++) {
         program->status = transfer(slave, &slave->reads[i]);
         if (program->journal.on)

@@ -71,7 +71,7 @@ static bool tell_stage(Program *program, int64_t which, Telegram *telegram, cons
     const uint32_t clock = (uint32_t)telegram->clock;
     const bool on = true, arrives = times[1] > times[0], goes_on = times[2] > times[1];
     void *instance = program->slaves[which].instance;
-    about_to(program, which, LAST_EVENT);
+    about_to(program, &program->slaves[which], LAST_EVENT);
     switch (stage) {
     case STAGE_SEND: return send_inputs(program, which);
     case STAGE_ARRIVE: return !arrives || simple_move(program, which, times[0], times[1] - times[0]);

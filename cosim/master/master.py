@@ -81,7 +81,7 @@ class Master:
         self._progress = progress
         self._all_finite = make_finite_check(plan.values)
         self.stepper = Choice(stepper)
-        self.between_steps: Callable[[], None] = _nothing_to_do
+        self.between_steps: Callable[[], None] | None = None
 
     def choose_stepper(self) -> None:
         """Choose who executes the plan; `run` does so where nobody did before. After it no component may be instantiated anew.
@@ -125,7 +125,8 @@ class Master:
         axis, compiled = self.axis, self.stepper.compiled
         k = 0
         while k < axis.count:
-            self.between_steps()
+            if self.between_steps is not None:
+                self.between_steps()
             step: Callable[[], Sequence[Row]] | None = partial(self.control.step, axis[k], axis[k + 1])
             if compiled is not None:
                 stretch = compiled.run(k, self.recorder)
@@ -200,9 +201,6 @@ class Master:
         name, value = self.plan.signals[bad].name, self.plan.values[bad]
         component = name.partition(".")[0]
         raise RunError(f"Component '{component}' at t = {t:g} s: output {name} is {value}; the run ends here.", component, t)
-
-
-def _nothing_to_do() -> None: ...
 
 
 def close(plan: Plan) -> None:

@@ -32,11 +32,10 @@ static double until_switch(Runtime *runtime, double t, double h) {
     return after;
 }
 
-PRIVATE void switching_step(Runtime *runtime, double t, double h) {
-    if (model.step == NULL)
-        return;
+/* A step on which a switch changes, as was just tried: in parts that end where one does. */
+static void divided_step(Runtime *runtime, double t, double h) {
     double end = t + h;
-    for (int i = 0; attempt(runtime, t, h) && i < MOST_SWITCHES; i++) {
+    for (int i = 0; i < MOST_SWITCHES; i++) {
         h = until_switch(runtime, t, h);
         attempt(runtime, t, h);
         accept_step(runtime);
@@ -44,6 +43,17 @@ PRIVATE void switching_step(Runtime *runtime, double t, double h) {
         h = end - t;
         if (h <= 0.0)
             return;
+        if (!attempt(runtime, t, h))
+            break;
     }
     accept_step(runtime);
+}
+
+PRIVATE void switching_step(Runtime *runtime, double t, double h) {
+    if (model.step == NULL)
+        return;
+    if (attempt(runtime, t, h))
+        divided_step(runtime, t, h);
+    else
+        accept_step(runtime);
 }

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from railway_runs import NO_ZONES, started
 from toy_systems import Clockwork, Hyperbola, Slider
 
+from fmu_observer.observers.parameter_values import parameter_values
 from plant_models import Locomotive, Odometer
 from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, state, vector
 from plant_models.interop import OperatingPointError, left_out, operating_point, to_nonlinear_io, to_state_space
@@ -219,3 +220,17 @@ def test_a_train_that_nothing_drives_has_no_equilibrium_at_speed() -> None:
             TRAIN, {"train_speed": 10.0, "wheel_rate": 10.0 / RADIUS}, parameters={"gradient[1]": 0.9},
             hold=("train_position", "train_speed"), drift=("train_position",), find=("effort",),
         )  # fmt: skip
+
+
+@pytest.mark.parametrize("t", [5.0, 15.0])
+def test_a_plant_with_switchings_is_linearised_on_the_side_where_it_is(t: float) -> None:
+    """At 15 s the rail is degraded (a zone from 10 to 20 s): the slope of the adhesion is that of central differences there."""
+    train, zones = Locomotive(), {"zone_from[1]": 10.0, "zone_to[1]": 20.0}
+    x = np.array([0.0, 10.0, 10.05])
+    A = to_state_space(train, x, parameters=zones, t=t).A
+    p = parameter_values(train, zones)
+    u = np.zeros(len(train.start_inputs()))
+    rate = lambda state: np.ravel(np.asarray(train.state_derivative(t, state, u, p), dtype=float))  # noqa: E731
+    step = 1e-6
+    numeric = np.stack([(rate(x + step * e) - rate(x - step * e)) / (2.0 * step) for e in np.eye(3)], axis=1)
+    assert A[:3, :3] == pytest.approx(numeric, rel=1e-5, abs=1e-6)
