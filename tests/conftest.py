@@ -37,13 +37,13 @@ def quick_builds(request: pytest.FixtureRequest) -> Iterator[None]:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark the second tier as slow; where whole files are collected, a line that fits none of their tests is an error."""
+    """Mark the second tier as slow, and what opens a browser. In whole files a line that fits none of the tests is an error."""
     lines = second_tier()
     used = set()
     for item in items:
         fitting = [beginning for beginning in lines if item.nodeid.startswith(beginning)]
         used |= set(fitting)
-        if fitting and lines[max(fitting, key=len)]:
+        if (fitting and lines[max(fitting, key=len)]) or item.get_closest_marker("browser"):
             item.add_marker(pytest.mark.slow)
     files = {item.nodeid.partition("::")[0] for item in items}
     idle = [line for line in lines if line not in used and line.partition("::")[0] in files]

@@ -101,8 +101,9 @@ def test_a_state_with_dry_friction_has_an_event_indicator(version: Any) -> None:
     description = describe(locomotive, version)
     names = [v.name for v in referenced(description.modelVariables, table.indicators, 2)]
     assert names == ["event_indicator.train_speed", "event_indicator.wheel_rate"]
-    assert [u.variable.name for u in description.eventIndicators] == names
-    assert description.numberOfEventIndicators == 2
+    switches = [f"event_indicator.{name}" for name in locomotive.switchings]
+    assert [u.variable.name for u in description.eventIndicators] == [*names, *switches]
+    assert description.numberOfEventIndicators == 2 + len(switches)
 
 
 def test_counts_can_announce_events_in_fmi_3() -> None:

@@ -22,7 +22,11 @@ def test_a_frozen_premise_keeps_the_odometer_of_the_last_balise() -> None:
 @pytest.mark.parametrize(("premise", "expected"), [("live", (50.0 - 30.0) / 45.0), ("estimated", (50.0 - 20.0) / 45.0)])
 def test_live_and_estimated_premises_follow_their_source(premise: str, expected: float) -> None:
     observer = TakagiSugenoCdo(premise=premise)  # type: ignore[arg-type]
-    x, u, p = np.array([0.0, 20.0, 0.0, 0.0]), observer.unpack_inputs(np.array([0.0, 30.0, 0.0])), observer.start_parameters()
+    x, u, p = (
+        np.array([0.0, 20.0, 0.0, 0.0]),
+        observer.unpack_inputs(np.array([0.0, 30.0, 0.0, 0.0])),
+        observer.start_parameters(),
+    )
     assert observer.vertex_weight(x, u, observer.unpack_parameters(p)) == pytest.approx(expected, abs=1e-15)
     assert "vertex_weight" not in [s.name for s in observer.states]
 

@@ -30,9 +30,9 @@ TRAIN = {"n_axles": 4.0, "davis_b": 32.0, "davis_c": 1.7}
 MODELS: dict[str, tuple[str, str | None, dict[str, float]]] = {
     "train": ("locomotive", PLANT_PRESET, {}),
     "odometer": ("odometer", None, {}),
-    "driver": ("driver", None, {}),
     "reader": ("balise_reader", None, {"first_balise": SPACING, "balise_spacing": SPACING}),
     "observer": ("takagi_sugeno_cdo", None, TRAIN),
+    "driver": ("driver", None, {}),  # last: train and observer are given the same effort, that of the start of the step
 }
 LINKS = (
     ("driver.effort", "train.effort"),
@@ -268,8 +268,8 @@ def _halved(plant: Runtime, before: Any, low: float, high: float, place: float) 
 
 
 def exact_observer(table: np.ndarray, instants: np.ndarray, lag: int) -> dict[str, np.ndarray]:
-    """The observer told of each passing at its own instant, with the recorded inputs: of the end of each step, or, with a `lag`
-    of 1, of its start. Position [m] and speed [m/s] at the rows."""
+    """The observer told of each passing at its own instant, with the recorded inputs: the effort of the start of each step, which
+    the train was given too, and the odometer of its end, or, with a `lag` of 1, of its start. Position [m] and speed [m/s]."""
     system = OBSERVERS["takagi_sugeno_cdo"]()
     observer = _runtime(system, None, **TRAIN)
     names = scalar_names(system.input_signals)
@@ -280,7 +280,7 @@ def exact_observer(table: np.ndarray, instants: np.ndarray, lag: int) -> dict[st
     rows[0] = observer.update_outputs()[columns]
     for k in range(len(table) - 1):
         row = k + 1 - lag
-        observer.u[[effort, odometer]] = table["driver.effort"][row], table["odometer.reading"][row]
+        observer.u[[effort, odometer]] = table["driver.effort"][k], table["odometer.reading"][row]
         while told < len(instants) and instants[told] <= (k + 1) * STEP:
             observer.advance(float(instants[told]))
             observer.u[place] = SPACING * (told + 1)

@@ -57,17 +57,27 @@ def _counting(name: str, folder: Path) -> Path:
     return build_fmu(recipe(name), folder.with_suffix(".fmu"), 3, protocol=EventProtocol("counts"))
 
 
-def wire(model: Callable[..., Unpacked], face: str, observers: dict[str, tuple[str, dict[str, float]]]) -> Wiring:
-    """Train, odometer, driver, reader, and observers by name: model and parameters. The order is that of the package's master."""
+def with_driver(w: Wiring, model: Callable[..., Unpacked], version: int) -> Wiring:
+    """The driver comes last: train and observers are given the same effort, that of the start of the step."""
+    w.slave("driver", model("driver", version))
+    return w.connect("driver.effort -> train.effort", "odometer.reading -> driver.odometer")
+
+
+def wire(
+    model: Callable[..., Unpacked], face: str, observers: dict[str, tuple[str, dict[str, float]]], driver: bool = True
+) -> Wiring:
+    """Train, odometer, reader, observers by name (model and parameters) and driver."""
     version, announcement = FACES[face]
     w = Wiring()
     w.slave("train", model("locomotive", version, preset="chapter_3_four_axles"))
-    w.slave("odometer", model("odometer", version)).slave("driver", model("driver", version))
+    w.slave("odometer", model("odometer", version))
     w.slave("reader", model("balise_reader", version), first_balise=5.0, balise_spacing=5.0)
-    w.connect("driver.effort -> train.effort", "train.wheel_speed -> odometer.wheel_speed")
-    w.connect("odometer.reading -> driver.odometer", "train.position -> reader.position", "train.speed -> reader.speed")
     for name, (kind, values) in observers.items():
         w.slave(name, model(kind, version, announcement), version == 3 and announcement == "clocks", **values)
+    if driver:
+        with_driver(w, model, version)
+    w.connect("train.wheel_speed -> odometer.wheel_speed", "train.position -> reader.position", "train.speed -> reader.speed")
+    for name in observers:
         w.connect(f"driver.effort -> {name}.effort", f"odometer.reading -> {name}.odometer")
         payload = {f"{name}.balise_{x}": f"reader.balise_{x}" for x in ("time", "position")}
         if announcement == "clocks":
@@ -184,9 +194,9 @@ def test_a_thread_each_gives_the_same_bytes(loop: Path, model: Callable[..., Unp
 def test_versions_may_be_mixed(loop: Path, model: Callable[..., Unpacked], tmp_path: Path) -> None:
     """The plant as FMI 2, the observer as FMI 3 with clocks: the same numbers, which are those of the one runtime."""
     pure = carried_out(loop, wire(model, "fmi2", S2), tmp_path, "pure", 2500)
-    mixed = wire(model, "fmi2", {})
+    mixed = wire(model, "fmi2", {}, driver=False)
     mixed.slave("observer", model("takagi_sugeno_cdo", 3), True, **TRAIN)
-    mixed.connect("driver.effort -> observer.effort", "odometer.reading -> observer.odometer")
+    with_driver(mixed, model, 2).connect("driver.effort -> observer.effort", "odometer.reading -> observer.odometer")
     payload = {f"observer.balise_{x}": f"reader.balise_{x}" for x in ("time", "position")}
     mixed.event("reader.balise_count", "observer.balise", payload).record(*OBSERVED)
     table = carried_out(loop, mixed, tmp_path, "mixed", 2500)

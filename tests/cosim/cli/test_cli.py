@@ -19,7 +19,7 @@ from cosim.results.folder import read_results
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every scenario name stands for the small one."""
-    monkeypatch.setattr(Scenario, "load", classmethod(lambda _cls, _name: small(title="Small run")))
+    monkeypatch.setattr(Scenario, "load", classmethod(lambda _cls, _name, **_: small(title="Small run")))
 
 
 @pytest.mark.usefixtures("quick")
@@ -55,7 +55,7 @@ def test_run_as_json_is_one_document(tmp_path: Path, capsys: pytest.CaptureFixtu
 def test_seeds_add_quartiles_to_print_and_report(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def load(_cls: type, _name: str) -> Scenario:
+    def load(_cls: type, _name: str, **_: bool) -> Scenario:
         scenario = small().report(phases=[{"name": "all", "start": 0.0, "end": 0.5}], published={"observer": {"all": 0.5}})
         return scenario.set("balises.layout", "aperiodic").set("balises.max_gap", 0.2)
 

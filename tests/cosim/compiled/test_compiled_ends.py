@@ -133,7 +133,7 @@ def test_the_library_is_compiled_once(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.setattr(library, "compile_library", never)
     assert library.cached_library(compiler, tmp_path) == path
     assert path.stat().st_mtime_ns == before
-    assert sorted(p.name for p in path.parent.iterdir()) == [path.name]
+    assert sorted(p.name for p in path.parent.iterdir()) == [f"{path.stem}.sha256", path.name]
 
 
 def test_progress_is_told_up_to_the_end(tmp_path: Path) -> None:

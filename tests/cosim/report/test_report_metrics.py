@@ -135,7 +135,7 @@ def test_telegrams_are_counted_by_kind_and_outcome() -> None:
         BaliseRecord(0.5, 3.0, "d", 0, 0, outcomes={"x": "replayed", "y": "late"}),
     )
     counts = count_events(events)
-    assert (counts.told, counts.missed, counts.false) == (3, 1, 1)
+    assert (counts.delivered, counts.missed, counts.false) == (3, 1, 1)
     assert counts.outcomes == {"x": {"accepted": 1, "rejected": 1, "replayed": 1}, "y": {"rejected": 2, "late": 1}}
     assert accepted_stamps(events) == [0.5, 1.0]
     assert accepted_stamps(events, "y") == [0.5]
