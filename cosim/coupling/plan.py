@@ -179,7 +179,7 @@ class Plan:
     held: Set[Signal] = frozenset()
 
     def __post_init__(self) -> None:
-        self._now, self._start = memoryview(self.values), memoryview(self.start)  # copied three times faster than as arrays
+        self._now, self._start = self.values.data, self.start.data  # copied three times faster than as arrays
         self._more_to_begin = len(self.untouched) > 0
 
     def hold(self, signals: Set[Signal]) -> None:
