@@ -111,7 +111,7 @@ def _gatherer(
     if not len(sources):
         return _nothing
     take = values.take
-    now, target = values.data, memoryview(buffer)
+    now, target = values.data, buffer.data
     pairs = list(enumerate(sources.tolist()))
 
     def gather_few() -> None:
