@@ -85,7 +85,8 @@ def test_events_are_told_as_the_version_of_fmi_does() -> None:
     counted, clocked = (text_of(documentation(recipe("takagi_sugeno_cdo"), version)["index.html"]) for version in (2, 3))
     assert "raise balise_count by one" in counted
     assert "triggered input clock balise" not in counted
-    assert "The triggered input clock balise: enter event mode, set the clock and balise_position, balise_time" in clocked
+    assert "The triggered input clock balise: enter event mode, set the clock and balise_position, " in clocked
+    assert "balise_location_accuracy, balise_time" in clocked
     assert "balise_count" not in clocked
     assert "every sample_period" in text_of(documentation(recipe("odometer"), 3)["index.html"])
 
