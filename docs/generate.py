@@ -1,7 +1,7 @@
 """Writes the generated parts of README.md and of these pages, and the README's picture: ``python docs/generate.py``.
 
-A generated part stands between ``<!-- generated: NAME -->`` and ``<!-- end -->``. The tests compare the parts with what this
-script would write, so that no table can drift from the code. It touches README.md, ``docs/*.md`` and the
+A generated part stands between ``<!-- generated: NAME -->`` and ``<!-- end -->``. The tests compare the parts with what
+this script would write, so that no table can drift from the code. It touches README.md, ``docs/*.md`` and the
 picture only.
 """
 
@@ -106,7 +106,8 @@ NUMBERS = {"S1": "differentiator_cdo", "S2": "takagi_sugeno_cdo", "S4": "multira
 def certificate_table() -> str:
     """Shipped observers and presets with their source and their certified gaps, default parameters."""
     rows = [
-        "| | observer | what it is | Bouchama 2024 | preset | mixed gaps certified up to | constant gap unstable from |",
+        "| | observer | what it is | Bouchama 2024 | preset | mixed gaps certified up to | constant gap unstable from "
+        "|",
         "|---|---|---|---|---|---|---|",
     ]
     for number, name in NUMBERS.items():
@@ -115,9 +116,14 @@ def certificate_table() -> str:
         for preset in list(system.presets) or [None]:
             certificate = system.certify(0.1, preset=preset)
             mixed, constant = certificate.aperiodic_limit, certificate.constant_limit
-            limits = [f"{mixed:.3g} s" if isfinite(mixed) else "any gap", f"{constant:.3g} s" if isfinite(constant) else "none"]
+            limits = [
+                f"{mixed:.3g} s" if isfinite(mixed) else "any gap",
+                f"{constant:.3g} s" if isfinite(constant) else "none",
+            ]
             preset_cell = _preset(system, preset)
-            rows.append(f"| {number} | `{name}` | {system.description} | {source} | {preset_cell} | {limits[0]} | {limits[1]} |")
+            rows.append(
+                f"| {number} | `{name}` | {system.description} | {source} | {preset_cell} | {limits[0]} | {limits[1]} |"
+            )
     return "\n".join([*rows, ""])
 
 
@@ -136,12 +142,16 @@ def schema_page(table: str) -> Callable[[], str]:
 
 
 def key_table(table: str) -> str:
-    """Keys of one table of the schema, types and defaults from the code, units and meanings from ``scenario_keys.toml``.
+    """Keys of one table of the schema, types and defaults from the code, units and meanings from
+    ``scenario_keys.toml``.
 
     Raises:
         ValueError: the code has a key without words, or there are words without a key.
     """
-    model, words = (schema_tables() | expectation_tables())[table], tomllib.loads(WORDS.read_text(encoding="utf-8"))[table]
+    model, words = (
+        (schema_tables() | expectation_tables())[table],
+        tomllib.loads(WORDS.read_text(encoding="utf-8"))[table],
+    )
     fields: Mapping[str, FieldInfo] = {info.alias or name: info for name, info in model.model_fields.items()}
     if set(fields) != set(words):
         bare, extra = sorted(set(fields) - set(words)), sorted(set(words) - set(fields))

@@ -46,10 +46,11 @@ LOG_CATEGORIES = {
 }
 
 FIRST_REFERENCE = 1
-"""Value references count from here in the order of the variables: each is the index of its variable as well, as FMI 2 counts.
+"""Value references count from here in the order of the variables: each is the index of its variable as well, as FMI 2
+counts.
 
-OMSimulator takes the dependencies of FMI 3, which are value references, for such indices, and does not load an FMU whose
-references are none.
+OMSimulator takes the dependencies of FMI 3, which are value references, for such indices, and does not load an FMU
+whose references are none.
 """
 
 VERSION_STRINGS = {2: "2.0", 3: "3.0"}
@@ -58,8 +59,18 @@ DISPLAY_UNITS = {"m/s": "km/h"}
 """Units to show at the user's edge where a signal names none."""
 
 TOKEN_ATTRIBUTES = (
-    "name", "valueReference", "type", "causality", "variability", "initial", "start", "min", "max", "unit", "displayUnit",
-)  # fmt: skip
+    "name",
+    "valueReference",
+    "type",
+    "causality",
+    "variability",
+    "initial",
+    "start",
+    "min",
+    "max",
+    "unit",
+    "displayUnit",
+)
 
 
 @dataclass(frozen=True)
@@ -74,7 +85,8 @@ class VariableTable:
         protocol: first of `late_policy` and `replay_horizon`; both are missing where there is no triggered event.
         outcomes: first of the counts of what became of events, see `OUTCOME_VARIABLES`; missing there too.
         derivatives: first of the derivatives of the continuous states.
-        indicators: first of the event indicators: one for each state with dry friction, then one for each switching function.
+        indicators: first of the event indicators: one for each state with dry friction, then one for each switching
+        function.
         end: first value reference that is not used.
     """
 
@@ -94,7 +106,13 @@ class VariableTable:
     def of(cls, system: HybridSystem) -> VariableTable:
         """The table of a system, the same for FMI 2 and FMI 3."""
         triggered = len(system.triggered_events)
-        counts = [1, width(exposed_inputs(system)), width(system.outputs), system.state_count, width(system.parameter_signals)]
+        counts = [
+            1,
+            width(exposed_inputs(system)),
+            width(system.outputs),
+            system.state_count,
+            width(system.parameter_signals),
+        ]
         counts += [2 * triggered, *((2, len(OUTCOME_VARIABLES)) if triggered else (0, 0))]
         counts += [system.continuous_count, len(system.frictions) + len(system.switchings)]
         return cls(*(FIRST_REFERENCE + sum(counts[:i]) for i in range(len(counts) + 1)))
@@ -111,9 +129,14 @@ def exposed_inputs(system: HybridSystem) -> tuple[Signal, ...]:
 
 
 def describe(
-    system: HybridSystem, fmi_version: FmiVersion, *, preset: str | None = None, model_name: str | None = None,
-    protocol: EventProtocol | None = None, model_exchange: bool = False,
-) -> ModelDescription:  # fmt: skip
+    system: HybridSystem,
+    fmi_version: FmiVersion,
+    *,
+    preset: str | None = None,
+    model_name: str | None = None,
+    protocol: EventProtocol | None = None,
+    model_exchange: bool = False,
+) -> ModelDescription:
     """The model description of a system as a co-simulation FMU.
 
     Args:
@@ -122,7 +145,8 @@ def describe(
         preset: preset whose values become the start values; None for the system's default.
         model_name: name to show; None for the system's own.
         protocol: how it is told of triggered events; by default as is usual in the FMI version.
-        model_exchange: whether it is a model exchange FMU as well; only a traceable system without communication events can be.
+        model_exchange: whether it is a model exchange FMU as well; only a traceable system without communication events
+        can be.
 
     Raises:
         ValueError: the preset or the version of FMI is unknown, or the protocol is none of this version.
@@ -131,7 +155,8 @@ def describe(
         raise ValueError(f"{system.name}: FMI version {fmi_version!r} is unknown; use 2 or 3.")
     protocol = protocol or EventProtocol()
     variables = _variables(system, fmi_version, preset, protocol)
-    experiment = DefaultExperiment(startTime="0.0", stopTime="10.0", stepSize="0.01")  # text, as fmpy reads it from a file
+    # text, as fmpy reads it from a file
+    experiment = DefaultExperiment(startTime="0.0", stopTime="10.0", stepSize="0.01")
     description = ModelDescription(
         fmiVersion=VERSION_STRINGS[fmi_version],
         modelName=model_name or system.name,
@@ -149,9 +174,12 @@ def describe(
     table = VariableTable.of(system)
     outputs = _unknowns(system, variables, "output", table.outputs, width(system.outputs))
     derivatives = _unknowns(system, variables, "derivative", table.derivatives, system.continuous_count)
-    # A master that is told nothing of these takes each to depend on every input, and sees algebraic loops where there are none.
+    # A master that is told nothing of these takes each to depend on every input, and sees algebraic loops where there
+    # are none.
     description.initialUnknowns = [*outputs, *derivatives]
-    description.outputs, description.derivatives = ([_running(system, u) for u in group] for group in (outputs, derivatives))
+    description.outputs, description.derivatives = (
+        [_running(system, u) for u in group] for group in (outputs, derivatives)
+    )
     indicators = referenced(variables, table.indicators, len(system.frictions) + len(system.switchings))
     description.eventIndicators = [Unknown(index=v.valueReference, variable=v) for v in indicators]
     description.numberOfContinuousStates, description.numberOfEventIndicators = system.continuous_count, len(indicators)
@@ -160,7 +188,9 @@ def describe(
 
 
 def can_exchange(system: HybridSystem) -> bool:
-    """Whether a system can be a model exchange FMU: its equations can be traced, and no master's steps are part of them."""
+    """Whether a system can be a model exchange FMU: its equations can be traced, and no master's steps are part of
+    them.
+    """
     return system.traceable and not system.communication_events
 
 
@@ -185,7 +215,9 @@ def _late_policy_type() -> SimpleType:
         "late": "Jump when told; for comparison only",
     }
     items = [Item(name=name, value=str(i + 1), description=texts[name]) for i, name in enumerate(LATE_POLICIES)]
-    return SimpleType(name=LATE_POLICY_TYPE, type="Enumeration", description="What to do with a late event", items=items)
+    return SimpleType(
+        name=LATE_POLICY_TYPE, type="Enumeration", description="What to do with a late event", items=items
+    )
 
 
 def _co_simulation(system: HybridSystem, counts_events: bool) -> CoSimulation:
@@ -200,7 +232,9 @@ def _co_simulation(system: HybridSystem, counts_events: bool) -> CoSimulation:
     )
 
 
-def _variables(system: HybridSystem, fmi_version: FmiVersion, preset: str | None, protocol: EventProtocol) -> list[ModelVariable]:
+def _variables(
+    system: HybridSystem, fmi_version: FmiVersion, preset: str | None, protocol: EventProtocol
+) -> list[ModelVariable]:
     table = VariableTable.of(system)
     real = "Real" if fmi_version == 2 else "Float64"
     starts = _start_values(system, preset)
@@ -229,14 +263,18 @@ def _signal_variable(signal: Signal, name: str, reference: int, real: str, start
     start = None if signal.causality == "output" else starts[name]
     kind = real if not signal.integer else ("Integer" if real == "Real" else "Int32")
     unit = None if signal.integer else signal.unit
-    variable = _variable(name, reference, kind, signal.causality, signal.variability, initial, unit, start, signal.description)
+    variable = _variable(
+        name, reference, kind, signal.causality, signal.variability, initial, unit, start, signal.description
+    )
     variable.displayUnit = signal.display_unit or DISPLAY_UNITS.get(signal.unit)
     variable.min = None if signal.min is None else repr(float(signal.min))
     variable.max = None if signal.max is None else repr(float(signal.max))
     return variable
 
 
-def _event_variables(event: TriggeredEvent, reference: int, fmi_version: FmiVersion, counts_events: bool) -> list[ModelVariable]:
+def _event_variables(
+    event: TriggeredEvent, reference: int, fmi_version: FmiVersion, counts_events: bool
+) -> list[ModelVariable]:
     what = event.description or f"event {event.name}"
     stamp_text = f"Instant of the {event.name}; start value: at the current time"
     real, integer = ("Real", "Integer") if fmi_version == 2 else ("Float64", "Int32")
@@ -257,7 +295,9 @@ def _protocol_variables(protocol: EventProtocol, reference: int, real: str) -> l
     policy = _variable("late_policy", reference, "Enumeration", "parameter", "fixed", "exact", None, number, text)
     policy.declaredType = _late_policy_type()
     text = f"How far back late events can be replayed, at most {JOURNAL_CAPACITY} records"
-    horizon = _variable("replay_horizon", reference + 1, real, "parameter", "fixed", "exact", "s", protocol.replay_horizon, text)
+    horizon = _variable(
+        "replay_horizon", reference + 1, real, "parameter", "fixed", "exact", "s", protocol.replay_horizon, text
+    )
     horizon.min = "0.0"
     return [policy, horizon]
 
@@ -275,7 +315,9 @@ def _rate_variables(system: HybridSystem, variables: list[ModelVariable], real: 
     rates = []
     for i, state in enumerate(states):
         unit, text = _per_second(state.unit or "1"), f"Derivative of {state.name}"
-        rate = _variable(f"der({state.name})", table.derivatives + i, real, "local", "continuous", "calculated", unit, None, text)
+        rate = _variable(
+            f"der({state.name})", table.derivatives + i, real, "local", "continuous", "calculated", unit, None, text
+        )
         rate.derivative, state.reinit = state, bool(system.events or system.frictions)
         rates.append(rate)
     texts = {name: f"Changes its sign when {name} comes to rest or breaks away" for name in system.frictions}
@@ -300,9 +342,16 @@ def _assign_clocks(system: HybridSystem, variables: list[ModelVariable]) -> None
 
 
 def _variable(
-    name: str, reference: int, kind: str, causality: str, variability: str, initial: str | None = None,
-    unit: str | None = None, start: float | None = None, description: str = "",
-) -> ModelVariable:  # fmt: skip
+    name: str,
+    reference: int,
+    kind: str,
+    causality: str,
+    variability: str,
+    initial: str | None = None,
+    unit: str | None = None,
+    start: float | None = None,
+    description: str = "",
+) -> ModelVariable:
     python_type: type = {"Integer": int, "Int32": int, "Enumeration": int, "Clock": bool}.get(kind, float)
     return ModelVariable(
         name=name,
@@ -345,8 +394,12 @@ def _unit_definition(name: str, shown: list[str]) -> Unit:
     return Unit(name=name, baseUnit=base, displayUnits=display)
 
 
-def _unknowns(system: HybridSystem, variables: list[ModelVariable], function: str, first: int, count: int) -> list[Unknown]:
-    """Outputs or derivatives at initialisation: each with the time, inputs, start values and parameters that it depends on."""
+def _unknowns(
+    system: HybridSystem, variables: list[ModelVariable], function: str, first: int, count: int
+) -> list[Unknown]:
+    """Outputs or derivatives at initialisation: each with the time, inputs, start values and parameters that it depends
+    on.
+    """
     named = referenced(variables, first, count)
     unknowns = []
     for variable, references in zip(named, _dependencies(system, function, count), strict=True):
@@ -359,7 +412,9 @@ def _running(system: HybridSystem, unknown: Unknown) -> Unknown:
     """The same once time runs: what it depends on among time, inputs and continuous states."""
     table = VariableTable.of(system)
     last = table.states + system.continuous_count
-    known = (v for v in unknown.dependencies if v.valueReference < table.outputs or table.states <= v.valueReference < last)
+    known = (
+        v for v in unknown.dependencies if v.valueReference < table.outputs or table.states <= v.valueReference < last
+    )
     return _unknown(unknown.variable, list(known))
 
 
@@ -372,8 +427,12 @@ def _dependencies(system: HybridSystem, function: str, count: int) -> list[list[
     """Value references that each row of `output` or `derivative` depends on; all of them where it cannot be traced."""
     table = VariableTable.of(system)
     inputs, parameters = width(exposed_inputs(system)), width(system.parameter_signals)
-    groups = (("t", table.time, 1), ("u", table.inputs, inputs), ("x", table.states, system.state_count),
-              ("p", table.parameters, parameters))  # fmt: skip
+    groups = (
+        ("t", table.time, 1),
+        ("u", table.inputs, inputs),
+        ("x", table.states, system.state_count),
+        ("p", table.parameters, parameters),
+    )
     rows: list[list[int]] = [[] for _ in range(count)]
     traced = TracedSystem(system) if system.traceable and count else None
     for group, first, width_ in groups:
@@ -387,8 +446,15 @@ def _dependencies(system: HybridSystem, function: str, count: int) -> list[list[
 
 def _token(system: HybridSystem, description: ModelDescription) -> str:
     """A name for the content: other equations, variables, starts, options or events, another token."""
-    content: list[object] = [description.fmiVersion, system.name, system.method, sorted(map(str, system.options.items()))]
-    content += [[getattr(v, name) for name in TOKEN_ATTRIBUTES] + list(v.clocks or ()) for v in description.modelVariables]
+    content: list[object] = [
+        description.fmiVersion,
+        system.name,
+        system.method,
+        sorted(map(str, system.options.items())),
+    ]
+    content += [
+        [getattr(v, name) for name in TOKEN_ATTRIBUTES] + list(v.clocks or ()) for v in description.modelVariables
+    ]
     content += [[e.name, e.period, e.offset, len(e.noises)] for e in system.periodic_events]
     structure = (*description.outputs, *description.derivatives)
     content += [[u.variable.name, *(known.name for known in u.dependencies)] for u in structure]

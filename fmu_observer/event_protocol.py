@@ -17,7 +17,9 @@ LATE_POLICIES: tuple[LatePolicy, ...] = ("replay", "reject", "late")
 DEFAULT_REPLAY_HORIZON = 10.0
 
 JOURNAL_CAPACITY = 4096
-"""Records of the past remembered at most, in the block and in the exported FMU; an event before them is out of reach."""
+"""Records of the past remembered at most, in the block and in the exported FMU; an event before them is out of
+reach.
+"""
 
 
 OUTCOME_TEXTS = {
@@ -41,10 +43,10 @@ class EventProtocol:
 
     Args:
         announcement: by ``clocks`` (FMI 3 only: a triggered input clock, set in event mode) or by ``counts`` (an input
-            ``<event>_count`` that is raised by one before the step; for masters that know no event mode); None for what is usual
-            in the FMI version: clocks in FMI 3, counts in FMI 2.
-        late_policy: what to do with an event stamped before the current time: ``replay``, ``reject`` or ``late``. In an FMU it
-            is the start value of the parameter ``late_policy``.
+            ``<event>_count`` that is raised by one before the step; for masters that know no event mode); None for what
+            is usual in the FMI version: clocks in FMI 3, counts in FMI 2.
+        late_policy: what to do with an event stamped before the current time: ``replay``, ``reject`` or ``late``. In an
+            FMU it is the start value of the parameter ``late_policy``.
         replay_horizon: how far back ``replay`` can go [s]; the start value of the parameter ``replay_horizon``.
 
     Raises:

@@ -1,7 +1,7 @@
 """How a model or an observer becomes an FMU: tracing, C generation, the C runtime, the model description, packing.
 
-Importing this package costs nothing and needs no compiler: what does the work is loaded when it is first used. It may use
-`plant_models` and `fmu_observer`, never `cosim`.
+Importing this package costs nothing and needs no compiler: what does the work is loaded when it is first used. It may
+use `plant_models` and `fmu_observer`, never `cosim`.
 """
 
 from __future__ import annotations

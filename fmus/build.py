@@ -1,4 +1,6 @@
-"""Building: a hybrid system becomes an FMU file. Puts generation, XML, compilation, documentation and packing in a row."""
+"""Building: a hybrid system becomes an FMU file. Puts generation, XML, compilation, documentation and packing in a
+row.
+"""
 
 from __future__ import annotations
 
@@ -71,7 +73,8 @@ def plan_fmu(
     """Trace and describe a system.
 
     Raises:
-        ValueError: the FMI version is not 2 or 3, the preset is unknown, a name is not legal, the protocol is none of this
+        ValueError: the FMI version is not 2 or 3, the preset is unknown, a name is not legal, the protocol is none of
+        this
             version, or the system cannot become C.
     """
     if fmi_version not in FACES:
@@ -83,9 +86,15 @@ def plan_fmu(
 
 
 def build_fmu(
-    system: HybridSystem, target: Path | str, fmi_version: FmiVersion = 3, preset: str | None = None, *,
-    platforms: str | Sequence[str] = HOST, protocol: EventProtocol | None = None, progress: Progress | None = None,
-) -> Path:  # fmt: skip
+    system: HybridSystem,
+    target: Path | str,
+    fmi_version: FmiVersion = 3,
+    preset: str | None = None,
+    *,
+    platforms: str | Sequence[str] = HOST,
+    protocol: EventProtocol | None = None,
+    progress: Progress | None = None,
+) -> Path:
     """Export a hybrid system as a native FMU, with its sources and documentation.
 
     Args:
@@ -93,10 +102,10 @@ def build_fmu(
         target: path of the FMU file (ending in ``.fmu``), or a folder that gets ``<name>.fmu``.
         fmi_version: 2 or 3.
         preset: preset whose values become the start values; None for the system's default.
-        platforms: ``host`` (built by the system's compiler), ``all``, or platform tuples such as ``x86_64-windows`` (built by the
-            cross compiler of the extra ``cross``), as a sequence or separated by commas.
-        protocol: how it is told of triggered events, and what it does with late ones; by default clocks in FMI 3 and counts in
-            FMI 2, and late events are replayed.
+        platforms: ``host`` (built by the system's compiler), ``all``, or platform tuples such as ``x86_64-windows``
+            (built by the cross compiler of the extra ``cross``), as a sequence or separated by commas.
+        protocol: how it is told of triggered events, and what it does with late ones; by default clocks in FMI 3 and
+            counts in FMI 2, and late events are replayed.
         progress: called with the name of each platform whose library is done, from any thread.
 
     Returns:
@@ -145,7 +154,8 @@ class Draft:
         Raises:
             TextRefusedError: a name or a description holds a character that XML forbids.
         """
-        description = plan.description_xml().encode()  # first: a text that XML cannot hold is refused before anything is compiled
+        # first: a text that XML cannot hold is refused before anything is compiled
+        description = plan.description_xml().encode()
         return cls(plan, targets, description, plan.source_files() | plan.header_files())
 
     def compile(self, progress: Progress | None = None) -> dict[Platform, bytes]:

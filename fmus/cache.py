@@ -1,8 +1,8 @@
 """Cache: FMUs that were built once are not built again.
 
 An FMU is kept under a digest of all that decides its bytes: the equations, the model description, the runtime, the
-generator and the compiler. There is nothing to invalidate and nothing to lock: two processes that build the same FMU at the
-same time write the same bytes, each in one move.
+generator and the compiler. There is nothing to invalidate and nothing to lock: two processes that build the same FMU at
+the same time write the same bytes, each in one move.
 """
 
 from __future__ import annotations
@@ -90,7 +90,9 @@ def cache_entry(
 
 
 def _is_whole(path: Path) -> bool:
-    """Whether an FMU is there and all of it can be read: a full disk, or a machine that stopped, may have left a part."""
+    """Whether an FMU is there and all of it can be read: a full disk, or a machine that stopped, may have left a
+    part.
+    """
     try:
         stamp = path.stat()
         return _can_be_read(path, stamp.st_size, stamp.st_mtime_ns)
@@ -140,5 +142,7 @@ def _own_files() -> dict[str, bytes]:
     """What writes the FMU, and what checks the gains that its documentation tells of."""
     rooms = ("content", "toolchain", "documentation", "licenses")
     folders = (files("fmus"), *(files("fmus") / room for room in rooms), files("fmu_observer") / "certificates")
-    entries = [(folder, entry) for folder in folders for entry in folder.iterdir() if entry.name.endswith((".py", ".txt"))]
+    entries = [
+        (folder, entry) for folder in folders for entry in folder.iterdir() if entry.name.endswith((".py", ".txt"))
+    ]
     return {f"{folder.name}/{entry.name}": entry.read_bytes() for folder, entry in entries}

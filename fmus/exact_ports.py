@@ -1,7 +1,7 @@
 """Exact ports: prepared reads and writes of one variable of any type, value by value, with nothing converted.
 
-Texts, bytes and 64-bit integers do not fit into doubles. Texts are `str` (UTF-8; what is not, comes back out as it came in),
-bytes are `bytes`, integers are `int`; arrays of FMI 3 are tuples, row by row.
+Texts, bytes and 64-bit integers do not fit into doubles. Texts are `str` (UTF-8; what is not, comes back out as it came
+in), bytes are `bytes`, integers are `int`; arrays of FMI 3 are tuples, row by row.
 """
 
 from __future__ import annotations
@@ -58,7 +58,9 @@ def _list_reader(slave: Any, kind: str, variable: ModelVariable, total: int) -> 
     return read
 
 
-def _native_call(slave: Any, fmi_version: int, verb: str, kind: str, variable: ModelVariable, *buffers: Any) -> Callable[[], Any]:
+def _native_call(
+    slave: Any, fmi_version: int, verb: str, kind: str, variable: ModelVariable, *buffers: Any
+) -> Callable[[], Any]:
     """The function of the library on one variable; buffers last to first as in its signature."""
     call = getattr(slave, f"fmi{fmi_version}{verb}{kind}")
     references = (ctypes.c_uint32 * 1)(variable.valueReference)
@@ -66,7 +68,9 @@ def _native_call(slave: Any, fmi_version: int, verb: str, kind: str, variable: M
     return lambda: call(*arguments)
 
 
-def _number_reader(slave: Any, fmi_version: int, kind: str, variable: ModelVariable, total: int) -> Callable[[], Values]:
+def _number_reader(
+    slave: Any, fmi_version: int, kind: str, variable: ModelVariable, total: int
+) -> Callable[[], Values]:
     ctype, _, dtype = c_type(kind, fmi_version)
     raw = (ctype * total)()
     seen: np.ndarray = np.frombuffer(raw, dtype=dtype)
@@ -105,7 +109,9 @@ def _string_reader(slave: Any, fmi_version: int, variable: ModelVariable, total:
     return read
 
 
-def _string_writer(slave: Any, fmi_version: int, variable: ModelVariable, total: int) -> Callable[[Sequence[Any]], None]:
+def _string_writer(
+    slave: Any, fmi_version: int, variable: ModelVariable, total: int
+) -> Callable[[Sequence[Any]], None]:
     raw = (ctypes.c_char_p * total)()
     call = _native_call(slave, fmi_version, "Set", "String", variable, raw)
 
@@ -132,7 +138,8 @@ def _binary_writer(slave: Any, variable: ModelVariable, total: int) -> Callable[
     call = _native_call(slave, 3, "Set", "Binary", variable, sizes, pointers)
 
     def write(values: Sequence[Any]) -> None:
-        kept = [ctypes.create_string_buffer(bytes(value), max(len(value), 1)) for value in values]  # never a null pointer
+        # never a null pointer
+        kept = [ctypes.create_string_buffer(bytes(value), max(len(value), 1)) for value in values]
         for i, (buffer, value) in enumerate(zip(kept, values, strict=True)):
             pointers[i] = ctypes.cast(buffer, ctypes.POINTER(ctypes.c_uint8))
             sizes[i] = len(value)

@@ -1,7 +1,9 @@
-"""Calls of a native FMU whose arguments are allocated once: a third of what fmpy's own call costs, with the same checks.
+"""Calls of a native FMU whose arguments are allocated once: a third of what fmpy's own call costs, with the same
+checks.
 
-fmpy's call looks its function up, converts every argument and asks for the type of the result each time. What hangs itself
-into it (a logger of calls, somebody who answers in place of the library) is respected: such calls go through fmpy.
+fmpy's call looks its function up, converts every argument and asks for the type of the result each time. What hangs
+itself into it (a logger of calls, somebody who answers in place of the library) is respected: such calls go through
+fmpy.
 """
 
 from __future__ import annotations
@@ -22,7 +24,8 @@ def prepared_call(slave: Any, name: str, *arguments: Any) -> Callable[[], None]:
     Args:
         slave: fmpy's slave, instantiated.
         name: the function in fmpy's words, e.g. ``fmi2GetReal``.
-        arguments: as for fmpy's method of this name. What is to change between calls is a ctypes object and changes its value.
+        arguments: as for fmpy's method of this name. What is to change between calls is a ctypes object and changes its
+        value.
 
     Returns:
         The call; it raises `FMICallException` where the status is worse than a warning.

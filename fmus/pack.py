@@ -30,7 +30,9 @@ def check_target(target: Path) -> None:
     try:
         handle, name = tempfile.mkstemp(prefix=".fmus-", dir=folder)
     except OSError as error:
-        raise type(error)(f"{target} cannot be written: {folder}: {error.strerror or error}; choose another folder.") from error
+        raise type(error)(
+            f"{target} cannot be written: {folder}: {error.strerror or error}; choose another folder."
+        ) from error
     os.close(handle)
     Path(name).unlink()
 
@@ -46,7 +48,8 @@ def pack_fmu(files: Mapping[str, bytes], target: Path) -> Path:
         `target`.
 
     Raises:
-        OSError: it cannot be written, for example to a full disk; names the target, and an older file there is as it was.
+        OSError: it cannot be written, for example to a full disk; names the target, and an older file there is as it
+        was.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=".part", dir=target.parent)

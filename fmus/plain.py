@@ -1,4 +1,6 @@
-"""Plain text: what others wrote (an FMU's log, names in its description), made harmless for a terminal. Standard library only."""
+"""Plain text: what others wrote (an FMU's log, names in its description), made harmless for a terminal. Standard
+library only.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,8 @@ UNSEEN = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
 
 
 def plain(text: str, keep: str = "\n\t") -> str:
-    r"""Text in which every control character is shown in place of acting, as ``\x1b``; ends of lines are made ``\n`` first.
+    r"""Text in which every control character is shown in place of acting, as ``\x1b``; ends of lines are made ``\n``
+    first.
 
     Args:
         text: of anyone.

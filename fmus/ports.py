@@ -1,8 +1,9 @@
 """Ports: prepared reads and writes of a group of numeric variables, without lists or look-ups in a step.
 
-Values are doubles; arrays of FMI 3 lie row by row. Variables of a native FMU go through preset ctypes buffers, doubles that
-lie together straight into the caller's array; those of a Python block go through calls it prepares; everything else goes
-through fmpy's list calls. What must stay as it is (texts, bytes, 64-bit integers) has the ports in `fmus.exact_ports`.
+Values are doubles; arrays of FMI 3 lie row by row. Variables of a native FMU go through preset ctypes buffers, doubles
+that lie together straight into the caller's array; those of a Python block go through calls it prepares; everything
+else goes through fmpy's list calls. What must stay as it is (texts, bytes, 64-bit integers) has the ports in
+`fmus.exact_ports`.
 """
 
 from __future__ import annotations
@@ -68,12 +69,16 @@ def is_native(slave: Any) -> bool:
     return hasattr(slave, "dll")
 
 
-def make_reader(slave: Any, fmi_version: int, variables: Sequence[ModelVariable], values: np.ndarray) -> Callable[[], None]:
+def make_reader(
+    slave: Any, fmi_version: int, variables: Sequence[ModelVariable], values: np.ndarray
+) -> Callable[[], None]:
     """A call that reads `variables` into `values`, shape (number of values of all,)."""
     return _make_port(slave, fmi_version, variables, values, "Get")
 
 
-def make_writer(slave: Any, fmi_version: int, variables: Sequence[ModelVariable], buffer: np.ndarray) -> Callable[[], None]:
+def make_writer(
+    slave: Any, fmi_version: int, variables: Sequence[ModelVariable], buffer: np.ndarray
+) -> Callable[[], None]:
     """A call that writes `variables` from `buffer`, shape (number of values of all,)."""
     return _make_port(slave, fmi_version, variables, buffer, "Set")
 
@@ -105,7 +110,12 @@ def _make_port(
         make = _native_reader if verb == "Get" else _native_writer
         return _sequence([make(slave, fmi_version, group, values) for group in groups])
     prepare = getattr(slave, f"prepared_{verb.lower()}", None)
-    if prepare is not None and len(groups) == 1 and groups[0].kind == REAL_TYPE[fmi_version] and not groups[0].has_arrays:
+    if (
+        prepare is not None
+        and len(groups) == 1
+        and groups[0].kind == REAL_TYPE[fmi_version]
+        and not groups[0].has_arrays
+    ):
         prepared: Callable[[], None] = prepare(groups[0].references, values)
         return prepared
     list_port = _list_reader if verb == "Get" else _list_writer
@@ -135,7 +145,9 @@ def _native_call(slave: Any, fmi_version: int, verb: str, group: _Group, buffer:
     count = len(group.references)
     references = (ctypes.c_uint32 * count)(*group.references)
     total = (group.total,) if fmi_version == 3 else ()
-    return prepared_call(slave, f"fmi{fmi_version}{verb}{group.kind}", slave.component, references, count, buffer, *total)
+    return prepared_call(
+        slave, f"fmi{fmi_version}{verb}{group.kind}", slave.component, references, count, buffer, *total
+    )
 
 
 def _straight(values: np.ndarray, group: _Group) -> Any:

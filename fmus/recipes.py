@@ -97,7 +97,9 @@ def recipe_presets(name: str) -> tuple[list[str], str | None]:
         name: model name, one of `RECIPES`.
     """
     cls = RECIPES[name]
-    required = (p.default is Parameter.empty and p.kind is not Parameter.VAR_KEYWORD for p in signature(cls).parameters.values())
+    required = (
+        p.default is Parameter.empty and p.kind is not Parameter.VAR_KEYWORD for p in signature(cls).parameters.values()
+    )
     made = cls if any(required) else cls()  # presets may depend on the options
     return list(made.presets), made.default_preset
 

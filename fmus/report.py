@@ -1,4 +1,6 @@
-"""Report: what an FMU file says about itself, in lines of text. Works with any FMU, ours or a vendor's; reads, never runs."""
+"""Report: what an FMU file says about itself, in lines of text. Works with any FMU, ours or a vendor's; reads, never
+runs.
+"""
 
 from __future__ import annotations
 
@@ -63,7 +65,8 @@ def describe_file(path: Path) -> list[str]:
     except Exception as error:
         raise ValueError(f"{path} cannot be read as an FMU: {_reason(error)}") from error
     lines = [
-        f"{description.modelName}: FMI {description.fmiVersion}, {', '.join(_interfaces(description)) or 'no interface'}",
+        f"{description.modelName}: FMI {description.fmiVersion}, "
+        f"{', '.join(_interfaces(description)) or 'no interface'}",
         *([description.description] if description.description else []),
         f"platforms: {', '.join(platforms) or 'none'}",
         _on_this_machine(description, names),
@@ -95,7 +98,11 @@ def _platforms(archive: zipfile.ZipFile) -> list[str]:
 
 def _libraries(archive: zipfile.ZipFile) -> list[str]:
     names = (entry.filename for entry in archive.infolist() if not entry.is_dir())
-    return [name for name in names if name.startswith("binaries/") and name.count("/") == 2 and name.endswith(LIBRARY_SUFFIXES)]
+    return [
+        name
+        for name in names
+        if name.startswith("binaries/") and name.count("/") == 2 and name.endswith(LIBRARY_SUFFIXES)
+    ]
 
 
 def _on_this_machine(description: ModelDescription, names: Sequence[str]) -> str:

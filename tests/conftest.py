@@ -1,4 +1,6 @@
-"""What holds for all tests: two tiers, no deadline on shared machines, the same examples at every continuous integration."""
+"""What holds for all tests: two tiers, no deadline on shared machines, the same examples at every continuous
+integration.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,9 @@ def quick_builds(request: pytest.FixtureRequest) -> Iterator[None]:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark the second tier as slow, and what opens a browser. In whole files a line that fits none of the tests is an error."""
+    """Mark the second tier as slow, and what opens a browser. In whole files a line that fits none of the tests is an
+    error.
+    """
     lines = second_tier()
     used = set()
     for item in items:

@@ -1,7 +1,7 @@
 """Delivery: a receiver is stepped through the telegrams that reach it within a communication step.
 
-What a receiver allows decides how: it is stopped at the instant where it can be, told beforehand with a stamp where it cannot,
-and told too late where the run asks for that.
+What a receiver allows decides how: it is stopped at the instant where it can be, told beforehand with a stamp where it
+cannot, and told too late where the run asks for that.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ class Delivery:
     Args:
         time: when the receiver was told [s].
         before, after: its outputs before and after, shape (q,); None where it could not be stopped there.
-        outcome: what became of it: ``accepted``, ``replayed``, ``late``, ``rejected``, ``doubted`` (and used), ``ignored``, or
-            ``told`` where that is not known.
+        outcome: what became of it: ``accepted``, ``replayed``, ``late``, ``rejected``, ``doubted`` (and used),
+            ``ignored``, or ``told`` where that is not known.
     """
 
     time: float
@@ -50,15 +50,15 @@ class Delivery:
 class Receiver:
     """A planned component that declares the balise event.
 
-    An FMI 2 receiver acts on a telegram in the step that follows, and knows one telegram for each step. A telegram of this very
-    instant is therefore announced before the step that ends there; of telegrams that must not be announced together the later
-    ones wait in `backlog` for the next step.
+    An FMI 2 receiver acts on a telegram in the step that follows, and knows one telegram for each step. A telegram of
+    this very instant is therefore announced before the step that ends there; of telegrams that must not be announced
+    together the later ones wait in `backlog` for the next step.
 
     Args:
         planned: the component in the plan.
         event: name of its event.
-        timing: ``exact`` uses a telegram at its own instant; ``stale`` hands it over unshifted at the next communication
-            point, as a master without events would (for comparison only).
+        timing: ``exact`` uses a telegram at its own instant; ``stale`` hands it over unshifted at the next
+            communication point, as a master without events would (for comparison only).
     """
 
     planned: PlannedComponent
@@ -102,7 +102,8 @@ class Receiver:
         return self._step_through(t, until, [*waiting, *telegrams])[len(waiting) :]
 
     def hold_back(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
-        """Keep telegrams of a part of a step, from `t` to `until` [s], that the component does not take: its next step has them.
+        """Keep telegrams of a part of a step, from `t` to `until` [s], that the component does not take: its next step
+        has them.
 
         Returns:
             A delivery for each, in the same order.
@@ -187,7 +188,9 @@ class Receiver:
     # -- a receiver that takes whole steps only ---------------------------------------------------------------------
 
     def _tell_then_step(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
-        """Stamps inside the coming step tell the receiver what it may not be stopped for; without stamps it is told late."""
+        """Stamps inside the coming step tell the receiver what it may not be stopped for; without stamps it is told
+        late.
+        """
         if self._port.stamp is None:
             return self._step_then_tell(t, until, telegrams)
         at_once = 1 if self.planned.component.event_needs_step else len(telegrams)
@@ -203,7 +206,8 @@ class Receiver:
         """Whatever was passed in the step is told at its end, as if it had happened there."""
         self._advance(t, until)
         self.arrived = self._outputs()
-        known = telegrams[-1:] if self.planned.component.event_needs_step else telegrams  # the last payload replaces the others
+        # the last payload replaces the others
+        known = telegrams[-1:] if self.planned.component.event_needs_step else telegrams
         overwritten = len(telegrams) - len(known)
         return [Delivery(until, self.arrived, self.arrived, "rejected") for _ in range(overwritten)] + [
             self._tell_here(until, telegram, until) for telegram in known
@@ -225,7 +229,7 @@ class Receiver:
         return self.planned.outputs.copy()
 
     def _tell(self, t: float, telegram: BaliseRecord, stamp: float, delivery: Delivery) -> None:
-        self.planned.component.tell(self._port, t, stamp, payload(telegram))
+        self.planned.component.notify(self._port, t, stamp, payload(telegram))
         self._open.append(delivery)
         self._note_outcome()
 

@@ -78,11 +78,13 @@ class HermiteStep:
         return first_time(lambda s: (self.position(s) >= target) == part.rising, part.start, part.end)
 
     def time_bound(self, acceleration_spread: float) -> float:
-        """Bound of the crossing time's error [s] where the true acceleration differs from the cubic's by no more than a spread D.
+        """Bound of the crossing time's error [s] where the true acceleration differs from the cubic's by no more than a
+        spread D.
 
-        A function with zero value and slope at both ends and a second derivative within +-D stays within ``D h^2 / 16``, and
-        its slope within ``D h / 4`` (bang-bang second derivative +D, -D, +D over h/4, h/2, h/4). The first divided by the
-        lowest possible speed is a time. Where the train may stand, nothing better than the step itself is known.
+        A function with zero value and slope at both ends and a second derivative within +-D stays within
+        ``D h^2 / 16``, and its slope within ``D h / 4`` (bang-bang second derivative +D, -D, +D over h/4, h/2, h/4).
+        The first divided by the lowest possible speed is a time. Where the train may stand, nothing better than the
+        step itself is known.
         """
         slowest = self._lowest_speed() - acceleration_spread * self.h / 4.0
         if slowest <= 0.0:
@@ -105,7 +107,9 @@ class HermiteStep:
 
 
 def first_time(reached: Callable[[float], bool], low: float, high: float) -> float:
-    """The first time in ``(low, high]`` at which `reached` is true, halved down to neighbouring floats; `high` must reach."""
+    """The first time in ``(low, high]`` at which `reached` is true, halved down to neighbouring floats; `high` must
+    reach.
+    """
     for _ in range(MAX_HALVINGS):
         middle = 0.5 * (low + high)
         if middle in (low, high):
@@ -118,7 +122,8 @@ def first_time(reached: Callable[[float], bool], low: float, high: float) -> flo
 
 
 def time_to_reach(distance: float, speed: float, acceleration: float) -> float:
-    """Least time [s] to cover a distance [m] ahead at a speed towards it [m/s] with no more than an acceleration [m/s2].
+    """Least time [s] to cover a distance [m] ahead at a speed towards it [m/s] with no more than an acceleration
+    [m/s2].
 
     The speed may be negative: the train must then brake first. The distance may be infinite.
     """

@@ -47,7 +47,8 @@ class TrackLayout:
         if np.any(steps <= 0.0):
             i = int(np.argmax(steps <= 0.0))
             raise ScenarioError(
-                f"Balises must be listed in increasing position, one at a place: number {i + 2} at {positions[i + 1]:g} m "
+                f"Balises must be listed in increasing position, one at a place: number {i + 2} at "
+                f"{positions[i + 1]:g} m "
                 f"follows number {i + 1} at {positions[i]:g} m."
             )
         self._check_balises()
@@ -57,7 +58,9 @@ class TrackLayout:
         names = [b.identity for b in self.balises]
         repeated = sorted({name for name in names if names.count(name) > 1}) if len(set(names)) < len(names) else []
         if repeated:
-            raise ScenarioError(f"Every balise needs an identity of its own; used more than once: {', '.join(repeated[:5])}.")
+            raise ScenarioError(
+                f"Every balise needs an identity of its own; used more than once: {', '.join(repeated[:5])}."
+            )
         for b in self.balises:
             if not 0.0 <= b.location_accuracy < inf:
                 raise ScenarioError(
@@ -65,7 +68,9 @@ class TrackLayout:
                 )
 
     def crossed(self, before: float, after: float) -> list[Balise]:
-        """Balises passed between two positions [m], in the order of passing: in ``(before, after]`` or ``[after, before)``."""
+        """Balises passed between two positions [m], in the order of crossing: in ``(before, after]`` or
+        ``[after, before)``.
+        """
         if after >= before:
             first, last = np.searchsorted(self.positions, [before, after], side="right")
             return list(self.balises[first:last])
@@ -73,8 +78,8 @@ class TrackLayout:
         return list(reversed(self.balises[first:last]))
 
     def gaps(self, position: float) -> tuple[float, float]:
-        """Distances [m] to the nearest balise behind and ahead of a position [m], infinite where there is none; one exactly there
-        is passed already and counts for neither."""
+        """Distances [m] to the nearest balise behind and ahead of a position [m], infinite where there is none; one
+        exactly there is passed already and counts for neither."""
         behind = int(np.searchsorted(self.positions, position, side="left")) - 1
         ahead = int(np.searchsorted(self.positions, position, side="right"))
         return (
@@ -115,7 +120,8 @@ class InstantLayout:
         if late.size:
             i = int(late[0])
             raise ScenarioError(
-                f"Balise instants must be finite and increasing: number {i + 2} at {self.instants[i + 1]:g} s follows number "
+                f"Balise instants must be finite and increasing: number {i + 2} at {self.instants[i + 1]:g} s follows "
+                f"number "
                 f"{i + 1} at {self.instants[i]:g} s."
             )
 
@@ -175,13 +181,20 @@ def from_csv(path: str | Path) -> TrackLayout:
 
 
 def aperiodic(
-    until: float, seed: int, *, min_gap: float = 0.1, max_gap: float = 0.5, dropout_after: float = 7.9,
-    dropout_fraction: float = 0.15, dropout_stretch: float = 2.5, start: float = 0.0,
-) -> InstantLayout:  # fmt: skip
+    until: float,
+    seed: int,
+    *,
+    min_gap: float = 0.1,
+    max_gap: float = 0.5,
+    dropout_after: float = 7.9,
+    dropout_fraction: float = 0.15,
+    dropout_stretch: float = 2.5,
+    start: float = 0.0,
+) -> InstantLayout:
     """Aperiodic instants as in the simulations of Bouchama 2024, figure 3.10 (the figure's own data are not published).
 
-    Gaps are uniform in [`min_gap`, `max_gap`]; after `dropout_after` a fraction of them is stretched by a factor uniform in
-    [1.2, `dropout_stretch`].
+    Gaps are uniform in [`min_gap`, `max_gap`]; after `dropout_after` a fraction of them is stretched by a factor
+    uniform in [1.2, `dropout_stretch`].
 
     Args:
         until: last instant at most [s].

@@ -1,8 +1,8 @@
-"""Localisation: which method finds the passings. `choose` takes the best one that the probed plant allows.
+"""Localisation: which method finds the crossings. `choose` takes the best one that the probed plant allows.
 
 | method | needs | error |
 |---|---|---|
-| ``early-return`` | an FMI 3 plant with event mode that reports the passing itself | the plant's own |
+| ``early-return`` | an FMI 3 plant with event mode that reports the crossing itself | the plant's own |
 | ``rollback`` | an exact state and steps of any length | root search on re-done steps |
 | ``predict`` | steps of any length | interpolation over the last short cut |
 | ``interpolate`` | nothing | cubic over the step; the bound is reported |
@@ -14,9 +14,9 @@ from cosim.balises.early_return import EarlyReturnLocaliser
 from cosim.balises.interpolate import InterpolateLocaliser
 from cosim.balises.layout import InstantLayout, TrackLayout
 from cosim.balises.localiser import METHODS, Localiser, Method
+from cosim.balises.plant_monitor import PlantMonitor
 from cosim.balises.predict import PredictLocaliser
 from cosim.balises.rollback import RollbackLocaliser
-from cosim.balises.watch import Watch
 from cosim.errors import CouplingError
 from fmus.check.restoring import Restores
 
@@ -29,10 +29,10 @@ def choose(honest_step: bool, restores: Restores, clock: str | None) -> tuple[Me
     Args:
         honest_step: steps of any length were seen to do what they say.
         restores: how what followed a restored state was seen to continue.
-        clock: output clock that reports passings, where the scenario names one.
+        clock: output clock that reports crossings, where the scenario names one.
     """
     if clock is not None:
-        return "early-return", f"the plant reports passings on its clock '{clock}'"
+        return "early-return", f"the plant reports crossings on its clock '{clock}'"
     if restores == "exact" and honest_step:
         return "rollback", "the plant restores its state exactly and takes steps of any length"
     if honest_step:
@@ -42,7 +42,11 @@ def choose(honest_step: bool, restores: Restores, clock: str | None) -> tuple[Me
 
 
 def make_localiser(
-    method: Method, watch: Watch, layout: TrackLayout | InstantLayout, clock: str | None = None, jerk_bound: float = 10.0
+    method: Method,
+    watch: PlantMonitor,
+    layout: TrackLayout | InstantLayout,
+    clock: str | None = None,
+    jerk_bound: float = 10.0,
 ) -> Localiser:
     """A localiser by name.
 
@@ -55,7 +59,9 @@ def make_localiser(
         return EarlyReturnLocaliser(watch, layout, clock)
     if method == "rollback":
         if not watch.component.can_save:
-            raise CouplingError(f"balises.method = 'rollback': {watch.component.name} cannot save its state; use 'auto'.")
+            raise CouplingError(
+                f"balises.method = 'rollback': {watch.component.name} cannot save its state; use 'auto'."
+            )
         return RollbackLocaliser(watch, layout)
     if method == "predict":
         return PredictLocaliser(watch, layout)

@@ -12,19 +12,21 @@ import numpy as np
 
 from cosim.balises.hermite import HermiteStep
 from cosim.balises.layout import InstantLayout, TrackLayout
-from cosim.balises.telegram import Passing
-from cosim.balises.watch import Watch
+from cosim.balises.plant_monitor import PlantMonitor
+from cosim.balises.telegram import Crossing
 
 Method = Literal["early-return", "rollback", "predict", "interpolate", "recorded"]
 METHODS: tuple[Method, ...] = ("early-return", "rollback", "predict", "interpolate")
-"""Those that find passings; what was ``recorded`` need not be found."""
+"""Those that find crossings; what was ``recorded`` need not be found."""
 
 ACCELERATION_LIMIT = 5.0
-"""No train accelerates or brakes harder [m/s2]; where one does, its passings are found all the same, with a larger bound."""
+"""No train accelerates or brakes harder [m/s2]; where one does, its crossings are found all the same, with a larger
+bound.
+"""
 
 
 class Localiser(ABC):
-    """Steps the watched plant and finds the passings on the way.
+    """Steps the watched plant and finds the crossings on the way.
 
     Args:
         watch: the plant with its position and speed.
@@ -33,15 +35,15 @@ class Localiser(ABC):
 
     method: Method
 
-    def __init__(self, watch: Watch, layout: TrackLayout | InstantLayout) -> None:
+    def __init__(self, watch: PlantMonitor, layout: TrackLayout | InstantLayout) -> None:
         self.watch, self.layout = watch, layout
 
     @abstractmethod
-    def step(self, t: float, until: float) -> list[tuple[Passing, np.ndarray]]:
+    def step(self, t: float, until: float) -> list[tuple[Crossing, np.ndarray]]:
         """Step the plant from `t` to `until` [s].
 
         Returns:
-            The passings in ``(t, until]`` in order of time, each with the plant's outputs at that instant, shape (q,).
+            The crossings in ``(t, until]`` in order of time, each with the plant's outputs at that instant, shape (q,).
         """
 
     def save(self) -> Any:
@@ -52,8 +54,10 @@ class Localiser(ABC):
         """Return to what was saved."""
         return
 
-    def passings_between(self, step: HermiteStep, t: float, start: np.ndarray, bound: float) -> list[tuple[Passing, np.ndarray]]:
-        """Passings of a step that was taken, by cubic Hermite interpolation.
+    def crossings_between(
+        self, step: HermiteStep, t: float, start: np.ndarray, bound: float
+    ) -> list[tuple[Crossing, np.ndarray]]:
+        """Crossings of a step that was taken, by cubic Hermite interpolation.
 
         Args:
             step: both ends of it. t: when it began [s]. start: the plant's outputs there, shape (q,).
@@ -65,11 +69,13 @@ class Localiser(ABC):
             for balise in self.layout.crossed(stretch.before, stretch.after):
                 s = step.crossing(balise.position, stretch)
                 whole = bound + self.watch.error.time(t + s, balise.position, step.speed(s))
-                passing = Passing(t + s, balise.position, balise.identity, balise.location_accuracy, self.method, whole)
-                found.append((passing, self.watch.between(start, s / step.h, balise.position)))
+                crossing = Crossing(
+                    t + s, balise.position, balise.identity, balise.location_accuracy, self.method, whole
+                )
+                found.append((crossing, self.watch.between(start, s / step.h, balise.position)))
         return found
 
-    def instant_passing(self, instant: float, position: float) -> Passing:
-        """The passing that a test placed at an instant [s], where the plant was at a position [m]."""
+    def instant_crossing(self, instant: float, position: float) -> Crossing:
+        """The crossing that a test placed at an instant [s], where the plant was at a position [m]."""
         assert isinstance(self.layout, InstantLayout)
-        return Passing(instant, position, self.layout.identity(instant), 0.0, self.method, 0.0)
+        return Crossing(instant, position, self.layout.identity(instant), 0.0, self.method, 0.0)

@@ -1,7 +1,8 @@
-"""The plant's error: how far its own solver leaves open where it is, as a part of the bound of a passing's time.
+"""The plant's error: how far its own solver leaves open where it is, as a part of the bound of a crossing's time.
 
-A search over redone steps ends within 1e-11 s of the trajectory it is shown. A solver with a variable step shows another one at
-each restart and for each division of a step, apart by about its tolerance: what the probe saw and what that allows add up.
+A search over redone steps ends within 1e-11 s of the trajectory it is shown. A solver with a variable step shows
+another one at each restart and for each division of a step, apart by about its tolerance: what the probe saw and what
+that allows add up.
 """
 
 from __future__ import annotations
@@ -33,7 +34,9 @@ class PlantError:
     unknown: str = ""
 
     def time(self, at: float, position: float, speed: float) -> float:
-        """Bound of the error [s] of the time `at` [s] when it was at a position [m] with a speed [m/s]; NaN where not known."""
+        """Bound of the error [s] of the time `at` [s] when it was at a position [m] with a speed [m/s]; NaN where not
+        known.
+        """
         if self.unknown:
             return math.nan
         solver = SOLVER_FACTOR * self.tolerance * max(abs(position), 1.0)

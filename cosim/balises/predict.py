@@ -7,43 +7,47 @@ import numpy as np
 from cosim.balises.hermite import HermiteStep, time_to_reach
 from cosim.balises.layout import InstantLayout, TrackLayout
 from cosim.balises.localiser import ACCELERATION_LIMIT, Localiser, Method
-from cosim.balises.telegram import Passing
+from cosim.balises.telegram import Crossing
 from cosim.components.component import TIME_TOLERANCE
 
 FINE_CUT = 1e-4
-"""Half the length of the cut that takes the plant over a balise [s]; interpolation over it errs by 1e-8 s at walking pace."""
+"""Half the length of the cut that takes the plant over a balise [s]; interpolation over it errs by 1e-8 s at walking
+pace.
+"""
 
 
 class PredictLocaliser(Localiser):
-    """Cut after cut the plant is brought near the balise, then over it in one short step, within which it is interpolated."""
+    """Cut after cut the plant is brought near the balise, then over it in one short step, within which it is
+    interpolated.
+    """
 
     method: Method = "predict"
 
-    def step(self, t: float, until: float) -> list[tuple[Passing, np.ndarray]]:  # noqa: D102 - see Localiser
+    def step(self, t: float, until: float) -> list[tuple[Crossing, np.ndarray]]:  # noqa: D102 - see Localiser
         watch = self.watch
         if isinstance(self.layout, InstantLayout):
             return self._step_to_instants(self.layout.within(t, until), t, until)
-        passings: list[tuple[Passing, np.ndarray]] = []
+        crossings: list[tuple[Crossing, np.ndarray]] = []
         while until - t > TIME_TOLERANCE:
             cut = self._next_cut(self.layout, t, until)
             begin, start = (watch.position, watch.speed), watch.outputs.copy()
             watch.step(t, cut)
             taken = HermiteStep(cut - t, *begin, watch.position, watch.speed)
-            passings += self.passings_between(taken, t, start, taken.time_bound(2.0 * ACCELERATION_LIMIT))
+            crossings += self.crossings_between(taken, t, start, taken.time_bound(2.0 * ACCELERATION_LIMIT))
             t = cut
-        return passings
+        return crossings
 
-    def _step_to_instants(self, instants: list[float], t: float, until: float) -> list[tuple[Passing, np.ndarray]]:
-        passings = []
+    def _step_to_instants(self, instants: list[float], t: float, until: float) -> list[tuple[Crossing, np.ndarray]]:
+        crossings = []
         for instant in instants:
             cut = until if until - instant <= TIME_TOLERANCE else instant
             if cut - t > TIME_TOLERANCE:
                 self.watch.step(t, cut)
                 t = cut
-            passings.append((self.instant_passing(instant, self.watch.position), self.watch.outputs.copy()))
+            crossings.append((self.instant_crossing(instant, self.watch.position), self.watch.outputs.copy()))
         if until - t > TIME_TOLERANCE:
             self.watch.step(t, until)
-        return passings
+        return crossings
 
     def _next_cut(self, layout: TrackLayout, now: float, until: float) -> float:
         """As far as no balise can be reached on the way, or a short way over one; the end where it is near."""

@@ -1,4 +1,6 @@
-"""Recorded telegrams: what an earlier run was told, told again, whatever the plant does now. Touches only the file it reads."""
+"""Recorded telegrams: what an earlier run was told, told again, whatever the plant does now. Touches only the file it
+reads.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +13,8 @@ import numpy as np
 
 from cosim.balises.layout import InstantLayout
 from cosim.balises.localiser import Localiser, Method
-from cosim.balises.telegram import NO_OUTCOMES, Channel, Passing
-from cosim.balises.watch import Watch
+from cosim.balises.plant_monitor import PlantMonitor
+from cosim.balises.telegram import NO_OUTCOMES, Channel, Crossing
 from cosim.components.component import TIME_TOLERANCE
 from cosim.components.recording import RecordingComponent
 from cosim.errors import OutputError, ScenarioError
@@ -41,10 +43,13 @@ class RecordedLayout:
         for number, record in enumerate(self.records, start=1):
             if not np.isfinite(record.stamp) or not np.isfinite(record.position):
                 what = "stamp" if not np.isfinite(record.stamp) else "position"
-                raise ScenarioError(f"{self.source}: telegram {number} ({record.identity}): its {what} is not a finite number.")
+                raise ScenarioError(
+                    f"{self.source}: telegram {number} ({record.identity}): its {what} is not a finite number."
+                )
             if record.delivered_at < record.stamp:
                 raise ScenarioError(
-                    f"{self.source}: telegram {number} ({record.identity}) was delivered at {record.delivered_at:g} s, before "
+                    f"{self.source}: telegram {number} ({record.identity}) was delivered at {record.delivered_at:g} s, "
+                    f"before "
                     f"its stamp, {record.stamp:g} s."
                 )
         object.__setattr__(self, "instants", np.unique([r.stamp for r in self.records if r.kind == "true"]))
@@ -56,7 +61,7 @@ class RecordedLayout:
 
 
 class RecordedLocaliser(Localiser):
-    """Steps the watched plant and gives the recorded passings. False telegrams are passings of nothing.
+    """Steps the watched plant and gives the recorded crossings. False telegrams are crossings of nothing.
 
     Args:
         watch: the plant. layout: what was told.
@@ -64,11 +69,11 @@ class RecordedLocaliser(Localiser):
 
     method: Method = "recorded"
 
-    def __init__(self, watch: Watch, layout: RecordedLayout) -> None:
+    def __init__(self, watch: PlantMonitor, layout: RecordedLayout) -> None:
         super().__init__(watch, InstantLayout(layout.instants))
         self._records, self._next = layout.records, 0
 
-    def step(self, t: float, until: float) -> list[tuple[Passing, np.ndarray]]:  # noqa: D102 - see Localiser
+    def step(self, t: float, until: float) -> list[tuple[Crossing, np.ndarray]]:  # noqa: D102 - see Localiser
         first = self._next
         while self._next < len(self._records) and self._is_due(self._records[self._next], until):
             self._next += 1
@@ -77,9 +82,9 @@ class RecordedLocaliser(Localiser):
         there = {record.stamp: self._played_back(t, record.stamp, until) for record in due}
         self.watch.step(t, until)
         for record in due:
-            passing = Passing(record.stamp, record.position, record.identity, record.location_accuracy, record.method)
+            crossing = Crossing(record.stamp, record.position, record.identity, record.location_accuracy, record.method)
             outputs = there[record.stamp]
-            found.append((passing, self._between(start, t, record.stamp, until) if outputs is None else outputs))
+            found.append((crossing, self._between(start, t, record.stamp, until) if outputs is None else outputs))
         return found
 
     def save(self) -> Any:  # noqa: D102 - see Localiser
@@ -90,11 +95,15 @@ class RecordedLocaliser(Localiser):
 
     @staticmethod
     def _is_due(record: BaliseRecord, until: float) -> bool:
-        """As in the run that was recorded: a passing belongs to the step that it lies in, a false telegram is told in time."""
+        """As in the run that was recorded: a crossing belongs to the step that it lies in, a false telegram is told in
+        time.
+        """
         return record.stamp <= until + (TIME_TOLERANCE if record.kind == "false" else 0.0)
 
     def _played_back(self, t: float, stamp: float, until: float) -> np.ndarray | None:
-        """The plant's outputs at a stamp within the step; None where the plant is no recording, so only it knows them."""
+        """The plant's outputs at a stamp within the step; None where the plant is no recording, so only it knows
+        them.
+        """
         component = self.watch.component
         if not isinstance(component, RecordingComponent) or not t + TIME_TOLERANCE < stamp < until - TIME_TOLERANCE:
             return None
@@ -123,14 +132,15 @@ class RecordedChannel(Channel):
     records: tuple[BaliseRecord, ...] = ()
 
     def transmit(
-        self, passing: Passing, number: int, odometer_reading: float, outcomes: Mapping[str, str] = NO_OUTCOMES
-    ) -> BaliseRecord:  # fmt: skip
+        self, crossing: Crossing, number: int, odometer_reading: float, outcomes: Mapping[str, str] = NO_OUTCOMES
+    ) -> BaliseRecord:
         """The recorded telegram of this number."""
         return replace(self.records[number], outcomes=outcomes)
 
 
 def read_layout(path: Path) -> RecordedLayout:
-    """The telegrams of a results folder, of its ``events.csv``, or of another file that keeps telegrams, alone or beside rows.
+    """The telegrams of a results folder, of its ``events.csv``, or of another file that keeps telegrams, alone or
+    beside rows.
 
     Raises:
         ScenarioError: there is no such file, or it is not one that holds telegrams; the line is named.
@@ -151,6 +161,9 @@ def _read(path: Path) -> Sequence[BaliseRecord]:
     if holds_telegrams(path):
         return read_telegrams(path)
     result = load_result(path)
-    if not result.events and "components" not in result.summary:  # a run keeps its telegrams, also where there were none
-        raise OutputError("it is a table of signals; expected a results folder, or a CSV with columns 'stamp' and 'position'.")
+    # a run keeps its telegrams, also where there were none
+    if not result.events and "components" not in result.summary:
+        raise OutputError(
+            "it is a table of signals; expected a results folder, or a CSV with columns 'stamp' and 'position'."
+        )
     return result.events

@@ -1,4 +1,6 @@
-"""Localisation by rollback: root search on re-done steps. The plant's trajectory is the one it would have had without it."""
+"""Localisation by rollback: root search on re-done steps. The plant's trajectory is the one it would have had without
+it.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,7 @@ import numpy as np
 from cosim.balises.hermite import HermiteStep, Stretch
 from cosim.balises.layout import Balise, InstantLayout, TrackLayout
 from cosim.balises.localiser import ACCELERATION_LIMIT, Localiser, Method
-from cosim.balises.telegram import Passing
+from cosim.balises.telegram import Crossing
 from cosim.components.component import TIME_TOLERANCE
 
 ROOT_TOLERANCE = 1e-11
@@ -27,7 +29,7 @@ class RollbackLocaliser(Localiser):
 
     method: Method = "rollback"
 
-    def step(self, t: float, until: float) -> list[tuple[Passing, np.ndarray]]:  # noqa: D102 - see Localiser
+    def step(self, t: float, until: float) -> list[tuple[Crossing, np.ndarray]]:  # noqa: D102 - see Localiser
         watch, layout = self.watch, self.layout
         if isinstance(layout, InstantLayout):
             instants = layout.within(t, until)
@@ -41,18 +43,18 @@ class RollbackLocaliser(Localiser):
         if isinstance(layout, InstantLayout) or not layout.crossed(begin[0], watch.position):
             return []
         step = HermiteStep(until - t, *begin, *self._ends())  # it moved further than any train: too late to go back
-        return self.passings_between(step, t, start, step.h)
+        return self.crossings_between(step, t, start, step.h)
 
-    def _redone(self, t: float, until: float, instants: list[float]) -> list[tuple[Passing, np.ndarray]]:
+    def _redone(self, t: float, until: float, instants: list[float]) -> list[tuple[Crossing, np.ndarray]]:
         trial = _Trial(self, t, until)
         try:
             found = [(instant, None) for instant in instants] if instants else self._crossings(trial)
-            passings = []
+            crossings = []
             for stamp, balise in found:
                 trial.go(stamp)
-                passings.append((self.passing(stamp, balise, *self._ends()), self.watch.outputs.copy()))
+                crossings.append((self.crossing(stamp, balise, *self._ends()), self.watch.outputs.copy()))
             trial.finish()
-            return passings
+            return crossings
         finally:
             trial.release()
 
@@ -64,18 +66,18 @@ class RollbackLocaliser(Localiser):
             for balise in self.layout.crossed(stretch.before, stretch.after)
         ]
 
-    def passing(self, stamp: float, balise: Balise | None, position: float, speed: float) -> Passing:
-        """What there is to say of a passing.
+    def crossing(self, stamp: float, balise: Balise | None, position: float, speed: float) -> Crossing:
+        """What there is to say of a crossing.
 
         Args:
             stamp: when [s]. balise: which one; None where they are placed by instant.
             position, speed: of the plant at the stamp [m], [m/s].
         """
         if balise is None:
-            return self.instant_passing(stamp, position)
+            return self.instant_crossing(stamp, position)
         rounding = 4.0 * ulp(position) / max(abs(speed), 1e-12) + 2.0 * ulp(stamp)
         bound = max(ROOT_TOLERANCE, rounding) + self.watch.error.time(stamp, position, speed)
-        return Passing(stamp, balise.position, balise.identity, balise.location_accuracy, self.method, bound)
+        return Crossing(stamp, balise.position, balise.identity, balise.location_accuracy, self.method, bound)
 
     def _ends(self) -> tuple[float, float]:
         return self.watch.position, self.watch.speed
@@ -142,7 +144,8 @@ class _Trial:
         for _ in range(MAX_ROOT_STEPS):
             self.go(self.t + guess)
             miss, speed = self.watch.position - target, self.watch.speed
-            if guess <= TIME_TOLERANCE:  # too short a step to take: `go` stayed at the start, and so does the linear rest
+            # too short a step to take: `go` stayed at the start, and so does the linear rest
+            if guess <= TIME_TOLERANCE:
                 return min(max(-miss / speed, 0.0), high) if speed else guess
             if (miss < 0.0) == stretch.rising:
                 low = max(low, guess)

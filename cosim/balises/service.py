@@ -1,7 +1,7 @@
 """The balise service of a run: the plant is watched, telegrams are sent, receivers are told, events become rows.
 
-It takes over how the watched plant and the receivers are moved; whoever steps the components need not know of it. The trajectory
-of the plant does not depend on whether anybody looks for balises (methods `rollback` and `interpolate`).
+It takes over how the watched plant and the receivers are moved; whoever steps the components need not know of it. The
+trajectory of the plant does not depend on whether anybody looks for balises (methods `rollback` and `interpolate`).
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ import numpy as np
 from cosim.balises.delivery import Delivery, Receiver
 from cosim.balises.layout import InstantLayout
 from cosim.balises.localiser import Localiser
-from cosim.balises.telegram import Channel, FalseTelegram, Mailbox, Passing
+from cosim.balises.telegram import Channel, Crossing, FalseTelegram, Mailbox
 from cosim.components.component import TIME_TOLERANCE
 from cosim.coupling.plan import Plan, PlannedComponent
 from cosim.errors import CouplingError
 from cosim.results.result import BaliseRecord
 
 Row = tuple[float, np.ndarray]
-Snapshot = tuple[Passing, np.ndarray]
+Snapshot = tuple[Crossing, np.ndarray]
 NO_ROWS: tuple[Row, ...] = ()
 
 
@@ -32,7 +32,7 @@ class BaliseService:
     """Everything about balises in a run.
 
     Args:
-        localiser: steps the watched plant and finds passings.
+        localiser: steps the watched plant and finds crossings.
         channel: latency, misses, false telegrams.
         receivers: components that are told.
         odometer: column of the odometer reading that a telegram carries, or None.
@@ -88,7 +88,9 @@ class BaliseService:
         self._snapshots += self.localiser.step(t, until)
 
     def _move_receiver(self, receiver: Receiver, t: float, until: float) -> None:
-        """Step a receiver through what is delivered to it; what it needs of plant and odometer has been stepped before."""
+        """Step a receiver through what is delivered to it; what it needs of plant and odometer has been stepped
+        before.
+        """
         if self._telegrams is None and self._something_to_tell:
             self._telegrams = self._collect(t, until)
         if self._telegrams or receiver.busy:
@@ -127,7 +129,9 @@ class BaliseService:
 
     @property
     def idle_until(self) -> float:
-        """Up to here [s] nothing is on its way to a receiver; what the plant passes in between is not known beforehand."""
+        """Up to here [s] nothing is on its way to a receiver; what the plant passes in between is not known
+        beforehand.
+        """
         if any(receiver.busy for receiver in self.receivers):
             return -np.inf
         known = [e.delivered_at for e in self.mailbox.waiting[:1]] + [f.time for f in self._false[:1]]
@@ -142,16 +146,16 @@ class BaliseService:
 
     @property
     def has_nothing_found(self) -> bool:
-        """Whether no passing is known that lies ahead of the receivers."""
+        """Whether no crossing is known that lies ahead of the receivers."""
         return not self._ahead
 
-    def told_elsewhere(self, passing: Passing, odometer_reading: float, outcomes: Mapping[str, str]) -> None:
+    def told_elsewhere(self, crossing: Crossing, odometer_reading: float, outcomes: Mapping[str, str]) -> None:
         """Somebody else did a step in which a balise was passed and all receivers were told at once.
 
         Args:
-            passing: of the balise. odometer_reading: there. outcomes: what became of the telegram, by receiver.
+            crossing: of the balise. odometer_reading: there. outcomes: what became of the telegram, by receiver.
         """
-        self.mailbox.log.append(self.channel.transmit(passing, self.passed, odometer_reading, outcomes))
+        self.mailbox.log.append(self.channel.transmit(crossing, self.passed, odometer_reading, outcomes))
         self.passed += 1
 
     # -- state ------------------------------------------------------------------------------------------------------
@@ -174,7 +178,9 @@ class BaliseService:
             receiver.restore(saved)
 
     def restore_but_plant(self, state: Any) -> None:
-        """Return to a saved state without the plant, which stays ahead of it: what it has passed is not found a second time."""
+        """Return to a saved state without the plant, which stays ahead of it: what it has passed is not found a second
+        time.
+        """
         found, localiser = [*self._snapshots, *self._ahead], self.localiser.save()
         self.restore(state)
         self.localiser.restore(localiser)
@@ -195,9 +201,9 @@ class BaliseService:
     # -- telegrams --------------------------------------------------------------------------------------------------
 
     def _collect(self, t: float, until: float) -> list[BaliseRecord]:
-        """Post the passings of this step, and take what is delivered within it."""
-        for passing, _ in self._snapshots:
-            self.mailbox.post(self.channel.transmit(passing, self.passed, self._odometer_at(passing.stamp, t, until)))
+        """Post the crossings of this step, and take what is delivered within it."""
+        for crossing, _ in self._snapshots:
+            self.mailbox.post(self.channel.transmit(crossing, self.passed, self._odometer_at(crossing.stamp, t, until)))
             self.passed += 1
         while self._false and self._false[0].time <= until + TIME_TOLERANCE:
             self.mailbox.post(self._false_telegram(self._false.pop(0), t, until))
@@ -218,7 +224,7 @@ class BaliseService:
     # -- rows -------------------------------------------------------------------------------------------------------
 
     def _event_rows(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Row]:
-        at_stamp = {passing.stamp: outputs for passing, outputs in self._snapshots}
+        at_stamp = {crossing.stamp: outputs for crossing, outputs in self._snapshots}
         rows: list[Row] = []
         for i, telegram in enumerate(telegrams):
             deliveries = {name: several[i] for name, several in self._told.items()}
@@ -234,7 +240,9 @@ class BaliseService:
     def _pair(
         self, time: float, t: float, until: float, deliveries: dict[str, Delivery], plant_there: np.ndarray | None
     ) -> list[Row]:
-        """The rows before and after one telegram; the latter only where it is not the row of the communication point."""
+        """The rows before and after one telegram; the latter only where it is not the row of the communication
+        point.
+        """
         end = self._plan.values.copy()
         for name in deliveries:
             end[self._by_name[name].planned.columns] = self._by_name[name].arrived
@@ -267,6 +275,8 @@ class BaliseService:
         order = [s.component.name for s in self._plan.steps]
         for name in self._by_name:
             if name == self.plant:
-                raise CouplingError(f"{name}: the watched plant cannot be told of its own balises; take it off the receivers.")
+                raise CouplingError(
+                    f"{name}: the watched plant cannot be told of its own balises; take it off the receivers."
+                )
             if order.index(name) < order.index(self.plant):
                 raise CouplingError(f"{name} is told of balises, so it must be stepped after the plant '{self.plant}'.")

@@ -1,7 +1,7 @@
-"""Telegrams: what the on-board is told of a passing, when, and what goes wrong on the way.
+"""Telegrams: what the on-board is told of a crossing, when, and what goes wrong on the way.
 
-A telegram carries its stamp and the odometer reading at the passing, and arrives a latency later. Some balises are missed,
-some telegrams are false. All chance comes from (seed, number of the passing) and from nothing else.
+A telegram carries its stamp and the odometer reading at the crossing, and arrives a latency later. Some balises are
+missed, some telegrams are false. All chance comes from (seed, number of the crossing) and from nothing else.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ NO_OUTCOMES: Mapping[str, str] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
-class Passing:
+class Crossing:
     """The train over a balise.
 
     Args:
@@ -48,7 +48,7 @@ class Channel:
     """What happens between a balise and the on-board.
 
     Args:
-        latency: delay from passing to delivery [s].
+        latency: delay from crossing to delivery [s].
         latency_jitter: further delay, uniform in [0, jitter] [s]; telegrams may overtake each other.
         missed_fraction: probability that a balise is not read.
         missed: identities of balises that are not read.
@@ -73,30 +73,30 @@ class Channel:
             raise ScenarioError(f"balises.missed_fraction is a probability, got {self.missed_fraction!r}.")
 
     def transmit(
-        self, passing: Passing, number: int, odometer_reading: float, outcomes: Mapping[str, str] = NO_OUTCOMES
-    ) -> BaliseRecord:  # fmt: skip
-        """The telegram of passing `number`; `delivered_at` is NaN where the balise is missed.
+        self, crossing: Crossing, number: int, odometer_reading: float, outcomes: Mapping[str, str] = NO_OUTCOMES
+    ) -> BaliseRecord:
+        """The telegram of crossing `number`; `delivered_at` is NaN where the balise is missed.
 
         Args:
-            passing: of the balise. number: of the passing. odometer_reading: there [m/s].
+            crossing: of the balise. number: of the crossing. odometer_reading: there [m/s].
             outcomes: what became of it, where that is known already.
         """
         chance = self.missed_fraction > 0.0 or self.latency_jitter > 0.0
         luck, jitter = uniform_pair(self.seed, 0, number) if chance else (1.0, 0.0)
-        missed = luck < self.missed_fraction or passing.identity in self.missed
-        spread = self.position_noise * passing.location_accuracy
+        missed = luck < self.missed_fraction or crossing.identity in self.missed
+        spread = self.position_noise * crossing.location_accuracy
         noise = spread * standard_normal(self.seed, 1, number) if spread > 0.0 else 0.0
         return BaliseRecord(
-            stamp=passing.stamp,
-            delivered_at=nan if missed else passing.stamp + self.latency + jitter * self.latency_jitter,
-            identity=passing.identity,
-            position=passing.position + noise,
-            true_position=passing.position,
-            location_accuracy=passing.location_accuracy,
+            stamp=crossing.stamp,
+            delivered_at=nan if missed else crossing.stamp + self.latency + jitter * self.latency_jitter,
+            identity=crossing.identity,
+            position=crossing.position + noise,
+            true_position=crossing.position,
+            location_accuracy=crossing.location_accuracy,
             odometer_reading=odometer_reading,
             kind="missed" if missed else "true",
-            method=passing.method,
-            time_bound=passing.time_bound,
+            method=crossing.method,
+            time_bound=crossing.time_bound,
             outcomes=outcomes,
         )
 

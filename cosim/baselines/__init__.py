@@ -1,4 +1,6 @@
-"""Baselines: results that were found right, kept as readable files beside the tests or inside an FMU, and checks against them."""
+"""Baselines: results that were found right, kept as readable files beside the tests or inside an FMU, and checks
+against them.
+"""
 
 from __future__ import annotations
 

@@ -35,9 +35,18 @@ class Call:
 
     @classmethod
     def run(
-        cls, what: Any, folder: Path, path: Path, *, signals: Iterable[str] | None = None, every: float | None = None,
-        tolerance: Any = None, tolerances: Mapping[str, Any] | None = None, ignore: Iterable[str] = (), **arguments: Any,
-    ) -> Call:  # fmt: skip
+        cls,
+        what: Any,
+        folder: Path,
+        path: Path,
+        *,
+        signals: Iterable[str] | None = None,
+        every: float | None = None,
+        tolerance: Any = None,
+        tolerances: Mapping[str, Any] | None = None,
+        ignore: Iterable[str] = (),
+        **arguments: Any,
+    ) -> Call:
         """Run what a test names.
 
         Args:
@@ -49,7 +58,8 @@ class Call:
         """
         ignored = tuple(ignore)
         given = tolerance is not None or tolerances or ignored
-        wanted = tolerances_of(Tolerances(), tolerance, tolerances, ignored) if given else None  # before the run: it may be long
+        # before the run: it may be long
+        wanted = tolerances_of(Tolerances(), tolerance, tolerances, ignored) if given else None
         chosen = None if signals is None else tuple(signals)
         return cls(make_subject(what, folder, **arguments), path, wanted, chosen, every)
 

@@ -1,4 +1,6 @@
-"""Check a result against a baseline: refuse what has nothing to do with it, compare, and say what else was different."""
+"""Check a result against a baseline: refuse what has nothing to do with it, compare, and say what else was
+different.
+"""
 
 from __future__ import annotations
 
@@ -65,7 +67,9 @@ def check(
     return regression(replace(comparison, notes=notes), outcome, actual, baseline)
 
 
-def regression(comparison: Comparison, outcome: Outcome | None, actual: Result, baseline: Baseline | None) -> Regression:
+def regression(
+    comparison: Comparison, outcome: Outcome | None, actual: Result, baseline: Baseline | None
+) -> Regression:
     """A comparison with the run behind it."""
     given: dict[str, Any] = {entry.name: getattr(comparison, entry.name) for entry in fields(Comparison)}
     return Regression(**given, outcome=outcome, actual=actual, baseline=baseline)
@@ -135,5 +139,8 @@ def tolerances_of(
     """
     default = Tolerances.of(tolerance).default if tolerance is not None else base.default
     given = Tolerances.of(default, by_signal, ignore)
-    merged: dict[str, Tolerance] = {**given.by_signal, **{k: v for k, v in base.by_signal.items() if k not in given.by_signal}}
+    merged: dict[str, Tolerance] = {
+        **given.by_signal,
+        **{k: v for k, v in base.by_signal.items() if k not in given.by_signal},
+    }
     return Tolerances(default, merged, (*base.ignore, *(name for name in given.ignore if name not in base.ignore)))

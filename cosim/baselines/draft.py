@@ -1,4 +1,6 @@
-"""A baseline as text, before it is written: the header, and the tables as they stand in their files. Touches no file."""
+"""A baseline as text, before it is written: the header, and the tables as they stand in their files. Touches no
+file.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,8 @@ class Draft:
     """A baseline before it is written.
 
     Args:
-        header: all but numbers. table: the CSV of the rows. events: the CSV of the telegrams; empty where there are none.
+        header: all but numbers. table: the CSV of the rows. events: the CSV of the telegrams; empty where there are
+        none.
     """
 
     header: Header
@@ -44,9 +47,13 @@ class Draft:
 
 
 def make_draft(
-    result: Result, tolerances: Tolerances | None = None, *, recipe: Recipe | None = None,
-    signals: Iterable[str] | None = None, every: float | None = None,
-) -> Draft:  # fmt: skip
+    result: Result,
+    tolerances: Tolerances | None = None,
+    *,
+    recipe: Recipe | None = None,
+    signals: Iterable[str] | None = None,
+    every: float | None = None,
+) -> Draft:
     """A baseline of a result.
 
     Args:
@@ -89,7 +96,9 @@ def make_draft(
 def resolved(tolerances: Tolerances, names: Sequence[str]) -> Tolerances:
     """Tolerances with the component put in front of names that stand without, where there is one component only."""
     by_signal = {resolve(pattern, names): given for pattern, given in tolerances.by_signal.items()}
-    return replace(tolerances, by_signal=by_signal, ignore=tuple(resolve(pattern, names) for pattern in tolerances.ignore))
+    return replace(
+        tolerances, by_signal=by_signal, ignore=tuple(resolve(pattern, names) for pattern in tolerances.ignore)
+    )
 
 
 def _title(result: Result) -> str:

@@ -1,7 +1,7 @@
 """Baselines on disk: ``NAME.json`` says what was run, ``NAME.csv`` holds rows, ``NAME.events.csv`` telegrams.
 
-Written so that a version control system shows what changed: one row a line, columns in alphabetical order, a line feed at the
-end of each, no time of day and no absolute paths. Files that would not change are not touched.
+Written so that a version control system shows what changed: one row a line, columns in alphabetical order, a line feed
+at the end of each, no time of day and no absolute paths. Files that would not change are not touched.
 """
 
 from __future__ import annotations
@@ -49,9 +49,14 @@ def is_baseline(path: str | Path) -> bool:
 
 
 def write_baseline(
-    result: Result, path: str | Path, *, tolerances: Tolerances | None = None, recipe: Recipe | None = None,
-    signals: Iterable[str] | None = None, every: float | None = None,
-) -> Change:  # fmt: skip
+    result: Result,
+    path: str | Path,
+    *,
+    tolerances: Tolerances | None = None,
+    recipe: Recipe | None = None,
+    signals: Iterable[str] | None = None,
+    every: float | None = None,
+) -> Change:
     """Write a baseline of a result.
 
     Args:
@@ -103,7 +108,9 @@ def write_texts(texts: dict[str, str], path: Path) -> None:
                     parts(path)[kind].unlink(missing_ok=True)
     except OSError as error:
         reason = error.strerror or str(error)
-        raise OutputError(f"The baseline {path} could not be written: {reason}. Former files are still whole.") from error
+        raise OutputError(
+            f"The baseline {path} could not be written: {reason}. Former files are still whole."
+        ) from error
 
 
 def demand_free(path: Path) -> None:
@@ -115,7 +122,8 @@ def demand_free(path: Path) -> None:
     for kind in ("table", "events"):
         if parts(path)[kind].exists() and not path.exists():
             raise OutputError(
-                f"{parts(path)[kind]} exists and belongs to no baseline ({path.name} is not there); it is not overwritten. "
+                f"{parts(path)[kind]} exists and belongs to no baseline ({path.name} is not there); it is not "
+                f"overwritten. "
                 "Give the baseline another name, or remove the file."
             )
 
@@ -154,7 +162,8 @@ def read_baseline(path: str | Path) -> Baseline:
         The baseline; its `notes` tell what was odd and did not matter.
 
     Raises:
-        BaselineError: it is missing, unreadable, cut off, in conflict after a merge, or of another version of the layout.
+        BaselineError: it is missing, unreadable, cut off, in conflict after a merge, or of another version of the
+        layout.
     """
     path = baseline_path(path)
     header = _read_header(path)
@@ -176,7 +185,8 @@ def read_baseline(path: str | Path) -> Baseline:
 def summary_of(header: Header) -> dict[str, Any]:
     """What a run would say of itself, as far as the header tells."""
     components = [
-        {key: getattr(entry, key) for key in entry.__dataclass_fields__} | {"source": entry.file} for entry in header.components
+        {key: getattr(entry, key) for key in entry.__dataclass_fields__} | {"source": entry.file}
+        for entry in header.components
     ]
     summary: dict[str, Any] = {"title": header.title, "versions": dict(header.versions), **header.span}
     return summary | {"components": components, "events_recorded": header.events is not None}

@@ -1,4 +1,6 @@
-"""Which model a component of a run was: enough to tell a new delivery from another model. Reads FMU files to digest them."""
+"""Which model a component of a run was: enough to tell a new delivery from another model. Reads FMU files to digest
+them.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Numbers as text: as few digits as the tolerance allows, so that noise of the last bits makes no difference between versions.
+"""Numbers as text: as few digits as the tolerance allows, so that noise of the last bits makes no difference between
+versions.
 
 Standard library only. Python's own conversions know no locale: the decimal point is a point everywhere.
 """
@@ -23,7 +24,8 @@ def decimals_for(allowed: float) -> int | None:
         allowed: difference allowed, in the unit of the column.
 
     Returns:
-        The number of digits, negative for tens and hundreds; None where every bit is kept (nothing is allowed to differ).
+        The number of digits, negative for tens and hundreds; None where every bit is kept (nothing is allowed to
+        differ).
     """
     if not (allowed > 0.0 and isfinite(allowed)):
         return None

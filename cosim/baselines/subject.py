@@ -42,14 +42,20 @@ def run_recipe(recipe: Recipe, progress: Progress | None = None, warn: Callable[
     """
     if recipe.kind == "result":
         raise BaselineError(
-            "This baseline was made from a result, not from an FMU or a scenario file, so it cannot be run again from here; "
+            "This baseline was made from a result, not from an FMU or a scenario file, so it cannot be run again from "
+            "here; "
             "give the result to be checked: --against DIR."
         )
     if recipe.kind == "fmu":
         scenario = Scenario.fmu(
-            recipe.source, start=recipe.start, stop=recipe.stop, step=recipe.step,
-            inputs=recipe.inputs, parameters=recipe.parameters, record=recipe.record,
-        )  # fmt: skip
+            recipe.source,
+            start=recipe.start,
+            stop=recipe.stop,
+            step=recipe.step,
+            inputs=recipe.inputs,
+            parameters=recipe.parameters,
+            record=recipe.record,
+        )
         outcome = scenario.run(progress=progress, warn=_about_inputs(recipe, warn))
     else:
         outcome = Scenario.load(recipe.source).run(progress=progress, overrides=recipe.overrides, warn=warn)
@@ -57,7 +63,10 @@ def run_recipe(recipe: Recipe, progress: Progress | None = None, warn: Callable[
 
 
 def run_again(
-    baseline: Baseline, fmu: str | Path | None = None, progress: Progress | None = None, warn: Callable[[str], None] | None = None
+    baseline: Baseline,
+    fmu: str | Path | None = None,
+    progress: Progress | None = None,
+    warn: Callable[[str], None] | None = None,
 ) -> Subject:
     """Run what a baseline was made of.
 
@@ -80,11 +89,19 @@ def run_again(
 
 
 def make_subject(
-    what: Any, folder: Path, *, start: float | None = None, stop: float | None = None, step: float | None = None,
-    inputs: Mapping[str, Any] | str | Path | None = None, parameters: Mapping[str, Any] | None = None,
-    record: Sequence[str] = (), overrides: Mapping[str, Any] | None = None,
-    progress: Progress | None = None, warn: Callable[[str], None] | None = None,
-) -> Subject:  # fmt: skip
+    what: Any,
+    folder: Path,
+    *,
+    start: float | None = None,
+    stop: float | None = None,
+    step: float | None = None,
+    inputs: Mapping[str, Any] | str | Path | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    record: Sequence[str] = (),
+    overrides: Mapping[str, Any] | None = None,
+    progress: Progress | None = None,
+    warn: Callable[[str], None] | None = None,
+) -> Subject:
     """Run what a user named.
 
     Args:
@@ -112,7 +129,9 @@ def make_subject(
     if isinstance(what, str | Path) and Path(what).suffix.lower() == ".fmu":
         _refuse("an FMU alone", _given(overrides=overrides))
         table = str((folder / inputs).resolve()) if isinstance(inputs, str | Path) else dict(inputs or {})
-        recipe = Recipe("fmu", str((folder / what).resolve()), start, stop, step, table, dict(parameters or {}), tuple(record))
+        recipe = Recipe(
+            "fmu", str((folder / what).resolve()), start, stop, step, table, dict(parameters or {}), tuple(record)
+        )
         return run_recipe(recipe, progress, warn)
     _refuse("a scenario", _given(inputs=inputs, parameters=parameters, record=record))
     changes = {**times, **(overrides or {})}

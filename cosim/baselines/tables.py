@@ -39,7 +39,9 @@ def parse_table(text: str, header: Header, file: Path) -> np.ndarray:
         raise BaselineError(f"{file}: no column {missing[0]!r}, which the header names. {_AGAIN}")
     rows = [_numbers(row, len(names), file, reader.line_num) for row in reader if row]
     if len(rows) != header.rows or not text.endswith("\n"):
-        raise BaselineError(f"{file} is cut off or was added to: {len(rows)} rows, {header.rows} were written. {_AGAIN}")
+        raise BaselineError(
+            f"{file} is cut off or was added to: {len(rows)} rows, {header.rows} were written. {_AGAIN}"
+        )
     values = np.array(rows, dtype=np.float64).reshape(len(rows), len(names))
     table = np.empty(len(rows), table_dtype(wanted))
     for name in wanted:
@@ -52,7 +54,9 @@ def parse_table(text: str, header: Header, file: Path) -> np.ndarray:
 
 def _numbers(row: list[str], count: int, file: Path, line: int) -> list[float]:
     if len(row) != count:
-        raise BaselineError(f"{file}, line {line}: {len(row)} cells, expected {count}; the file is cut off or damaged. {_AGAIN}")
+        raise BaselineError(
+            f"{file}, line {line}: {len(row)} cells, expected {count}; the file is cut off or damaged. {_AGAIN}"
+        )
     try:
         return [float(cell) for cell in row]
     except ValueError as error:
@@ -78,5 +82,7 @@ def parse_events(text: str, header: Header, file: Path) -> list[BaliseRecord]:
         except (KeyError, TypeError, ValueError) as error:
             raise BaselineError(f"{file}, line {reader.line_num}: {error}. {_AGAIN}") from error
     if len(events) != header.events:
-        raise BaselineError(f"{file} is cut off or was added to: {len(events)} telegrams, {header.events} were written. {_AGAIN}")
+        raise BaselineError(
+            f"{file} is cut off or was added to: {len(events)} telegrams, {header.events} were written. {_AGAIN}"
+        )
     return events

@@ -1,4 +1,6 @@
-"""What updating a baseline would do: nothing, say something else of the model, or keep new rows. Reads files, writes none."""
+"""What updating a baseline would do: nothing, say something else of the model, or keep new rows. Reads files, writes
+none.
+"""
 
 from __future__ import annotations
 
@@ -38,13 +40,18 @@ class Update:
 
 
 def plan_update(
-    result: Result | Outcome, path: Path, tolerances: Tolerances | None = None, *, recipe: Recipe | None = None,
-    signals: Iterable[str] | None = None, every: float | None = None,
-) -> Update:  # fmt: skip
+    result: Result | Outcome,
+    path: Path,
+    tolerances: Tolerances | None = None,
+    *,
+    recipe: Recipe | None = None,
+    signals: Iterable[str] | None = None,
+    every: float | None = None,
+) -> Update:
     """What writing a baseline of a result over the one at `path` would do.
 
-    Rows within tolerance of the former ones are kept as they are: a new machine or package version changes last digits, which
-    nobody wants to read as a difference. The header then tells of a new delivery.
+    Rows within tolerance of the former ones are kept as they are: a new machine or package version changes last digits,
+    which nobody wants to read as a difference. The header then tells of a new delivery.
 
     Args:
         result: of a run, or its outcome. path: of the JSON file.
@@ -95,9 +102,13 @@ def _text(path: Path, suffix: str) -> str:
 
 
 def _sound_draft(
-    result: Result, path: Path, tolerances: Tolerances | None, recipe: Recipe | None,
-    signals: Iterable[str] | None, every: float | None,
-) -> Draft:  # fmt: skip
+    result: Result,
+    path: Path,
+    tolerances: Tolerances | None,
+    recipe: Recipe | None,
+    signals: Iterable[str] | None,
+    every: float | None,
+) -> Draft:
     """A draft that the result itself passes."""
     draft = make_draft(result, tolerances, recipe=recipe, signals=signals, every=every)
     found = check(result, _as_baseline(draft, path))

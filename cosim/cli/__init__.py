@@ -1,4 +1,5 @@
-"""The command line ``cosim``: run, show, list, info, export. Exit codes: 0 done, 1 not as asked for, 2 usage or run error.
+"""The command line ``cosim``: run, show, list, info, export. Exit codes: 0 done, 1 not as asked for, 2 usage or run
+error.
 
 A command runs in a process of its own, so that an FMU that crashes, exits or hangs there does not decide how it ends.
 """
@@ -21,17 +22,28 @@ __all__ = ["main"]
 
 ERROR = 2
 COMMANDS = (
-    "run", "rerun", "sweep", "compare", "baseline", "benchmark_observers", "report", "convert", "new", "show", "listing", "info",
+    "run",
+    "rerun",
+    "sweep",
+    "compare",
+    "baseline",
+    "benchmark_observers",
+    "report",
+    "convert",
+    "new",
+    "show",
+    "listing",
+    "info",
     "export",
-)  # fmt: skip
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of ``cosim``; returns the exit code.
 
     Args:
-        arguments: words after the program's name: the command runs in this process. None for those of the process: it runs in
-            another one, where that can be.
+        arguments: words after the program's name: the command runs in this process. None for those of the process: it
+            runs in another one, where that can be.
     """
     if arguments is None and can_watch():
         return watched(lambda: _main(sys.argv[1:]))

@@ -27,7 +27,9 @@ EPILOG = "Exit codes: 0 equal within tolerance or done, 1 different, 2 error."
 def register(commands: Any) -> None:
     """Add the command and its actions to the parser."""
     description = "Keep a result as a baseline, and check later ones against it."
-    parser = commands.add_parser("baseline", help="make, check and update baselines", description=description, epilog=EPILOG)
+    parser = commands.add_parser(
+        "baseline", help="make, check and update baselines", description=description, epilog=EPILOG
+    )
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     _register_make(actions)
     _register_check(actions)
@@ -41,10 +43,18 @@ def register(commands: Any) -> None:
 
 def _register_make(actions: Any) -> None:
     make = _action(actions, "make", "run an FMU or a scenario and keep its outputs", _make)
-    make.add_argument("subject", metavar="FMU_OR_SCENARIO", help="an FMU, a scenario by name or file, or a results folder")
+    make.add_argument(
+        "subject", metavar="FMU_OR_SCENARIO", help="an FMU, a scenario by name or file, or a results folder"
+    )
     _add_file(make)
-    make.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="settings",
-                      help=f"of a scenario: {OVERRIDES}; of an FMU: a start value or a constant input")  # fmt: skip
+    make.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        dest="settings",
+        help=f"of a scenario: {OVERRIDES}; of an FMU: a start value or a constant input",
+    )
     make.add_argument("--inputs", metavar="TABLE", help="of an FMU: a table with a column for each input")
     for key, what in (("start", "begin"), ("stop", "end"), ("step", "communication step")):
         make.add_argument(f"--{key}", type=float, metavar="SECONDS", help=f"{what} of the run [s]")
@@ -52,7 +62,9 @@ def _register_make(actions: Any) -> None:
         "--record", nargs="+", default=[], metavar="NAME", help="of an FMU: variables to record besides the outputs"
     )
     make.add_argument("--signals", nargs="+", action="extend", metavar="PATTERN", help="signals to keep (default: all)")
-    make.add_argument("--every", type=float, metavar="SECONDS", help="least spacing of the rows [s] (default: about 2000 rows)")
+    make.add_argument(
+        "--every", type=float, metavar="SECONDS", help="least spacing of the rows [s] (default: about 2000 rows)"
+    )
     make.add_argument("--force", action="store_true", help="replace a baseline that is there already")
     _add_tolerances(make)
 
@@ -60,7 +72,9 @@ def _register_make(actions: Any) -> None:
 def _register_check(actions: Any) -> None:
     check = _action(actions, "check", "run again, or take a given result, and compare", _check)
     check.add_argument("file", metavar="FILE.json", help="the baseline, or an FMU that holds references")
-    check.add_argument("--against", metavar="FMU_OR_RESULT", help="another FMU to run, or a results folder or table to compare")
+    check.add_argument(
+        "--against", metavar="FMU_OR_RESULT", help="another FMU to run, or a results folder or table to compare"
+    )
     check.add_argument("--reference", metavar="NAME", help="of several references in an FMU: this one only")
     check.add_argument("--plots", metavar="DIR", help="write a page with pictures of what differs to this folder")
     check.add_argument("--verbose", action="store_true", help="print all signals and everything that was found")
@@ -123,9 +137,16 @@ def _subject(options: argparse.Namespace) -> Subject:
         return Subject(Recipe(), load_result(options.subject))
     with _progress(options) as bar:
         return make_subject(
-            options.subject, Path(), start=options.start, stop=options.stop, step=options.step,
-            record=options.record, progress=bar, warn=_warn, **_values(options),
-        )  # fmt: skip
+            options.subject,
+            Path(),
+            start=options.start,
+            stop=options.stop,
+            step=options.step,
+            record=options.record,
+            progress=bar,
+            warn=_warn,
+            **_values(options),
+        )
 
 
 def _values(options: argparse.Namespace) -> dict[str, Any]:
@@ -138,7 +159,9 @@ def _values(options: argparse.Namespace) -> dict[str, Any]:
     variables = read_description(options.subject, options.subject).modelVariables
     held = {v.name: values.pop(v.name) for v in variables if v.causality == "input" and v.name in values}
     if held and options.inputs:
-        raise BaselineError(f"Give the inputs in the table {options.inputs} or with --set, not both: {', '.join(held)}.")
+        raise BaselineError(
+            f"Give the inputs in the table {options.inputs} or with --set, not both: {', '.join(held)}."
+        )
     return {"inputs": options.inputs or held, "parameters": values}
 
 
@@ -178,7 +201,9 @@ def _check_one(baseline: Baseline, asked: Asked, options: argparse.Namespace) ->
         return check(load_result(other), baseline, tolerances, label=other)
     with _progress(options) as bar:
         subject = run_again(baseline, other, bar, _warn)
-    return check(subject.outcome or subject.result, baseline, tolerances, label=Path(other or subject.recipe.source).name)
+    return check(
+        subject.outcome or subject.result, baseline, tolerances, label=Path(other or subject.recipe.source).name
+    )
 
 
 def _draw(found: list[Regression], options: argparse.Namespace) -> None:
@@ -213,9 +238,13 @@ def _update(options: argparse.Namespace) -> int:
         subject = run_again(baseline, None, bar, _warn)
     header = baseline.header
     update = plan_update(
-        subject.outcome or subject.result, baseline.path, tolerances,
-        recipe=header.recipe, signals=header.selection, every=header.every,
-    )  # fmt: skip
+        subject.outcome or subject.result,
+        baseline.path,
+        tolerances,
+        recipe=header.recipe,
+        signals=header.selection,
+        every=header.every,
+    )
     return _write(update, baseline.path, options)
 
 
@@ -233,7 +262,9 @@ def _embed(options: argparse.Namespace) -> int:
     from cosim.baselines.references import embed_baseline  # noqa: PLC0415
 
     target = embed_baseline(read_baseline(options.file), options.fmu, options.output, options.name)
-    print_json({"file": str(target)}) if options.json else print(f"{target} holds {options.name or Path(options.file).stem}.")
+    print_json({"file": str(target)}) if options.json else print(
+        f"{target} holds {options.name or Path(options.file).stem}."
+    )
     return DONE
 
 

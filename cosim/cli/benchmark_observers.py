@@ -19,22 +19,31 @@ DONE, NOT_AS_ASKED = 0, 1
 def register(commands: Any) -> None:
     """Add the command to the parser."""
     description = (
-        "Run the plant side of a scenario once, play it back to several observers, each alone, and compare errors, slip "
+        "Run the plant side of a scenario once, play it back to several observers, each alone, and compare errors, "
+        "slip "
         "detection, certificates and cost."
     )
-    epilog = "Exit codes: 0 done, 1 an observer failed or could not be coupled, 2 error or interrupted; what was judged is told."
+    epilog = (
+        "Exit codes: 0 done, 1 an observer failed or could not be coupled, 2 error or interrupted; what was "
+        "judged is told."
+    )
     parser = commands.add_parser(
         "benchmark-observers", help="compare observers on one recorded run", description=description, epilog=epilog
     )
     add_scenario(parser)
     parser.add_argument(
-        "--observers", type=_names, metavar="A,B,...",
-        help="components of the scenario or shipped observers (default: the scenario's own, and all shipped train observers "
+        "--observers",
+        type=_names,
+        metavar="A,B,...",
+        help="components of the scenario or shipped observers (default: the scenario's own, and all shipped train "
+        "observers "
         "whose inputs and event it can serve)",
-    )  # fmt: skip
+    )
     source = parser.add_mutually_exclusive_group()
     source.add_argument("--record", metavar="DIR", help="keep the recorded run as a results folder")
-    source.add_argument("--from", metavar="DIR", dest="recorded", help="play back this results folder instead of a new run")
+    source.add_argument(
+        "--from", metavar="DIR", dest="recorded", help="play back this results folder instead of a new run"
+    )
     parser.add_argument(
         "--repeat", type=positive, default=1, metavar="N", help="runs of each observer, for the cost (default: 1)"
     )
@@ -55,9 +64,14 @@ def execute(options: argparse.Namespace) -> int:
     bar = _Bar(silent=options.quiet or options.json)
     try:
         benchmark = benchmark_observers(
-            load_scenario(options), options.observers, record=options.record, recorded=options.recorded, repeat=options.repeat,
-            progress=bar, warn=_warn,
-        )  # fmt: skip
+            load_scenario(options),
+            options.observers,
+            record=options.record,
+            recorded=options.recorded,
+            repeat=options.repeat,
+            progress=bar,
+            warn=_warn,
+        )
     finally:
         bar.close()
     paths = benchmark.write(options.out) if options.out is not None else {}

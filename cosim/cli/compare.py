@@ -1,4 +1,6 @@
-"""``cosim compare``: a result against a reference, as text, JSON, page, pictures. Exit codes: 0 equal, 1 different, 2 error."""
+"""``cosim compare``: a result against a reference, as text, JSON, page, pictures. Exit codes: 0 equal, 1 different, 2
+error.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +22,10 @@ if TYPE_CHECKING:
 EQUAL, DIFFERENT = 0, 1
 NO_TELEGRAMS = "Telegrams were not compared (--no-telegrams)."
 EPILOG = (
-    'A tolerance file is TOML: [default] with absolute, relative, time and time_relative; [signals."train.*"] with the same '
-    'keys for the signals that fit; ignore = ["driver.*"]. A value may differ by absolute + relative * range of the reference, '
+    'A tolerance file is TOML: [default] with absolute, relative, time and time_relative; [signals."train.*"] with the '
+    "same "
+    'keys for the signals that fit; ignore = ["driver.*"]. A value may differ by absolute + relative * range of the '
+    "reference, "
     "an instant by time + time_relative * length. Exit codes: 0 equal within tolerance, 1 different, 2 error."
 )
 
@@ -29,15 +33,20 @@ EPILOG = (
 def register(commands: Any) -> None:
     """Add the command to the parser."""
     description = "Compare a result with a reference: signals in tolerance tubes, telegrams as events."
-    parser = commands.add_parser("compare", help="compare a result with a reference", description=description, epilog=EPILOG)
+    parser = commands.add_parser(
+        "compare", help="compare a result with a reference", description=description, epilog=EPILOG
+    )
     what = "a results folder, a table (CSV, MAT, ...) or a baseline (JSON)"
     parser.add_argument("reference", metavar="A", help=f"what is right: {what}")
     parser.add_argument("result", metavar="B", help=f"what is compared with it: {what}")
     allowed = parser.add_argument_group(
-        "what is compared, and how closely", "tolerances that are not given are those of a baseline A, or else the usual ones"
+        "what is compared, and how closely",
+        "tolerances that are not given are those of a baseline A, or else the usual ones",
     )
     add_tolerances(allowed)
-    allowed.add_argument("--signals", action="append", metavar="PATTERN", help="compare these signals only; may be repeated")
+    allowed.add_argument(
+        "--signals", action="append", metavar="PATTERN", help="compare these signals only; may be repeated"
+    )
     allowed.add_argument("--no-telegrams", action="store_true", help="do not compare the balise telegrams")
     allowed.add_argument("--extra-fails", action="store_true", help="signals that only B has are a difference")
     told = parser.add_argument_group("what is told")
@@ -109,7 +118,9 @@ def _fits(name: str, pattern: str) -> bool:
 
 
 def _columns(side: Result, names: Sequence[str]) -> Result:
-    return replace(side, table=side.table[["time", *names]], signals=[info for info in side.signals if info.name in names])
+    return replace(
+        side, table=side.table[["time", *names]], signals=[info for info in side.signals if info.name in names]
+    )
 
 
 # -- telling ----------------------------------------------------------------------------------------------------------
@@ -135,6 +146,8 @@ def _tell(comparison: Comparison, options: argparse.Namespace) -> None:
     lines = [f"{'page':>10}: {write_page(comparison, options.html)}"] if options.html else []
     if options.plots:
         drawn = write_pictures(comparison, options.plots)
-        lines += [f"{'picture':>10}: {path}" for path in drawn.values()] or ["no pictures: nothing that differs can be drawn"]
+        lines += [f"{'picture':>10}: {path}" for path in drawn.values()] or [
+            "no pictures: nothing that differs can be drawn"
+        ]
     if not (options.json or options.quiet):
         print("", *lines, sep="\n")

@@ -12,14 +12,17 @@ DONE = 0
 def register(commands: Any) -> None:
     """Add the command to the parser."""
     text = (
-        "Write a result in another format: the ending of TARGET says which, one of .csv, .mat (MATLAB), .modelica.mat (Dymola, "
+        "Write a result in another format: the ending of TARGET says which, one of .csv, .mat (MATLAB), .modelica.mat "
+        "(Dymola, "
         "OpenModelica), .npy, .parquet, .h5. SOURCE is a results folder or a table of ours or of another tool."
     )
     epilog = "Exit codes: 0 written, 2 error."
     parser = commands.add_parser("convert", help="write a result in another format", description=text, epilog=epilog)
     parser.add_argument("source", metavar="SOURCE", help="results folder or file")
     parser.add_argument("target", metavar="TARGET", help="file to write")
-    parser.add_argument("--signals", nargs="+", action="extend", metavar="PATTERN", help="only these signals, e.g. 'train.*'")
+    parser.add_argument(
+        "--signals", nargs="+", action="extend", metavar="PATTERN", help="only these signals, e.g. 'train.*'"
+    )
     parser.add_argument("--no-units", action="store_true", help="CSV headings without units")
     parser.set_defaults(execute=execute)
 
@@ -41,7 +44,8 @@ def execute(options: argparse.Namespace) -> int:
         result = selected(result, options.signals)
     written = save_result(result, target, units=not options.no_units)
     print(
-        f"{len(result.table)} rows, {len(result.signals)} signals, {len(result.events)} telegrams: {', '.join(map(str, written))}"
+        f"{len(result.table)} rows, {len(result.signals)} signals, {len(result.events)} telegrams: "
+        f"{', '.join(map(str, written))}"
     )
     if wanted.name == "npy" and any(signal.unit != "1" for signal in result.signals):
         print("A NumPy file keeps no units; .parquet, .h5, .mat and .csv do.")

@@ -1,4 +1,6 @@
-"""``cosim info FILE``: what an FMU says about itself and whether it can run here, or what is in a system structure package."""
+"""``cosim info FILE``: what an FMU says about itself and whether it can run here, or what is in a system structure
+package.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,8 @@ def register(commands: Any) -> None:
     parser = commands.add_parser(
         "info",
         help="describe an FMU or SSP file",
-        description="Interfaces, platforms and variables of an FMU, or the systems, components and connections in an SSP.",
+        description="Interfaces, platforms and variables of an FMU, or the systems, components and connections in an "
+        "SSP.",
     )
     parser.add_argument("file", type=Path)
     parser.add_argument("--json", action="store_true", help="print JSON")
@@ -63,7 +66,11 @@ def describe_file(path: Path) -> dict[str, Any]:
     import fmpy  # noqa: PLC0415 - only here
 
     description = read_description(path, "info")
-    interfaces = {"coSimulation": "co-simulation", "modelExchange": "model exchange", "scheduledExecution": "scheduled execution"}
+    interfaces = {
+        "coSimulation": "co-simulation",
+        "modelExchange": "model exchange",
+        "scheduledExecution": "scheduled execution",
+    }
     return {
         "file": str(path),
         "model": description.modelName,
@@ -75,8 +82,15 @@ def describe_file(path: Path) -> dict[str, Any]:
         "tool": description.generationTool or "",
         "declares": list(read_capabilities(description).declared()),
         "variables": [
-            {"name": v.name, "causality": v.causality or "local", "variability": v.variability, "type": v.type,
-             "unit": v.unit, "start": v.start, "description": v.description}
+            {
+                "name": v.name,
+                "causality": v.causality or "local",
+                "variability": v.variability,
+                "type": v.type,
+                "unit": v.unit,
+                "start": v.start,
+                "description": v.description,
+            }
             for v in description.modelVariables
         ],
-    }  # fmt: skip
+    }

@@ -66,8 +66,12 @@ def _details(kind: str, name: str, entry: Mapping[str, Any]) -> list[str]:
     if entry["presets"]:
         lines.append(f"presets: {', '.join(entry['presets'])}")
     if entry["options"]:
-        words = {option: legal(choices[option]).removeprefix(", ").removeprefix("one of ") for option in entry["options"]}
-        lines.append("options: " + ", ".join(f"{option} ({values})" if values else option for option, values in words.items()))
+        words = {
+            option: legal(choices[option]).removeprefix(", ").removeprefix("one of ") for option in entry["options"]
+        }
+        lines.append(
+            "options: " + ", ".join(f"{option} ({values})" if values else option for option, values in words.items())
+        )
     return lines
 
 
@@ -100,7 +104,11 @@ def catalogue() -> dict[str, dict[str, dict[str, Any]]]:
     for name in shipped_scenarios():
         table = Scenario.load(name).table()
         scenarios[name] = {"description": table.title, "source": table.source}
-    return {"scenarios": scenarios, "models": _systems(plant_models.PLANTS), "observers": _systems(fmu_observer.OBSERVERS)}
+    return {
+        "scenarios": scenarios,
+        "models": _systems(plant_models.PLANTS),
+        "observers": _systems(fmu_observer.OBSERVERS),
+    }
 
 
 def _systems(registry: Mapping[str, Any]) -> dict[str, dict[str, Any]]:

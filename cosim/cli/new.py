@@ -10,13 +10,18 @@ from typing import Any
 
 def register(commands: Any) -> None:
     """Add the command to the parser."""
-    description = """Look into an FMU and write a commented scenario file: inputs and outputs, and guesses for position, speed,
-    wheel speed and effort, to be confirmed by editing. Only the description is read; nothing of the FMU is executed."""
+    description = """Look into an FMU and write a commented scenario file: inputs and outputs, and guesses for position,
+    speed, wheel speed and effort, to be confirmed by editing. Only the description is read; nothing of the FMU is
+    executed."""
     epilog = "Exit codes: 0 written, 2 error."
-    parser = commands.add_parser("new", help="write a starter scenario for an FMU", description=description, epilog=epilog)
+    parser = commands.add_parser(
+        "new", help="write a starter scenario for an FMU", description=description, epilog=epilog
+    )
     parser.add_argument("fmu", type=Path, help="the FMU")
     parser.add_argument("-o", "--out", type=Path, metavar="FILE", help="scenario file to write (default: NAME.toml)")
-    parser.add_argument("--observer", metavar="NAME", help="shipped observer to put beside it (default: takagi_sugeno_cdo)")
+    parser.add_argument(
+        "--observer", metavar="NAME", help="shipped observer to put beside it (default: takagi_sugeno_cdo)"
+    )
     parser.add_argument("--force", action="store_true", help="replace a file that exists")
     parser.set_defaults(execute=execute)
 

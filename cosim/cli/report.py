@@ -23,18 +23,32 @@ DONE = 0
 def register(commands: Any) -> None:
     """Add the command to the parser."""
     description = (
-        "Make the report of a results folder again, or lay several results over each other on one page: the first is what the "
+        "Make the report of a results folder again, or lay several results over each other on one page: the first is "
+        "what the "
         "others are compared with."
     )
     parser = commands.add_parser(
-        "report", help="report of results, or of several laid over each other", description=description,
+        "report",
+        help="report of results, or of several laid over each other",
+        description=description,
         epilog="Exit codes: 0 written, 2 error.",
-    )  # fmt: skip
-    parser.add_argument("results", nargs="+", metavar="DIR", help="results folders, or tables in any format that can be read")
-    parser.add_argument("--out", metavar="FILE.html", help=f"the page (default: report.html in DIR, or {OVERLAY} for several)")
-    parser.add_argument("--labels", metavar="A,B", help="texts for the runs, separated by commas (default: names of the folders)")
-    parser.add_argument("--signals", action="append", default=[], metavar="PATTERN",
-                        help="for several runs: recorded signals to draw as well, e.g. 'train.*'; may be repeated")  # fmt: skip
+    )
+    parser.add_argument(
+        "results", nargs="+", metavar="DIR", help="results folders, or tables in any format that can be read"
+    )
+    parser.add_argument(
+        "--out", metavar="FILE.html", help=f"the page (default: report.html in DIR, or {OVERLAY} for several)"
+    )
+    parser.add_argument(
+        "--labels", metavar="A,B", help="texts for the runs, separated by commas (default: names of the folders)"
+    )
+    parser.add_argument(
+        "--signals",
+        action="append",
+        default=[],
+        metavar="PATTERN",
+        help="for several runs: recorded signals to draw as well, e.g. 'train.*'; may be repeated",
+    )
     parser.set_defaults(execute=execute)
 
 
@@ -50,7 +64,9 @@ def execute(options: argparse.Namespace) -> int:
     for path, result, spec in zip(paths, results, specs, strict=True):
         if is_guessed(result):
             print(f"{path} does not tell which signals play which role; {_guess(spec)}", file=sys.stderr)
-    page = _one(options, paths[0], results[0], specs[0]) if len(paths) == 1 else _several(options, results, specs, labels)
+    page = (
+        _one(options, paths[0], results[0], specs[0]) if len(paths) == 1 else _several(options, results, specs, labels)
+    )
     print(f"report: {page}")
     return DONE
 
@@ -68,7 +84,9 @@ def _one(options: argparse.Namespace, path: Path, result: Result, spec: ReportSp
     return write_report(result, spec, path)
 
 
-def _several(options: argparse.Namespace, results: Sequence[Result], specs: Sequence[ReportSpec], labels: Sequence[str]) -> Path:
+def _several(
+    options: argparse.Namespace, results: Sequence[Result], specs: Sequence[ReportSpec], labels: Sequence[str]
+) -> Path:
     from cosim.report.overlay.runs import make_runs  # noqa: PLC0415
     from cosim.report.page.overlay import write_overlay_page  # noqa: PLC0415 - matplotlib is loaded last
 
@@ -82,7 +100,9 @@ def _labels(text: str | None, paths: Sequence[Path]) -> list[str]:
     if text is not None:
         labels = [label.strip() for label in text.split(",")]
         if len(labels) != len(paths) or not all(labels):
-            raise ComparisonError(f"--labels {text!r}: expected {len(paths)} texts separated by commas (got {len(labels)}).")
+            raise ComparisonError(
+                f"--labels {text!r}: expected {len(paths)} texts separated by commas (got {len(labels)})."
+            )
         return labels
     parts = [path.resolve().parts for path in paths]
     for length in range(1, max(map(len, parts)) + 1):
@@ -103,12 +123,20 @@ def _matching(patterns: Sequence[str], names: Sequence[str]) -> list[str]:
             raise ComparisonError(f"--signals {pattern!r}: no such signal in any run; {nearest(pattern, names)}")
     chosen = [name for name in names if any(fnmatchcase(name, pattern) for pattern in patterns)]
     if len(chosen) > MOST_SIGNALS:
-        raise ComparisonError(f"--signals: {len(chosen)} signals match; a page holds {MOST_SIGNALS} figures. Choose some.")
+        raise ComparisonError(
+            f"--signals: {len(chosen)} signals match; a page holds {MOST_SIGNALS} figures. Choose some."
+        )
     return chosen
 
 
 def _guess(spec: ReportSpec) -> str:
     """What was guessed, in words."""
-    roles = [f"{role} = {name}" for role in ("true_position", "true_speed") if (name := getattr(spec, role)) is not None]
+    roles = [
+        f"{role} = {name}" for role in ("true_position", "true_speed") if (name := getattr(spec, role)) is not None
+    ]
     observers = [f"observers = {', '.join(spec.observers)}"] if spec.observers else []
-    return f"guessed from their names: {', '.join([*roles, *observers])}." if roles or observers else "their names give no hint."
+    return (
+        f"guessed from their names: {', '.join([*roles, *observers])}."
+        if roles or observers
+        else "their names give no hint."
+    )

@@ -12,8 +12,10 @@ from cosim.cli.scenarios import OVERRIDES, parse_setting
 
 EQUAL, DIFFERS, ERROR = 0, 1, 2
 DESCRIPTION = (
-    "Run again what a results folder holds, and compare with the results in it. The folder may have been moved, and the "
-    "FMUs it was made from may be gone. Exit codes: 0 bit-identical or within the tolerance, 1 differs, 2 it cannot be run again."
+    "Run again what a results folder holds, and compare with the results in it. The folder may have been moved, and "
+    "the "
+    "FMUs it was made from may be gone. Exit codes: 0 bit-identical or within the tolerance, 1 differs, 2 it cannot be "
+    "run again."
 )
 
 
@@ -24,7 +26,10 @@ def register(commands: Any) -> None:
     parser.add_argument("--out", metavar="OTHER", help="folder for the new results (default: only the verdict is kept)")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="settings", help=OVERRIDES)
     parser.add_argument(
-        "--tolerance", type=_share, metavar="SHARE", help="how far a signal may differ, as a share of its range (default: 1e-4)"
+        "--tolerance",
+        type=_share,
+        metavar="SHARE",
+        help="how far a signal may differ, as a share of its range (default: 1e-4)",
     )
     parser.add_argument("--trust", action="store_true", help="go on where files of the folder were edited since")
     parser.add_argument("--json", action="store_true", help="print the comparison as JSON")
@@ -43,9 +48,15 @@ def execute(options: argparse.Namespace) -> int:
     out = None if options.out is None else Path(options.out).absolute()
     try:
         again = rerun(
-            options.directory, out=out, overrides=settings, tolerance=options.tolerance, trust=options.trust,
-            progress=bar, warn=_warn, building=_ignore if options.quiet else _say,
-        )  # fmt: skip
+            options.directory,
+            out=out,
+            overrides=settings,
+            tolerance=options.tolerance,
+            trust=options.trust,
+            progress=bar,
+            warn=_warn,
+            building=_ignore if options.quiet else _say,
+        )
     finally:
         if bar is not None:
             bar.close()

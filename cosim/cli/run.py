@@ -25,20 +25,35 @@ CALL_LOG = "calls.log"
 def register(commands: Any) -> None:
     """Add the command to the parser."""
     description = "Run a scenario: shipped, from a TOML file, or from a system structure package (SSP)."
-    epilog = "Exit codes: 0 done, 1 an expectation of the scenario is not met (or --strict), 2 the run failed or could not begin."
+    epilog = (
+        "Exit codes: 0 done, 1 an expectation of the scenario is not met (or --strict), 2 the run failed or could "
+        "not begin."
+    )
     parser = commands.add_parser("run", help="run a scenario", description=description, epilog=epilog)
     add_scenario(parser)
-    parser.add_argument("--out", metavar="DIR", default=None, help="folder for results and report (default: results/NAME)")
-    parser.add_argument("--seeds", type=positive, metavar="N", help="also run N balise seeds and report medians and quartiles")
+    parser.add_argument(
+        "--out", metavar="DIR", default=None, help="folder for results and report (default: results/NAME)"
+    )
+    parser.add_argument(
+        "--seeds", type=positive, metavar="N", help="also run N balise seeds and report medians and quartiles"
+    )
     parser.add_argument("--json", action="store_true", help="print the summary as JSON instead of the table")
     parser.add_argument("--no-report", action="store_true", help="write result files only")
     parser.add_argument(
         "--strict", action="store_true", help="refuse an SSP of wrong form; exit with 1 when the run gave warnings"
     )
-    parser.add_argument("--log-calls", nargs="?", const="", metavar="FILE",
-                        help="log every call of every component to FILE (default: calls.log among the results)")  # fmt: skip
-    parser.add_argument("--stream", action="store_true",
-                        help="write results while the run goes on, as table.npy, so that they outlive the program")  # fmt: skip
+    parser.add_argument(
+        "--log-calls",
+        nargs="?",
+        const="",
+        metavar="FILE",
+        help="log every call of every component to FILE (default: calls.log among the results)",
+    )
+    parser.add_argument(
+        "--stream",
+        action="store_true",
+        help="write results while the run goes on, as table.npy, so that they outlive the program",
+    )
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
     parser.set_defaults(execute=execute)
 
@@ -59,7 +74,13 @@ def execute(options: argparse.Namespace) -> int:
         stream = directory if options.stream else None
         with _kept(directory, options.stream, formats) as spare:
             scenario.run(
-                progress=bar, warn=_warn, call_log=call_log, building=building, stream=stream, spare=spare, finished=results.write
+                progress=bar,
+                warn=_warn,
+                call_log=call_log,
+                building=building,
+                stream=stream,
+                spare=spare,
+                finished=results.write,
             )
     except OutputError:
         if results.outcome is not None:
@@ -99,7 +120,9 @@ class _Results:
 
 @contextmanager
 def _kept(directory: Path, streamed: bool, formats: Sequence[str]) -> Iterator[Path | None]:
-    """Who watches this process is told what to keep should it die; yields the folder to stream to for that, if one is needed."""
+    """Who watches this process is told what to keep should it die; yields the folder to stream to for that, if one is
+    needed.
+    """
     if not LAST_CALL.watched:
         yield None
         return
@@ -125,7 +148,9 @@ class ProgressBar:
             from tqdm import tqdm  # noqa: PLC0415 - only for those who watch
 
             shape = "{percentage:3.0f}%|{bar}| {n:.1f}/{total:.1f} s simulated, {elapsed} elapsed"
-            self._bar = tqdm(total=stop, bar_format=shape, disable=not sys.stderr.isatty(), leave=False, file=sys.stderr)
+            self._bar = tqdm(
+                total=stop, bar_format=shape, disable=not sys.stderr.isatty(), leave=False, file=sys.stderr
+            )
         self._bar.update(t - self._bar.n)
 
     def close(self) -> None:

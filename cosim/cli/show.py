@@ -15,7 +15,9 @@ from cosim.cli.scenarios import add_scenario, load_scenario
 def register(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        "show", help="show how components hang together", description="Components, connections, order and loops, without a run."
+        "show",
+        help="show how components hang together",
+        description="Components, connections, order and loops, without a run.",
     )
     add_scenario(parser)
     parser.add_argument("--picture", metavar="FILE", type=Path, help="also draw it, to a .png, .svg or .pdf file")

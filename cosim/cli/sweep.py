@@ -16,15 +16,19 @@ DONE, SOME_FAILED = 0, 1
 RANGE = re.compile(r"(-?\d+):(-?\d+)(?::(-?\d+))?")
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 SPAN = re.compile(rf"({NUMBER})\.\.({NUMBER})")
-VARY = """values to vary, may be repeated: NAME=70e3,80e3 a list; NAME=0:10 the whole numbers from 0 to 9; NAME=70e3..90e3 a
-range, with --samples"""
+VARY = """values to vary, may be repeated: NAME=70e3,80e3 a list; NAME=0:10 the whole numbers from 0 to 9; NAME=70e3..90e3
+a range, with --samples"""  # noqa: E501
 
 
 def register(commands: Any) -> None:
     """Add the command to the parser."""
     description = "Run a scenario once for each combination of some values. A run that fails does not stop the others."
-    epilog = "Exit codes: 0 all runs done, 1 a run failed, 2 error or interrupted; runs that were done are in the folder."
-    parser = commands.add_parser("sweep", help="run a scenario with varied values", description=description, epilog=epilog)
+    epilog = (
+        "Exit codes: 0 all runs done, 1 a run failed, 2 error or interrupted; runs that were done are in the folder."
+    )
+    parser = commands.add_parser(
+        "sweep", help="run a scenario with varied values", description=description, epilog=epilog
+    )
     add_scenario(parser, default=None)
     parser.add_argument("--vary", action="append", required=True, metavar="NAME=VALUES", help=VARY)
     parser.add_argument(
@@ -32,7 +36,9 @@ def register(commands: Any) -> None:
     )
     parser.add_argument("--samples", type=int, metavar="N", help="N points of a Latin hypercube over ranges and lists")
     parser.add_argument("--seed", type=int, default=0, help="of the points (default: 0)")
-    parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes at a time (default: 1, this one)")
+    parser.add_argument(
+        "--workers", type=int, default=1, metavar="N", help="processes at a time (default: 1, this one)"
+    )
     parser.add_argument("--out", metavar="DIR", help="folder for the results (default: results/NAME_sweep)")
     parser.add_argument("--json", action="store_true", help="print the table as JSON")
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
@@ -54,7 +60,9 @@ def execute(options: argparse.Namespace) -> int:
             f"--vary {ranges[0]}: a range is sampled; say with --samples N at how many points, or list values: a,b."
         )
     sweep = scenario.vary(values, mode, count=options.samples, seed=options.seed)
-    directory = check_writable(Path(options.out) if options.out is not None else Path("results") / f"{scenario.name}_sweep")
+    directory = check_writable(
+        Path(options.out) if options.out is not None else Path("results") / f"{scenario.name}_sweep"
+    )
     with _Bar(len(sweep), visible=not (options.quiet or options.json)) as bar:
         result = sweep.run(options.workers, progress=bar.move, keep=False, directory=directory.absolute())
     if options.json:
@@ -75,7 +83,9 @@ def _values(given: list[str]) -> dict[str, Any]:
     for text in given:
         name, sign, listed = (part.strip() for part in text.partition("="))
         if not (name and sign and listed):
-            raise ScenarioError(f"--vary {text!r}: expected NAME=VALUES, for instance --vary locomotive.mass=70e3,80e3.")
+            raise ScenarioError(
+                f"--vary {text!r}: expected NAME=VALUES, for instance --vary locomotive.mass=70e3,80e3."
+            )
         if name in values:
             raise ScenarioError(f"--vary {name} is given twice; write all values in one list.")
         values[name] = parse_values(listed)
@@ -83,7 +93,8 @@ def _values(given: list[str]) -> dict[str, Any]:
 
 
 def parse_values(text: str) -> Any:
-    """``70e3,80e3``, ``0:10``, ``0:10:2`` or ``70e3..90e3`` as a list or a range; each value TOML where it is that, else text.
+    """``70e3,80e3``, ``0:10``, ``0:10:2`` or ``70e3..90e3`` as a list or a range; each value TOML where it is that,
+    else text.
 
     Raises:
         ScenarioError: a range without numbers in it.

@@ -1,4 +1,6 @@
-"""Tolerances on the command line: the options that the commands share, and what they ask for. Reads a tolerance file."""
+"""Tolerances on the command line: the options that the commands share, and what they ask for. Reads a tolerance
+file.
+"""
 
 from __future__ import annotations
 
@@ -24,10 +26,20 @@ def add_tolerances(group: Any) -> None:
     group.add_argument("--rtol", type=float, metavar="SHARE", help="in value, a share of the range of the reference")
     group.add_argument("--atol", type=float, metavar="SIZE", help="in value, in the SI unit of each signal")
     group.add_argument("--ttol", type=float, metavar="SECONDS", help="in time [s]")
-    group.add_argument("--tolerances", metavar="FILE", help="tolerances by signal, a TOML file (end of 'cosim compare --help')")
-    group.add_argument("--set-tolerance", action="append", default=[], metavar="SIGNAL=VALUE", dest="tolerance_settings",
-                       help=f"of one signal or pattern: {BY_SIGNAL_EXAMPLE}; may be repeated")  # fmt: skip
-    group.add_argument("--ignore", action="append", default=[], metavar="PATTERN", help="signals not to compare; may be repeated")
+    group.add_argument(
+        "--tolerances", metavar="FILE", help="tolerances by signal, a TOML file (end of 'cosim compare --help')"
+    )
+    group.add_argument(
+        "--set-tolerance",
+        action="append",
+        default=[],
+        metavar="SIGNAL=VALUE",
+        dest="tolerance_settings",
+        help=f"of one signal or pattern: {BY_SIGNAL_EXAMPLE}; may be repeated",
+    )
+    group.add_argument(
+        "--ignore", action="append", default=[], metavar="PATTERN", help="signals not to compare; may be repeated"
+    )
 
 
 def asked_tolerances(options: argparse.Namespace) -> Asked:
@@ -48,7 +60,8 @@ def asked_tolerances(options: argparse.Namespace) -> Asked:
 
 
 def chosen_tolerances(options: argparse.Namespace, asked: Asked, stored: Tolerances) -> Tolerances:
-    """What is asked for, over what is stored with a baseline; new defaults replace its tolerances by signal in the same keys.
+    """What is asked for, over what is stored with a baseline; new defaults replace its tolerances by signal in the same
+    keys.
 
     Args:
         options: of the command. asked: from `asked_tolerances`. stored: of the baseline, or the usual ones.
@@ -57,7 +70,9 @@ def chosen_tolerances(options: argparse.Namespace, asked: Asked, stored: Toleran
     base = tolerance(default, stored.default)
     changed = {key: default[key] for key in ("relative", "absolute", "time") if _given(options, key)}
     kept = {name: replace(old, **changed) for name, old in stored.by_signal.items() if name not in by_signal}
-    return Tolerances(base, {name: tolerance(v, base) for name, v in by_signal.items()} | kept, (*ignore, *stored.ignore))
+    return Tolerances(
+        base, {name: tolerance(v, base) for name, v in by_signal.items()} | kept, (*ignore, *stored.ignore)
+    )
 
 
 def _given(options: argparse.Namespace, key: str) -> bool:
@@ -68,7 +83,9 @@ def _checked(name: str, value: Any, base: Tolerance) -> Tolerance:
     try:
         return tolerance(value, base)
     except (ComparisonError, TypeError) as error:
-        raise ComparisonError(f"Tolerance of {name!r}: {error} Give a number, or a table of {', '.join(KEYS)}.") from error
+        raise ComparisonError(
+            f"Tolerance of {name!r}: {error} Give a number, or a table of {', '.join(KEYS)}."
+        ) from error
 
 
 def _setting(text: str) -> tuple[str, Any]:

@@ -26,9 +26,14 @@ Given = Tolerance | Mapping[str, Any] | float
 
 
 def compare_results(
-    reference: Result, result: Result, tolerances: Tolerances | None = None, *,
-    labels: tuple[str, str] = ("reference", "result"), extra_fails: bool = False, curves: bool = True,
-) -> Comparison:  # fmt: skip
+    reference: Result,
+    result: Result,
+    tolerances: Tolerances | None = None,
+    *,
+    labels: tuple[str, str] = ("reference", "result"),
+    extra_fails: bool = False,
+    curves: bool = True,
+) -> Comparison:
     """Compare two results.
 
     Args:
@@ -54,17 +59,23 @@ def compare_results(
     with np.errstate(over="ignore", invalid="ignore"):  # infinities, and numbers so large that their differences are
         signals = [pair.compare(name) for name in ours] + [pair.lone(name, "extra") for name in extra]
     return Comparison(
-        *labels, signals,
+        *labels,
+        signals,
         compare_telegrams(reference, result, tolerances.default, pair.length),
         notes(reference, result, tolerances, labels),
         extra_fails,
-    )  # fmt: skip
+    )
 
 
 def compare(
-    reference: Any, result: Any, tolerance: Given | None = None, *, tolerances: Mapping[str, Given] | None = None,
-    ignore: Iterable[str] = (), extra_fails: bool = False,
-) -> Comparison:  # fmt: skip
+    reference: Any,
+    result: Any,
+    tolerance: Given | None = None,
+    *,
+    tolerances: Mapping[str, Given] | None = None,
+    ignore: Iterable[str] = (),
+    extra_fails: bool = False,
+) -> Comparison:
     """Compare two results, outcomes, or files and folders that hold results.
 
     Args:
@@ -109,13 +120,17 @@ def _check_common(reference: Result, result: Result, tolerances: Tolerances, lab
         near = _nearest(ours[0], theirs) if ours else []
         hint = f" {labels[0]} has {ours[0]!r}, nearest in {labels[1]}: {', '.join(map(repr, near))}." if near else ""
         raise ComparisonError(
-            f"Nothing to compare: none of the {len(ours)} signals of {labels[0]} is among the {len(theirs)} of {labels[1]}.{hint}"
+            f"Nothing to compare: none of the {len(ours)} signals of {labels[0]} is among the {len(theirs)} of "
+            f"{labels[1]}.{hint}"
         )
     if all(tolerances.ignores(name) for name in common):
         raise ComparisonError(f"Nothing to compare: all {len(common)} common signals are ignored.")
     first, last = max(reference.time[0], result.time[0]), min(reference.time[-1], result.time[-1])
     if first > last + tolerances.default.time_for(float(np.ptp(reference.time))):
-        spans = [f"{label} {s.time[0]:.9g} to {s.time[-1]:.9g} s" for label, s in zip(labels, (reference, result), strict=True)]
+        spans = [
+            f"{label} {s.time[0]:.9g} to {s.time[-1]:.9g} s"
+            for label, s in zip(labels, (reference, result), strict=True)
+        ]
         raise ComparisonError(f"Nothing to compare: no time in common ({', '.join(spans)}).")
 
 
@@ -131,7 +146,9 @@ def _nearest(name: str, known: Iterable[str]) -> list[str]:
 class _Pair:
     """Two results whose signals are compared one by one."""
 
-    def __init__(self, reference: Result, result: Result, tolerances: Tolerances, curves: bool, extra: list[str]) -> None:
+    def __init__(
+        self, reference: Result, result: Result, tolerances: Tolerances, curves: bool, extra: list[str]
+    ) -> None:
         self.sides = (reference, result)
         self.tolerances, self.curves, self.extra = tolerances, curves, extra
         self.length = float(reference.time[-1] - reference.time[0])
@@ -149,7 +166,9 @@ class _Pair:
         if any(self.bare):
             one, two = (replace(info, unit=(two if self.bare[0] else one).unit) for info in (one, two))
         try:
-            factor, offset = (1.0, 0.0) if one.unit == two.unit else conversion(parse_unit(two.unit), parse_unit(one.unit))
+            factor, offset = (
+                (1.0, 0.0) if one.unit == two.unit else conversion(parse_unit(two.unit), parse_unit(one.unit))
+            )
         except UnitError as error:
             return self._other_unit(name, one.unit, two.unit, str(error))
         values = [np.asarray(side[name][rows], dtype=float) for side, rows in zip(self.sides, self.rows, strict=True)]

@@ -69,7 +69,9 @@ class Curve:
 
 
 def rows_to_keep(time: np.ndarray) -> np.ndarray:
-    """Which rows count: of several with one time the first and the last, before and after all events of that instant."""
+    """Which rows count: of several with one time the first and the last, before and after all events of that
+    instant.
+    """
     keep = np.ones(len(time), dtype=bool)
     if len(time) > 2:
         keep[1:-1] = (time[1:-1] > time[:-2]) | (time[2:] > time[1:-1])
@@ -88,7 +90,9 @@ def check_time(time: np.ndarray, label: str) -> None:
     if len(wrong):
         row = int(wrong[0])
         was = "" if row == 0 else f" after {time[row - 1]:.9g} s"
-        raise ComparisonError(f"{label}: row {row + 1} has the time {time[row]:.9g} s{was}; expected times that never fall.")
+        raise ComparisonError(
+            f"{label}: row {row + 1} has the time {time[row]:.9g} s{was}; expected times that never fall."
+        )
 
 
 def looks_held(values: np.ndarray) -> bool:

@@ -52,7 +52,7 @@ def with_unit(value: float, unit: str) -> str:
 
 def _value_finding(
     name: str, unit: str, points: Points, ends: tuple[int, int], worst: int, count: int, allowed: Allowed
-) -> Finding:  # fmt: skip
+) -> Finding:
     begin, end, at = (float(points.time[row]) for row in (*ends, worst))
     error = float(points.error[worst])
     side = f"{with_unit(abs(error), unit)} too {'high' if error > 0.0 else 'low'}"
@@ -62,8 +62,16 @@ def _value_finding(
         where = f"{count} points outside the tube, at worst {side} at {at:.9g} s {limit}"
     text = f"{name}: {_when(begin, end)} {where}"
     return Finding(
-        "value", begin, end, float(points.reference[worst]), float(points.result[worst]), abs(error), allowed.value, text, at
-    )  # fmt: skip
+        "value",
+        begin,
+        end,
+        float(points.reference[worst]),
+        float(points.result[worst]),
+        abs(error),
+        allowed.value,
+        text,
+        at,
+    )
 
 
 def _shift_findings(name: str, unit: str, jumps: MatchedJumps, allowed: Allowed) -> list[Finding]:
@@ -86,13 +94,11 @@ def _shift_findings(name: str, unit: str, jumps: MatchedJumps, allowed: Allowed)
     return found
 
 
-def _lone_findings(
-    name: str, unit: str, kind: Kind, jumps: Jumps, points: Points, allowed: Allowed
-) -> list[Finding]:  # fmt: skip
+def _lone_findings(name: str, unit: str, kind: Kind, jumps: Jumps, points: Points, allowed: Allowed) -> list[Finding]:
     if not len(jumps):
         return []
-    # One that is hardly larger than allowed may be a little smaller on the other side, and none there; one whose points are
-    # within the tube is followed by the other side within its own rows.
+    # One that is hardly larger than allowed may be a little smaller on the other side, and none there; one whose points
+    # are within the tube is followed by the other side within its own rows.
     large = np.abs(jumps.size) > 2.0 * allowed.value
     confirmed = large & outside_between(points, allowed, jumps.begin, jumps.end)
     found = []

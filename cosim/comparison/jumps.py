@@ -44,9 +44,9 @@ class Jumps:
 def find_jumps(curve: Curve, allowed: float) -> Jumps:
     """The jumps of a curve that are larger than the allowed difference in value.
 
-    A jump is (a) a change between two rows with the same time, (b) any change of a held signal, (c) in other signals a change
-    within one sample that is steeper than ten times the steepest of four samples before it and four after it. Ramps, sampled
-    exponentials and noise are not: there a neighbour is about as steep.
+    A jump is (a) a change between two rows with the same time, (b) any change of a held signal, (c) in other signals a
+    change within one sample that is steeper than ten times the steepest of four samples before it and four after it.
+    Ramps, sampled exponentials and noise are not: there a neighbour is about as steep.
 
     Args:
         curve: the signal. allowed: smaller changes are none [unit].
@@ -65,9 +65,10 @@ def find_jumps(curve: Curve, allowed: float) -> Jumps:
 def shifts(reference: Jumps, result: Jumps) -> np.ndarray:
     """How much later the jumps of the result are, pair by pair [s], shape (jumps,).
 
-    A jump between two samples may be anywhere between them, so the shift is the smallest that brings the shorter of the two
-    intervals into the longer. On equal grids that is the distance of the samples; on others it is never overstated. One side
-    that jumps at an event while the other is still unchanged in the row after that event is earlier, by that side's sample.
+    A jump between two samples may be anywhere between them, so the shift is the smallest that brings the shorter of the
+    two intervals into the longer. On equal grids that is the distance of the samples; on others it is never overstated.
+    One side that jumps at an event while the other is still unchanged in the row after that event is earlier, by that
+    side's sample.
     """
     first, last = result.begin - reference.begin, result.end - reference.end
     smaller = np.where(np.abs(first) < np.abs(last), first, last)

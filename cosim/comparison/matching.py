@@ -1,4 +1,6 @@
-"""Which jump of the result is which of the reference: alignment in order, by dynamic programming in a band. NumPy only."""
+"""Which jump of the result is which of the reference: alignment in order, by dynamic programming in a band. NumPy
+only.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +20,8 @@ def match_jumps(reference: Jumps, result: Jumps, *, window: float, allowed: floa
     """Pairs of jumps, in order, with the least sum of costs.
 
     A pair costs its shift as a share of the window, and where the values before or after differ by more than allowed
-    something for that, by how much height and values differ. So a whole row of samples that is late is matched as late, and
-    a row of samples that are each a little wrong as wrong.
+    something for that, by how much height and values differ. So a whole row of samples that is late is matched as late,
+    and a row of samples that are each a little wrong as wrong.
 
     Args:
         reference, result: the jumps. window: largest shift that is looked at [s]. allowed: difference in value [unit].
@@ -63,8 +65,10 @@ def _align(a: Jumps, b: Jumps, window: float, allowed: float, scale: float) -> P
 
 def _costs(
     a: Jumps, b: Jumps, centre: np.ndarray, band: int, window: float, allowed: float, scale: float
-) -> np.ndarray:  # fmt: skip
-    """Cost of the pairs (i, centre[i] - band - 1 + c), shape (len(a), 2 band + 2); infinite where there is no such pair."""
+) -> np.ndarray:
+    """Cost of the pairs (i, centre[i] - band - 1 + c), shape (len(a), 2 band + 2); infinite where there is no such
+    pair.
+    """
     other = centre[:, None] + np.arange(-band - 1, band + 1)
     there = (other >= 0) & (other < len(b))
     rows, columns = np.nonzero(there)
@@ -105,7 +109,9 @@ def _moves(cost: np.ndarray, centre: np.ndarray, band: int, n: int) -> np.ndarra
 
 
 def _read(row: np.ndarray, shift: int, skips: np.ndarray) -> np.ndarray:
-    """The cells shift - 1, shift, ... of a row, one more than it has: infinite before its begin, beyond its end all are skips."""
+    """The cells shift - 1, shift, ... of a row, one more than it has: infinite before its begin, beyond its end all are
+    skips.
+    """
     width = len(row)
     if shift <= 0:
         return np.concatenate([np.full(1 - shift, np.inf), row])[: width + 1]

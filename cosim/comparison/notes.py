@@ -1,4 +1,6 @@
-"""What to know beside a comparison: other versions, parameters, FMUs, a run that ended early, tolerances that fit nothing."""
+"""What to know beside a comparison: other versions, parameters, FMUs, a run that ended early, tolerances that fit
+nothing.
+"""
 
 from __future__ import annotations
 
@@ -26,17 +28,23 @@ def notes(reference: Result, result: Result, tolerances: Tolerances, labels: tup
         lines.append(f"{without} names no units; its numbers were taken to be in those of {with_units}.")
     one, two = reference.summary, result.summary
     lines += [
-        f"{key}: {two[key]} instead of {one[key]}." for key in RUN_KEYS if key in one and key in two and one[key] != two[key]
+        f"{key}: {two[key]} instead of {one[key]}."
+        for key in RUN_KEYS
+        if key in one and key in two and one[key] != two[key]
     ]
     lines += _versions(one.get("versions"), two.get("versions"))
     lines += _components(one.get("components"), two.get("components"))
     names = list(dict.fromkeys([*_names(reference), *_names(result)]))
-    lines += [f"The tolerance for {given!r} fits no signal; {nearest(given, names)}" for given in tolerances.unused(names)]
+    lines += [
+        f"The tolerance for {given!r} fits no signal; {nearest(given, names)}" for given in tolerances.unused(names)
+    ]
     return lines
 
 
 def tells_no_units(side: Result) -> bool:
-    """Whether it is a mere table without any unit, as most CSV files are: not a run, whose pure numbers are meant so."""
+    """Whether it is a mere table without any unit, as most CSV files are: not a run, whose pure numbers are meant
+    so.
+    """
     return "components" not in side.summary and all(info.unit in ("", "1") for info in side.signals)
 
 

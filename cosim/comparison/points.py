@@ -34,8 +34,8 @@ class Points:
     """Two curves compared at the rows of the coarser one; arrays of shape (points,).
 
     Args:
-        time: [s]. error: signed difference of value beyond what the allowed time explains, result minus reference [unit].
-        reference, result: values there; that of the finer curve is the nearest one its tube allows.
+        time: [s]. error: signed difference of value beyond what the allowed time explains, result minus reference
+        [unit]. reference, result: values there; that of the finer curve is the nearest one its tube allows.
         judged: where both curves have a number in the same piece.
         no_number: where one holds a number and the other does not, or they hold different kinds of none.
     """
@@ -67,9 +67,10 @@ class MatchedJumps:
 def compare_points(reference: Curve, result: Curve, allowed: Allowed) -> tuple[Points, MatchedJumps]:
     """Match jumps, then hold the points of the coarser curve against the tube around the finer one, piece by piece.
 
-    A pair of jumps further apart than the allowed time counts only where the values confirm it: where some point between the
-    two is outside a tube that is not cut there. Else the two show one jump with different samples. Where many jumps
-    would be moved in a way that no delay does, the value is wrong and not the time, and jumps are matched in place.
+    A pair of jumps further apart than the allowed time counts only where the values confirm it: where some point
+    between the two is outside a tube that is not cut there. Else the two show one jump with different samples. Where
+    many jumps would be moved in a way that no delay does, the value is wrong and not the time, and jumps are matched in
+    place.
     """
     view = _view(reference, result, allowed.time)
     one, two = (find_jumps(curve, allowed.value) for curve in view.sides)
@@ -89,7 +90,9 @@ def compare_points(reference: Curve, result: Curve, allowed: Allowed) -> tuple[P
 
 
 def outside_between(points: Points, allowed: Allowed, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Whether a point between two instants, or the next one before or after them, is outside the tube; of their shape."""
+    """Whether a point between two instants, or the next one before or after them, is outside the tube; of their
+    shape.
+    """
     outside = np.append(0, np.cumsum(points.judged & (np.abs(points.error) > allowed.value)))
     first = np.maximum(np.searchsorted(points.time, begin - allowed.time) - 1, 0)
     last = np.minimum(np.searchsorted(points.time, end + allowed.time, side="right") + 1, len(points.time))
@@ -184,7 +187,8 @@ def _count_outside(points: Points, allowed: Allowed) -> int:
 def _is_patchwork(jumps: MatchedJumps, apart: np.ndarray, allowed: float, explains: bool) -> bool:
     """Whether many jumps would be at other instants, but not as a delay does it.
 
-    A delay explains most points outside the tube, leaves hardly a jump alone, and has the same values before and after them.
+    A delay explains most points outside the tube, leaves hardly a jump alone, and has the same values before and after
+    them.
     """
     count = int(np.count_nonzero(apart))
     if len(apart) < MANY or not explains or count < MANY:
@@ -198,8 +202,8 @@ def _is_patchwork(jumps: MatchedJumps, apart: np.ndarray, allowed: float, explai
 def _from_event(fine: Curve, coarse: Curve, tolerance: float, first: np.ndarray, last: np.ndarray) -> np.ndarray:
     """First row of the finer curve that explains each point, shape (points,), within its piece first <= row < last.
 
-    In the row after an event of both sides, what was before it is over: not even a result that is late by the allowed time
-    still shows it, unless it has another row within that time.
+    In the row after an event of both sides, what was before it is over: not even a result that is late by the allowed
+    time still shows it, unless it has another row within that time.
     """
     at, rows = coarse.time, np.flatnonzero(np.append(False, np.diff(coarse.time) == 0.0))
     following = np.append(at, np.inf)[rows + 1]
@@ -230,7 +234,9 @@ def _numbers(fine: Curve, coarse: Curve, tolerance: float) -> tuple[np.ndarray, 
     return within & ~agrees & ~(mixed & present[0]), within & coarse.finite & present[0] & ~mixed
 
 
-def _sides_of_events(fine: np.ndarray, coarse: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _sides_of_events(
+    fine: np.ndarray, coarse: np.ndarray, a: np.ndarray, b: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Ranges of fine rows [a, b), where both sides have two rows of an event only the one on the same side of it."""
     same = np.diff(coarse) == 0.0
     last = np.minimum(b, len(fine)) - 1

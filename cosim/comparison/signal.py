@@ -47,7 +47,12 @@ def compare_signal(task: Task) -> SignalComparison:
     size = np.abs(points.error[judged])
     at = int(judged[np.argmax(size)]) if len(judged) else None
     return SignalComparison(
-        task.name, task.unit, "differs" if findings else "within", task.tolerance, allowed.value, allowed.time,
+        task.name,
+        task.unit,
+        "differs" if findings else "within",
+        task.tolerance,
+        allowed.value,
+        allowed.time,
         max_error=float(np.max(size)) if len(size) else float("nan"),
         max_error_at=float("nan") if at is None else float(points.time[at]),
         max_shift=float(np.max(np.abs(jumps.shift), initial=0.0)),
@@ -56,7 +61,7 @@ def compare_signal(task: Task) -> SignalComparison:
         worst=_worst(points, findings, at),
         findings=findings,
         curves=_curves(task, points, jumps, allowed) if task.curves else None,
-    )  # fmt: skip
+    )
 
 
 def allowed_for(task: Task) -> Allowed:
@@ -83,10 +88,17 @@ def _equal(task: Task, allowed: Allowed) -> SignalComparison:
         time, values = reference.time, reference.values
         curves = Curves(time, values, time, values, time, low, high, time, error, allowed.value)
     return SignalComparison(
-        task.name, task.unit, "equal", task.tolerance, allowed.value, allowed.time,
-        max_error=0.0 if numbers else float("nan"), max_error_at=float(reference.time[0]),
-        rms_error=0.0 if numbers else float("nan"), curves=curves,
-    )  # fmt: skip
+        task.name,
+        task.unit,
+        "equal",
+        task.tolerance,
+        allowed.value,
+        allowed.time,
+        max_error=0.0 if numbers else float("nan"),
+        max_error_at=float(reference.time[0]),
+        rms_error=0.0 if numbers else float("nan"),
+        curves=curves,
+    )
 
 
 def _findings(task: Task, points: Points, jumps: MatchedJumps, allowed: Allowed) -> list[Finding]:
@@ -140,12 +152,23 @@ def _curves(task: Task, points: Points, jumps: MatchedJumps, allowed: Allowed) -
         low, high = (np.insert(line, cuts + 1, np.nan) for line in (low, high))
         time = np.insert(time, cuts + 1, reference.time[cuts + 1])
     return Curves(
-        reference.time, reference.values, result.time, result.values, time, low, high, points.time, points.error, allowed.value
+        reference.time,
+        reference.values,
+        result.time,
+        result.values,
+        time,
+        low,
+        high,
+        points.time,
+        points.error,
+        allowed.value,
     )
 
 
 def _is_whole(reference: Curve, jumps: MatchedJumps) -> bool:
-    """Whether the rows of the jumps are those of the reference itself, not those of its projection onto a coarser curve."""
+    """Whether the rows of the jumps are those of the reference itself, not those of its projection onto a coarser
+    curve.
+    """
     rows = jumps.reference.row
     return not len(rows) or (
         int(rows[-1]) + 1 < len(reference.time) and np.array_equal(reference.time[rows], jumps.reference.begin)

@@ -21,13 +21,20 @@ def span_findings(name: str, reference: Curve, result: Curve, allowed: float) ->
     for one, two, early, late, verb in ends:
         size = abs(two - one)
         if size > allowed + rounding(one, two):
-            text = f"{name}: {verb} at {two:.9g} s instead of {one:.9g} s, {size:.4g} s {'later' if two > one else 'earlier'}"
-            found.append(Finding(late if two > one else early, min(one, two), max(one, two), one, two, size, allowed, text))
+            text = (
+                f"{name}: {verb} at {two:.9g} s instead of {one:.9g} s, {size:.4g} s "
+                f"{'later' if two > one else 'earlier'}"
+            )
+            found.append(
+                Finding(late if two > one else early, min(one, two), max(one, two), one, two, size, allowed, text)
+            )
     return found
 
 
 def gap_findings(name: str, reference: Curve, result: Curve, allowed: float, allowed_time: float) -> list[Finding]:
-    """Stretches in which one side has no rows where the other has many that are not on the straight line over the gap."""
+    """Stretches in which one side has no rows where the other has many that are not on the straight line over the
+    gap.
+    """
     found = []
     for lacking, full, who in ((reference, result, "reference"), (result, reference, "result")):
         for row in _gaps(lacking, full):

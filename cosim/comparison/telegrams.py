@@ -98,7 +98,7 @@ def _groups(records: Iterable[BaliseRecord]) -> dict[tuple[str, str], list[Balis
 
 def _assign(
     one: list[BaliseRecord], two: list[BaliseRecord]
-) -> tuple[list[Pair], list[BaliseRecord], list[BaliseRecord]]:  # fmt: skip
+) -> tuple[list[Pair], list[BaliseRecord], list[BaliseRecord]]:
     """Pairs with the least sum of time differences, and what is left on either side."""
     count = min(len(one), len(two))
     rows = columns = np.arange(count)
@@ -107,7 +107,9 @@ def _assign(
         rows, columns = linear_sum_assignment(np.abs(stamps[0][:, None] - stamps[1]))
     taken = set(rows.tolist()), set(columns.tolist())
     pairs = [(one[int(i)], two[int(j)]) for i, j in zip(rows, columns, strict=True)]
-    left, right = ([r for k, r in enumerate(side) if k not in done] for side, done in zip((one, two), taken, strict=True))
+    left, right = (
+        [r for k, r in enumerate(side) if k not in done] for side, done in zip((one, two), taken, strict=True)
+    )
     return pairs, left, right
 
 
@@ -123,7 +125,9 @@ def _time_text(field: str, one: BaliseRecord, two: BaliseRecord, allowed: float)
     a, b = getattr(one, field), getattr(two, field)
     if isnan(a) or isnan(b):
         return (
-            "" if isnan(a) and isnan(b) else f"{TIMES[field]} {'never' if isnan(b) else f'at {b:.9g} s, in the reference never'}"
+            ""
+            if isnan(a) and isnan(b)
+            else f"{TIMES[field]} {'never' if isnan(b) else f'at {b:.9g} s, in the reference never'}"
         )
     if abs(b - a) <= allowed + rounding(a, b):
         return ""
@@ -134,7 +138,9 @@ def _payload_text(field: str, one: BaliseRecord, two: BaliseRecord, allowed: flo
     a, b = getattr(one, field), getattr(two, field)
     if a == b or (isnan(a) and isnan(b)) or abs(b - a) <= allowed:
         return ""
-    return f"{field} {b:.9g} {PAYLOAD[field]} instead of {a:.9g} {PAYLOAD[field]} (allowed {allowed:.4g} {PAYLOAD[field]})"
+    return (
+        f"{field} {b:.9g} {PAYLOAD[field]} instead of {a:.9g} {PAYLOAD[field]} (allowed {allowed:.4g} {PAYLOAD[field]})"
+    )
 
 
 def _words(one: BaliseRecord, two: BaliseRecord) -> list[tuple[str, str, str]]:

@@ -48,7 +48,9 @@ def _shown(comparison: Comparison, verbose: bool, shared: Mapping[str, int]) -> 
 
 
 def _shared(comparison: Comparison) -> dict[str, int]:
-    """What is so with all signals, such as a sample less at the end: text without the name of the signal, how many have it."""
+    """What is so with all signals, such as a sample less at the end: text without the name of the signal, how many have
+    it.
+    """
     both = [signal for signal in comparison.signals if signal.status in ("equal", "within", "differs")]
     counts = Counter(f.text.removeprefix(s.name + ": ") for s in both for f in s.findings if f.kind in SPAN)
     return {text: count for text, count in counts.items() if count == len(both) > 1}
@@ -61,9 +63,13 @@ def _own(signal: SignalComparison, shared: Mapping[str, int]) -> list[Finding]:
 def _headline(comparison: Comparison) -> str:
     statuses = [signal.status for signal in comparison.signals]
     words = {
-        "equal": "equal", "within": "within tolerance", "differs": "differ", "missing": "missing", "extra": "extra",
+        "equal": "equal",
+        "within": "within tolerance",
+        "differs": "differ",
+        "missing": "missing",
+        "extra": "extra",
         "ignored": "ignored",
-    }  # fmt: skip
+    }
     counts = [f"{statuses.count(s)} {word}" for s, word in words.items() if s in statuses]
     events = comparison.events
     told = f"{events.matched} telegrams match" if events.compared else "telegrams not compared: one side keeps none"
@@ -78,7 +84,10 @@ def _table(signals: Sequence[SignalComparison]) -> list[str]:
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = []
     for row in rows:
-        cells = [cell.ljust(w) if k in (0, 1, 7) else cell.rjust(w) for k, (cell, w) in enumerate(zip(row, widths, strict=True))]
+        cells = [
+            cell.ljust(w) if k in (0, 1, 7) else cell.rjust(w)
+            for k, (cell, w) in enumerate(zip(row, widths, strict=True))
+        ]
         lines.append("  ".join(cells).rstrip())
     return [lines[0], "-" * max(map(len, lines)), *lines[1:]]
 

@@ -15,9 +15,9 @@ from cosim.errors import ComparisonError, nearest
 class Tolerance:
     """How far a signal may be from its reference.
 
-    A value may differ by ``absolute + relative * range``, where range is largest minus smallest value of the reference, at
-    least a millionth of its largest size, and that size where it is constant; an instant by ``time + time_relative * length``
-    of the reference.
+    A value may differ by ``absolute + relative * range``, where range is largest minus smallest value of the reference,
+    at least a millionth of its largest size, and that size where it is constant; an instant by
+    ``time + time_relative * length`` of the reference.
 
     Args:
         absolute: in the SI unit of the signal.
@@ -38,7 +38,9 @@ class Tolerance:
         for entry in fields(self):
             value = getattr(self, entry.name)
             if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value) or value < 0.0:
-                raise ComparisonError(f"Tolerance {entry.name} = {value!r}: expected a number that is zero or positive.")
+                raise ComparisonError(
+                    f"Tolerance {entry.name} = {value!r}: expected a number that is zero or positive."
+                )
 
     def value_for(self, scale: float) -> float:
         """Allowed difference in value, for a reference of range `scale`."""
@@ -56,7 +58,8 @@ def tolerance(given: Tolerance | Mapping[str, Any] | float, base: Tolerance) -> 
     """A tolerance as users write it.
 
     Args:
-        given: a tolerance, a mapping with some of its keys (the others as in `base`), or a number: the relative tolerance.
+        given: a tolerance, a mapping with some of its keys (the others as in `base`), or a number: the relative
+        tolerance.
         base: what is not given.
 
     Raises:
@@ -110,4 +113,6 @@ class Tolerances:
     def unused(self, names: Iterable[str]) -> list[str]:
         """Names and patterns that fit none of the signals `names`: misspelt, most likely."""
         known = list(names)
-        return [p for p in (*self.by_signal, *self.ignore) if not any(p == name or fnmatchcase(name, p) for name in known)]
+        return [
+            p for p in (*self.by_signal, *self.ignore) if not any(p == name or fnmatchcase(name, p) for name in known)
+        ]

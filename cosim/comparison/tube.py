@@ -24,8 +24,12 @@ class Band:
 
 
 def band_of(
-    curve: Curve, at: np.ndarray, tolerance: float | np.ndarray, first: np.ndarray | int = 0, last: np.ndarray | int | None = None
-) -> Band:  # fmt: skip
+    curve: Curve,
+    at: np.ndarray,
+    tolerance: float | np.ndarray,
+    first: np.ndarray | int = 0,
+    last: np.ndarray | int | None = None,
+) -> Band:
     """Smallest and largest value of the curve in [at - tolerance, at + tolerance], within one piece.
 
     Args:
@@ -47,17 +51,22 @@ def band_of(
     return Band(np.minimum.reduce([*ends, smallest]), np.maximum.reduce([*ends, largest]), judged)
 
 
-def widen_at_ends(band: Band, curve: Curve, at: np.ndarray, tolerance: float, first: np.ndarray, last: np.ndarray) -> Band:
+def widen_at_ends(
+    band: Band, curve: Curve, at: np.ndarray, tolerance: float, first: np.ndarray, last: np.ndarray
+) -> Band:
     """The band with what the curve may have been within the allowed time before its first row and after its last one.
 
-    Nobody knows, so the curve is continued by its own reflection in its end point: a ramp as the same ramp. Without this a
-    smooth signal that is late by less than allowed would be wrong in its first rows.
+    Nobody knows, so the curve is continued by its own reflection in its end point: a ramp as the same ramp. Without
+    this a smooth signal that is late by less than allowed would be wrong in its first rows.
 
     Args:
         band: of `curve` at the instants. The others as in `band_of`.
     """
     low, high = band.low.copy(), band.high.copy()
-    ends = [(0, at - tolerance < curve.time[0], first == 0), (-1, at + tolerance > curve.time[-1], last == len(curve.time))]
+    ends = [
+        (0, at - tolerance < curve.time[0], first == 0),
+        (-1, at + tolerance > curve.time[-1], last == len(curve.time)),
+    ]
     for row, beyond, in_piece in ends:
         near = np.flatnonzero(beyond & in_piece & band.judged)
         if len(near):
@@ -72,8 +81,8 @@ def widen_at_ends(band: Band, curve: Curve, at: np.ndarray, tolerance: float, fi
 def held_band(curve: Curve, tolerance: float, first: np.ndarray, last: np.ndarray) -> Band:
     """Values of a held curve that are allowed for another on the same rows, all the time that a row holds.
 
-    A row holds from its own time until that of the next. A value that comes one row late is right at the begin of the row,
-    within the allowed time, and wrong at its end; so the begin, the middle and the end are looked at.
+    A row holds from its own time until that of the next. A value that comes one row late is right at the begin of the
+    row, within the allowed time, and wrong at its end; so the begin, the middle and the end are looked at.
 
     Args:
         curve: the curve, on the rows of the other. tolerance: [s]. first, last: as in `band_of`, for each row.

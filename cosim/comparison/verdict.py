@@ -25,7 +25,9 @@ Kind = Literal[
     "unit",  # units that cannot be converted into each other
 ]
 Status = Literal["equal", "within", "differs", "missing", "extra", "ignored"]
-"""``equal``: every bit; ``within`` the tolerance; ``missing``: only the reference has the signal; ``extra``: only the result."""
+"""``equal``: every bit; ``within`` the tolerance; ``missing``: only the reference has the signal; ``extra``: only the
+result.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +86,8 @@ class SignalComparison:
     Args:
         name: of the signal. unit: SI unit of the reference. status: see `Status`.
         tolerance: in use. allowed: difference in value allowed [unit]. allowed_time: in time [s].
-        max_error: largest difference in value beyond what the allowed time explains [unit]; NaN where nothing was compared.
+        max_error: largest difference in value beyond what the allowed time explains [unit]; NaN where nothing was
+        compared.
         max_error_at: when [s].
         max_shift: largest difference in time of a matched jump [s]; 0 without jumps.
         rms_error: time-weighted root mean square of the value error [unit].
@@ -176,7 +179,9 @@ class Comparison:
 
     @property
     def failed(self) -> list[SignalComparison]:
-        """Signals that are not as they should be, the worst first: missing ones, then by excess over what is allowed."""
+        """Signals that are not as they should be, the worst first: missing ones, then by excess over what is
+        allowed.
+        """
         bad = [s for s in self.signals if not s.passed and (s.status != "extra" or self.extra_fails)]
         return sorted(bad, key=_badness, reverse=True)
 
@@ -217,13 +222,25 @@ def _badness(signal: SignalComparison) -> float:
 
 def _signal_data(signal: SignalComparison) -> dict[str, Any]:
     names = (
-        "name", "unit", "status", "allowed", "allowed_time",
-        "max_error", "max_error_at", "max_shift", "rms_error", "share_outside",
-    )  # fmt: skip
-    tolerances: Mapping[str, float] = {k: getattr(signal.tolerance, k) for k in ("absolute", "relative", "time", "time_relative")}
+        "name",
+        "unit",
+        "status",
+        "allowed",
+        "allowed_time",
+        "max_error",
+        "max_error_at",
+        "max_shift",
+        "rms_error",
+        "share_outside",
+    )
+    tolerances: Mapping[str, float] = {
+        k: getattr(signal.tolerance, k) for k in ("absolute", "relative", "time", "time_relative")
+    }
     return {name: getattr(signal, name) for name in names} | {
         "tolerance": dict(tolerances),
         "worst": [list(point) for point in signal.worst],
-        "findings": [{k: getattr(f, k) for k in ("kind", "time", "end", "size", "allowed", "text")} for f in signal.findings],
+        "findings": [
+            {k: getattr(f, k) for k in ("kind", "time", "end", "size", "allowed", "text")} for f in signal.findings
+        ],
         "nearest": list(signal.nearest),
     }

@@ -1,1 +1,3 @@
-"""The compiled stepper: the plan executed by a C routine over the FMUs' own functions, bit-identical with the Python stepper."""
+"""The compiled stepper: the plan executed by a C routine over the FMUs' own functions, bit-identical with the Python
+stepper.
+"""

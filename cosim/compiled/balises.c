@@ -1,7 +1,7 @@
 /* A step over a balise, or near one: the rules of `RollbackLocaliser`, `BaliseService` and `Receiver`. Part of `stepper.c`.
 
    Whatever is not ordinary (several balises, a train that turns, a call that fails) is handed to Python with all that was said so far. */
-#include "telling.c"
+#include "notifying.c"
 
 #define ROOT_TOLERANCE 1e-11 /* [s], as in Python */
 #define MAX_ROOT_STEPS 60
@@ -23,14 +23,14 @@ typedef struct {
 /* -- the plant ----------------------------------------------------------------------------------------------------- */
 
 /* Put the cursor before the first place at or behind `position`. */
-static void seek(Watch *watch, double position) {
+static void seek(PlantMonitor *watch, double position) {
     while (watch->cursor > 0 && !(watch->places[watch->cursor - 1] < position))
         watch->cursor--;
     while (watch->cursor < watch->place_count && watch->places[watch->cursor] < position)
         watch->cursor++;
 }
 
-static int64_t first_ahead(const Watch *watch, double position) {
+static int64_t first_ahead(const PlantMonitor *watch, double position) {
     int64_t ahead = watch->cursor;
     while (ahead < watch->place_count && !(watch->places[ahead] > position))
         ahead++;
@@ -46,7 +46,7 @@ static double speed_of(const Program *program, const double *values) {
 }
 
 static bool is_near(Program *program, double h) {
-    Watch *watch = &program->watch;
+    PlantMonitor *watch = &program->watch;
     double position = position_of(program, program->values), speed = speed_of(program, program->values);
     seek(watch, position);
     int64_t ahead = first_ahead(watch, position);
@@ -56,7 +56,7 @@ static bool is_near(Program *program, double h) {
 }
 
 static bool crossed(const Program *program) {
-    const Watch *watch = &program->watch;
+    const PlantMonitor *watch = &program->watch;
     double before = position_of(program, start_of(program)), after = position_of(program, program->values);
     if (after >= before) {
         int64_t ahead = first_ahead(watch, before);
@@ -89,7 +89,7 @@ static bool state_call(Over *over, int64_t call, void *function, void *state) {
 /* The plant at `time` [s] within the step, as it was, with the inputs it had. */
 static bool go(Over *over, void *state, double time) {
     Program *program = over->program;
-    const Watch *watch = &program->watch;
+    const PlantMonitor *watch = &program->watch;
     if (!state_call(over, CALL_RESTORE, program->balises.restore_state, state))
         return false;
     program->slaves[watch->slave].now = over->t;
@@ -161,7 +161,7 @@ static bool search(Over *over, void *state, double target) {
 
 /* The first balise between both ends of the step, and how many there are. */
 static int64_t count_crossed(Over *over) {
-    Watch *watch = &over->program->watch;
+    PlantMonitor *watch = &over->program->watch;
     int64_t number = 0;
     seek(watch, over->p0);
     if (over->p1 >= over->p0) {
@@ -193,7 +193,7 @@ static bool find_stamp(Over *over, void *state) {
 static bool move_plant(Over *over) {
     Program *program = over->program;
     Balises *balises = &program->balises;
-    const Watch *watch = &program->watch;
+    const PlantMonitor *watch = &program->watch;
     double *outputs = program->values + watch->first_output;
     size_t size = (size_t)watch->output_count * sizeof(double);
     void *state = NULL;
@@ -233,7 +233,7 @@ static double mixed(const Over *over, double time, int64_t column, double end) {
     return program->balises.continuous[column] ? start + share * (end - start) : start;
 }
 
-/* The odometer at the passing; it is read when the first receiver is due. */
+/* The odometer at the crossing; it is read when the first receiver is due. */
 static void read_odometer(Over *over) {
     int64_t column = over->program->balises.odometer;
     if (!over->read)
@@ -297,7 +297,7 @@ static bool move_all(Over *over) {
 /* Rows before and after the telegram, as `BaliseService._pair`; the latter only where it is not the row of the communication point. */
 static int64_t write_rows(Over *over, double *rows) {
     const Program *program = over->program;
-    const Watch *watch = &program->watch;
+    const PlantMonitor *watch = &program->watch;
     const Balises *balises = &program->balises;
     size_t width = (size_t)program->value_count + 1;
     double nominal = over->stamp < over->t ? over->t : over->stamp;
@@ -327,7 +327,7 @@ static int64_t write_rows(Over *over, double *rows) {
     return two ? 2 : 1;
 }
 
-static void log_passing(Over *over) {
+static void log_crossing(Over *over) {
     Balises *balises = &over->program->balises;
     int64_t *outcomes = balises->outcomes + balises->passed_count * over->program->slave_count;
     balises->passed[balises->passed_count++] = (Passed){over->which, over->stamp, over->position, over->speed, over->reading};
@@ -385,6 +385,6 @@ static int64_t step_over(Program *program, double t, double until, double *rows,
     if (!over.found)
         return 0;
     read_odometer(&over);
-    log_passing(&over);
+    log_crossing(&over);
     return write_rows(&over, rows);
 }

@@ -1,4 +1,6 @@
-"""The choice of the stepper: compiled where the plan allows it and nobody wants otherwise, with the reason where it does not."""
+"""The choice of the stepper: compiled where the plan allows it and nobody wants otherwise, with the reason where it
+does not.
+"""
 
 from __future__ import annotations
 
@@ -61,6 +63,7 @@ def choose_stepper(wanted: Wanted, control: StepControl, axis: TimeAxis) -> Choi
     except NotCompilable as error:
         if wanted == "compiled":
             raise CouplingError(
-                f"master.stepper = 'compiled' cannot be: {error}. Use 'auto', or 'python', which gives the same numbers."
+                f"master.stepper = 'compiled' cannot be: {error}. Use 'auto', or 'python', which gives the same "
+                f"numbers."
             ) from error
         return Choice(wanted, reason=str(error))

@@ -1,4 +1,6 @@
-"""The journal of the stepper: calls of a step that Python may have to do again, and what was said, as in ``stepper.h``."""
+"""The journal of the stepper: calls of a step that Python may have to do again, and what was said, as in
+``stepper.h``.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +10,12 @@ from enum import IntEnum
 
 import numpy as np
 
-from cosim.compiled.answers import Answer
+from cosim.compiled.recorded_returns import Answer
 
 STEPS_AT_MOST = 68
-"""Of the plant in a step over a balise: the whole step, `MAX_ROOT_STEPS` of the root search, to the stamp, again to the end."""
+"""Of the plant in a step over a balise: the whole step, `MAX_ROOT_STEPS` of the root search, to the stamp, again to the
+end.
+"""
 
 CALLS_OF_EVENT = 12
 FMI2, FMI3 = 2, 3
@@ -43,10 +47,16 @@ class Call(IntEnum):
 
 
 NAMES = {
-    Call.ENTER_EVENT: "fmi3EnterEventMode", Call.SET_CLOCK: "fmi3SetClock", Call.SET_REALS: "fmi3SetFloat64",
-    Call.UPDATE: "fmi3UpdateDiscreteStates", Call.ENTER_STEP: "fmi3EnterStepMode", Call.COUNT: "fmi3GetInt32",
-    Call.SAVE: "fmi3GetFMUState", Call.RESTORE: "fmi3SetFMUState", Call.RELEASE: "fmi3FreeFMUState",
-}  # fmt: skip
+    Call.ENTER_EVENT: "fmi3EnterEventMode",
+    Call.SET_CLOCK: "fmi3SetClock",
+    Call.SET_REALS: "fmi3SetFloat64",
+    Call.UPDATE: "fmi3UpdateDiscreteStates",
+    Call.ENTER_STEP: "fmi3EnterStepMode",
+    Call.COUNT: "fmi3GetInt32",
+    Call.SAVE: "fmi3GetFMUState",
+    Call.RESTORE: "fmi3SetFMUState",
+    Call.RELEASE: "fmi3FreeFMUState",
+}
 
 
 class CNote(ctypes.Structure):

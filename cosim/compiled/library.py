@@ -1,4 +1,6 @@
-"""The library of the stepper: compiled once with the tool chain of the exports, cached, loaded. Touches the cache folder only."""
+"""The library of the stepper: compiled once with the tool chain of the exports, cached, loaded. Touches the cache
+folder only.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,7 @@ from pathlib import Path
 from fmus.folders import cache_folder
 from fmus.toolchain.compile import Compiler, compile_library, find_compiler, library_name
 
-SOURCES = ("stepper.c", "balises.c", "telling.c", "slave.c", "stepper.h")  # the first one includes the others
+SOURCES = ("stepper.c", "balises.c", "notifying.c", "slave.c", "stepper.h")  # the first one includes the others
 
 
 def load_stepper() -> ctypes.CDLL:
@@ -27,7 +29,9 @@ def load_stepper() -> ctypes.CDLL:
 
 
 def cached_library(compiler: Compiler, folder: Path) -> Path:
-    """Path of the library in a cache folder; built there where it is missing, in one move, so that nothing is to be locked."""
+    """Path of the library in a cache folder; built there where it is missing, in one move, so that nothing is to be
+    locked.
+    """
     sources = {name: (files("cosim.compiled") / name).read_bytes() for name in SOURCES}
     digest = hashlib.sha256(b"\0".join([compiler.identity().encode(), *sources.values()])).hexdigest()[:32]
     target = folder / f"stepper-{digest}" / library_name("stepper")
@@ -62,8 +66,12 @@ def _loaded(path: Path) -> ctypes.CDLL:
     library = ctypes.CDLL(str(path))
     library.stepper_run.restype = ctypes.c_int64
     library.stepper_run.argtypes = [
-        ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64,
-    ]  # fmt: skip
+        ctypes.c_void_p,
+        ctypes.c_int64,
+        ctypes.c_int64,
+        ctypes.c_void_p,
+        ctypes.c_int64,
+    ]
     library.stepper_move.restype = ctypes.c_int64
     library.stepper_move.argtypes = [ctypes.c_void_p, ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_int64]
     library.stepper_tell.restype = ctypes.c_int64

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from cosim.compiled.answers import Answer
 from cosim.compiled.journal import Call, CJournal, Journal
+from cosim.compiled.recorded_returns import Answer
 from cosim.components.component import Component
 from cosim.components.elements import Element
 from cosim.coupling.plan import Plan, PlannedComponent
@@ -24,8 +24,19 @@ from cosim.process.last_call import LAST_CALL
 from fmus.ports import c_type, getter_type, size
 
 KINDS = (
-    "Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean8", "Boolean32",
-)  # fmt: skip
+    "Float64",
+    "Float32",
+    "Int8",
+    "UInt8",
+    "Int16",
+    "UInt16",
+    "Int32",
+    "UInt32",
+    "Int64",
+    "UInt64",
+    "Boolean8",
+    "Boolean32",
+)
 FMI3 = 3
 SAME_AS = {"Real": "Float64", "Integer": "Int32"}
 
@@ -64,7 +75,10 @@ class CSlave(ctypes.Structure):
 
     _fields_ = (
         *((name, ctypes.c_void_p) for name in ("instance", "do_step", "writes", "reads")),
-        *((name, ctypes.c_int64) for name in ("write_count", "read_count", "fmi_version", "heeds_events", "input_count")),
+        *(
+            (name, ctypes.c_int64)
+            for name in ("write_count", "read_count", "fmi_version", "heeds_events", "input_count")
+        ),
         *((name, ctypes.c_void_p) for name in ("sources", "factors", "offsets", "inputs")),
         ("calls", ctypes.c_int64),
         ("all_calls", ctypes.c_int64),
@@ -77,8 +91,8 @@ class CSlave(ctypes.Structure):
     )
 
 
-class CWatch(ctypes.Structure):
-    """`Watch`."""
+class CPlantMonitor(ctypes.Structure):
+    """`PlantMonitor`."""
 
     _fields_ = (
         *((name, ctypes.c_int64) for name in ("slave", "first_output", "output_count", "position", "speed")),
@@ -91,7 +105,10 @@ class CWatch(ctypes.Structure):
 class CPassed(ctypes.Structure):
     """`Passed`."""
 
-    _fields_ = (("which", ctypes.c_int64), *((name, ctypes.c_double) for name in ("stamp", "position", "speed", "reading")))
+    _fields_ = (
+        ("which", ctypes.c_int64),
+        *((name, ctypes.c_double) for name in ("stamp", "position", "speed", "reading")),
+    )
 
 
 class CBalises(ctypes.Structure):
@@ -119,7 +136,7 @@ class CProgram(ctypes.Structure):
         ("value_count", ctypes.c_int64),
         ("slaves", ctypes.c_void_p),
         ("slave_count", ctypes.c_int64),
-        ("watch", CWatch),
+        ("watch", CPlantMonitor),
         ("balises", CBalises),
         ("journal", CJournal),
         ("seconds_at_most", ctypes.c_double),
@@ -139,7 +156,8 @@ class Program:
         plan: prepared; components instantiated, and not to be instantiated anew.
         axis: communication points.
 
-    Attributes `head` and `slaves` are the structures; `writes` and `reads` the names of the functions of each slave's ports.
+    Attributes `head` and `slaves` are the structures; `writes` and `reads` the names of the functions of each slave's
+    ports.
 
     Raises:
         NotCompilable: something in the plan has no place in it; it is named.
@@ -161,7 +179,9 @@ class Program:
         self.tell_rows(None, 0)
         self._versions = [step.component.fmi_version for step in plan.steps]
         calls = [len(writes) + len(reads) + 1 for writes, reads in zip(self.writes, self.reads, strict=True)]
-        self.journal = Journal(self.head.journal, sum(calls), sum(int(r.raw_bytes) for s in self.slaves for r in _ports_read(s)))
+        self.journal = Journal(
+            self.head.journal, sum(calls), sum(int(r.raw_bytes) for s in self.slaves for r in _ports_read(s))
+        )
 
     def tell_rows(self, place: int | None, before: int) -> None:
         """Have the stepper count the rows it fills.
@@ -172,7 +192,9 @@ class Program:
         self.head.rows_told = ctypes.addressof(self._nobody_reads) if place is None else place
         self.head.rows_before = before
 
-    def watch(self, slave: int, position: int, speed: int, scales: tuple[float, float], places: np.ndarray, limit: float) -> None:
+    def watch(
+        self, slave: int, position: int, speed: int, scales: tuple[float, float], places: np.ndarray, limit: float
+    ) -> None:
         """Have the stepper leave steps in which a balise may be passed.
 
         Args:
@@ -180,11 +202,19 @@ class Program:
             places: of the balises [m], increasing. limit: acceleration [m/s2].
         """
         columns = self.plan.steps[slave].columns
-        self.head.watch = CWatch(
-            slave=slave, first_output=columns.start, output_count=columns.stop - columns.start, position=position, speed=speed,
-            position_scale=scales[0], speed_scale=scales[1], acceleration_limit=limit,
-            places=self.keep(np.ascontiguousarray(places, dtype=np.float64)), place_count=len(places), cursor=0,
-        )  # fmt: skip
+        self.head.watch = CPlantMonitor(
+            slave=slave,
+            first_output=columns.start,
+            output_count=columns.stop - columns.start,
+            position=position,
+            speed=speed,
+            position_scale=scales[0],
+            speed_scale=scales[1],
+            acceleration_limit=limit,
+            places=self.keep(np.ascontiguousarray(places, dtype=np.float64)),
+            place_count=len(places),
+            cursor=0,
+        )
 
     @property
     def address(self) -> int:
@@ -210,7 +240,9 @@ class Program:
         results: tuple[Any, ...] = (False, False, False, math.inf)  # arrived, as it did
         if stop is Stop.STEP:
             results = bool(head.event), bool(head.terminate), bool(head.early), float(head.reached)
-        said[f"fmi{version}DoStep"] = [Answer(head.status if stop is Stop.STEP else 0, results if version == FMI3 else ())]
+        said[f"fmi{version}DoStep"] = [
+            Answer(head.status if stop is Stop.STEP else 0, results if version == FMI3 else ())
+        ]
         if stop is Stop.READ:
             said[reads[head.port]] = [Answer(head.status)]
         return said
@@ -296,7 +328,9 @@ def _ports_read(slave: CSlave) -> list[CPort]:
 
 
 def _first_values(elements: Sequence[Element]) -> tuple[dict[str, int], int]:
-    """Where the values of each whole variable begin when they are read in order of first use, and how many there are."""
+    """Where the values of each whole variable begin when they are read in order of first use, and how many there
+    are.
+    """
     first: dict[str, int] = {}
     total = 0
     for element in elements:

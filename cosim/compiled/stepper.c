@@ -7,7 +7,7 @@
 #define SAMPLING 17 /* every so many steps the clock is read; prime, so as not to follow a rhythm of the model */
 
 static bool step_plan(Program *program, double t, double h, bool timed) {
-    const Watch *watch = &program->watch;
+    const PlantMonitor *watch = &program->watch;
     bool watched = watch->slave >= 0 && !program->balises.by_instant;
     begin_step(program);
     for (int64_t i = 0; i < program->slave_count; i++) {

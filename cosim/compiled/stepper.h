@@ -57,7 +57,7 @@ typedef struct {
     const double *places;               /* of the balises [m], increasing */
     int64_t place_count;
     int64_t cursor;                     /* places[cursor - 1] < position <= places[cursor], kept from step to step */
-} Watch;
+} PlantMonitor;
 
 enum { OUTCOMES_AT_MOST = 8 };
 
@@ -107,7 +107,7 @@ typedef struct {
     double *start, *final, *there; /* outputs of the plant: at both ends, and at the stamp */
     double *arrived;        /* values at the end, before anything was told there */
     Passed *passed;
-    int64_t *outcomes;      /* of each passing at each slave */
+    int64_t *outcomes;      /* of each crossing at each slave */
     int64_t passed_count, passed_limit;
     int64_t steps;          /* done in all, also those that passed none */
 } Balises;
@@ -160,7 +160,7 @@ typedef struct {
     int64_t value_count;
     Slave *slaves;
     int64_t slave_count;
-    Watch watch;
+    PlantMonitor watch;
     Balises balises;
     Journal journal;
     double seconds_at_most;     /* a stretch is to last [s] */

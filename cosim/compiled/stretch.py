@@ -1,6 +1,8 @@
-"""Stretches: communication steps that the compiled stepper does in one call, and the way back to Python where one is odd.
+"""Stretches: communication steps that the compiled stepper does in one call, and the way back to Python where one is
+odd.
 
-A stretch ends at a row of events that Python knows beforehand (a telegram, an instant, a time event), and at whatever the stepper
+A stretch ends at a row of events that Python knows beforehand (a telegram, an instant, a time event), and at whatever
+the stepper
 meets: then the Python stepper finishes the step from where it stands.
 """
 
@@ -15,11 +17,11 @@ from time import perf_counter
 from typing import Any
 
 from cosim.balises.rollback import RollbackLocaliser
-from cosim.compiled.answers import Answer, answered
+from cosim.compiled.crossings import Crossings
 from cosim.compiled.library import load_stepper
-from cosim.compiled.passings import Passings
+from cosim.compiled.notifying import Telling, can_be_told
 from cosim.compiled.program import NotCompilable, Program, Stop
-from cosim.compiled.telling import Telling, can_be_told
+from cosim.compiled.recorded_returns import Answer, answered
 from cosim.components.component import NEVER, TIME_TOLERANCE, Component
 from cosim.coupling.plan import Mover, Plan, PlannedComponent
 from cosim.master.axis import TimeAxis
@@ -54,8 +56,8 @@ class Stretch:
 
     Args:
         done: steps done and recorded.
-        finish: does what is left of the next step, or all of it, in Python and returns its event rows; None where the next step
-            may be the stepper's again.
+        finish: does what is left of the next step, or all of it, in Python and returns its event rows; None where the
+            next step may be the stepper's again.
         suspect: a value of the last row is not finite.
     """
 
@@ -90,7 +92,7 @@ class CompiledStepper:
         self._answering = False
         for place, step in enumerate(self.plan.steps):
             self._quicken(place, step)
-        self._passings = self._watch_balises()
+        self._crossings = self._watch_balises()
         self._first: int | None = None
         for place, step in enumerate(self.plan.steps):
             step.component.clock = partial(self._time_in_stretch, place, step.component)
@@ -101,12 +103,12 @@ class CompiledStepper:
         Raises:
             OutputError: the recorder takes no more rows.
         """
-        own_passings = self._passings is not None and self._passings.allow(recorder.every == 1)
+        own_crossings = self._crossings is not None and self._crossings.allow(recorder.every == 1)
         free = self._free_steps(k)
         if free < 1:
             return Stretch(0, partial(self._whole_step, k))
         wanted = min(free, self._longest)
-        rows = recorder.block(wanted + ROWS_OF_EVENTS if own_passings else wanted)
+        rows = recorder.block(wanted + ROWS_OF_EVENTS if own_crossings else wanted)
         head = self._program.head
         self._program.tell_rows(recorder.count_address, recorder.block_start)
         self._first = k
@@ -115,8 +117,8 @@ class CompiledStepper:
         self._first = None
         recorder.commit(int(head.rows_done))
         self.steps += done
-        if self._passings is not None:
-            self._passings.collect()
+        if self._crossings is not None:
+            self._crossings.collect()
         self._set_times(k + done)
         if done:
             fitting = int(self._longest * SECONDS / max(head.seconds, 1e-9))
@@ -145,7 +147,9 @@ class CompiledStepper:
     # -- how far ----------------------------------------------------------------------------------------------------
 
     def _free_steps(self, k: int) -> int:
-        """How many steps from number `k` on hold nothing that is known to be Python's; passings the stepper leaves to it."""
+        """How many steps from number `k` on hold nothing that is known to be Python's; crossings the stepper leaves to
+        it.
+        """
         free, balises = self.axis.count - k, self.system.balises
         limit = min((s.component.next_event for s in self.plan.steps), default=NEVER)
         if any(s.component.terminated for s in self.plan.steps):
@@ -199,7 +203,7 @@ class CompiledStepper:
                 component.time = until
                 component.calls += 1
                 for kind in ("get", "set") if reads else ("set",):
-                    component.tallies[kind].add(0.0, 1)
+                    component.call_statistics[kind].add(0.0, 1)
                 component.seconds += perf_counter() - begin
             else:
                 self._answered_move(slowly, t, until)
@@ -212,8 +216,10 @@ class CompiledStepper:
         step.drive = quick_drive  # type: ignore[method-assign]
         step.advance = lambda t, until: move(advance, t, until, reads=False)  # type: ignore[method-assign]
 
-    def _watch_balises(self) -> Passings | None:
-        """The stepper knows of the balises; receivers that allow it are stepped through a telegram by one call into it."""
+    def _watch_balises(self) -> Crossings | None:
+        """The stepper knows of the balises; receivers that allow it are stepped through a telegram by one call into
+        it.
+        """
         service = self.system.balises
         if service is None:
             return None
@@ -226,7 +232,7 @@ class CompiledStepper:
                 idle = lambda: not self._answering  # noqa: E731 - one word of state
                 tellings[place] = Telling(receiver, place, self._program, self._library, self._answered, idle)
                 receiver.step = tellings[place].step  # type: ignore[method-assign]
-        return Passings(self._program, self.plan, service, tellings)
+        return Crossings(self._program, self.plan, service, tellings)
 
     def _answered_move(self, move: Mover, t: float, until: float) -> None:
         """Move a component in Python that the stepper has moved in part."""
@@ -236,7 +242,9 @@ class CompiledStepper:
 
     @contextmanager
     def _answered(self, answers: Mapping[int, Mapping[str, Sequence[Answer]]]) -> Iterator[None]:
-        """Python is at work on a step that the stepper has begun: slaves repeat themselves, and nobody calls the stepper."""
+        """Python is at work on a step that the stepper has begun: slaves repeat themselves, and nobody calls the
+        stepper.
+        """
         self._answering = True
         try:
             with ExitStack() as stack:
@@ -247,7 +255,9 @@ class CompiledStepper:
             self._answering = False
 
     def _set_times(self, k: int) -> None:
-        """Where the components stand after a stretch that ended in step number `k`; one call there is Python's to count."""
+        """Where the components stand after a stretch that ended in step number `k`; one call there is Python's to
+        count.
+        """
         head, t = self._program.head, self.axis[k]
         for step in self.plan.steps:
             step.component.time = t
@@ -258,13 +268,15 @@ class CompiledStepper:
 
     def close(self) -> None:
         """Add what was done here to the counters of the components."""
-        if self._passings is not None:
-            self._passings.close()
+        if self._crossings is not None:
+            self._crossings.close()
         for step, slave in zip(self.plan.steps, self._program.slaves, strict=True):
             component, calls, over = step.component, slave.calls + slave.all_calls, self._program.head.balises.steps
             component.calls += calls + slave.more_calls
             for kind in ("get", "set") if len(step.inputs) else ("get",):
-                component.tallies[kind].add(0.0, calls + slave.more_calls)  # so short in C that only doStep is timed
+                component.call_statistics[kind].add(
+                    0.0, calls + slave.more_calls
+                )  # so short in C that only doStep is timed
             component.seconds += slave.seconds_over
             if self._program.head.sampled:
                 component.seconds += slave.seconds * max(calls - over, 0) / self._program.head.sampled
@@ -293,13 +305,15 @@ def _check(control: StepControl, system: System) -> None:
             raise NotCompilable(f"inputs of {step.component.name} are sent by something in Python")
         if _owner(step.move) not in (step, system.balises):
             raise NotCompilable(f"{step.component.name} is moved by something in Python")
-        if step.inputs.untouched is not None:
-            raise NotCompilable(f"inputs of {step.component.name} are no doubles: {', '.join(step.inputs.untouched.names)}")
-        if step.inputs.untouched is not None or len(system.plan.untouched):
+        if step.inputs.non_numeric is not None:
+            raise NotCompilable(
+                f"inputs of {step.component.name} are no doubles: {', '.join(step.inputs.non_numeric.names)}"
+            )
+        if step.inputs.non_numeric is not None or len(system.plan.non_numeric):
             raise NotCompilable("values that are no doubles are passed on")
         if step.inputs.tables:
             raise NotCompilable(f"inputs of {step.component.name} are mapped by tables of values")
-        if step.carrier is not None:
+        if step.interpolator is not None:
             raise NotCompilable(f"inputs of {step.component.name} follow lines between communication points")
         if step.substeps != 1:
             raise NotCompilable(f"{step.component.name} takes {step.substeps} steps for one")

@@ -1,4 +1,6 @@
-"""Capabilities: what an FMU of any FMI version says it can do, read once from its model description. Knows descriptions only."""
+"""Capabilities: what an FMU of any FMI version says it can do, read once from its model description. Knows descriptions
+only.
+"""
 
 from __future__ import annotations
 
@@ -19,13 +21,16 @@ HELD_AS = {
 class Capabilities:
     """Capability flags of co-simulation, in the words of FMI 3.0 where it has them, else in those of 2.0.
 
-    A flag that an FMI version does not have is at its default. What a flag says is believed only as far as the probe saw it.
+    A flag that an FMI version does not have is at its default. What a flag says is believed only as far as the probe
+    saw it.
 
     Args:
         needsExecutionTool: another program must be installed.
         canBeInstantiatedOnlyOncePerProcess: two instances in one process are not allowed.
-        canNotUseMemoryManagementFunctions: it ignores the callbacks for memory (FMI 1, 2); they are passed all the same.
-        canRunAsynchronuously: its doStep may return before it is done (FMI 1, 2), if the master can wait; this one cannot.
+        canNotUseMemoryManagementFunctions: it ignores the callbacks for memory (FMI 1, 2); they are passed all the
+        same.
+        canRunAsynchronuously: its doStep may return before it is done (FMI 1, 2), if the master can wait; this one
+        cannot.
         canHandleVariableCommunicationStepSize: the communication step may vary.
         fixedInternalStepSize: its own step [s], where it says so (FMI 3).
         canInterpolateInputs: it takes derivatives of inputs (FMI 1, 2).

@@ -1,8 +1,9 @@
-"""Time-based clocks of an FMI 3.0 slave: when each of them ticks next. Knows the clock functions of a slave, and no master.
+"""Time-based clocks of an FMI 3.0 slave: when each of them ticks next. Knows the clock functions of a slave, and no
+master.
 
 FMI 3.0.2, 2.2.10 and 2.3.5: a clock with ``intervalVariability`` ``constant``, ``fixed`` or ``tunable`` is periodic; a
-``changing`` one says at each tick when the next one comes, a ``countdown`` says in Event Mode how long it is until it ticks
-once. Instants follow from their number and are never accumulated.
+``changing`` one says at each tick when the next one comes, a ``countdown`` says in Event Mode how long it is until it
+ticks once. Instants follow from their number and are never accumulated.
 """
 
 from __future__ import annotations
@@ -122,7 +123,9 @@ class ClockSchedule:
         return [clock for clock in self.clocks if clock.next <= t + TIME_TOLERANCE]
 
     def begin(self, t: float) -> None:
-        """Initialisation ends at `t` [s]: ask for what the model description leaves open. To be called in Initialization Mode."""
+        """Initialisation ends at `t` [s]: ask for what the model description leaves open. To be called in
+        Initialization Mode.
+        """
         for clock in self.clocks:
             clock.rhythm, clock.number, clock.ticked = None, 0, False
             if clock.kind in PERIODIC and clock.declared is not None:
@@ -149,7 +152,9 @@ class ClockSchedule:
                 clock.rhythm = None
 
     def ask(self, t: float) -> None:
-        """Discrete states were updated at `t` [s]: ask for intervals that may have changed. To be called in Event Mode."""
+        """Discrete states were updated at `t` [s]: ask for intervals that may have changed. To be called in Event
+        Mode.
+        """
         asked = [c for c in self.clocks if _may_change(c)]
         for clock, (interval, resolution, qualifier) in self._intervals(asked):
             clock.ticked = False
@@ -175,9 +180,13 @@ class ClockSchedule:
         seconds = rhythm.interval / rhythm.resolution if rhythm.resolution > 0.0 else math.nan
         least = "above 0" if clock.kind in PERIODIC else "0 or more"
         if not math.isfinite(seconds) or seconds < 0.0 or (seconds == 0.0 and clock.kind in PERIODIC):
-            raise self.refuse(f"clock '{clock.name}' ({clock.kind}) has the interval {seconds:g} s, expected one {least}")
+            raise self.refuse(
+                f"clock '{clock.name}' ({clock.kind}) has the interval {seconds:g} s, expected one {least}"
+            )
         if not (math.isfinite(rhythm.shift) and rhythm.shift >= 0.0):
-            raise self.refuse(f"clock '{clock.name}' has the shift {rhythm.shift / rhythm.resolution:g} s, expected 0 or more")
+            raise self.refuse(
+                f"clock '{clock.name}' has the shift {rhythm.shift / rhythm.resolution:g} s, expected 0 or more"
+            )
         clock.rhythm, clock.number = rhythm, number
 
     def _shift(self, clock: TimeClock, resolution: float) -> float:
@@ -212,7 +221,11 @@ class ClockSchedule:
 
 def is_time_based(variable: ModelVariable) -> bool:
     """Whether a variable is a clock that the importer sets by the time."""
-    return variable.type == "Clock" and variable.causality == "input" and variable.intervalVariability in PERIODIC + APERIODIC
+    return (
+        variable.type == "Clock"
+        and variable.causality == "input"
+        and variable.intervalVariability in PERIODIC + APERIODIC
+    )
 
 
 def _may_change(clock: TimeClock) -> bool:

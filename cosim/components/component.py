@@ -1,7 +1,7 @@
 """Components: everything the master can step, with one face for slaves of FMI 1, 2 and 3 and Python blocks.
 
-A component wraps an object with the call surface of fmpy's `FMU1Slave`, `FMU2Slave` or `FMU3Slave`; whether that is a sealed
-library or a block makes no difference here. The dialects are in `fmi1`, `fmi2` and `fmi3`.
+A component wraps an object with the call surface of fmpy's `FMU1Slave`, `FMU2Slave` or `FMU3Slave`; whether that is a
+sealed library or a block makes no difference here. The dialects are in `fmi1`, `fmi2` and `fmi3`.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from cosim.components.described import Described, EventPort
 from cosim.components.start_values import StartValue, refusal, typed_value, typed_values
 from cosim.components.surroundings import Surroundings
 from cosim.components.values import element_reader, element_writer, exact_reader, exact_writer, write_start
+from cosim.diagnostics.call_statistics import CallStatistics, count_methods, new_call_statistics
 from cosim.diagnostics.log_choice import LogSwitch, log_switch, switch_log
 from cosim.diagnostics.messages import LogChoice, MessageLog
 from cosim.diagnostics.native_log import forget
-from cosim.diagnostics.tally import Tally, count_methods, new_tallies
 from cosim.errors import CouplingError, RunError
 from cosim.process.last_call import LAST_CALL, READ, STEP, WRITE
 from fmu_observer.event_protocol import OUTCOME_VARIABLES
@@ -48,13 +48,14 @@ class Component(Described):
     """One stepped thing, from instantiation to the end.
 
     The life: `configure`, `instantiate`, `set_start`, `enter_initialization`, readers and writers in turn,
-    `exit_initialization`, then `advance` and `tell` in turn, `terminate`, `free`. `reader` and `writer` are prepared once and
-    called without arguments. Variables go by name; elements of arrays are named ``x[1]``, ``m[2,3]``, from 1, row by row.
-    `save`, `restore` and `release` exist where `can_save` says so. Counters: `seconds` spent in doStep, `calls` of it, `tallies`
-    of everything else. `messages` are what the slave logged. `time` is where it stands [s]. `terminated` says that the slave
-    asked for the end of the run. `trespasses` are what it changed for everybody in the process before its first step, each with
-    the call that did; it was put back. Whatever a call of the slave throws comes out as a `RunError` with component, time and
-    the names of the variables concerned.
+    `exit_initialization`, then `advance` and `notify` in turn, `terminate`, `free`. `reader` and `writer` are prepared
+    once and called without arguments. Variables go by name; elements of arrays are named ``x[1]``, ``m[2,3]``, from 1,
+    row by row. `save`, `restore` and `release` exist where `can_save` says so. Counters: `seconds` spent in doStep,
+    `calls` of it, `call_statistics` of everything else. `messages` are what the slave logged. `time` is where it
+    stands [s].
+    `terminated` says that the slave asked for the end of the run. `trespasses` are what it changed for everybody in the
+    process before its first step, each with the call that did; it was put back. Whatever a call of the slave throws
+    comes out as a `RunError` with component, time and the names of the variables concerned.
 
     Args:
         name: name in the scenario.
@@ -66,9 +67,15 @@ class Component(Described):
     """
 
     def __init__(
-        self, name: str, slave: Any, description: ModelDescription, *, source: str = "", kind: str = "FMU",
+        self,
+        name: str,
+        slave: Any,
+        description: ModelDescription,
+        *,
+        source: str = "",
+        kind: str = "FMU",
         release_files: Callable[[], None] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         super().__init__(name, description, source, kind)
         self.slave = slave
         self.negated: frozenset[str] = frozenset()  # variables whose slave holds the value with the other sign (FMI 1)
@@ -80,10 +87,12 @@ class Component(Described):
         self._release_files = release_files
         self._alive = self._running = False
         self.messages = MessageLog(name)
-        self.held_outputs: frozenset[str] = frozenset()  # that others take at the start of a step, as where they were recorded
-        self.clock: Callable[[], float] | None = None  # says where it stands [s] while somebody else than Python steps it
+        # that others take at the start of a step, as where they were recorded
+        self.held_outputs: frozenset[str] = frozenset()
+        # says where it stands [s] while somebody else than Python steps it
+        self.clock: Callable[[], float] | None = None
         self.log: LogSwitch | None = None
-        self.tallies = new_tallies()
+        self.call_statistics = new_call_statistics()
         self.trespasses: dict[str, str] = {}
         self._last, self._numbers = LAST_CALL, LAST_CALL.numbers(name)
         self._outcomes, self._read_outcomes = np.zeros(len(OUTCOME_VARIABLES)), NOT_PREPARED
@@ -102,13 +111,14 @@ class Component(Described):
 
     @property
     def seconds_in_all(self) -> float:
-        """Seconds in the slave: steps, and everything in `tallies` [s]."""
-        return self.seconds + sum(tally.seconds for tally in self.tallies.values())
+        """Seconds in the slave: steps, and everything in `call_statistics` [s]."""
+        return self.seconds + sum(statistics.seconds for statistics in self.call_statistics.values())
 
     # -- life -------------------------------------------------------------------------------------------------------
 
     def configure(self, starts: Mapping[str, StartValue]) -> None:
-        """Take the structural parameters among start values: the shapes of arrays follow from them. Before `instantiate`.
+        """Take the structural parameters among start values: the shapes of arrays follow from them. Before
+        `instantiate`.
 
         Raises:
             CouplingError: a value is no dimension.
@@ -142,8 +152,8 @@ class Component(Described):
 
         Args:
             name: variable, or element of an array.
-            value: of the variable's type; an item's name for an enumeration, a hexadecimal text for bytes, a nested or flat list
-                or one value for all elements of an array.
+            value: of the variable's type; an item's name for an enumeration, a hexadecimal text for bytes, a nested or
+                flat list or one value for all elements of an array.
 
         Raises:
             CouplingError: the variable does not exist or cannot be set, or the value is not of its type.
@@ -167,7 +177,9 @@ class Component(Described):
         """End initialisation, discrete states settled."""
 
     def reader(self, names: Sequence[str], values: np.ndarray) -> Callable[[], None]:
-        """A call that reads scalars and elements into `values`, shape (len(names),), a contiguous view of the caller's array."""
+        """A call that reads scalars and elements into `values`, shape (len(names),), a contiguous view of the caller's
+        array.
+        """
         return self._counted("get", READ, f"reading {_shown(names)}", self._unguarded_reader(names, values))
 
     def writer(self, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
@@ -176,7 +188,9 @@ class Component(Described):
         return self._counted("set", WRITE, f"writing {_shown(names)}", write), buffer
 
     def exact_reader(self, name: str) -> Callable[[], Values]:
-        """A call that returns the values of a whole variable as they are: texts, bytes, integers of any size; row by row."""
+        """A call that returns the values of a whole variable as they are: texts, bytes, integers of any size; row by
+        row.
+        """
         read = exact_reader(self, self.variables[name])
         return lambda: self._guard(f"reading {name}", read)
 
@@ -186,17 +200,21 @@ class Component(Described):
         return lambda values: self._guard(f"writing {name}", lambda: write(values))
 
     def make_derivative_writer(self, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
-        """A call that tells the first derivatives of inputs (FMI 1 and 2), and the array of shape (len(names),) it tells from.
+        """A call that tells the first derivatives of inputs (FMI 1 and 2), and the array of shape (len(names),) it
+        tells from.
 
         They hold for the coming step only.
 
         Raises:
-            CouplingError: the slave does not take derivatives (canInterpolateInputs), or a name is no continuous real input.
+            CouplingError: the slave does not take derivatives (canInterpolateInputs), or a name is no continuous real
+            input.
         """
         tell, buffer = make_derivative_writer(self, names)
         return self._guarded(f"derivatives of {_shown(names)}", tell), buffer
 
-    def directional_derivative(self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]) -> np.ndarray:
+    def directional_derivative(
+        self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
+    ) -> np.ndarray:
         """Derivatives of scalars and elements `unknowns` along a direction in `knowns`, where declared.
 
         Args:
@@ -222,13 +240,14 @@ class Component(Described):
         """
 
     @abstractmethod
-    def tell(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:
+    def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:
         """A triggered event is delivered at `t` [s]; it happened at `stamp` [s].
 
         Args:
             event: one of `events`.
             t: current time of the component [s].
-            stamp: when the event happened [s]: at or before `t`, or within the coming step where the component takes stamps.
+            stamp: when the event happened [s]: at or before `t`, or within the coming step where the component takes
+            stamps.
             payload: fields by name; fields the component does not declare are dropped.
 
         Where `event_needs_step` says so, only the last event told before a step happens, and it happens in that step.
@@ -266,14 +285,19 @@ class Component(Described):
 
     def pending(self, t: float) -> RunError:
         """The error of a slave that returned from doStep at `t` [s] before it was done."""
-        asynchronous = "as canRunAsynchronuously allows" if self.capabilities.canRunAsynchronuously else "against its description"
+        asynchronous = (
+            "as canRunAsynchronuously allows" if self.capabilities.canRunAsynchronuously else "against its description"
+        )
         return self.failure(
-            f"doStep returned before it was done (status pending), {asynchronous}; slaves that compute asynchronously are not "
-            "stepped here. Export the FMU without asynchronous computation.", t,
-        )  # fmt: skip
+            f"doStep returned before it was done (status pending), {asynchronous}; slaves that compute asynchronously "
+            f"are not "
+            "stepped here. Export the FMU without asynchronous computation.",
+            t,
+        )
 
     def outcomes(self) -> Mapping[str, int] | None:
-        """Counts of what became of the events told, where the slave keeps them: blocks, and FMUs with `OUTCOME_VARIABLES`.
+        """Counts of what became of the events told, where the slave keeps them: blocks, and FMUs with
+        `OUTCOME_VARIABLES`.
 
         Of an FMU that cannot say any more those that were read last.
         """
@@ -361,8 +385,10 @@ class Component(Described):
 
     def _counted(self, kind: str, number: int, what: str, call: Callable[[], None]) -> Callable[[], None]:
         """`_guarded`, counted, and noted as the last call: the one of this number among those that are made often."""
-        tally: Tally = self.tallies[kind]
-        return tally.counting(call, lambda error: self._explained(what, error), self._last.call, self._numbers + number)
+        statistics: CallStatistics = self.call_statistics[kind]
+        return statistics.counting(
+            call, lambda error: self._explained(what, error), self._last.call, self._numbers + number
+        )
 
     def _guarded(self, what: str, call: Callable[[], None]) -> Callable[[], None]:
         def guarded() -> None:
@@ -403,8 +429,12 @@ class Component(Described):
     def _explained(self, what: str, error: Exception, t: float | None = None) -> RunError:
         if isinstance(error, FMICallException) and getattr(error, "status", None) == FATAL:
             self._alive = self._running = False  # after a fatal error no function of the slave may be called
-        return error if isinstance(error, RunError) else self.failure(f"{what} failed: {error or type(error).__name__}", t)
+        return (
+            error if isinstance(error, RunError) else self.failure(f"{what} failed: {error or type(error).__name__}", t)
+        )
 
 
 def _shown(names: Sequence[str]) -> str:
-    return ", ".join(names[:NAMES_SHOWN]) + (f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else "")
+    return ", ".join(names[:NAMES_SHOWN]) + (
+        f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
+    )

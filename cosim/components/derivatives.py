@@ -27,7 +27,11 @@ def make_derivative_writer(component: Component, names: Sequence[str]) -> tuple[
         CouplingError: the slave does not take derivatives, or a name is no real input.
     """
     if component.fmi_version == 3 or not component.capabilities.canInterpolateInputs:
-        why = "FMI 3 has no input derivatives" if component.fmi_version == 3 else "it does not declare canInterpolateInputs"
+        why = (
+            "FMI 3 has no input derivatives"
+            if component.fmi_version == 3
+            else "it does not declare canInterpolateInputs"
+        )
         raise CouplingError(f"{component.name} takes no derivatives of inputs: {why}.")
     variables = [component.variable(name, "input") for name in names]
     for variable in variables:
@@ -89,5 +93,7 @@ def _real(component: Component, names: Sequence[str]) -> Layout:
     elements = [element for name in names for element in component.elements(name)]
     for element in elements:
         if element.variable.type not in FLOATING_TYPES:
-            raise CouplingError(f"{component.name}.{element.name} has no derivative: it is a {described(element.variable)}.")
+            raise CouplingError(
+                f"{component.name}.{element.name} has no derivative: it is a {described(element.variable)}."
+            )
     return layout(elements)

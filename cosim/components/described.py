@@ -64,7 +64,9 @@ class Described(ABC):
         self._units = Units(description)
 
     def choose_tolerance(self, tolerance: float | str | None) -> None:
-        """Another relative tolerance than the declared one, or ``none``; None changes nothing. FMI 1.0 knows of none."""
+        """Another relative tolerance than the declared one, or ``none``; None changes nothing. FMI 1.0 knows of
+        none.
+        """
         if tolerance is not None and self.fmi_version > 1:
             self.tolerance = None if isinstance(tolerance, str) else tolerance
 
@@ -87,14 +89,22 @@ class Described(ABC):
 
     @property
     def restores_exactly(self) -> bool:
-        """Whether its states are known to be exact without a probe: those of blocks and of the FMUs this package exports."""
+        """Whether its states are known to be exact without a probe: those of blocks and of the FMUs this package
+        exports.
+        """
         return self.can_save and (self.kind == "block" or self.description.generationTool == OWN_TOOL)
 
     def names(self, causality: str) -> list[str]:
-        """Names of the numeric scalars and elements of one causality, without the triggers, stamps and payloads of events."""
+        """Names of the numeric scalars and elements of one causality, without the triggers, stamps and payloads of
+        events.
+        """
         hidden = self.event_references() if causality == "input" else set()
         variables = self.description.modelVariables
-        found = [v for v in variables if v.causality == causality and v.type in NUMERIC_TYPES and v.valueReference not in hidden]
+        found = [
+            v
+            for v in variables
+            if v.causality == causality and v.type in NUMERIC_TYPES and v.valueReference not in hidden
+        ]
         return [name for v in found for name in ([e.name for e in elements_of(v)] if v.shape else [v.name])]
 
     def elements(self, name: str) -> list[Element]:
@@ -117,7 +127,9 @@ class Described(ABC):
         except KeyError as error:
             array = self.variables.get(name.partition("[")[0])
             if array is not None and array.shape:
-                raise CouplingError(f"{self.name}: no element {name!r} in a {described(array)}; the first is 1.") from error
+                raise CouplingError(
+                    f"{self.name}: no element {name!r} in a {described(array)}; the first is 1."
+                ) from error
             candidates = [v.name for v in self.variables.values() if not causalities or v.causality in causalities]
             raise CouplingError(f"{self.name}: no variable {name!r}; {nearest(name, candidates)}") from error
         if causalities and found.causality not in causalities:
@@ -159,7 +171,9 @@ class Described(ABC):
         return variable
 
     def event_references(self) -> set[int]:
-        """Value references of the triggers, stamps and payloads of all events: the master sets them, no connection may."""
+        """Value references of the triggers, stamps and payloads of all events: the master sets them, no connection
+        may.
+        """
         hidden: set[int] = set()
         for event in self.events.values():
             hidden |= {event.trigger, *event.payload.values()} | ({event.stamp} if event.stamp is not None else set())
@@ -171,5 +185,9 @@ class Described(ABC):
     def _payload_of(self, event: str, references: Mapping[str, int]) -> dict[str, int]:
         prefix = f"{event}_"
         reserved = {f"{event}_time", f"{event}_count"}
-        real = {n: r for n, r in references.items() if self.variables[n].type == self.real_type and not self.variables[n].shape}
+        real = {
+            n: r
+            for n, r in references.items()
+            if self.variables[n].type == self.real_type and not self.variables[n].shape
+        }
         return {n.removeprefix(prefix): r for n, r in real.items() if n.startswith(prefix) and n not in reserved}

@@ -1,4 +1,6 @@
-"""Elements: scalars, and the elements of arrays by name (``x[1]``, ``m[2,3]``: from 1, row by row). Knows variables only."""
+"""Elements: scalars, and the elements of arrays by name (``x[1]``, ``m[2,3]``: from 1, row by row). Knows variables
+only.
+"""
 
 from __future__ import annotations
 

@@ -37,12 +37,16 @@ def _linkage(content: bytes) -> Linkage:
     segments = [struct.unpack_from("<2I4Q", content, start + k * size) for k in range(count)]
     entries = [
         struct.unpack_from("<2Q", content, offset + at)
-        for kind, _, offset, _, _, length in segments if kind == DYNAMIC for at in range(0, length, 16)
-    ]  # fmt: skip
+        for kind, _, offset, _, _, length in segments
+        if kind == DYNAMIC
+        for at in range(0, length, 16)
+    ]
     entries = entries[: next((k for k, (tag, _) in enumerate(entries) if tag == END), len(entries))]
     address = next((value for tag, value in entries if tag == STRINGS), 0)
     loads = [(begin, offset, length) for kind, _, offset, begin, _, length in segments if kind == LOAD]
-    strings = next((offset + address - begin for begin, offset, length in loads if begin <= address < begin + length), 0)
+    strings = next(
+        (offset + address - begin for begin, offset, length in loads if begin <= address < begin + length), 0
+    )
 
     def text(value: int) -> str:
         return content[strings + value : content.index(b"\0", strings + value)].decode("utf-8", "replace")

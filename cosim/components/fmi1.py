@@ -1,7 +1,8 @@
 """The FMI 1.0 dialect of a component: no Initialization Mode, no saved states, aliases with the other sign.
 
-Inputs and start values are set before fmiInitializeSlave, and nothing can be read before it: until then the outputs are their
-declared start values, which is what the other components see while inputs and outputs are exchanged at the start time.
+Inputs and start values are set before fmiInitializeSlave, and nothing can be read before it: until then the outputs are
+their declared start values, which is what the other components see while inputs and outputs are exchanged at the start
+time.
 """
 
 from __future__ import annotations
@@ -43,8 +44,14 @@ class FMI1Component(Component):
     event_needs_step = True
 
     def __init__(
-        self, name: str, slave: Any, description: ModelDescription, *, negated: frozenset[str] = frozenset(), **more: Any
-    ) -> None:  # fmt: skip
+        self,
+        name: str,
+        slave: Any,
+        description: ModelDescription,
+        *,
+        negated: frozenset[str] = frozenset(),
+        **more: Any,
+    ) -> None:
         super().__init__(name, slave, description, **more)
         self.negated = negated
         self._stop_time = 0.0
@@ -105,7 +112,7 @@ class FMI1Component(Component):
         reason = f"doStep was discarded: asked for {until:g} s, {known}; try a smaller communication step"
         raise self.failure(reason, t) from error
 
-    def tell(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Component
+    def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Component
         raise self.failure(f"an FMI 1.0 slave takes no events (got '{event.name}')", t)
 
     def save(self) -> Any:  # noqa: D102 - see Component
@@ -195,4 +202,6 @@ def _declared_start(component: Component, name: str) -> Any:
     try:
         return float(text) if variable.type == "Real" else int(text)
     except ValueError as error:
-        raise CouplingError(f"{component.name}.{name} declares the start value {text!r}, which is no {variable.type}.") from error
+        raise CouplingError(
+            f"{component.name}.{name} declares the start value {text!r}, which is no {variable.type}."
+        ) from error

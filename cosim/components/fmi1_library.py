@@ -1,7 +1,7 @@
 """fmpy's slave of FMI 1.0, with what is wrong in fmpy 0.3.32 put right.
 
-There the status of doStep and of some other calls is declared to be a text: a status other than OK is then read as an address,
-and the process dies. And setRealInputDerivatives calls fmiInitializeSlave.
+There the status of doStep and of some other calls is declared to be a text: a status other than OK is then read as an
+address, and the process dies. And setRealInputDerivatives calls fmiInitializeSlave.
 """
 
 from __future__ import annotations
@@ -13,9 +13,17 @@ from typing import Any
 from fmpy.fmi1 import FMU1Slave
 
 RETURN_A_STATUS = (
-    "fmi1InitializeSlave", "fmi1DoStep", "fmi1CancelStep", "fmi1SetRealInputDerivatives", "fmi1GetRealOutputDerivatives",
-    "fmi1GetStatus", "fmi1GetRealStatus", "fmi1GetIntegerStatus", "fmi1GetBooleanStatus", "fmi1GetStringStatus",
-)  # fmt: skip
+    "fmi1InitializeSlave",
+    "fmi1DoStep",
+    "fmi1CancelStep",
+    "fmi1SetRealInputDerivatives",
+    "fmi1GetRealOutputDerivatives",
+    "fmi1GetStatus",
+    "fmi1GetRealStatus",
+    "fmi1GetIntegerStatus",
+    "fmi1GetBooleanStatus",
+    "fmi1GetStringStatus",
+)
 
 
 class FMU1SlaveRepaired(FMU1Slave):
@@ -26,7 +34,8 @@ class FMU1SlaveRepaired(FMU1Slave):
         for name in RETURN_A_STATUS:
             self._functions[name].restype = ctypes.c_int
 
-    @wraps(FMU1Slave.fmi1SetRealInputDerivatives, assigned=())  # fmpy takes the types of the arguments from the signature
+    # fmpy takes the types of the arguments from the signature
+    @wraps(FMU1Slave.fmi1SetRealInputDerivatives, assigned=())
     def fmi1SetRealInputDerivatives(self, *arguments: Any) -> Any:
         """The call that this name says."""
         return self._call("fmi1SetRealInputDerivatives", *arguments)

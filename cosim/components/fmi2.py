@@ -54,7 +54,8 @@ class FMI2Component(Component):
         slave, self.time = self.slave, start_time
         tolerance, words = self.tolerance_argument()
         self._guard(
-            f"setupExperiment{words}", lambda: slave.setupExperiment(startTime=start_time, stopTime=stop_time, **tolerance)
+            f"setupExperiment{words}",
+            lambda: slave.setupExperiment(startTime=start_time, stopTime=stop_time, **tolerance),
         )
         self._guard("enterInitializationMode", slave.enterInitializationMode)
 
@@ -65,7 +66,7 @@ class FMI2Component(Component):
     def advance(self, t: float, until: float) -> None:  # noqa: D102 - see Component
         self._step_whole(self._do_step, self._after_refusal, t, until)
 
-    def tell(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Component
+    def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Component
         self._counts[event.name] += 1
         fields = {event.payload[n]: float(payload[n]) for n in event.payload if n in payload}
         if event.stamp is not None:

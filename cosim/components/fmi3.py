@@ -32,8 +32,8 @@ class FMI3Component(Component):
     """An FMI 3.0 co-simulation slave. Arguments as for `Component`.
 
     It handles its events itself, unless somebody coordinates it: then it stops at an event (`EventMet`), says so
-    (`event_pending`), and is taken through Event Mode from outside. `next_event` is when something known in advance is due,
-    `clocks` are its time-based input clocks.
+    (`event_pending`), and is taken through Event Mode from outside. `next_event` is when something known in advance is
+    due, `clocks` are its time-based input clocks.
     """
 
     fmi_version = 3
@@ -60,7 +60,9 @@ class FMI3Component(Component):
             self._intermediate.request([self.variable(name, "input") for name in names])
 
     def follow_within_step(self, names: Sequence[str], handler: Callable[[float], None]) -> bool:
-        """Call `handler` with the time [s] whenever these inputs may be set within a step; False where that was not arranged."""
+        """Call `handler` with the time [s] whenever these inputs may be set within a step; False where that was not
+        arranged.
+        """
         if not names or not set(names) <= set(self._intermediate.requested):
             return False
         self._intermediate.handler = handler
@@ -101,9 +103,13 @@ class FMI3Component(Component):
     def _instantiate(self) -> None:
         early = self.capabilities.mightReturnEarlyFromDoStep
         native = hasattr(self.slave, "dll")
-        log: dict[str, Any] = {"logMessage": lambda _environment, status, category, message: self.note(message, status, category)}
+        log: dict[str, Any] = {
+            "logMessage": lambda _environment, status, category, message: self.note(message, status, category)
+        }
         log |= {"loggingOn": self._logging_on} if native else {}
-        self.slave.instantiate(eventModeUsed=self.has_event_mode, earlyReturnAllowed=early, **log, **self._intermediate.arguments)
+        self.slave.instantiate(
+            eventModeUsed=self.has_event_mode, earlyReturnAllowed=early, **log, **self._intermediate.arguments
+        )
         self._do_step = _native_step(self.slave) if native else self.slave.doStep
         if native:
             quicken(self.slave)
@@ -116,7 +122,9 @@ class FMI3Component(Component):
             if clock.type == "Clock" and clock.causality == "input" and clock.intervalVariability == "triggered":
                 clocked = {v.name: v.valueReference for v in variables if _is_clocked_by(v, clock)}
                 stamp = clocked.get(f"{clock.name}_time")
-                events[clock.name] = EventPort(clock.name, clock.valueReference, stamp, self._payload_of(clock.name, clocked))
+                events[clock.name] = EventPort(
+                    clock.name, clock.valueReference, stamp, self._payload_of(clock.name, clocked)
+                )
         return events
 
     def output_clock(self, name: str) -> int:
@@ -126,7 +134,9 @@ class FMI3Component(Component):
     def enter_initialization(self, start_time: float, stop_time: float) -> None:  # noqa: D102 - see Component
         call, self.time = self.slave.enterInitializationMode, start_time
         tolerance, words = self.tolerance_argument()
-        self._guard(f"enterInitializationMode{words}", lambda: call(startTime=start_time, stopTime=stop_time, **tolerance))
+        self._guard(
+            f"enterInitializationMode{words}", lambda: call(startTime=start_time, stopTime=stop_time, **tolerance)
+        )
 
     def exit_initialization(self) -> None:  # noqa: D102 - see Component
         if self.clocks:
@@ -156,8 +166,10 @@ class FMI3Component(Component):
             self.calls += 1
         if terminate:
             self.terminated = True
-            early = early or t + TIME_TOLERANCE < reached < until - TIME_TOLERANCE  # a slave that stops on the way says where
-        if not early:  # lastSuccessfulTime may then be that of an internal step: the slave stands where it was asked to go
+            # a slave that stops on the way says where
+            early = early or t + TIME_TOLERANCE < reached < until - TIME_TOLERANCE
+        # lastSuccessfulTime may then be that of an internal step: the slave stands where it was asked to go
+        if not early:
             self.time = until
             return until, event
         if not t - TIME_TOLERANCE <= reached <= until + TIME_TOLERANCE:
@@ -187,7 +199,9 @@ class FMI3Component(Component):
         raise self.failure(f"returned early {MAX_RETURNS_PER_STEP} times without reaching {until:g} s", t)
 
     def step_towards(self, t: float, until: float) -> float:
-        """One doStep to `until` or to the next time event before it, with the event handled; returns the time reached [s]."""
+        """One doStep to `until` or to the next time event before it, with the event handled; returns the time reached
+        [s].
+        """
         reached, event = self.step(t, self.next_stop(t, until))
         if self.has_event_mode and not self.terminated and self.is_event(reached, event):
             self._meet_event(reached, until)
@@ -230,7 +244,9 @@ class FMI3Component(Component):
 
     def update_discrete_states(self) -> bool:
         """In Event Mode: end a super-dense instant; True where the slave needs another one."""
-        again, terminate, _, _, defined, next_time = self._guard("updateDiscreteStates", self.slave.updateDiscreteStates)
+        again, terminate, _, _, defined, next_time = self._guard(
+            "updateDiscreteStates", self.slave.updateDiscreteStates
+        )
         self.terminated |= bool(terminate)
         if defined and math.isnan(next_time):
             raise self.failure("updateDiscreteStates says that the next event is at t = nan")
@@ -262,7 +278,7 @@ class FMI3Component(Component):
         self._settle()
         return ticked
 
-    def tell(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Component
+    def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Component
         self._guard(f"event '{event.name}'", lambda: self._tell(event, stamp, payload))
 
     def _tell(self, event: EventPort, stamp: float, payload: Mapping[str, float]) -> None:
@@ -299,7 +315,9 @@ class FMI3Component(Component):
 
 
 def _is_clocked_by(variable: ModelVariable, clock: ModelVariable) -> bool:
-    """fmpy puts the clocks themselves where it read a file, and value references where a description was made in Python."""
+    """fmpy puts the clocks themselves where it read a file, and value references where a description was made in
+    Python.
+    """
     return any(entry is clock or entry == clock.valueReference for entry in variable.clocks or ())
 
 

@@ -1,4 +1,6 @@
-"""Intermediate update: an FMI 3 slave that calls back within its step, to be given inputs of that instant (FMI 3.0, 4.2.2)."""
+"""Intermediate update: an FMI 3 slave that calls back within its step, to be given inputs of that instant (FMI 3.0,
+4.2.2).
+"""
 
 from __future__ import annotations
 
@@ -11,9 +13,9 @@ from fmpy.model_description import ModelVariable
 class IntermediateUpdate:
     """The callback of one slave.
 
-    `request` names the inputs before the slave is instantiated; afterwards `handler` is called with the time [s] whenever the
-    slave lets inputs be set within its step. An exception of the handler cannot pass through the slave's C code; it is kept, and
-    raised by `check` after the step.
+    `request` names the inputs before the slave is instantiated; afterwards `handler` is called with the time [s]
+    whenever the slave lets inputs be set within its step. An exception of the handler cannot pass through the slave's C
+    code; it is kept, and raised by `check` after the step.
     """
 
     def __init__(self) -> None:

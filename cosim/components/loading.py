@@ -49,7 +49,9 @@ def load_fmu(path: str | Path, name: str, tolerance: float | str | None = None) 
     archive = _open(path, name)
     description = archive.description
     if description.coSimulation is None:
-        raise FmuLoadError(f"{name}: {path} offers no co-simulation interface; this master steps co-simulation FMUs only.")
+        raise FmuLoadError(
+            f"{name}: {path} offers no co-simulation interface; this master steps co-simulation FMUs only."
+        )
     try:
         archive.demand_this_platform(CO_SIMULATION)
     except NotAnFmuError as error:
@@ -67,16 +69,23 @@ def load_fmu(path: str | Path, name: str, tolerance: float | str | None = None) 
         raise
     except Exception as error:
         shutil.rmtree(folder, ignore_errors=True)
-        lacks = "its library lacks a function that FMI demands of every FMU: " if isinstance(error, AttributeError) else ""
+        lacks = (
+            "its library lacks a function that FMI demands of every FMU: " if isinstance(error, AttributeError) else ""
+        )
         raise FmuLoadError(f"{name}: cannot load {path}: {lacks}{error}") from error
     finally:
         os.chdir(here)  # fmpy changes it while it loads, and leaves it so when it fails
         changed = before.put_back()
     more = {"negated": negated_aliases(folder)} if _version(description) == 1 else {}
     component: Component = COMPONENTS[_version(description)](
-        name, slave, description, source=str(path), kind="FMU",
-        release_files=lambda: shutil.rmtree(folder, ignore_errors=True), **more,
-    )  # fmt: skip
+        name,
+        slave,
+        description,
+        source=str(path),
+        kind="FMU",
+        release_files=lambda: shutil.rmtree(folder, ignore_errors=True),
+        **more,
+    )
     component.trespasses |= dict.fromkeys(changed, "loading its library")
     component.choose_tolerance(tolerance)
     return component

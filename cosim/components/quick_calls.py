@@ -1,4 +1,5 @@
-"""Quick calls: the calls around an event of a native FMI 3 slave with their arguments allocated once. Touches one slave.
+"""Quick calls: the calls around an event of a native FMI 3 slave with their arguments allocated once. Touches one
+slave.
 
 A telegram costs four such calls in every receiver. fmpy's own stay in the class and do what is not prepared here.
 """
@@ -15,7 +16,8 @@ Discrete = tuple[bool, bool, bool, bool, bool, float]
 
 
 def quicken(slave: Any) -> None:
-    """Prepare the calls of an instantiated native slave that enter and leave event mode, tell of an event, and restore a state.
+    """Prepare the calls of an instantiated native slave that enter and leave event mode, tell of an event, and restore
+    a state.
 
     Arguments and results are those of fmpy's methods.
     """
@@ -30,7 +32,9 @@ def quicken(slave: Any) -> None:
 def _update(slave: Any) -> Callable[[], Discrete]:
     flags = [ctypes.c_bool() for _ in range(5)]
     time = ctypes.c_double()
-    call = prepared_call(slave, "fmi3UpdateDiscreteStates", slave.component, *map(ctypes.byref, flags), ctypes.byref(time))
+    call = prepared_call(
+        slave, "fmi3UpdateDiscreteStates", slave.component, *map(ctypes.byref, flags), ctypes.byref(time)
+    )
 
     def update() -> Discrete:
         for flag in flags:  # a slave may leave out what it has nothing to say of

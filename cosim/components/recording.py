@@ -1,8 +1,8 @@
 """A recording as a component: its columns are outputs, played back in time. Knows one recording.
 
-It has the call surface of an FMI 3.0 slave, so that whoever steps components cannot tell it from a plant. What jumped in the
-recording (two rows of the same time) is a time event: the step that ends there ends with the row before it, Event Mode brings
-the row after it. So whoever listens gets the very inputs it had beside the plant.
+It has the call surface of an FMI 3.0 slave, so that whoever steps components cannot tell it from a plant. What jumped
+in the recording (two rows of the same time) is a time event: the step that ends there ends with the row before it,
+Event Mode brings the row after it. So whoever listens gets the very inputs it had beside the plant.
 """
 
 from __future__ import annotations
@@ -139,26 +139,43 @@ def describe(recording: Recording) -> ModelDescription:
     whole = whole_number_columns(recording)
     outputs = [
         ModelVariable(
-            name=signal.name, valueReference=i, type="Int32" if is_whole else "Float64", causality="output",
-            variability="discrete" if is_whole else signal.variability, description=signal.description,
-            unit=None if signal.unit == "1" else signal.unit, displayUnit=signal.display_unit,
+            name=signal.name,
+            valueReference=i,
+            type="Int32" if is_whole else "Float64",
+            causality="output",
+            variability="discrete" if is_whole else signal.variability,
+            description=signal.description,
+            unit=None if signal.unit == "1" else signal.unit,
+            displayUnit=signal.display_unit,
         )
         for i, (signal, is_whole) in enumerate(zip(recording.signals, whole, strict=True), start=1)
-    ]  # fmt: skip
+    ]
     abilities = CoSimulation(
-        modelIdentifier=KIND, canHandleVariableCommunicationStepSize=True, canGetAndSetFMUstate=True,
+        modelIdentifier=KIND,
+        canHandleVariableCommunicationStepSize=True,
+        canGetAndSetFMUstate=True,
         hasEventMode=bool(len(recording.events)),
-    )  # fmt: skip
+    )
     return ModelDescription(
-        fmiVersion="3.0", modelName=Path(recording.source).name, instantiationToken=recording.digest, description="A recording",
-        generationTool=KIND, coSimulation=abilities, modelVariables=outputs,
+        fmiVersion="3.0",
+        modelName=Path(recording.source).name,
+        instantiationToken=recording.digest,
+        description="A recording",
+        generationTool=KIND,
+        coSimulation=abilities,
+        modelVariables=outputs,
         outputs=[Unknown(variable=variable, dependencies=[]) for variable in outputs],
-    )  # fmt: skip
+    )
 
 
 def load_recording(
-    path: Path, name: str, component: str | None, interpolation: Interpolation, span: tuple[float, float] | None, where: str
-) -> Recording:  # fmt: skip
+    path: Path,
+    name: str,
+    component: str | None,
+    interpolation: Interpolation,
+    span: tuple[float, float] | None,
+    where: str,
+) -> Recording:
     """The recording of a results folder or table.
 
     Args:

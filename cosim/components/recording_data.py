@@ -1,4 +1,6 @@
-"""Recordings: columns over time, from a result or a measured table, and what they were at any instant. NumPy and results only."""
+"""Recordings: columns over time, from a result or a measured table, and what they were at any instant. NumPy and
+results only.
+"""
 
 from __future__ import annotations
 
@@ -23,8 +25,8 @@ class Recording:
 
     Args:
         source: where they come from, for people.
-        time: of the rows [s], not decreasing, shape (rows,). Of rows with the same time the first one is before an event, the
-            last one after it.
+        time: of the rows [s], not decreasing, shape (rows,). Of rows with the same time the first one is before an
+            event, the last one after it.
         signals: what each column is; names without a component.
         values: shape (rows, n), finite.
         held: mask of the columns that keep their value until the next row, shape (n,); the others run on lines.
@@ -63,26 +65,35 @@ class Recording:
         if row < 0 or (row == len(self.time) - 1 and t > self.time[row] + TIME_TOLERANCE):
             raise ValueError(f"t = {t:g} s is outside of the recording, {self.time[0]:g} s to {self.time[-1]:g} s")
         if self.time[row] >= t - TIME_TOLERANCE:
-            return np.asarray(self.values[np.searchsorted(self.time, t - TIME_TOLERANCE)] if before else self.values[row])
+            return np.asarray(
+                self.values[np.searchsorted(self.time, t - TIME_TOLERANCE)] if before else self.values[row]
+            )
         here, following = self.values[row], self.values[row + 1]
         share = (t - self.time[row]) / (self.time[row + 1] - self.time[row])
         return np.asarray(np.where(self.held, here, here + share * (following - here)))
 
 
 def make_recording(
-    result: Result, source: str, component: str | None, name: str, interpolation: Interpolation, span: tuple[float, float] | None
-) -> Recording:  # fmt: skip
+    result: Result,
+    source: str,
+    component: str | None,
+    name: str,
+    interpolation: Interpolation,
+    span: tuple[float, float] | None,
+) -> Recording:
     """The recording of one component of a result, or of a whole table.
 
     Args:
         result: what was recorded. source: where it comes from, for messages.
-        component: whose columns are taken. None: those of `name` where it was recorded, else all under their full names.
+        component: whose columns are taken. None: those of `name` where it was recorded, else all under their full
+        names.
         name: of the component that plays it back.
         interpolation: between the rows; what was recorded as discrete is always held.
         span: start and stop of the run [s], which the recording must cover; None where nobody steps it.
 
     Raises:
-        ScenarioError: nothing was recorded, the component is not in it, times do not increase, or it does not cover the run.
+        ScenarioError: nothing was recorded, the component is not in it, times do not increase, or it does not cover the
+        run.
     """
     chosen = _chosen(result, source, component, name)
     time = np.array(result.time, dtype=float)
@@ -97,7 +108,9 @@ def make_recording(
             signals.append(signal)
             columns.append(values)
     if not signals:
-        raise ScenarioError(f"{source}: no column can be played back; " + "; ".join(f"{n}: {w}" for n, w in left_out.items()))
+        raise ScenarioError(
+            f"{source}: no column can be played back; " + "; ".join(f"{n}: {w}" for n, w in left_out.items())
+        )
     held = np.array([interpolation == "hold" or s.variability == "discrete" for s in signals])
     values = np.column_stack(columns)
     events = _events(time[rows], values, np.array([e.delivered_at for e in result.events]))
@@ -116,7 +129,9 @@ def _chosen(result: Result, source: str, component: str | None, name: str) -> di
     """Columns to play back, with what they are, under their new names."""
     recorded = dict.fromkeys(s.name.partition(".")[0] for s in result.signals if "." in s.name)
     if component is not None and component not in recorded:
-        hint = nearest(component, recorded) if recorded else "its columns belong to no component, leave 'component' out."
+        hint = (
+            nearest(component, recorded) if recorded else "its columns belong to no component, leave 'component' out."
+        )
         raise ScenarioError(f"{source}: component {component!r} was not recorded there; {hint}")
     own = component or (name if name in recorded else None)
     prefix = "" if own is None else f"{own}."
@@ -135,14 +150,19 @@ def _check_time(time: np.ndarray, source: str, span: tuple[float, float] | None)
     if back.size:
         i = int(back[0])
         raise ScenarioError(
-            f"{source}: time goes back from {time[i]:g} s to {time[i + 1]:g} s in row {i + 2}; sort the rows, or cut the file."
+            f"{source}: time goes back from {time[i]:g} s to {time[i + 1]:g} s in row {i + 2}; sort the rows, or cut "
+            f"the file."
         )
     if span is None:
         return
     start, stop = span
     if time[0] > start + TIME_TOLERANCE or time[-1] < stop - TIME_TOLERANCE:
         late = time[-1] < stop - TIME_TOLERANCE
-        what = f"ends at {time[-1]:g} s, the run at {stop:g} s" if late else f"begins at {time[0]:g} s, the run at {start:g} s"
+        what = (
+            f"ends at {time[-1]:g} s, the run at {stop:g} s"
+            if late
+            else f"begins at {time[0]:g} s, the run at {start:g} s"
+        )
         raise ScenarioError(
             f"{source}: the recording {what}; set start and stop of the run within {time[0]:g} s to {time[-1]:g} s."
         )
@@ -162,7 +182,8 @@ def _rows(time: np.ndarray, span: tuple[float, float] | None) -> slice:
 def _events(time: np.ndarray, values: np.ndarray, telegrams: np.ndarray) -> np.ndarray:
     """Times of events: there are rows before and after, of other values, or not for the sake of a telegram to somebody.
 
-    A plant that returns early at an event may show its new values before the event already: others jump there all the same.
+    A plant that returns early at an event may show its new values before the event already: others jump there all the
+    same.
 
     Args:
         time: of the rows [s], shape (rows,). values: shape (rows, n). telegrams: when telegrams were delivered [s].
@@ -186,14 +207,21 @@ def _without_gaps(values: np.ndarray, time: np.ndarray, interpolation: Interpola
     if interpolation == "hold" and good[0]:
         return values[np.maximum.accumulate(np.where(good, np.arange(len(values)), 0))], ""
     fault = f"its value at {time[bad]:g} s is {values[bad]} ({int((~good).sum())} such of {len(values)})"
-    hint = {"hold": "there is nothing before it to hold", "linear": "interpolation = 'hold' keeps the last value over gaps"}
+    hint = {
+        "hold": "there is nothing before it to hold",
+        "linear": "interpolation = 'hold' keeps the last value over gaps",
+    }
     return values, f"{fault}; {hint[interpolation]}"
 
 
 def whole_number_columns(recording: Recording) -> Sequence[bool]:
-    """For each column whether it is a discrete pure number that was whole throughout: a mode, a count, a truth value."""
+    """For each column whether it is a discrete pure number that was whole throughout: a mode, a count, a truth
+    value.
+    """
     largest = 2.0**31 - 1.0
     return [
-        s.variability == "discrete" and s.unit == "1" and bool(np.all((column == np.rint(column)) & (np.abs(column) <= largest)))
+        s.variability == "discrete"
+        and s.unit == "1"
+        and bool(np.all((column == np.rint(column)) & (np.abs(column) <= largest)))
         for s, column in zip(recording.signals, recording.values.T, strict=True)
     ]

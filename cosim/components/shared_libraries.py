@@ -1,8 +1,10 @@
-"""Shared libraries: two FMUs that bring different libraries of one name would share one of them, and compute with the wrong one.
+"""Shared libraries: two FMUs that bring different libraries of one name would share one of them, and compute with the
+wrong one.
 
-The dynamic linker knows a library that another one needs by its name alone (its soname): where one of that name is loaded,
-whatever the folder, it is taken. So whoever comes second is refused. Libraries of the same bytes are shared, as the instances
-of one FMU share theirs; those of the system are left to the system. Linux with ELF; elsewhere nothing is looked at.
+The dynamic linker knows a library that another one needs by its name alone (its soname): where one of that name is
+loaded, whatever the folder, it is taken. So whoever comes second is refused. Libraries of the same bytes are shared, as
+the instances of one FMU share theirs; those of the system are left to the system. Linux with ELF; elsewhere nothing is
+looked at.
 """
 
 from __future__ import annotations
@@ -30,7 +32,8 @@ def refuse_foreign_libraries(library: Path, fmu: Path, name: str) -> None:
     """Make sure that what an FMU brings for itself is what it would get.
 
     Args:
-        library: the FMU's own library, unpacked and not loaded yet. fmu: the file, name: of the component, for the message.
+        library: the FMU's own library, unpacked and not loaded yet. fmu: the file, name: of the component, for the
+        message.
 
     Raises:
         FmuLoadError: another FMU has brought another library of the same name into this process.
@@ -46,8 +49,10 @@ def refuse_foreign_libraries(library: Path, fmu: Path, name: str) -> None:
         other, its_digest = _brought[loaded]
         if its_digest != digest:
             raise FmuLoadError(
-                f"{name}: {fmu} and {other} each bring a library {soname}, and these differ; in one process both would use that "
-                f"of {other.name}, and one of them compute wrong numbers. Have one of them built with the library linked into it "
+                f"{name}: {fmu} and {other} each bring a library {soname}, and these differ; in one process both would "
+                f"use that "
+                f"of {other.name}, and one of them compute wrong numbers. Have one of them built with the library "
+                f"linked into it "
                 "(static), or under another name; or run the FMUs in programs of their own."
             )
 
@@ -58,7 +63,11 @@ def _own_needs(library: Path) -> dict[str, Path]:
     if not library.is_file():
         return {}  # which loading it will say
     files = {path.name: path for path in folder.iterdir() if path.is_file() and path != library}
-    files |= {linkage.soname: path for path in files.values() if (linkage := read_linkage(path)) is not None and linkage.soname}
+    files |= {
+        linkage.soname: path
+        for path in files.values()
+        if (linkage := read_linkage(path)) is not None and linkage.soname
+    }
     found: dict[str, Path] = {}
     waiting = [library]
     while waiting:

@@ -1,4 +1,6 @@
-"""Start values: what a user writes for a variable of any type, checked and turned into the values FMI takes. No slaves here."""
+"""Start values: what a user writes for a variable of any type, checked and turned into the values FMI takes. No slaves
+here.
+"""
 
 from __future__ import annotations
 
@@ -25,8 +27,8 @@ def typed_values(variable: ModelVariable, value: Any) -> list[Any]:
 
     Args:
         variable: what is set.
-        value: a number, truth value, text or bytes (or bytes as a hexadecimal text); an item's name for an enumeration; for an
-            array a nested or flat list, or one value for all elements.
+        value: a number, truth value, text or bytes (or bytes as a hexadecimal text); an item's name for an enumeration;
+            for an array a nested or flat list, or one value for all elements.
 
     Raises:
         ValueError: the value does not fit the variable; the message says what was expected.
@@ -57,7 +59,9 @@ def _flat(variable: ModelVariable, value: Any) -> list[Any]:
         return [value] * size(variable)
     shape, flat = _shape(value), _leaves(value)
     if len(flat) != size(variable) or (len(shape) > 1 and shape != tuple(variable.shape or ())):
-        raise ValueError(f"expected {size(variable)} values for a {described(variable)} (got {len(flat)} in shape {shape})")
+        raise ValueError(
+            f"expected {size(variable)} values for a {described(variable)} (got {len(flat)} in shape {shape})"
+        )
     return flat
 
 

@@ -27,7 +27,9 @@ def structural_value(component: str, variable: ModelVariable, value: Any) -> int
     low = 0 if variable.min is None else int(variable.min)
     if number < low or (variable.max is not None and number > int(variable.max)):
         high = "any" if variable.max is None else variable.max
-        raise CouplingError(f"{component}.{variable.name} = {number} is outside of what the component declares: {low} to {high}.")
+        raise CouplingError(
+            f"{component}.{variable.name} = {number} is outside of what the component declares: {low} to {high}."
+        )
     return number
 
 

@@ -1,4 +1,5 @@
-"""Surroundings: what an FMU may change for everybody in its process, working directory and rounding of numbers, is put back.
+"""Surroundings: what an FMU may change for everybody in its process, working directory and rounding of numbers, is put
+back.
 
 An FMU that leaves another rounding mode behind changes the last digits of every other component, and of Python itself.
 """

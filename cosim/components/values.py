@@ -1,7 +1,7 @@
 """Values by name: reading and writing scalars and elements of a component's variables, whole arrays and signs included.
 
-FMI reads and writes whole variables. Where only some elements of an array are asked for, the others are read and left alone;
-where the slave holds a variable with the other sign (a negated alias of FMI 1.0), the sign is turned on the way.
+FMI reads and writes whole variables. Where only some elements of an array are asked for, the others are read and left
+alone; where the slave holds a variable with the other sign (a negated alias of FMI 1.0), the sign is turned on the way.
 """
 
 from __future__ import annotations

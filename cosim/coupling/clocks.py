@@ -33,11 +33,11 @@ class ClockConnection:
 
 def connect_clocks(
     pairs: Sequence[Link], components: Mapping[str, Component]
-) -> tuple[list[ClockConnection], list[Link]]:  # fmt: skip
+) -> tuple[list[ClockConnection], list[Link]]:
     """Take the connections between clocks out of all connections.
 
-    A connected input clock is no longer an event that somebody may tell (no balise event), and its clocked inputs may be
-    connected like any others; to be called before `cosim.coupling.connection.connect`.
+    A connected input clock is no longer an event that somebody may tell (no balise event), and its clocked inputs may
+    be connected like any others; to be called before `cosim.coupling.connection.connect`.
 
     Args:
         pairs: names of source and target. components: by name.
@@ -46,7 +46,8 @@ def connect_clocks(
         The clock connections, and the other pairs.
 
     Raises:
-        CouplingError: a clock joined to something else, a clock that ticks by itself, a component without Event Mode, or two
+        CouplingError: a clock joined to something else, a clock that ticks by itself, a component without Event Mode,
+        or two
             sources for one clock.
     """
     clocks: list[ClockConnection] = []
@@ -59,7 +60,8 @@ def connect_clocks(
             continue
         if made.target in taken:
             raise CouplingError(
-                f"Clock {pair[1]} has two sources, {taken[made.target]} and {pair[0]}; a clock takes one. Remove one connection."
+                f"Clock {pair[1]} has two sources, {taken[made.target]} and {pair[0]}; a clock takes one. Remove one "
+                f"connection."
             )
         taken[made.target] = pair[0]
         clocks.append(made)
@@ -70,7 +72,9 @@ def connect_clocks(
 
 
 def _leave_to_connection(target: str, components: Mapping[str, Component]) -> None:
-    """An event whose count is connected is told by its source, stamp and payload with it: the master has no part in it."""
+    """An event whose count is connected is told by its source, stamp and payload with it: the master has no part in
+    it.
+    """
     component, signal = split_name(target, components, "Connection target")
     events = components[component].events
     variable = components[component].variables.get(signal)
@@ -93,7 +97,9 @@ def _clock_connection(pair: Link, components: Mapping[str, Component]) -> ClockC
     components[target[0]].variable(target[1], "input")
     kind = ends[1].intervalVariability
     if kind != TRIGGERED:
-        raise CouplingError(f"{where}: {pair[1]} ticks at its own instants (intervalVariability '{kind}'); leave it unconnected.")
+        raise CouplingError(
+            f"{where}: {pair[1]} ticks at its own instants (intervalVariability '{kind}'); leave it unconnected."
+        )
     for name in (source[0], target[0]):
         if not components[name].capabilities.hasEventMode:
             raise CouplingError(f"{where}: {name} has no Event Mode (hasEventMode), so its clocks never tick.")

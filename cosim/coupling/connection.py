@@ -1,7 +1,7 @@
 """Connections: one output to one input, types and units checked and converted. Knows components, not time.
 
-A connection joins two scalars or two elements; whole arrays are joined element by element. Numbers travel as doubles; texts,
-bytes and 64-bit integers, which doubles cannot hold, travel as they are.
+A connection joins two scalars or two elements; whole arrays are joined element by element. Numbers travel as doubles;
+texts, bytes and 64-bit integers, which doubles cannot hold, travel as they are.
 """
 
 from __future__ import annotations
@@ -27,7 +27,9 @@ LONG_TYPES = frozenset({"Int64", "UInt64"})
 
 
 SOURCES = ("output", "local")
-"""What may be connected to an input. A local variable may be read like an output; what acts on it at once is never declared."""
+"""What may be connected to an input. A local variable may be read like an output; what acts on it at once is never
+declared.
+"""
 
 
 @dataclass(frozen=True)
@@ -35,8 +37,10 @@ class Connection:
     """``target = factor * source + offset``.
 
     Args:
-        source: (component, output). target: (component, input). factor, offset: unit conversion and linear transformation.
-        table: (source, target) values of a discrete signal, where it is mapped; a value without an entry passes unchanged.
+        source: (component, output). target: (component, input). factor, offset: unit conversion and linear
+        transformation.
+        table: (source, target) values of a discrete signal, where it is mapped; a value without an entry passes
+        unchanged.
         exact: whether the value travels as it is instead of as a double.
         source_array, target_array: the array that the source or target is an element of, or an empty name.
     """
@@ -81,10 +85,12 @@ def split_name(name: str, components: Iterable[str], what: str) -> tuple[str, st
 
 
 def connect(pairs: Sequence[Link], components: Mapping[str, Component]) -> list[Connection]:
-    """Checked connections from ``(source, target)`` names, with a transformation or without; one for each element of arrays.
+    """Checked connections from ``(source, target)`` names, with a transformation or without; one for each element of
+    arrays.
 
     Raises:
-        CouplingError: an unknown variable, a wrong causality, types, shapes or units that do not fit, or two sources for one
+        CouplingError: an unknown variable, a wrong causality, types, shapes or units that do not fit, or two sources
+        for one
             input.
     """
     connections: list[Connection] = []
@@ -97,12 +103,18 @@ def connect(pairs: Sequence[Link], components: Mapping[str, Component]) -> list[
         factor, offset = _conversion(components, source, target) if transformation.convert_units else (1.0, 0.0)
         for output, name in _elements(components, source, target):
             made = Connection(
-                (source[0], output.name), (target[0], name.name), *transformation.after(factor, offset), transformation.table,
-                exact, _array(output), _array(name),
-            )  # fmt: skip
+                (source[0], output.name),
+                (target[0], name.name),
+                *transformation.after(factor, offset),
+                transformation.table,
+                exact,
+                _array(output),
+                _array(name),
+            )
             if made.target in taken:
                 raise CouplingError(
-                    f"Input {'.'.join(made.target)} has two sources, {taken[made.target]} and {source_name}; an input takes one. "
+                    f"Input {'.'.join(made.target)} has two sources, {taken[made.target]} and {source_name}; an input "
+                    f"takes one. "
                     "Remove one connection."
                 )
             taken[made.target] = source_name
@@ -123,7 +135,9 @@ def _elements(
     shapes = [tuple(c.variables[s].shape or ()) if s in c.variables else () for c, s in sides]
     if shapes[0] != shapes[1]:
         words = [f"{c.name}.{s} is {_article(shape)}" for (c, s), shape in zip(sides, shapes, strict=True)]
-        raise CouplingError(f"{words[0]}, {words[1]}; connect arrays of one shape, or their elements ('a.x[1] -> b.u').")
+        raise CouplingError(
+            f"{words[0]}, {words[1]}; connect arrays of one shape, or their elements ('a.x[1] -> b.u')."
+        )
     return zip(outputs, inputs, strict=True)
 
 
@@ -136,7 +150,10 @@ def _array(element: Element) -> str:
 
 
 def _exact(
-    components: Mapping[str, Component], source: tuple[str, str], target: tuple[str, str], transformation: Transformation
+    components: Mapping[str, Component],
+    source: tuple[str, str],
+    target: tuple[str, str],
+    transformation: Transformation,
 ) -> bool:
     """Whether a value travels as it is.
 
@@ -151,7 +168,9 @@ def _exact(
         raise CouplingError(f"Connection {'.'.join(source)} -> {'.'.join(target)}: {types}; {reason}.")
     if output.type not in NUMERIC_TYPES:
         if transformation != Transformation():
-            raise CouplingError(f"Connection {'.'.join(source)} -> {'.'.join(target)}: a {output.type} cannot be transformed.")
+            raise CouplingError(
+                f"Connection {'.'.join(source)} -> {'.'.join(target)}: a {output.type} cannot be transformed."
+            )
         return True
     versions = [components[end[0]].fmi_version for end in (source, target)]
     kinds = {getter_type(v.type, version) for v, version in zip((output, name), versions, strict=True)}
@@ -161,8 +180,8 @@ def _exact(
 def _misfit(source: ModelVariable, target: ModelVariable) -> str:
     """Why a value of one type is no value of another, or an empty text.
 
-    Floating-point numbers fit one another, and so do integers, truth values and enumerations; those also fit floating-point
-    inputs, not the other way round. Texts fit texts, bytes fit bytes.
+    Floating-point numbers fit one another, and so do integers, truth values and enumerations; those also fit
+    floating-point inputs, not the other way round. Texts fit texts, bytes fit bytes.
     """
     if source.type not in NUMERIC_TYPES or target.type not in NUMERIC_TYPES:
         return "" if source.type == target.type else "only equal types fit here"
@@ -182,13 +201,22 @@ def unconnected_inputs(
     """
     set_by_hand = {(name, signal) for name, signals in (given or {}).items() for signal in signals}
     taken = {c.target for c in connections} | set_by_hand
-    return [f"{c.name}.{name}" for c in components for v in _free_to_connect(c, taken) for name in _without_source(c, v, taken)]
+    return [
+        f"{c.name}.{name}"
+        for c in components
+        for v in _free_to_connect(c, taken)
+        for name in _without_source(c, v, taken)
+    ]
 
 
 def _free_to_connect(component: Component, taken: set[tuple[str, str]]) -> list[ModelVariable]:
     """The inputs that may be connected; an FMI 3 alias is its variable, and one that is taken takes it."""
     hidden = component.event_references()
-    inputs = [v for v in component.description.modelVariables if v.causality == "input" and v.type != "Clock" and v.alias is None]
+    inputs = [
+        v
+        for v in component.description.modelVariables
+        if v.causality == "input" and v.type != "Clock" and v.alias is None
+    ]
     by_alias = {v.name for v in inputs if any((component.name, alias.name) in taken for alias in v.aliases)}
     return [v for v in inputs if v.valueReference not in hidden and v.name not in by_alias]
 
@@ -203,11 +231,15 @@ def _without_source(component: Component, variable: ModelVariable, taken: set[tu
 
 
 def local_sources(connections: Iterable[Connection], components: Mapping[str, Component]) -> dict[str, list[str]]:
-    """Local variables that other components read, element by element, by component: sealed FMUs hide what others need."""
+    """Local variables that other components read, element by element, by component: sealed FMUs hide what others
+    need.
+    """
     found: dict[str, list[str]] = {}
     for c in connections:
         name = c.source[0]
-        if components[name].variable(c.source[1]).causality == "local" and c.source[1] not in found.setdefault(name, []):
+        if components[name].variable(c.source[1]).causality == "local" and c.source[1] not in found.setdefault(
+            name, []
+        ):
             found[name].append(c.source[1])
     return {name: signals for name, signals in found.items() if signals}
 
@@ -215,15 +247,20 @@ def local_sources(connections: Iterable[Connection], components: Mapping[str, Co
 def _connectable(component: Component, name: str, *causalities: str) -> ModelVariable:
     variable = component.variable(name, *causalities)
     if variable.type == "Clock":
-        raise CouplingError(f"{component.name}.{name} is a {described(variable)}; it has no value that could be connected.")
+        raise CouplingError(
+            f"{component.name}.{name} is a {described(variable)}; it has no value that could be connected."
+        )
     if variable.causality == "input" and variable.valueReference in component.event_references():
         raise CouplingError(
-            f"{component.name}.{name} belongs to an event, of which the master tells; connect its count too, or leave all of it."
+            f"{component.name}.{name} belongs to an event, of which the master tells; connect its count too, or leave "
+            f"all of it."
         )
     return variable
 
 
-def _conversion(components: Mapping[str, Component], source: tuple[str, str], target: tuple[str, str]) -> tuple[float, float]:
+def _conversion(
+    components: Mapping[str, Component], source: tuple[str, str], target: tuple[str, str]
+) -> tuple[float, float]:
     sender, receiver = components[source[0]], components[target[0]]
     if sender.variables[source[1]].type not in FLOATING_TYPES:
         return 1.0, 0.0  # only floating-point numbers have units

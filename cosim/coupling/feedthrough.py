@@ -1,4 +1,6 @@
-"""Direct feedthrough: which inputs act on which outputs at once, and the algebraic loops this makes. Reads descriptions only."""
+"""Direct feedthrough: which inputs act on which outputs at once, and the algebraic loops this makes. Reads descriptions
+only.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,8 @@ def declared_feedthrough(component: Component) -> dict[str, list[str]]:
 
 
 def undeclared_outputs(component: Component) -> list[str]:
-    """Outputs and locals of which the description does not say what they depend on; by the standard that may be every input.
+    """Outputs and locals of which the description does not say what they depend on; by the standard that may be every
+    input.
 
     Locals that are continuous states depend on none at once.
     """
@@ -126,4 +129,8 @@ def _knots(
 
 def _input_variables(component: Component) -> list[str]:
     hidden = component.event_references()
-    return [v.name for v in component.description.modelVariables if v.causality == "input" and v.valueReference not in hidden]
+    return [
+        v.name
+        for v in component.description.modelVariables
+        if v.causality == "input" and v.valueReference not in hidden
+    ]

@@ -1,7 +1,7 @@
 """Order: in which order the components are stepped, and which of them hang together in loops. Pure graph work on names.
 
-The connection graph of a controlled train has cycles; they are harmless where some output in the cycle follows from states
-alone. Only a cycle of direct feedthrough is an algebraic loop (`cosim.coupling.feedthrough`).
+The connection graph of a controlled train has cycles; they are harmless where some output in the cycle follows from
+states alone. Only a cycle of direct feedthrough is an algebraic loop (`cosim.coupling.feedthrough`).
 """
 
 from __future__ import annotations
@@ -22,7 +22,14 @@ from cosim.coupling.ordering import Signal, in_order, satisfied
 from cosim.coupling.strong import strong_groups, topological
 from cosim.errors import CouplingError
 
-__all__ = ["Group", "check_algebraic_loops", "declared_feedthrough", "execution_groups", "execution_order", "undeclared"]
+__all__ = [
+    "Group",
+    "check_algebraic_loops",
+    "declared_feedthrough",
+    "execution_groups",
+    "execution_order",
+    "undeclared",
+]
 
 Pair = tuple[str, str]
 
@@ -47,17 +54,21 @@ class Group:
 
 
 def execution_groups(
-    components: Mapping[str, Component], connections: Sequence[Connection], before: Iterable[Pair] = (),
-    first: Iterable[str] = (), last: Iterable[str] = (),
-) -> list[Group]:  # fmt: skip
+    components: Mapping[str, Component],
+    connections: Sequence[Connection],
+    before: Iterable[Pair] = (),
+    first: Iterable[str] = (),
+    last: Iterable[str] = (),
+) -> list[Group]:
     """Strongly connected groups in topological order, the members of each in Gauss-Seidel order.
 
-    The order in which components and connections are listed does not matter. Inside a group the components of an algebraic loop
-    stand together, and who takes their iterated signals comes after them; an input that acts directly on an output which is
-    passed on comes after its source; where an FMU does not say what its outputs depend on, every input is taken to act on all of
-    them as far as that contradicts nothing that is declared. What remains free is ordered as `first` and `last` say, then so that
-    few signals are held (`cosim.coupling.instants`), rather those that are constant between their jumps; names decide last.
-    The time it takes grows linearly with components and connections, but for a logarithm.
+    The order in which components and connections are listed does not matter. Inside a group the components of an
+    algebraic loop stand together, and who takes their iterated signals comes after them; an input that acts directly on
+    an output which is passed on comes after its source; where an FMU does not say what its outputs depend on, every
+    input is taken to act on all of them as far as that contradicts nothing that is declared. What remains free is
+    ordered as `first` and `last` say, then so that few signals are held (`cosim.coupling.instants`), rather those that
+    are constant between their jumps; names decide last. The time it takes grows linearly with components and
+    connections, but for a logarithm.
 
     Args:
         components: by name. connections: checked.
@@ -103,9 +114,12 @@ def execution_groups(
 
 
 def execution_order(
-    components: Mapping[str, Component], connections: Sequence[Connection], before: Iterable[Pair] = (),
-    first: Iterable[str] = (), last: Iterable[str] = (),
-) -> list[str]:  # fmt: skip
+    components: Mapping[str, Component],
+    connections: Sequence[Connection],
+    before: Iterable[Pair] = (),
+    first: Iterable[str] = (),
+    last: Iterable[str] = (),
+) -> list[str]:
     """Component names in Gauss-Seidel order, see `execution_groups`, for a master that does not iterate.
 
     Args:
@@ -127,12 +141,14 @@ def check_algebraic_loops(components: Mapping[str, Component], connections: Sequ
     loops = algebraic_loops(components, connections)
     if loops:
         raise CouplingError(
-            f"Algebraic loop without a method: {loops[0]}. Iterate it (master.algorithm = 'auto' or 'iterate'), break it with a "
+            f"Algebraic loop without a method: {loops[0]}. Iterate it (master.algorithm = 'auto' or 'iterate'), break "
+            f"it with a "
             "component that holds a state or a sample (for instance a sampled sensor), or merge the components."
         )
 
 
-# -- order inside a group -----------------------------------------------------------------------------------------------
+# -- order inside a group
+# -----------------------------------------------------------------------------------------------
 
 
 def _levels(components: Mapping[str, Component], connections: Sequence[Connection], must: set[Pair]) -> list[set[Pair]]:
@@ -157,7 +173,9 @@ def _signals(components: Mapping[str, Component], connections: Sequence[Connecti
     for c in connections:
         targets.setdefault(c.source_variable, set()).add(c.target[0])
     return [
-        Signal(name, frozenset(taking - {name}), components[name].variables[variable].variability in (None, "continuous"))
+        Signal(
+            name, frozenset(taking - {name}), components[name].variables[variable].variability in (None, "continuous")
+        )
         for (name, variable), taking in targets.items()
     ]
 
@@ -183,12 +201,16 @@ class Inside:
             return [(name,) for name in self._arranged(self.names, self.levels, self.signals)]
         head = {name: knot[0] for knot in knots for name in knot}
         outer = [{(head[a], head[b]) for a, b in level | after if head[a] != head[b]} for level in self.levels]
-        joined = [Signal(head[s.source], frozenset(head[n] for n in s.targets) - {head[s.source]}, s.flows) for s in self.signals]
+        joined = [
+            Signal(head[s.source], frozenset(head[n] for n in s.targets) - {head[s.source]}, s.flows)
+            for s in self.signals
+        ]
         members = {knot[0]: knot for knot in knots}
         return [self._inside(members[name]) for name in self._arranged(list(members), outer, joined)]
 
     def _knots(self, ties: Sequence[Pair]) -> tuple[list[list[str]], set[Pair]]:
-        """Who is tied together, and pairs (first, second): who takes a signal that is iterated inside a knot comes after it.
+        """Who is tied together, and pairs (first, second): who takes a signal that is iterated inside a knot comes
+        after it.
 
         Where that contradicts what holds always, or two knots take such signals of one another, they are one knot.
         """

@@ -1,7 +1,7 @@
 """The connected inputs of one component: gathered from the array of all values, then sent.
 
-Gathering and sending are apart, because an algorithm may gather for all components before it steps any of them, and because an
-input may follow a line between communication points instead of the gathered value.
+Gathering and sending are apart, because an algorithm may gather for all components before it steps any of them, and
+because an input may follow a line between communication points instead of the gathered value.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from cosim.components.component import Component
 from cosim.coupling.connection import Connection
 from cosim.coupling.instants import Signal
-from cosim.coupling.untouched import UntouchedInputs
+from cosim.coupling.non_numeric import UntouchedInputs
 
 FEW = 4  # inputs that are gathered faster one by one
 
@@ -29,27 +29,36 @@ class Inputs:
         values: all outputs of all components, now and after that as they were at the start of the step, shape (2 n,).
         buffer: what `send` writes, shape (m,).
         send: writes `buffer` to the component.
-        tables: for an input whose values are mapped, its place -> {source: target}; a value without an entry passes unchanged.
-        untouched: inputs that are no numbers, or integers beyond doubles, gathered and sent with the others; or None.
+        tables: for an input whose values are mapped, its place -> {source: target}; a value without an entry passes
+        unchanged.
+        non_numeric: inputs that are no numbers, or integers beyond doubles, gathered and sent with the others; or None.
 
-    `gather` takes what holds for a step: of held signals the value at its start. `gather_now` takes what the sources say now.
-    `places` says where `gather` finds each value, shape (m,).
+    `gather` takes what holds for a step: of held signals the value at its start. `gather_now` takes what the sources
+    say now. `places` says where `gather` finds each value, shape (m,).
     """
 
     def __init__(
-        self, names: Sequence[str], sources: np.ndarray, signals: Sequence[Signal], factors: np.ndarray, offsets: np.ndarray,
-        values: np.ndarray, buffer: np.ndarray, send: Callable[[], None],
-        tables: Mapping[int, Mapping[float, float]] | None = None, untouched: UntouchedInputs | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        names: Sequence[str],
+        sources: np.ndarray,
+        signals: Sequence[Signal],
+        factors: np.ndarray,
+        offsets: np.ndarray,
+        values: np.ndarray,
+        buffer: np.ndarray,
+        send: Callable[[], None],
+        tables: Mapping[int, Mapping[float, float]] | None = None,
+        non_numeric: UntouchedInputs | None = None,
+    ) -> None:
         self.names, self.sources, self.factors, self.offsets = tuple(names), sources, factors, offsets
         self.buffer, self.send = buffer, send
         self.tables = dict(tables or {})
         self.places, self._signals, self._count = sources.copy(), tuple(signals), len(values) // 2
-        self._values, self.untouched = values, untouched
+        self._values, self.non_numeric = values, non_numeric
         self.gather, self.gather_now = self._gathering(self.places), self._gathering(sources)
-        if untouched is not None:
-            self.gather, self.send = _both(self.gather, untouched.gather), _both(self.send, untouched.send)
-            self.gather_now = _both(self.gather_now, untouched.gather_now)
+        if non_numeric is not None:
+            self.gather, self.send = _both(self.gather, non_numeric.gather), _both(self.send, non_numeric.send)
+            self.gather_now = _both(self.gather_now, non_numeric.gather_now)
 
     def _gathering(self, places: np.ndarray) -> Callable[[], None]:
         gather = _gatherer(places, self.factors, self.offsets, self._values, self.buffer)
@@ -68,22 +77,25 @@ class Inputs:
         held = np.array([signal in signals for signal in self._signals], dtype=bool)
         self.places[:] = np.where(held, self.sources + self._count, self.sources)
         self.gather = self._gathering(self.places)
-        if self.untouched is not None:
-            self.untouched.hold(signals)
-            self.gather = _both(self.gather, self.untouched.gather)
+        if self.non_numeric is not None:
+            self.non_numeric.hold(signals)
+            self.gather = _both(self.gather, self.non_numeric.gather)
 
 
 def connected_inputs(
-    component: Component, connections: Sequence[Connection], columns: Mapping[tuple[str, str], int], values: np.ndarray,
-    untouched: UntouchedInputs | None = None,
-) -> Inputs:  # fmt: skip
+    component: Component,
+    connections: Sequence[Connection],
+    columns: Mapping[tuple[str, str], int],
+    values: np.ndarray,
+    non_numeric: UntouchedInputs | None = None,
+) -> Inputs:
     """The inputs of a component that have a source.
 
     Args:
         connections: of all components.
         columns: (component, output) -> column of the values of the plan.
         values: all outputs of all components, as for `Inputs`.
-        untouched: the component's connected inputs that do not travel as doubles, if any.
+        non_numeric: the component's connected inputs that do not travel as doubles, if any.
     """
     own = [c for c in connections if c.target[0] == component.name and not c.exact]
     send, buffer = component.writer([c.target[1] for c in own]) if own else (_nothing, np.zeros(0))
@@ -91,7 +103,9 @@ def connected_inputs(
     factors, offsets = np.array([c.factor for c in own], dtype=float), np.array([c.offset for c in own], dtype=float)
     tables = {place: dict(c.table) for place, c in enumerate(own) if c.table}
     signals = [c.source_variable for c in own]
-    return Inputs([c.target[1] for c in own], sources, signals, factors, offsets, values, buffer, send, tables, untouched)
+    return Inputs(
+        [c.target[1] for c in own], sources, signals, factors, offsets, values, buffer, send, tables, non_numeric
+    )
 
 
 def _both(first: Callable[[], None], second: Callable[[], None]) -> Callable[[], None]:
@@ -132,7 +146,9 @@ def _gatherer(
     return gather_few if len(sources) <= FEW and buffer.dtype == np.float64 else gather
 
 
-def _mapped(gather: Callable[[], None], tables: Mapping[int, Mapping[float, float]], buffer: np.ndarray) -> Callable[[], None]:
+def _mapped(
+    gather: Callable[[], None], tables: Mapping[int, Mapping[float, float]], buffer: np.ndarray
+) -> Callable[[], None]:
     if not tables:
         return gather
 

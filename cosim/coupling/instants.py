@@ -1,8 +1,8 @@
 """Instants: at which end of a step the targets of a signal take it. Pure graph work on names and descriptions.
 
-A signal means the same instant in all its targets. It is *fresh* where its source is stepped before all of them: each takes the
-value at the end of the step. Else it is *held*: each takes the value at the start of the step, also those stepped after the
-source.
+A signal means the same instant in all its targets. It is *fresh* where its source is stepped before all of them: each
+takes the value at the end of the step. Else it is *held*: each takes the value at the start of the step, also those
+stepped after the source.
 """
 
 from __future__ import annotations
@@ -18,17 +18,20 @@ Signal = tuple[str, str]
 
 
 def held_signals(
-    components: Mapping[str, Component], connections: Sequence[Connection], order: Sequence[str],
+    components: Mapping[str, Component],
+    connections: Sequence[Connection],
+    order: Sequence[str],
     iterated: Sequence[Sequence[str]] = (),
-) -> frozenset[Signal]:  # fmt: skip
+) -> frozenset[Signal]:
     """The signals that are held; all others are fresh.
 
-    Besides those with a target that is stepped no later than the source these are: what a target takes at events only, and what
-    was held in the run that a recording plays back.
+    Besides those with a target that is stepped no later than the source these are: what a target takes at events only,
+    and what was held in the run that a recording plays back.
 
     Args:
         components: by name. connections: checked. order: of execution.
-        iterated: names of the components of each loop that is iterated; within it all values are those of the end of the step.
+        iterated: names of the components of each loop that is iterated; within it all values are those of the end of
+        the step.
     """
     place = {name: i for i, name in enumerate(order)}
     loop_of = {name: i for i, loop in enumerate(iterated) for name in loop}
@@ -38,7 +41,9 @@ def held_signals(
         together = source in loop_of and loop_of[source] == loop_of.get(target)
         if place[target] <= place[source] and not together:
             return True
-        return c.source[1] in components[source].held_outputs or _waits_for_events(components[source], components[target], c)
+        return c.source[1] in components[source].held_outputs or _waits_for_events(
+            components[source], components[target], c
+        )
 
     return frozenset(c.source_variable for c in connections if holds(c))
 

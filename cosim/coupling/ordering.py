@@ -31,7 +31,8 @@ class Signal(Generic[Node]):
 
 
 def satisfied(nodes: Sequence[Node], levels: Sequence[Set[Pair[Node]]]) -> set[Pair[Node]]:
-    """Edges without a cycle: those of the first level; where these have cycles, inside each cycle those of the next level.
+    """Edges without a cycle: those of the first level; where these have cycles, inside each cycle those of the next
+    level.
 
     Args:
         nodes: all of them. levels: sets of edges, each a subset of the one before.
@@ -53,12 +54,12 @@ def satisfied(nodes: Sequence[Node], levels: Sequence[Set[Pair[Node]]]) -> set[P
 
 def in_order(
     nodes: Sequence[Node], edges: Set[Pair[Node]], signals: Iterable[Signal[Node]], rank: Mapping[Node, int]
-) -> list[Node]:  # fmt: skip
+) -> list[Node]:
     """The nodes in an order that satisfies the edges and holds few signals, found node by node.
 
-    Of the nodes that the edges leave free the next one is of lowest rank; of these the one that makes the fewest signals held,
-    flowing ones first; of these the one that gives to most others; of these the first one of `nodes`. Takes linear time but for
-    a heap.
+    Of the nodes that the edges leave free the next one is of lowest rank; of these the one that makes the fewest
+    signals held, flowing ones first; of these the one that gives to most others; of these the first one of `nodes`.
+    Takes linear time but for a heap.
 
     Args:
         nodes: all of them. edges: without a cycle. signals: between nodes. rank: of each node.
@@ -78,7 +79,7 @@ class _Search(Generic[Node]):
 
     def __init__(
         self, nodes: Sequence[Node], edges: Set[Pair[Node]], signals: Sequence[Signal[Node]], rank: Mapping[Node, int]
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._nodes, self._signals, self._rank = nodes, signals, rank
         self._place = {node: i for i, node in enumerate(nodes)}
         self._successors: dict[Node, list[Node]] = {node: [] for node in nodes}

@@ -1,8 +1,8 @@
 """The plan: everything a step needs, prepared once as contiguous arrays and calls without arguments.
 
-One array `values` holds all outputs of all components, a contiguous slice each, which the FMUs write into directly; another one
-right behind it holds them as they were at the start of the step. The inputs of a component are gathered from the two by index.
-The stepper executes the plan; nothing is looked up in a step.
+One array `values` holds all outputs of all components, a contiguous slice each, which the FMUs write into directly;
+another one right behind it holds them as they were at the start of the step. The inputs of a component are gathered
+from the two by index. The stepper executes the plan; nothing is looked up in a step.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from cosim.coupling.clocks import ClockConnection
 from cosim.coupling.connection import Connection, local_sources
 from cosim.coupling.inputs import Inputs, connected_inputs
 from cosim.coupling.instants import Signal
-from cosim.coupling.untouched import untouched_cells, untouched_inputs, with_untouched
+from cosim.coupling.non_numeric import non_numeric_cells, non_numeric_inputs, with_non_numeric
 from cosim.errors import CouplingError, nearest
 from cosim.results.result import SignalInfo
 
 Mover = Callable[[float, float], None]
 
 
-class Carrier(Protocol):
-    """Lets inputs follow a line during a step (`cosim.master.lines`)."""
+class InputInterpolator(Protocol):
+    """Lets inputs follow a line during a step (`cosim.master.interpolation`)."""
 
     @property
     def name(self) -> str:
@@ -76,9 +76,9 @@ class PlannedComponent:
         inputs: its connected inputs.
         columns: where the view lies in `values`.
         continuous: mask of the outputs that may be interpolated between communication points, shape (q,).
-        move: how it gets from one time to another [s] once its inputs are gathered; `drive`, unless a service takes it over (the
-            watched plant is stepped by its localiser, a receiver through the telegrams that reach it).
-        carrier: tells the component of lines that its inputs follow; None where they are held.
+        move: how it gets from one time to another [s] once its inputs are gathered; `drive`, unless a service takes it
+            over (the watched plant is stepped by its localiser, a receiver through the telegrams that reach it).
+        interpolator: tells the component of lines that its inputs follow; None where they are held.
         substeps: number of steps that the component takes for one of the master's.
     """
 
@@ -89,7 +89,7 @@ class PlannedComponent:
     columns: slice
     continuous: np.ndarray
     move: Mover = field(init=False)
-    carrier: Carrier | None = field(default=None, init=False)
+    interpolator: InputInterpolator | None = field(default=None, init=False)
     substeps: int = field(default=1, init=False)
 
     def __post_init__(self) -> None:
@@ -99,20 +99,20 @@ class PlannedComponent:
         """Gather the inputs for a step from `t` to `until` [s].
 
         Args:
-            ends_known: `values` are those of `until`, wherever the components stand (a step that is iterated); for all inputs or
-                for each, shape (m,).
+            ends_known: `values` are those of `until`, wherever the components stand (a step that is iterated); for all
+                inputs or for each, shape (m,).
         """
-        if self.carrier is None:
+        if self.interpolator is None:
             self.inputs.gather()
         else:
-            self.carrier.prepare(until, ends_known=ends_known)
+            self.interpolator.prepare(until, ends_known=ends_known)
 
     def send(self, t: float, until: float) -> None:
         """Send the prepared inputs for a step from `t` to `until` [s]."""
-        if self.carrier is None:
+        if self.interpolator is None:
             self.inputs.send()
         else:
-            self.carrier.send(t, until)
+            self.interpolator.send(t, until)
 
     def advance(self, t: float, until: float) -> None:
         """Advance with the prepared inputs, in so many steps as the component wants; times in [s]."""
@@ -155,13 +155,13 @@ class Plan:
         start: the same at the start of the step, shape (n,).
         signals: what each value is, in the same order.
         continuous: mask of the values that may be interpolated between communication points, shape (n,).
-        untouched: connected outputs that are no numbers, or integers beyond doubles; shape (m,), of objects. Whoever keeps and
-            restores a copy of `values` does so with them.
-        untouched_start: the same at the start of the step, shape (m,).
+        non_numeric: connected outputs that are no numbers, or integers beyond doubles; shape (m,), of objects. Whoever
+            keeps and restores a copy of `values` does so with them.
+        non_numeric_start: the same at the start of the step, shape (m,).
         connections: in the order of their targets in the plan.
         clocks: connections between clocks.
         services: who took over how components move.
-        carriers: of the components with lines.
+        interpolators: of the components with lines.
         held: signals of which all targets take the value at the start of a step; see `cosim.coupling.instants`.
     """
 
@@ -170,17 +170,17 @@ class Plan:
     start: np.ndarray
     signals: list[SignalInfo]
     continuous: np.ndarray
-    untouched: np.ndarray
-    untouched_start: np.ndarray
+    non_numeric: np.ndarray
+    non_numeric_start: np.ndarray
     connections: Sequence[Connection] = ()
     clocks: Sequence[ClockConnection] = ()
     services: list[Service] = field(default_factory=list)
-    carriers: list[Carrier] = field(default_factory=list)
+    interpolators: list[InputInterpolator] = field(default_factory=list)
     held: Set[Signal] = frozenset()
 
     def __post_init__(self) -> None:
         self._now, self._start = self.values.data, self.start.data  # copied three times faster than as arrays
-        self._more_to_begin = len(self.untouched) > 0
+        self._more_to_begin = len(self.non_numeric) > 0
 
     def hold(self, signals: Set[Signal]) -> None:
         """All targets of these signals, and of no others, take the value at the start of a step."""
@@ -192,9 +192,9 @@ class Plan:
         """A step begins, or a part of one: what the values are now is what is held over it."""
         self._start[:] = self._now
         if self._more_to_begin:
-            self.untouched_start[:] = self.untouched
-        for carrier in self.carriers:
-            carrier.begin()
+            self.non_numeric_start[:] = self.non_numeric
+        for interpolator in self.interpolators:
+            interpolator.begin()
 
     def find(self, component: str) -> PlannedComponent:
         """The planned component of this name.
@@ -220,9 +220,12 @@ class Plan:
 
 
 def make_plan(
-    components: Mapping[str, Component], connections: Sequence[Connection], order: Sequence[str],
-    extra: Mapping[str, Sequence[str]] | None = None, clocks: Sequence[ClockConnection] = (),
-) -> Plan:  # fmt: skip
+    components: Mapping[str, Component],
+    connections: Sequence[Connection],
+    order: Sequence[str],
+    extra: Mapping[str, Sequence[str]] | None = None,
+    clocks: Sequence[ClockConnection] = (),
+) -> Plan:
     """Prepare the plan; the components must be instantiated.
 
     Args:
@@ -234,7 +237,7 @@ def make_plan(
         CouplingError: a variable to record does not exist or is not a number.
     """
     connections = _in_order(connections, components, order)
-    cells, places = untouched_cells(connections)
+    cells, places = non_numeric_cells(connections)
     hidden = local_sources(connections, components)
     read_names = {n: _names_to_read(components[n], (extra or {}).get(n, ()), hidden.get(n, ())) for n in order}
     columns: dict[tuple[str, str], int] = {}
@@ -251,9 +254,9 @@ def make_plan(
     steps = []
     for name in order:
         component, span = components[name], spans[name]
-        read = with_untouched(component.reader(read_names[name], values[span]), component, places, cells)
-        untouched = untouched_inputs(component, connections, places, cells)
-        inputs = connected_inputs(component, connections, columns, twice, untouched)
+        read = with_non_numeric(component.reader(read_names[name], values[span]), component, places, cells)
+        non_numeric = non_numeric_inputs(component, connections, places, cells)
+        inputs = connected_inputs(component, connections, columns, twice, non_numeric)
         steps.append(PlannedComponent(component, values[span], read, inputs, span, continuous[span]))
     now, before = cells[: len(places)], cells[len(places) :]
     return Plan(steps, values, start, signals, continuous, now, before, connections, clocks)
@@ -261,7 +264,7 @@ def make_plan(
 
 def _in_order(
     connections: Sequence[Connection], components: Mapping[str, Component], order: Sequence[str]
-) -> list[Connection]:  # fmt: skip
+) -> list[Connection]:
     """The connections in the order of their targets, however they were listed: as executed, then as described."""
     place = {name: i for i, name in enumerate(order)}
     described = {(n, v.name): i for n in order for i, v in enumerate(components[n].description.modelVariables)}
@@ -281,7 +284,8 @@ def _names_to_read(component: Component, extra: Sequence[str], sources: Sequence
         kind = component.variable(name).type
         if kind not in NUMERIC_TYPES:
             raise CouplingError(
-                f"{component.name}.{name} cannot be recorded: it is a {kind}, and results are a table of numbers. It can be "
+                f"{component.name}.{name} cannot be recorded: it is a {kind}, and results are a table of numbers. It "
+                f"can be "
                 "connected, and set as a parameter."
             )
         names += [element.name for element in component.elements(name) if element.name not in names]

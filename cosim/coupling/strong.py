@@ -1,4 +1,6 @@
-"""Graph work on plain nodes, in linear time: strongly connected groups, topological order, closed paths. Knows no components."""
+"""Graph work on plain nodes, in linear time: strongly connected groups, topological order, closed paths. Knows no
+components.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,8 @@ def strong_groups(nodes: Sequence[Node], edges: Edges[Node]) -> list[list[Node]]
     Args:
         nodes: what is grouped. edges: pairs (first, second) of these nodes.
 
-    Source: D. Pearce, An improved algorithm for finding the strongly connected components of a directed graph, 2005 (SciPy).
+    Source: D. Pearce, An improved algorithm for finding the strongly connected components of a directed graph, 2005
+    (SciPy).
     """
     edges = list(edges)
     place = {node: i for i, node in enumerate(nodes)}

@@ -15,7 +15,8 @@ class Transformation:
 
     Args:
         factor, offset: linear transformation, of the source in the unit of the target.
-        convert_units: whether the source is converted to the unit of the target first; if not, its number is taken as it is.
+        convert_units: whether the source is converted to the unit of the target first; if not, its number is taken as
+        it is.
         table: (source, target) values of a discrete signal; a value without an entry passes unchanged.
     """
 
@@ -32,7 +33,8 @@ class Transformation:
 
 
 def as_affine(table: Mapping[float, float], domain: frozenset[float]) -> tuple[float, float] | None:
-    """``(factor, offset)`` that does the same as a table on every value of a finite domain, or None where there is none.
+    """``(factor, offset)`` that does the same as a table on every value of a finite domain, or None where there is
+    none.
 
     Args:
         table: target by source value; a value without an entry stays.

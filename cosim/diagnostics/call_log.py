@@ -1,7 +1,8 @@
 """The call log: every call of every component, written before it begins. Touches the file it is given.
 
-A line is written in two pieces, what is called and what came of it, each straight to the operating system: where a call takes the
-process with it, the log ends with that call. Calls of several threads are written, and so made, one after the other.
+A line is written in two pieces, what is called and what came of it, each straight to the operating system: where a call
+takes the process with it, the log ends with that call. Calls of several threads are written, and so made, one after the
+other.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""Calls in words: function, variables by name, values; long lists cut. Knows fmpy's slaves and our blocks, calls neither."""
+"""Calls in words: function, variables by name, values; long lists cut. Knows fmpy's slaves and our blocks, calls
+neither.
+"""
 
 from __future__ import annotations
 
@@ -49,8 +51,12 @@ def describe_native(names: Names, function: str, argument_names: Sequence[str], 
         count = int(arguments[2])
         called = names.of(kind, [int(arguments[1][i]) for i in range(count)])
         if verb == "Set":
-            return Described(f"{function}({_pairs(called, _values(arguments[-1 - _counted(function)], count))})", _native_status)
-        return Described(f"{function}({_list(called)})", lambda status: (_word(status), _got(arguments, function, count)))
+            return Described(
+                f"{function}({_pairs(called, _values(arguments[-1 - _counted(function)], count))})", _native_status
+            )
+        return Described(
+            f"{function}({_list(called)})", lambda status: (_word(status), _got(arguments, function, count))
+        )
     shown = [f"{n}={_short(a)}" for n, a in zip(argument_names, arguments, strict=False) if not _is_hidden(n, a)]
     results = [(n, a) for n, a in zip(argument_names, arguments, strict=False) if _is_result(a)]
     return Described(
@@ -116,13 +122,21 @@ def _is_whole(argument: Any) -> bool:
 
 
 def _is_result(argument: Any) -> bool:
-    return hasattr(argument, "_obj") and hasattr(argument._obj, "value") and not isinstance(argument._obj, ctypes.c_void_p)
+    return (
+        hasattr(argument, "_obj") and hasattr(argument._obj, "value") and not isinstance(argument._obj, ctypes.c_void_p)
+    )
 
 
 def _is_hidden(name: str, argument: Any) -> bool:
     """Addresses say nothing to people, and results are not known yet."""
-    address = isinstance(argument, (ctypes.c_void_p, ctypes.Structure)) or hasattr(argument, "_obj") or callable(argument)
-    return address or name in ("c", "instance", "component", "functions", "callbacks", "instanceEnvironment") or argument is None
+    address = (
+        isinstance(argument, (ctypes.c_void_p, ctypes.Structure)) or hasattr(argument, "_obj") or callable(argument)
+    )
+    return (
+        address
+        or name in ("c", "instance", "component", "functions", "callbacks", "instanceEnvironment")
+        or argument is None
+    )
 
 
 def _pairs(names: Sequence[str], values: Sequence[Any]) -> str:

@@ -1,4 +1,6 @@
-"""Where a run that ended in numbers that are none began to go wrong: read off the recorded rows afterwards, never in a step."""
+"""Where a run that ended in numbers that are none began to go wrong: read off the recorded rows afterwards, never in a
+step.
+"""
 
 from __future__ import annotations
 
@@ -62,7 +64,8 @@ def explained_failure(error: Exception, plan: Plan, table: Any) -> str:
     """The text of a failure, with the signal that went wrong first and what fed its component, where the rows tell.
 
     Args:
-        error: that ended the run. plan: that was run. table: rows by ``component.signal``, in the components' own units.
+        error: that ended the run. plan: that was run. table: rows by ``component.signal``, in the components' own
+        units.
     """
     found = first_departure(plan, table) if isinstance(error, RunError) else None
     if found is None:
@@ -118,7 +121,9 @@ def _for_good(outside: np.ndarray) -> int | None:
 
 
 def _ranges(step: PlannedComponent, signal: str, values: np.ndarray) -> Iterator[_Range]:
-    """What a signal should stay in: its declared range, and what is plausible for its unit or, without one, its history."""
+    """What a signal should stay in: its declared range, and what is plausible for its unit or, without one, its
+    history.
+    """
     variable = step.component.variable(signal)
     low, high = (_number(getattr(variable, bound), otherwise) for bound, otherwise in (("min", -inf), ("max", inf)))
     if isfinite(low) and isfinite(high) and low < high:
@@ -150,9 +155,11 @@ def _fed(plan: Plan, table: Any, found: Departure) -> str:
     if not sources:
         return f"Nothing is connected to '{found.component}', so it went by itself."
     pairs = [
-        f"{source} -> {name} ({float(table[source][found.row]):.4g})" for source, name in zip(sources, inputs.names, strict=True)
+        f"{source} -> {name} ({float(table[source][found.row]):.4g})"
+        for source, name in zip(sources, inputs.names, strict=True)
     ]
     more = f", and {len(pairs) - SHOWN} more" if len(pairs) > SHOWN else ""
     return (
-        f"'{found.component}' was fed by {', '.join(pairs[:SHOWN])}{more}: look there first, and at its parameters and the step."
+        f"'{found.component}' was fed by {', '.join(pairs[:SHOWN])}{more}: look there first, and at its parameters "
+        f"and the step."
     )

@@ -1,4 +1,6 @@
-"""Inspection: what components and their connections look like to the master. Reads descriptions only; nothing is instantiated."""
+"""Inspection: what components and their connections look like to the master. Reads descriptions only; nothing is
+instantiated.
+"""
 
 from __future__ import annotations
 
@@ -30,9 +32,12 @@ ABILITIES = {
 
 
 def make_links(
-    components: Mapping[str, Component], connections: Sequence[Connection], choice: AlgorithmChoice, order: Sequence[str],
+    components: Mapping[str, Component],
+    connections: Sequence[Connection],
+    choice: AlgorithmChoice,
+    order: Sequence[str],
     loops: Iterable[AlgebraicLoop],
-) -> tuple[Link, ...]:  # fmt: skip
+) -> tuple[Link, ...]:
     """Connections with what becomes of them in a step; those between the elements of two arrays as one.
 
     Args:
@@ -55,12 +60,17 @@ def make_links(
 
 
 def make_part(
-    component: Component, connections: Sequence[Connection], group: int, rate: str = "", clocks: Iterable[ClockConnection] = ()
+    component: Component,
+    connections: Sequence[Connection],
+    group: int,
+    rate: str = "",
+    clocks: Iterable[ClockConnection] = (),
 ) -> Part:
     """A component as data.
 
     Args:
-        component: what is described. connections: of all components. group: number of its group. rate: of its steps, in words.
+        component: what is described. connections: of all components. group: number of its group. rate: of its steps, in
+        words.
         clocks: connections between clocks.
     """
     description = component.description
@@ -70,7 +80,9 @@ def make_part(
     used |= {c.source[1] for c in clocks if c.source[0] == component.name}
     hidden = component.event_references()
     inputs = [v for v in description.modelVariables if v.causality == "input" and v.valueReference not in hidden]
-    outputs = [v for v in description.modelVariables if v.causality == "output" or (v.causality == "local" and v.name in used)]
+    outputs = [
+        v for v in description.modelVariables if v.causality == "output" or (v.causality == "local" and v.name in used)
+    ]
     silent, table = set(undeclared_outputs(component)), declared_feedthrough(component)
     return Part(
         component.name,
@@ -104,7 +116,9 @@ def group_index(groups: Iterable[Sequence[str]]) -> Mapping[str, int]:
     return {name: i for i, group in enumerate(groups) for name in group}
 
 
-def _port(component: Component, variable: ModelVariable, connected: set[str], depends: tuple[str, ...] | None = None) -> Port:
+def _port(
+    component: Component, variable: ModelVariable, connected: set[str], depends: tuple[str, ...] | None = None
+) -> Port:
     shape = "x".join(map(str, variable.shape)) if variable.shape else ""
     kind = f"{variable.type}[{shape}]" if shape else str(variable.type)
     ticks = str(variable.intervalVariability) if variable.type == "Clock" and variable.causality == "input" else None

@@ -1,8 +1,9 @@
-"""Where the boxes and wires of a structure's picture go. Pure geometry in inches, y pointing down; standard library only.
+"""Where the boxes and wires of a structure's picture go. Pure geometry in inches, y pointing down; standard library
+only.
 
-Columns follow the flow: a group of components that influence one another keeps together, in columns of its own and in a band of
-its own height, so that frames around groups never meet. A wire forward passes columns through gaps left free for it; a wire back
-runs below its group.
+Columns follow the flow: a group of components that influence one another keeps together, in columns of its own and in a
+band of its own height, so that frames around groups never meet. A wire forward passes columns through gaps left free
+for it; a wire back runs below its group.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from cosim.diagnostics.shapes import Box, Edge, Frame, Layout, Size, Wire
 from cosim.diagnostics.structure import Structure
 
 BOX_GAP, BAND_GAP, PASS = 0.28, 0.34, 0.16  # between boxes and bands; height left free for a wire that passes
-FRAME, FRAME_TITLE, LANE, TRACK, TIP = 0.16, 0.26, 0.14, 0.12, 0.08  # of group frames, and the room of a wire that runs back
+# of group frames, and the room of a wire that runs back
+FRAME, FRAME_TITLE, LANE, TRACK, TIP = 0.16, 0.26, 0.14, 0.12, 0.08
 CURVE = 0.62  # room for a wire to swing from one height to another
 PER_WIRE, MOST_WIRES = 0.06, 15
 SWEEPS = 6
@@ -38,7 +40,7 @@ class _Item:
 
 @dataclass
 class _Band:
-    """A group, or wires passing a layer, with a height of its own over the columns of the layer."""
+    """A group, or wires crossing a layer, with a height of its own over the columns of the layer."""
 
     names: tuple[str, ...]
     columns: dict[int, list[_Item]] = field(default_factory=dict)
@@ -85,7 +87,7 @@ class _Placing:
         self.band_of = {n: band for layer in self.bands for band in layer for n in band.names}
         for name, box in self.boxes.items():
             self.band_of[name].columns.setdefault(box.column, []).append(_Item((name, ""), box.size.height))
-        self.passing: dict[tuple[Net, int], _Item] = {}
+        self.crossing: dict[tuple[Net, int], _Item] = {}
         for edge in sorted(edges, key=self._reach):  # short ways back lie above long ones
             self._reserve(edge)
 
@@ -118,9 +120,9 @@ class _Placing:
             return
         source, target = edge.source[0], edge.target[0]
         for column in range(self.boxes[source].column + 1, self.boxes[target].column):
-            if (edge.source, column) not in self.passing:
+            if (edge.source, column) not in self.crossing:
                 item = _Item(edge.source, PASS)
-                self.passing[edge.source, column] = item
+                self.crossing[edge.source, column] = item
                 self._band_for(column, source, target, edge.source).columns.setdefault(column, []).append(item)
 
     def _band_for(self, column: int, source: str, target: str, net: Net) -> _Band:
@@ -163,7 +165,7 @@ class _Placing:
         """Heights of a forward wire at its output, in the columns it passes, and at its input."""
         start, end = self._ends(edge)
         columns = range(self.boxes[edge.source[0]].column + 1, self.boxes[edge.target[0]].column)
-        items = [self.passing[edge.source, c] for c in columns]
+        items = [self.crossing[edge.source, c] for c in columns]
         return [start, *(item.y + item.height / 2 for item in items), end]
 
     def _cost(self) -> float:
@@ -179,7 +181,9 @@ class _Placing:
     # -- order within columns ---------------------------------------------------------------------------------------
 
     def _ordering(self) -> list[tuple[list[_Band], list[dict[int, list[_Item]]]]]:
-        return [(list(layer), [{c: list(items) for c, items in b.columns.items()} for b in layer]) for layer in self.bands]
+        return [
+            (list(layer), [{c: list(items) for c, items in b.columns.items()} for b in layer]) for layer in self.bands
+        ]
 
     def _restore(self, ordering: list[tuple[list[_Band], list[dict[int, list[_Item]]]]]) -> None:
         self.bands = [bands for bands, _ in ordering]
@@ -188,7 +192,9 @@ class _Placing:
                 band.columns = saved
 
     def _sort_by_neighbours(self) -> None:
-        """Move everything towards the mean height of what it is wired to on its left, or where there is nothing, on its right."""
+        """Move everything towards the mean height of what it is wired to on its left, or where there is nothing, on its
+        right.
+        """
         pulls: dict[int, list[float]] = {}
         for edge in self.edges:
             if self.is_back(edge):
@@ -196,7 +202,7 @@ class _Placing:
             heights = self._heights(edge)
             chain: list[int] = [id(self.boxes[edge.source[0]])]
             first, last = self.boxes[edge.source[0]].column, self.boxes[edge.target[0]].column
-            chain += [id(self.passing[edge.source, c]) for c in range(first + 1, last)]
+            chain += [id(self.crossing[edge.source, c]) for c in range(first + 1, last)]
             for before, node in zip(heights, [*chain[1:], id(self.boxes[edge.target[0]])], strict=False):
                 pulls.setdefault(node, []).append(before)
 
@@ -216,7 +222,10 @@ class _Placing:
 
     def _laid(self) -> Layout:
         count = max(box.column for box in self.boxes.values()) + 1
-        rights = [sorted({e.source for e in self.edges if self.is_back(e) and self._column(e.source) == c}) for c in range(count)]
+        rights = [
+            sorted({e.source for e in self.edges if self.is_back(e) and self._column(e.source) == c})
+            for c in range(count)
+        ]
         lefts = [
             sorted({e.source for e in self.edges if self.is_back(e) and self._column(e.target) == c}, key=self._lane_of)
             for c in range(count)
@@ -233,7 +242,9 @@ class _Placing:
         for box in self.boxes.values():
             box.x, box.size = left_edges[box.column], replace(box.size, width=widths[box.column])
         spans = [(a, a + w) for a, w in zip(left_edges, widths, strict=True)]
-        wires = tuple(self._back(e, spans, lefts, rights) if self.is_back(e) else self._forward(e, spans) for e in self.edges)
+        wires = tuple(
+            self._back(e, spans, lefts, rights) if self.is_back(e) else self._forward(e, spans) for e in self.edges
+        )
         frames = tuple(self._frame(b, spans, lefts, rights) for layer in self.bands for b in layer if b.framed)
         height = max(band.y + band.height for layer in self.bands for band in layer)
         return Layout(self.boxes, wires, frames, x, height)
@@ -258,7 +269,11 @@ class _Placing:
         return Wire(edge, (*points, (spans[target.column][0], heights[-1]), (target.x, heights[-1])), False)
 
     def _back(
-        self, edge: Edge, spans: Sequence[tuple[float, float]], lefts: Sequence[Sequence[Net]], rights: Sequence[Sequence[Net]]
+        self,
+        edge: Edge,
+        spans: Sequence[tuple[float, float]],
+        lefts: Sequence[Sequence[Net]],
+        rights: Sequence[Sequence[Net]],
     ) -> Wire:
         source, target = self.boxes[edge.source[0]], self.boxes[edge.target[0]]
         band = self.band_of[source.name]
@@ -266,10 +281,16 @@ class _Placing:
         lane = band.y + (FRAME_TITLE if band.framed else 0.0) + band.body + LANE * (band.lanes[edge.source] + 1)
         out = spans[source.column][1] + TRACK * (rights[source.column].index(edge.source) + 1)
         back = spans[target.column][0] - TIP - TRACK * (lefts[target.column].index(edge.source) + 1)
-        return Wire(edge, ((source.right, start), (out, start), (out, lane), (back, lane), (back, end), (target.x, end)), True)
+        return Wire(
+            edge, ((source.right, start), (out, start), (out, lane), (back, lane), (back, end), (target.x, end)), True
+        )
 
     def _frame(
-        self, band: _Band, spans: Sequence[tuple[float, float]], lefts: Sequence[Sequence[Net]], rights: Sequence[Sequence[Net]]
+        self,
+        band: _Band,
+        spans: Sequence[tuple[float, float]],
+        lefts: Sequence[Sequence[Net]],
+        rights: Sequence[Sequence[Net]],
     ) -> Frame:
         columns = [self.boxes[n].column for n in band.names]
         first, last = min(columns), max(columns)

@@ -60,7 +60,9 @@ class LoggedSlave:
 
         def call(*arguments: Any, **named: Any) -> Any:
             described = describe_python(self._names, name, arguments, named)
-            return self._log.call(self._component.time, self._component.name, described, lambda: found(*arguments, **named))
+            return self._log.call(
+                self._component.time, self._component.name, described, lambda: found(*arguments, **named)
+            )
 
         return call
 

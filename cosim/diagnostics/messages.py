@@ -1,7 +1,7 @@
 """Messages: what the components log, with time, category and status, in bounded memory. Standard library only.
 
-A component that logs at every step must not fill the memory of a long run: the first and the last messages are kept, those
-between are counted.
+A component that logs at every step must not fill the memory of a long run: the first and the last messages are kept,
+those between are counted.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ class Message:
     Args:
         time: where the component stood [s]: within a step its start; NaN before initialisation.
         component: its name. category: as the component calls it, empty where it gives none.
-        status: in FMI's words: ``ok``, ``warning``, ``discard``, ``error``, ``fatal``, ``pending``; or ``omitted`` for a line
-            that says how many messages were not kept.
+        status: in FMI's words: ``ok``, ``warning``, ``discard``, ``error``, ``fatal``, ``pending``; or ``omitted`` for
+            a line that says how many messages were not kept.
         text: what it says.
     """
 
@@ -65,7 +65,9 @@ class MessageLog:
         self._latest: Message | None = None
         self._worst: Message | None = None
 
-    def add(self, time: float, text: str | bytes | None, status: int | str = 0, category: str | bytes | None = None) -> None:
+    def add(
+        self, time: float, text: str | bytes | None, status: int | str = 0, category: str | bytes | None = None
+    ) -> None:
         """Take a message; an empty one is dropped.
 
         Args:

@@ -1,8 +1,9 @@
 """The logger that native FMUs of FMI 1.0 and 2.0 are given: their messages arrive with the arguments filled in.
 
-That logger takes arguments as C's printf does, which Python cannot receive; fmpy brings a small library that fills them in and
-then calls one function of the whole process. So one function hears all FMUs here and finds out who speaks: in FMI 2.0 by the
-environment handed to the FMU, in FMI 1.0 by its instance name. Where a platform has no such library, messages arrive as written.
+That logger takes arguments as C's printf does, which Python cannot receive; fmpy brings a small library that fills them
+in and then calls one function of the whole process. So one function hears all FMUs here and finds out who speaks: in
+FMI 2.0 by the environment handed to the FMU, in FMI 1.0 by its instance name. Where a platform has no such library,
+messages arrive as written.
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ def fmi1_callbacks(listener: Listener) -> Any:
     """Callbacks for an instance of FMI 1.0; `forget` the listener once it is freed."""
     _listen(listener)
     made = fmi1CallbackFunctions()
-    ctypes.memmove(ctypes.byref(made), ctypes.byref(_shared), ctypes.sizeof(ctypes.c_void_p))  # the logger is the first field
+    # the logger is the first field
+    ctypes.memmove(ctypes.byref(made), ctypes.byref(_shared), ctypes.sizeof(ctypes.c_void_p))
     made.allocateMemory, made.freeMemory = fmi1.defaultCallbacks.allocateMemory, fmi1.defaultCallbacks.freeMemory
     made.stepFinished = None  # so that the slave must not return before a step is done
     return made
@@ -62,7 +64,9 @@ def _listen(listener: Listener) -> int:
     return number
 
 
-def _hear(environment: int | None, name: bytes | None, status: int, category: bytes | None, message: bytes | None) -> None:
+def _hear(
+    environment: int | None, name: bytes | None, status: int, category: bytes | None, message: bytes | None
+) -> None:
     listener = _listeners.get(environment or 0) or _named(name)
     if listener is not None:
         listener.note(message, status, category)

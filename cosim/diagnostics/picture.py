@@ -1,4 +1,5 @@
-"""The structure of a run as a picture: boxes with their ports, wires by what becomes of them in a step. Touches only its file.
+"""The structure of a run as a picture: boxes with their ports, wires by what becomes of them in a step. Touches only
+its file.
 
 Every name stands inside a box, beside its port, so that no label can lie on another or on a wire.
 """
@@ -66,11 +67,15 @@ def draw_structure(structure: Structure, path: str | Path) -> Path:
     dpi = min(PNG_DPI, MAX_PIXELS / max(figure.get_size_inches()))
     if kind == "png" and dpi < LEAST_DPI:
         count = len(structure.parts)
-        raise OutputError(f"A picture of {count} components is too large for {path}: choose a file that ends in .svg or .pdf.")
+        raise OutputError(
+            f"A picture of {count} components is too large for {path}: choose a file that ends in .svg or .pdf."
+        )
     try:
         figure.savefig(path, format=kind, dpi=dpi)
     except OSError as error:
-        raise OutputError(f"The picture cannot be written to {path}: {error.strerror or error}. Choose another file.") from error
+        raise OutputError(
+            f"The picture cannot be written to {path}: {error.strerror or error}. Choose another file."
+        ) from error
     return path
 
 
@@ -125,9 +130,12 @@ def box_size(part: Part, edges: Sequence[Edge]) -> Size:
     gap = MIDDLE if inputs and outputs else 0.0
     foot = foot_text(part)
     width = max(
-        left + gap + right, text_width(part.name, NAME, bold=True) + 3.2 * BADGE, text_width(kind_text(part), SMALL),
-        text_width(foot, SMALL), 0.8,
-    )  # fmt: skip
+        left + gap + right,
+        text_width(part.name, NAME, bold=True) + 3.2 * BADGE,
+        text_width(kind_text(part), SMALL),
+        text_width(foot, SMALL),
+        0.8,
+    )
     return Size(width + 2 * SIDE, inputs, outputs, bool(foot))
 
 
@@ -179,10 +187,16 @@ def _draw_layout(ax: Axes, structure: Structure, layout: Layout) -> None:
 def _draw_frame(ax: Axes, frame: Frame, loop: bool) -> None:
     fill, edge = (LOOP_FRAME_FILL, LOOP_FRAME_EDGE) if loop else (FRAME_FILL, FRAME_EDGE)
     shape = FancyBboxPatch(
-        (frame.x + CORNER, frame.y + CORNER), frame.width - 2 * CORNER, frame.height - 2 * CORNER,
-        boxstyle=f"round,pad={CORNER},rounding_size=0.1", facecolor=fill, edgecolor=edge, linewidth=0.8, linestyle=(0, (4, 2)),
+        (frame.x + CORNER, frame.y + CORNER),
+        frame.width - 2 * CORNER,
+        frame.height - 2 * CORNER,
+        boxstyle=f"round,pad={CORNER},rounding_size=0.1",
+        facecolor=fill,
+        edgecolor=edge,
+        linewidth=0.8,
+        linestyle=(0, (4, 2)),
         zorder=0.5,
-    )  # fmt: skip
+    )
     ax.add_patch(shape)
     text = "algebraic loop" if loop else "group: influence one another"
     ax.text(frame.x + 0.1, frame.y + 0.17, text, fontsize=SMALL, color=edge if loop else QUIET, va="baseline", zorder=3)
@@ -191,23 +205,48 @@ def _draw_frame(ax: Axes, frame: Frame, loop: bool) -> None:
 def _draw_box(ax: Axes, structure: Structure, part: Part, box: Box, number: int) -> None:
     fill = FILLS.get(part.kind, FILLS["FMU"])
     shape = FancyBboxPatch(
-        (box.x + 0.05, box.y + 0.05), box.size.width - 0.1, box.size.height - 0.1,
-        boxstyle="round,pad=0.05,rounding_size=0.05", facecolor=fill, edgecolor=INK, linewidth=0.9, zorder=2,
-    )  # fmt: skip
+        (box.x + 0.05, box.y + 0.05),
+        box.size.width - 0.1,
+        box.size.height - 0.1,
+        boxstyle="round,pad=0.05,rounding_size=0.05",
+        facecolor=fill,
+        edgecolor=INK,
+        linewidth=0.9,
+        zorder=2,
+    )
     ax.add_patch(shape)
     middle = box.y + 0.17
     ax.add_patch(Circle((box.x + SIDE + BADGE, middle), BADGE, facecolor=INK, edgecolor="none", zorder=3))
-    ax.text(box.x + SIDE + BADGE, middle + 0.004, str(number), fontsize=6.8, color="white", ha="center",
-            va="center_baseline", zorder=4)  # fmt: skip
+    ax.text(
+        box.x + SIDE + BADGE,
+        middle + 0.004,
+        str(number),
+        fontsize=6.8,
+        color="white",
+        ha="center",
+        va="center_baseline",
+        zorder=4,
+    )
     name_at = box.x + SIDE + 2.7 * BADGE
-    ax.text(name_at, middle + 0.05, _plain(part.name), fontsize=NAME, fontweight="bold", color=INK, va="baseline", zorder=3)
+    ax.text(
+        name_at, middle + 0.05, _plain(part.name), fontsize=NAME, fontweight="bold", color=INK, va="baseline", zorder=3
+    )
     ax.text(box.x + SIDE, box.y + 0.385, kind_text(part), fontsize=SMALL, color=QUIET, va="baseline", zorder=3)
     for names, x, side in ((box.size.inputs, box.x + SIDE, "left"), (box.size.outputs, box.right - SIDE, "right")):
         for name in names:
             event = name == EVENT_PORT
             shown = name.strip("()") if event else _plain(name)
-            ax.text(x, box.row(names, name) + 0.035, shown, fontsize=PORT, ha=side, va="baseline", zorder=3,
-                    color=COLOURS["event"] if event else INK, fontstyle="italic" if event else "normal")  # fmt: skip
+            ax.text(
+                x,
+                box.row(names, name) + 0.035,
+                shown,
+                fontsize=PORT,
+                ha=side,
+                va="baseline",
+                zorder=3,
+                color=COLOURS["event"] if event else INK,
+                fontstyle="italic" if event else "normal",
+            )
     if box.size.foot:
         at = box.bottom - PAD - FOOT + 0.13
         ax.text(box.x + SIDE, at, foot_text(part), fontsize=SMALL, color=QUIET, va="baseline", zorder=3)
@@ -241,7 +280,9 @@ def _draw_wire(ax: Axes, wire: Wire, drawn: set[object]) -> None:
         if key not in drawn:
             drawn.add(key)
             ax.add_patch(
-                PathPatch(piece, facecolor="none", edgecolor=COLOURS[kind], linewidth=width, linestyle=style, zorder=1.5)
+                PathPatch(
+                    piece, facecolor="none", edgecolor=COLOURS[kind], linewidth=width, linestyle=style, zorder=1.5
+                )
             )
     x, y = wire.points[-1]
     tip = [(x, y), (x - ARROW * 1.5, y - ARROW / 1.6), (x - ARROW * 1.5, y + ARROW / 1.6)]
@@ -306,7 +347,11 @@ def _key_width(kind: str) -> float:
 
 def _draw_key(ax: Axes, kinds: Sequence[str], x: float, y: float) -> None:
     for kind in kinds:
-        _draw_wire(ax, Wire(Edge(("", ""), ("", ""), kind), ((x, y), (x, y), (x + KEY_LINE, y), (x + KEY_LINE, y)), False), set())
+        _draw_wire(
+            ax,
+            Wire(Edge(("", ""), ("", ""), kind), ((x, y), (x, y), (x + KEY_LINE, y), (x + KEY_LINE, y)), False),
+            set(),
+        )
         ax.text(x + KEY_LINE + 0.07, y + 0.035, MEANINGS[kind], fontsize=SMALL, color=INK, va="baseline")
         x += _key_width(kind)
 

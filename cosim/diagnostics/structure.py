@@ -45,7 +45,8 @@ class Part:
 
     Args:
         name: in the scenario. kind: ``FMU`` or ``block``. fmi_version: as the description says. model: its model name.
-        source: file or origin. inputs, outputs: without the triggers and payloads of events. events: triggered ones it declares.
+        source: file or origin. inputs, outputs: without the triggers and payloads of events. events: triggered ones it
+        declares.
         abilities: capabilities that matter to a master, in words. group: index of its group in `Structure.groups`.
         rate: every how many communication steps it runs, or how many times in one, in words; empty for once a step.
     """
@@ -99,7 +100,8 @@ class Balises:
     Args:
         plant: the watched component. position, speed: its outputs, empty where telegrams are recorded.
         receivers: components that are told.
-        method: as asked for; ``auto`` is decided by a probe of the plant when the run is set up. timing: ``exact`` or ``stale``.
+        method: as asked for; ``auto`` is decided by a probe of the plant when the run is set up. timing: ``exact`` or
+        ``stale``.
         odometer: output whose reading the telegrams carry, or None.
     """
 

@@ -24,7 +24,9 @@ def structure_text(structure: Structure, width: int | None = None) -> str:
         _section("Groups", _groups(structure)),
         _section("Algebraic loops", _loops(structure)),
         _section("Balises", _balises(structure)),
-        _section("Algorithm", [f"{structure.algorithm}: {structure.reason}" if structure.reason else structure.algorithm]),
+        _section(
+            "Algorithm", [f"{structure.algorithm}: {structure.reason}" if structure.reason else structure.algorithm]
+        ),
         _section("Warnings", structure.warnings),
     ]
     return "\n\n".join(_broken(section, width) for section in sections if section)
@@ -60,11 +62,18 @@ def _components(structure: Structure) -> list[str]:
     headings = ["#", "name", "kind", "FMI", "model", "inputs", "outputs", *(["steps"] if rates else []), "declares"]
     rows = [
         [
-            str(number), part.name, part.kind, part.fmi_version, part.model, _used(part.inputs), _used(part.outputs),
-            *([part.rate or "1"] if rates else []), ", ".join(part.abilities) or DASH,
+            str(number),
+            part.name,
+            part.kind,
+            part.fmi_version,
+            part.model,
+            _used(part.inputs),
+            _used(part.outputs),
+            *([part.rate or "1"] if rates else []),
+            ", ".join(part.abilities) or DASH,
         ]
         for number, part in enumerate(structure.parts, start=1)
-    ]  # fmt: skip
+    ]
     return [*table(headings, rows), "", "inputs, outputs: connected of all"]
 
 
@@ -84,8 +93,12 @@ def _ports(structure: Structure) -> list[str]:
             sources = [".".join(link.source) for target, link in into.items() if _is_end(target, part, port)]
             rows.append([f"{part.name}.{port.name}", "input", port.unit or DASH, port.kind, _from(sources, port)])
         for port in part.outputs:
-            targets = [".".join(k.target) for source, links in out_of.items() if _is_end(source, part, port) for k in links]
-            rows.append([f"{part.name}.{port.name}", "output", port.unit or DASH, port.kind, _to(targets) + _direct(port)])
+            targets = [
+                ".".join(k.target) for source, links in out_of.items() if _is_end(source, part, port) for k in links
+            ]
+            rows.append(
+                [f"{part.name}.{port.name}", "output", port.unit or DASH, port.kind, _to(targets) + _direct(port)]
+            )
     return table(["signal", "causality", "unit", "type", ""], rows)
 
 
@@ -110,16 +123,26 @@ def _direct(port: Port) -> str:
 
 
 def _connections(structure: Structure) -> list[str]:
-    rows = [[".".join(link.source), f"-> {'.'.join(link.target)}", when(link), _conversion(link)] for link in structure.links]
+    rows = [
+        [".".join(link.source), f"-> {'.'.join(link.target)}", when(link), _conversion(link)]
+        for link in structure.links
+    ]
     rows += [
-        [".".join(link.source), f"-> {'.'.join(link.target)}", "clock, ticks at its own instant", ""] for link in structure.clocks
+        [".".join(link.source), f"-> {'.'.join(link.target)}", "clock, ticks at its own instant", ""]
+        for link in structure.clocks
     ]
     return table(["source", "   target", "value used", "conversion"], rows) if rows else ["none"]
 
 
 def when(link: Link) -> str:
     """Which value the target uses."""
-    text = "held, of the start of the step" if link.held else "iterated" if link.iterated else "fresh, of the end of the step"
+    text = (
+        "held, of the start of the step"
+        if link.held
+        else "iterated"
+        if link.iterated
+        else "fresh, of the end of the step"
+    )
     return f"{text}; in an algebraic loop" if link.in_loop else text
 
 

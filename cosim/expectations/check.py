@@ -24,7 +24,7 @@ NEVER_CERTIFIED = 'certificates = "ignore" leaves nothing to judge; remove that 
 
 def check_expectations(
     table: ScenarioTable, components: Mapping[str, Component], receivers: Sequence[str], where: str
-) -> ScenarioTable:  # fmt: skip
+) -> ScenarioTable:
     """Check the expectations of a scenario against its components.
 
     Args:
@@ -34,7 +34,8 @@ def check_expectations(
         The scenario, with the thresholds of indicators that were left to us.
 
     Raises:
-        ScenarioError: a signal, observer or receiver does not exist, a window lies outside the run, or an expectation can never
+        ScenarioError: a signal, observer or receiver does not exist, a window lies outside the run, or an expectation
+        can never
             be judged; one line for each expectation at fault.
     """
     faults, items = [], []
@@ -65,7 +66,11 @@ class _Check:
         elif item.check == "difference":
             _same_dimension(units)
         elif item.check in ("on", "off"):
-            return item if item.threshold is not None else item.model_copy(update={"threshold": self._threshold(item.signal)})
+            return (
+                item
+                if item.threshold is not None
+                else item.model_copy(update={"threshold": self._threshold(item.signal)})
+            )
         elif item.check == "telegrams":
             self._telegrams(item)
         elif item.check == "certificate":
@@ -75,10 +80,15 @@ class _Check:
     def _window(self, item: Any) -> None:
         """The window lies within the run, and holds at least one point that is recorded."""
         first, last = self.table.start, self.table.stop
-        for key, value in (("from", getattr(item, "start", None)), ("to", getattr(item, "end", None)),
-                           ("before", getattr(item, "before", None))):  # fmt: skip
+        for key, value in (
+            ("from", getattr(item, "start", None)),
+            ("to", getattr(item, "end", None)),
+            ("before", getattr(item, "before", None)),
+        ):
             if value is not None and not first - SLACK <= value <= last + SLACK:
-                raise ScenarioError(f"{key!r} ({value:g} s) lies outside the run, which lasts from {first:g} to {last:g} s")
+                raise ScenarioError(
+                    f"{key!r} ({value:g} s) lies outside the run, which lasts from {first:g} to {last:g} s"
+                )
         if not hasattr(item, "end"):
             return
         begin = item.start if item.start is not None else first
@@ -108,7 +118,9 @@ class _Check:
     def _estimates(self, item: Any) -> None:
         role, output, _ = ERRORS[item.check]
         if getattr(self.table.report, role) is None:
-            raise ScenarioError(f'the true value is not known; say which signal it is with report.{role} = "component.signal"')
+            raise ScenarioError(
+                f'the true value is not known; say which signal it is with report.{role} = "component.signal"'
+            )
         observers = self._named(item.of, self._observers(), "observer")
         if not observers:
             raise ScenarioError("there is no observer; name the component that estimates with 'of'")
@@ -118,7 +130,11 @@ class _Check:
 
     def _observers(self) -> list[str]:
         given = self.table.report.observers
-        return list(given) if given is not None else [n for n, t in self.table.components.items() if t.observer is not None]
+        return (
+            list(given)
+            if given is not None
+            else [n for n, t in self.table.components.items() if t.observer is not None]
+        )
 
     def _named(self, of: str | Sequence[str] | None, otherwise: Sequence[str], what: str) -> list[str]:
         names = list(otherwise) if of is None else [of] if isinstance(of, str) else list(of)
@@ -160,8 +176,12 @@ class _Check:
         return known
 
     def _follows_our_levels(self, component: str, signal: str) -> bool:
-        """Whether an indicator's name tells its levels: of shipped models, and the slip indicator of what plays an observer."""
-        return self.table.components[component].fmu is None or (signal == "slip_indicator" and component in self._observers())
+        """Whether an indicator's name tells its levels: of shipped models, and the slip indicator of what plays an
+        observer.
+        """
+        return self.table.components[component].fmu is None or (
+            signal == "slip_indicator" and component in self._observers()
+        )
 
 
 def _same_dimension(units: Sequence[Any]) -> None:

@@ -1,4 +1,6 @@
-"""Judges of indicators: on in time, or never on. An indicator holds its value from one row to the next. Imports NumPy only."""
+"""Judges of indicators: on in time, or never on. An indicator holds its value from one row to the next. Imports NumPy
+only.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ LEVELS = {
     "sanding_request": BETWEEN_0_AND_1,
     "adhesion_degraded": BETWEEN_0_AND_1,
 }
-"""Thresholds of the shipped models' indicators, by name of the output: halfway between nominal and degraded, off and on."""
+"""Thresholds of the shipped models' indicators, by name of the output: halfway between nominal and degraded, off and
+on.
+"""
 ROUNDING = 1e-9
 
 
@@ -70,7 +74,8 @@ def judge_off(item: OffExpectation, run: Run) -> list[Judged]:
 
 
 def first_on(time: np.ndarray, values: np.ndarray, threshold: float, start: float) -> float | None:
-    """When an indicator is first on, from `start` on [s]; `start` itself where it is on already; None where it never is.
+    """When an indicator is first on, from `start` on [s]; `start` itself where it is on already; None where it never
+    is.
 
     Args:
         time: not decreasing [s], shape (rows,). values: shape (rows,), each held until the next row.

@@ -1,4 +1,6 @@
-"""Judge of balise telegrams: how many were missed, false, rejected, late, undelivered and used. Standard library only."""
+"""Judge of balise telegrams: how many were missed, false, rejected, late, undelivered and used. Standard library
+only.
+"""
 
 from __future__ import annotations
 
@@ -57,7 +59,9 @@ def _at_most(name: str, limit: int, chosen: list[BaliseRecord], window: Window) 
 def _at_least(name: str, limit: int, chosen: list[BaliseRecord], window: Window) -> Judged:
     """Enough telegrams are enough, also where the run ended early."""
     passed = len(chosen) >= limit
-    text = f"{len(chosen)}, expected at least {limit}" + (f"; {window.unreached}" if not passed and window.broken else "")
+    text = f"{len(chosen)}, expected at least {limit}" + (
+        f"; {window.unreached}" if not passed and window.broken else ""
+    )
     return _counted(name, passed, chosen, limit, float("nan"), text)
 
 

@@ -99,9 +99,16 @@ def _judge_sizes(name: str, item: Any, window: Window, error: np.ndarray, unit: 
 
 
 def _bounded(
-    name: str, base: dict[str, Any], window: Window, time: np.ndarray, values: np.ndarray, low: float, high: float, *,
+    name: str,
+    base: dict[str, Any],
+    window: Window,
+    time: np.ndarray,
+    values: np.ndarray,
+    low: float,
+    high: float,
+    *,
     last: bool = False,
-) -> Judged:  # fmt: skip
+) -> Judged:
     """Whether values lie between two bounds, one of which may be infinite."""
     unit = base["unit"]
     nothing = _nothing_measured(window, time, values, 1 if last else window.fewest)
@@ -119,11 +126,15 @@ def _bounded(
     text += f"; {window.unreached}" if passed and window.broken else ""
     if last and window.broken:
         text, passed = f"{with_unit(measured, unit)} so far, expected {allowed}; {window.unreached}", False
-    return Judged(name, passed=passed and not window.broken, measured=measured, limit=limit, when=when, text=text, **base)
+    return Judged(
+        name, passed=passed and not window.broken, measured=measured, limit=limit, when=when, text=text, **base
+    )
 
 
 def _nothing_measured(window: Window, time: np.ndarray, values: np.ndarray, fewest: int) -> dict[str, Any] | None:
-    """What to say where there are fewer than `fewest` instants, or values that are no finite numbers; None where all is well."""
+    """What to say where there are fewer than `fewest` instants, or values that are no finite numbers; None where all is
+    well.
+    """
     count = instants(time)
     if count < fewest:
         rows = f"only {count} instant{'s' * (count > 1)}, too few to judge:" if count else "nothing measured: no row"

@@ -35,11 +35,18 @@ def _certificate(observer: str, entry: Any, run: Run) -> Judged:
     if entry.get("holds") is False:
         text = f"certified for {bound}, expected were {wanted}"
         return Judged(
-            name, "certificate", passed=False, measured=float("nan") if expected is None else expected, text=text, **values
+            name,
+            "certificate",
+            passed=False,
+            measured=float("nan") if expected is None else expected,
+            text=text,
+            **values,
         )
     before = f"expected were {wanted}" if expected is not None else "what to expect was not known before the run"
     if seen is None:
-        return Judged(name, "certificate", passed=False, text=f"certified for {bound}, {before}; no gap was seen", **values)
+        return Judged(
+            name, "certificate", passed=False, text=f"certified for {bound}, {before}; no gap was seen", **values
+        )
     passed = (limit is None or seen <= limit) and run.result.failure is None
     text = f"certified for {bound}, {before}, {seen:.4g} s occurred"
     text += "; not reached: the run ended early" if run.result.failure is not None else ""

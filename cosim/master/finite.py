@@ -11,7 +11,8 @@ def make_finite_check(values: np.ndarray) -> Callable[[], bool]:
     """A call that says whether all values are finite.
 
     Args:
-        values: shape (n,); looked at anew in each call. The flags are compared as bytes, a quarter of what ``all`` costs.
+        values: shape (n,); looked at anew in each call. The flags are compared as bytes, a quarter of what ``all``
+        costs.
     """
     flags, good, isfinite = bytearray(len(values)), b"\1" * len(values), np.isfinite
     finite = np.frombuffer(flags, dtype=bool)

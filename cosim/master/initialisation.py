@@ -1,7 +1,7 @@
 """Initialisation: all components exchange inputs and outputs in Initialization Mode until nothing changes.
 
-First they exchange plainly, which settles whatever holds a state somewhere. What does not settle so (an algebraic loop) is
-searched for by Newton's method on the values that are fed back; setting inputs needs no saved states here.
+First they exchange plainly, which settles whatever holds a state somewhere. What does not settle so (an algebraic loop)
+is searched for by Newton's method on the values that are fed back; setting inputs needs no saved states here.
 """
 
 from __future__ import annotations
@@ -16,7 +16,9 @@ from cosim.master.algorithms.links import interface, plan_links
 
 MAX_ROUNDS = 100
 PLAIN_ROUNDS = (10, 30)
-"""Plain exchanges before Newton's method: as many as a chain of values that are fed back can be long, within these bounds."""
+"""Plain exchanges before Newton's method: as many as a chain of values that are fed back can be long, within these
+bounds.
+"""
 
 EXPLOSION = 100.0
 """Growth of the changes from one plain exchange to the next that is not waited out."""
@@ -31,8 +33,9 @@ JUMP = 1e-6
 def initialise(plan: Plan, start_time: float, stop_time: float) -> int:
     """Bring all components from instantiated to step mode.
 
-    What jumps when initialisation ends (a sample taken at the start time) is passed on once more, so that the first row is
-    consistent. Until then the targets of held signals know what was before the jump, those of fresh ones what is after it.
+    What jumps when initialisation ends (a sample taken at the start time) is passed on once more, so that the first row
+    is consistent. Until then the targets of held signals know what was before the jump, those of fresh ones what is
+    after it.
 
     Args:
         plan: prepared, components instantiated and start values set.
@@ -60,16 +63,16 @@ def initialise(plan: Plan, start_time: float, stop_time: float) -> int:
     if settling.exchange_changes_feedback():
         settling.run()
     plan.begin_step()
-    for carrier in plan.carriers:
-        carrier.prepare(start_time)  # where its lines begin
+    for interpolator in plan.interpolators:
+        interpolator.prepare(start_time)  # where its lines begin
     return rounds
 
 
 class _Settling:
     """Exchanges until nothing changes.
 
-    After `run`, `rounds` says how many it took and `residuals` by how much what is fed back changed in each, as a share of its
-    first size.
+    After `run`, `rounds` says how many it took and `residuals` by how much what is fed back changed in each, as a share
+    of its first size.
     """
 
     def __init__(self, plan: Plan) -> None:
@@ -149,7 +152,8 @@ def _unsettled(plan: Plan, changing: list[int], residuals: list[float], start_ti
     more = f" and {len(names) - 5} more" if len(names) > 5 else ""
     reason = (
         f"Initialisation at t = {start_time:g} s does not settle after {MAX_ROUNDS} exchanges; still changing: "
-        f"{', '.join(names[:5])}{more}. Relative changes of what is fed back: {shown(residuals)}. Check the start values; if it "
+        f"{', '.join(names[:5])}{more}. Relative changes of what is fed back: {shown(residuals)}. Check the start "
+        f"values; if it "
         "is an algebraic loop, whether its equations have a solution."
     )
     return RunError(reason, names[0].partition(".")[0], start_time)

@@ -58,18 +58,25 @@ class Master:
 
     `between_steps` is called between two steps, or stretches of the compiled stepper; it may raise KeyboardInterrupt.
 
-    After `run`, `recorder`, `timing`, `exchange_rounds` and `balises.mailbox.log` hold what came out, also when it failed.
+    After `run`, `recorder`, `timing`, `exchange_rounds` and `balises.mailbox.log` hold what came out, also when it
+    failed.
 
     Raises:
         CouplingError: a receiver is stepped before the watched plant, or is the plant itself.
     """
 
     def __init__(
-        self, plan: Plan, axis: TimeAxis, balises: BaliseService | None = None, progress: Callable[[float], None] | None = None,
-        algorithm: Callable[[Plan], Algorithm] = GaussSeidel, control: Callable[[System], StepControl] = FixedStep,
-        stepper: Wanted = "python", recorder: Callable[[Sequence[SignalInfo], int], Recorder] = Recorder,
+        self,
+        plan: Plan,
+        axis: TimeAxis,
+        balises: BaliseService | None = None,
+        progress: Callable[[float], None] | None = None,
+        algorithm: Callable[[Plan], Algorithm] = GaussSeidel,
+        control: Callable[[System], StepControl] = FixedStep,
+        stepper: Wanted = "python",
+        recorder: Callable[[Sequence[SignalInfo], int], Recorder] = Recorder,
         events: Events = "propagate",
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.plan, self.axis, self.balises = plan, axis, balises
         self.system = System(plan, algorithm(plan), balises, events)
         self.control = control(self.system)
@@ -84,7 +91,8 @@ class Master:
         self.between_steps: Callable[[], None] | None = None
 
     def choose_stepper(self) -> None:
-        """Choose who executes the plan; `run` does so where nobody did before. After it no component may be instantiated anew.
+        """Choose who executes the plan; `run` does so where nobody did before. After it no component may be
+        instantiated anew.
 
         Raises:
             CouplingError: the compiled stepper is demanded and cannot be had; why.
@@ -200,7 +208,9 @@ class Master:
         bad = int(np.argmin(np.isfinite(self.plan.values)))
         name, value = self.plan.signals[bad].name, self.plan.values[bad]
         component = name.partition(".")[0]
-        raise RunError(f"Component '{component}' at t = {t:g} s: output {name} is {value}; the run ends here.", component, t)
+        raise RunError(
+            f"Component '{component}' at t = {t:g} s: output {name} is {value}; the run ends here.", component, t
+        )
 
 
 def close(plan: Plan) -> None:

@@ -30,7 +30,7 @@ class Checkpoint:
         values: shape (n,).
         lines: of the inputs that follow one, in the order of the plan; None for the others.
         balises: of the balise service, or None.
-        untouched: the values that are no doubles, shape (m,).
+        non_numeric: the values that are no doubles, shape (m,).
         algorithm: what the algorithm remembers, or None.
         events: what the coordinator remembers, or None.
     """
@@ -39,7 +39,7 @@ class Checkpoint:
     values: np.ndarray
     lines: list[Any]
     balises: Any
-    untouched: np.ndarray
+    non_numeric: np.ndarray
     algorithm: Any = None
     events: Any = None
 
@@ -56,7 +56,7 @@ class System:
 
     def __init__(
         self, plan: Plan, algorithm: Algorithm, balises: BaliseService | None = None, events: Events = "propagate"
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.plan, self.algorithm, self.balises = plan, algorithm, balises
         if balises is not None:
             balises.attach(plan)
@@ -106,16 +106,16 @@ class System:
         """
         self.plan.begin_step()
         for step in self.plan.steps:
-            if step.carrier is None:
+            if step.interpolator is None:
                 continue
-            step.carrier.forget(jumped | stale)
+            step.interpolator.forget(jumped | stale)
             if jumped[step.inputs.sources].any():
-                step.carrier.prepare(t)
-                step.carrier.forget(stale & ~jumped)
+                step.interpolator.prepare(t)
+                step.interpolator.forget(stale & ~jumped)
 
     def _begin_lines_of(self, names: Collection[str], t: float) -> None:
         """The outputs of these components may have jumped on the way to `t` [s]."""
-        if not self.plan.carriers:
+        if not self.plan.interpolators:
             return
         jumped = np.zeros(len(self.plan.values), dtype=bool)
         for name in names:
@@ -133,7 +133,9 @@ class System:
         """
         stateless = [s.component.name for s in self.plan.steps if not s.component.can_save]
         if stateless:
-            raise CouplingError(f"{what} steps back, and these components cannot save their state: {', '.join(stateless)}.")
+            raise CouplingError(
+                f"{what} steps back, and these components cannot save their state: {', '.join(stateless)}."
+            )
 
     def save(self, *, anyway: bool = False) -> Checkpoint:
         """Everything, to be restored any number of times and released once.
@@ -142,12 +144,12 @@ class System:
             anyway: leave out components that cannot save their state.
         """
         states = [step.component.save() if step.component.can_save or not anyway else None for step in self.plan.steps]
-        lines = [None if step.carrier is None else step.carrier.save() for step in self.plan.steps]
+        lines = [None if step.interpolator is None else step.interpolator.save() for step in self.plan.steps]
         balises = None if self.balises is None else self.balises.save()
         events = None if self.events is None else self.events.save()
         return Checkpoint(
-            states, self.plan.values.copy(), lines, balises, self.plan.untouched.copy(), self.algorithm.save(), events
-        )  # fmt: skip
+            states, self.plan.values.copy(), lines, balises, self.plan.non_numeric.copy(), self.algorithm.save(), events
+        )
 
     def restore(self, checkpoint: Checkpoint, keep: Set[str] = frozenset()) -> None:
         """Return to a checkpoint.
@@ -156,17 +158,18 @@ class System:
             keep: components that stay as they are; so do those that the checkpoint leaves out.
         """
         stay = [
-            step for step, state in zip(self.plan.steps, checkpoint.states, strict=True)
+            step
+            for step, state in zip(self.plan.steps, checkpoint.states, strict=True)
             if state is None or step.component.name in keep
-        ]  # fmt: skip
+        ]
         for step, state in zip(self.plan.steps, checkpoint.states, strict=True):
             if step not in stay:
                 step.component.restore(state)
         for step, line in zip(self.plan.steps, checkpoint.lines, strict=True):
-            if step.carrier is not None:
-                step.carrier.restore(line)
+            if step.interpolator is not None:
+                step.interpolator.restore(line)
         self.plan.values[:] = checkpoint.values
-        self.plan.untouched[:] = checkpoint.untouched
+        self.plan.non_numeric[:] = checkpoint.non_numeric
         self.algorithm.restore(checkpoint.algorithm)
         if self.events is not None:
             self.events.restore(checkpoint.events)

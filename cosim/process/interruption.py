@@ -13,14 +13,17 @@ from time import monotonic
 from typing import Any
 
 PATIENCE = 1.0
-"""One key may arrive twice, from the terminal and from who watches; a signal after so long means that somebody insists [s]."""
+"""One key may arrive twice, from the terminal and from who watches; a signal after so long means that somebody insists
+[s].
+"""
 
 STOPPING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 """Signals that ask for the end."""
 
 
 class Interruption:
-    """Within this context the first Ctrl-C is noted in `came`, and raises nothing; whoever insists gets a KeyboardInterrupt.
+    """Within this context the first Ctrl-C is noted in `came`, and raises nothing; whoever insists gets a
+    KeyboardInterrupt.
 
     A handler that somebody else has installed is left alone.
     """

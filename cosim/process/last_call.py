@@ -1,7 +1,7 @@
 """The last call: which function of which component is being called, at what time. Standard library only.
 
-It stands in a page of memory that a watching process shares, so that it can be told when this process is gone. To note a call is
-one store of a number; the words behind the numbers are written to the page when they are asked for first.
+It stands in a page of memory that a watching process shares, so that it can be told when this process is gone. To note
+a call is one store of a number; the words behind the numbers are written to the page when they are asked for first.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from pathlib import Path
 
 PAGE = 1 << 16
 CALL, TIME, LIMIT, ENDED, USED = range(5)
-"""Cells of the page: number of the call, 0 for none; the time [s]; how long a call may last [s]; how the process ended; bytes of
-words."""
+"""Cells of the page: number of the call, 0 for none; the time [s]; how long a call may last [s]; how the process ended;
+bytes of words."""
 TEXTS = 64
 NOTE = PAGE // 2
 LONGEST = 80
@@ -28,8 +28,9 @@ OFTEN = ("setting inputs", "getting outputs", "doStep", "an event")
 class LastCall:
     """What is being called.
 
-    `call[0]` is the number of the call, `time[0]` the time of the communication point from which it is made [s]. Whoever calls
-    stores there; `numbers` says what. `watched` says that another process looks at it, `timed` that it also keeps the time.
+    `call[0]` is the number of the call, `time[0]` the time of the communication point from which it is made [s].
+    Whoever calls stores there; `numbers` says what. `watched` says that another process looks at it, `timed` that it
+    also keeps the time.
     """
 
     def __init__(self, memory: mmap.mmap) -> None:

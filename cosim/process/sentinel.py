@@ -1,4 +1,5 @@
-"""The sentinel: an FMU that calls exit() ends no script, and no test, as if all were well. For processes that nobody watches.
+"""The sentinel: an FMU that calls exit() ends no script, and no test, as if all were well. For processes that nobody
+watches.
 
 The C library calls it when somebody exits while Python is at work. It also ends a call that takes too long. Imports the
 standard library only.
@@ -22,7 +23,9 @@ _output = [2]
 
 
 def report_to_copy_of_stderr() -> int:
-    """From now on the sentinel writes to what is the error stream now, also if that is captured later; returns the descriptor."""
+    """From now on the sentinel writes to what is the error stream now, also if that is captured later; returns the
+    descriptor.
+    """
     _output[0] = os.dup(2)
     return _output[0]
 
@@ -31,8 +34,8 @@ def report_to_copy_of_stderr() -> int:
 def guard_exit() -> None:
     """From now on exit() in a call of an FMU ends this process with code 2, and with words; once for a process.
 
-    What the FMU calls is C's exit(): against _exit() only another process helps. Where the C library offers no way to be asked
-    (Windows) nothing is done.
+    What the FMU calls is C's exit(): against _exit() only another process helps. Where the C library offers no way to
+    be asked (Windows) nothing is done.
     """
     import ctypes  # noqa: PLC0415 - a plugin of pytest imports this module at every start
 
@@ -59,7 +62,9 @@ def _exit_called() -> None:
 
 @contextmanager
 def limited_calls(seconds: float | None) -> Iterator[None]:
-    """Within this context a call may last so long [s]; None for any time. A process that does not return is ended with code 2."""
+    """Within this context a call may last so long [s]; None for any time. A process that does not return is ended with
+    code 2.
+    """
     LAST_CALL.limit(seconds)
     over = threading.Event()
     if seconds is not None and not LAST_CALL.timed:

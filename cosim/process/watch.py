@@ -1,7 +1,7 @@
 """The watch: a command runs in a process of its own, and this one tells what an FMU did to it. Standard library only.
 
-The process is forked before anything large is loaded, so this one costs milliseconds and a few megabytes. It hands signals on,
-ends a call that takes too long, and keeps what was computed when the other one is gone.
+The process is forked before anything large is loaded, so this one costs milliseconds and a few megabytes. It hands
+signals on, ends a call that takes too long, and keeps what was computed when the other one is gone.
 """
 
 from __future__ import annotations

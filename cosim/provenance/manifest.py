@@ -91,16 +91,21 @@ def read_manifest(directory: str | Path) -> Manifest:
     file = folder / MADE_FROM / MANIFEST
     if not file.is_file():
         if not (folder / "summary.json").is_file():
-            raise ProvenanceError(f"{folder} is no results folder: it has neither summary.json nor {MADE_FROM}/{MANIFEST}.")
+            raise ProvenanceError(
+                f"{folder} is no results folder: it has neither summary.json nor {MADE_FROM}/{MANIFEST}."
+            )
         raise ProvenanceError(
-            f"{folder} does not say how it was made: it has no {MADE_FROM}/{MANIFEST}. An older version wrote it, or it was "
+            f"{folder} does not say how it was made: it has no {MADE_FROM}/{MANIFEST}. An older version wrote it, or "
+            f"it was "
             "copied in part; run its scenario again."
         )
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
         known = int(data["format"])
         if known != FORMAT:
-            raise ProvenanceError(f"{file} has format {known}, this version reads format {FORMAT}; use a newer fmu-observer.")
+            raise ProvenanceError(
+                f"{file} has format {known}, this version reads format {FORMAT}; use a newer fmu-observer."
+            )
         for key in ("scenario", "versions", "files", "results"):
             data[key]
     except (OSError, ValueError, KeyError, TypeError) as error:

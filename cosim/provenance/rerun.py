@@ -1,4 +1,6 @@
-"""Rerun: results are made again from what their folder holds, and compared with those that are there. Changes nothing in it."""
+"""Rerun: results are made again from what their folder holds, and compared with those that are there. Changes nothing
+in it.
+"""
 
 from __future__ import annotations
 
@@ -65,23 +67,37 @@ class Rerun:
             largest = max((s.max_error for s in self.comparison.signals if s.status == "within"), default=0.0)
             lines.append(f"  the largest difference is {largest:.3g} in the unit of its signal")
         lines += [f"  note: {note}" for note in self.comparison.notes]
-        lines += ["Changed since:", *(f"  {change}" for change in self.changes)] if self.changes else ["Nothing changed since."]
+        lines += (
+            ["Changed since:", *(f"  {change}" for change in self.changes)]
+            if self.changes
+            else ["Nothing changed since."]
+        )
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for a JSON file."""
         return {
-            "directory": str(self.directory), "verdict": self.verdict, "equal": self.equal, "changes": list(self.changes),
-            "failure": self.outcome.failure, "comparison": self.comparison.to_dict(),
+            "directory": str(self.directory),
+            "verdict": self.verdict,
+            "equal": self.equal,
+            "changes": list(self.changes),
+            "failure": self.outcome.failure,
+            "comparison": self.comparison.to_dict(),
             "files": {kind: str(path) for kind, path in self.paths.items()},
-        }  # fmt: skip
+        }
 
 
 def rerun(
-    directory: str | Path, *, out: str | Path | None = None, overrides: Mapping[str, Any] | None = None,
-    tolerance: Given | None = None, trust: bool = False, progress: Callable[[float, float], None] | None = None,
-    warn: Callable[[str], None] | None = None, building: Callable[[str], None] | None = None,
-) -> Rerun:  # fmt: skip
+    directory: str | Path,
+    *,
+    out: str | Path | None = None,
+    overrides: Mapping[str, Any] | None = None,
+    tolerance: Given | None = None,
+    trust: bool = False,
+    progress: Callable[[float, float], None] | None = None,
+    warn: Callable[[str], None] | None = None,
+    building: Callable[[str], None] | None = None,
+) -> Rerun:
     """Run again what a results folder holds, and compare.
 
     Args:
@@ -123,7 +139,9 @@ def rerun(
 
 
 def stored_scenario(manifest: Manifest) -> Scenario:
-    """The scenario that a results folder holds; the log of all calls, which belongs to its folder, is not written again."""
+    """The scenario that a results folder holds; the log of all calls, which belongs to its folder, is not written
+    again.
+    """
     from cosim.scenario import Scenario  # noqa: PLC0415 - a scenario loads results folders, and these make scenarios
 
     scenario = Scenario.load(manifest.directory)
@@ -174,7 +192,10 @@ def _changes(manifest: Manifest, outcome: Outcome) -> list[str]:
         if former != component["guid"]:
             lines.append(f"{component['name']}: model {former} then, {component['guid']} now")
     notes = [
-        f"{part['path']}: {part['note']}" for foreign in manifest.data["files"] for part in foreign["parts"] if part.get("note")
+        f"{part['path']}: {part['note']}"
+        for foreign in manifest.data["files"]
+        for part in foreign["parts"]
+        if part.get("note")
     ]
     return lines + notes + manifest.moved_on()
 

@@ -13,7 +13,9 @@ CHUNK = 65536
 
 
 def same_result(first: Result, second: Result) -> bool:
-    """Whether tables and telegrams agree in every bit; one NaN is as good as another, since text files keep no more of it."""
+    """Whether tables and telegrams agree in every bit; one NaN is as good as another, since text files keep no more of
+    it.
+    """
     return same_table(first.table, second.table) and same_events(first.events, second.events)
 
 

@@ -1,4 +1,6 @@
-"""Writing ``made_from``: the scenario, the files it uses and the manifest. Touches only the results folder it is given."""
+"""Writing ``made_from``: the scenario, the files it uses and the manifest. Touches only the results folder it is
+given.
+"""
 
 from __future__ import annotations
 
@@ -23,14 +25,17 @@ from cosim.scenario.save import plain
 FILES_UP_TO = 50e6
 """Files of others up to this size are copied into the results [bytes]."""
 
-HEADER = "# The scenario of these results, with what it included and what was overridden. cosim rerun runs it again.\n\n"
+HEADER = (
+    "# The scenario of these results, with what it included and what was overridden. cosim rerun runs it again.\n\n"
+)
 UNHASHED = ("summary", "messages", "report", "calls")
 Seal = Callable[[Mapping[str, Path], Mapping[str, Any]], None]
 
 
 @contextmanager
 def renewed(directory: str | Path, origin: Origin | None, files_up_to: float = FILES_UP_TO) -> Iterator[Seal]:
-    """``made_from`` is exchanged with the results: prepared before, put in place after, the former one back on a failure.
+    """``made_from`` is exchanged with the results: prepared before, put in place after, the former one back on a
+    failure.
 
     Args:
         directory: the results folder. origin: of the results; None where it is not known: a former ``made_from`` goes.
@@ -66,7 +71,9 @@ def renewed(directory: str | Path, origin: Origin | None, files_up_to: float = F
     except OutputError:
         raise
     except OSError as error:
-        raise OutputError(f"Results could not be written to {folder}: {error.strerror or error} ({error.filename}).") from error
+        raise OutputError(
+            f"Results could not be written to {folder}: {error.strerror or error} ({error.filename})."
+        ) from error
 
 
 def _prepare(origin: Origin, new: Path, files_up_to: float) -> dict[str, Any]:
@@ -75,7 +82,9 @@ def _prepare(origin: Origin, new: Path, files_up_to: float) -> dict[str, Any]:
     copies: dict[str, str] = {}
     files = [_keep(foreign, origin, new, files_up_to, copies) for foreign in origin.files]
     data = plain(origin.table.model_dump(by_alias=True, exclude_unset=True))
-    data = map_paths(data, lambda path: copies.get(str((origin.folder / path).resolve()), str((origin.folder / path).resolve())))
+    data = map_paths(
+        data, lambda path: copies.get(str((origin.folder / path).resolve()), str((origin.folder / path).resolve()))
+    )
     (new / SCENARIO).write_text(HEADER + tomli_w.dumps(data), encoding="utf-8")
     return {
         "format": FORMAT,
@@ -86,7 +95,9 @@ def _prepare(origin: Origin, new: Path, files_up_to: float) -> dict[str, Any]:
     }
 
 
-def _keep(foreign: ForeignFile, origin: Origin, new: Path, files_up_to: float, copies: dict[str, str]) -> dict[str, Any]:
+def _keep(
+    foreign: ForeignFile, origin: Origin, new: Path, files_up_to: float, copies: dict[str, str]
+) -> dict[str, Any]:
     """Copy the parts of a file that are small enough; one that was copied already is named again."""
     name = f"{FILES}/{foreign.owner}" + (f"/{foreign.path.name}" if foreign.path.is_dir() else "")
     entry: dict[str, Any] = {"key": foreign.key, "path": str(foreign.path), "parts": []}
@@ -110,7 +121,10 @@ def _keep_part(path: Path, copy: str, origin: Origin, new: Path, files_up_to: fl
         if origin.stamps.get(str(path), seen) != seen:
             part["note"] = "it was changed after the run had begun"
         if seen[0] > files_up_to:
-            return part | {"sha256": sha256(path), "why": f"{seen[0] / 1e6:.3g} MB are more than {files_up_to / 1e6:.3g} MB"}
+            return part | {
+                "sha256": sha256(path),
+                "why": f"{seen[0] / 1e6:.3g} MB are more than {files_up_to / 1e6:.3g} MB",
+            }
         target = new / copy
         if not target.exists():
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -126,7 +140,9 @@ def _seal(manifest: dict[str, Any], new: Path, paths: Mapping[str, Path], summar
     from cosim.scenario.summary import versions  # noqa: PLC0415 - pulls in the master
 
     results = {p.name: {"sha256": sha256(p), "size": p.stat().st_size} for k, p in paths.items() if k not in UNHASHED}
-    components = [{k: c.get(k) for k in ("name", "kind", "model", "fmi_version", "guid")} for c in summary.get("components", ())]
+    components = [
+        {k: c.get(k) for k in ("name", "kind", "model", "fmi_version", "guid")} for c in summary.get("components", ())
+    ]
     content = manifest | {
         "written": datetime.now(UTC).isoformat(timespec="seconds"),
         "versions": summary.get("versions") or versions(),

@@ -1,7 +1,7 @@
 """pytest plugin: the fixture `fmu_regression`, markers for slow and vendor tests, baselines checked and written.
 
-pytest loads this at every start, for every project in whose environment the package is, so it imports pytest and the standard
-library only; what runs and compares is loaded when the fixture is first called.
+pytest loads this at every start, for every project in whose environment the package is, so it imports pytest and the
+standard library only; what runs and compares is loaded when the fixture is first called.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""The end of a session: baselines are written or refused, and the terminal says what was found. Standard library and pytest."""
+"""The end of a session: baselines are written or refused, and the terminal says what was found. Standard library and
+pytest.
+"""
 
 from __future__ import annotations
 
@@ -90,8 +92,9 @@ def _tell_update(terminal: pytest.TerminalReporter, records: list[Record], confi
         advice = "Make them pass" if why == "tests failed" else "Run them to the end"
         terminal.write_line(
             f"No baseline was written: {why} ({len(staged)} to be written). "
-            f"{advice}, or write all the same with --fmu-baseline-force.", red=True,
-        )  # fmt: skip
+            f"{advice}, or write all the same with --fmu-baseline-force.",
+            red=True,
+        )
     elif staged:
         terminal.write_line(f"{len(staged)} written.")
     if unused := _unused(records, config):
@@ -100,7 +103,9 @@ def _tell_update(terminal: pytest.TerminalReporter, records: list[Record], confi
 
 def _unused(records: list[Record], config: pytest.Config) -> list[Path]:
     """Baselines beside those in use that no test asked for; nothing where only some of the tests were chosen."""
-    chosen = config.getoption("keyword", "") or config.getoption("markexpr", "") or any("::" in str(a) for a in config.args)
+    chosen = (
+        config.getoption("keyword", "") or config.getoption("markexpr", "") or any("::" in str(a) for a in config.args)
+    )
     refused = config.stash.get(REFUSED, "")
     if chosen or refused:
         return []

@@ -39,18 +39,28 @@ class FmuRegression:
         self._calls: list[str] = []
 
     def __call__(
-        self, what: Any, *, stop: float | None = None, step: float | None = None, start: float | None = None,
-        inputs: Mapping[str, Any] | str | Path | None = None, parameters: Mapping[str, Any] | None = None,
-        record: Sequence[str] = (), overrides: Mapping[str, Any] | None = None,
-        signals: Sequence[str] | None = None, every: float | None = None,
-        tolerance: Any = None, tolerances: Mapping[str, Any] | None = None, ignore: Iterable[str] = (),
+        self,
+        what: Any,
+        *,
+        stop: float | None = None,
+        step: float | None = None,
+        start: float | None = None,
+        inputs: Mapping[str, Any] | str | Path | None = None,
+        parameters: Mapping[str, Any] | None = None,
+        record: Sequence[str] = (),
+        overrides: Mapping[str, Any] | None = None,
+        signals: Sequence[str] | None = None,
+        every: float | None = None,
+        tolerance: Any = None,
+        tolerances: Mapping[str, Any] | None = None,
+        ignore: Iterable[str] = (),
         name: str | None = None,
-    ) -> Regression:  # fmt: skip
+    ) -> Regression:
         """Run and compare.
 
         Args:
-            what: path of an FMU; name or path of a scenario; a `Scenario`; an `Outcome` or a `Result` of a run made already.
-                Relative paths start at the test file.
+            what: path of an FMU; name or path of a scenario; a `Scenario`; an `Outcome` or a `Result` of a run made
+                already. Relative paths start at the test file.
             start, stop, step: of the run [s]; of an FMU alone those of its default experiment where not given.
             inputs: of an FMU alone: constants by name, or a table (CSV) with a column for each.
             parameters: start values of an FMU alone. record: its variables to record besides the outputs.
@@ -70,10 +80,22 @@ class FmuRegression:
         path, reason = self._path(name), ""
         try:
             call = Call.run(
-                what, self._file.parent, path,
-                signals=signals, every=every, tolerance=tolerance, tolerances=tolerances, ignore=ignore,
-                start=start, stop=stop, step=step, inputs=inputs, parameters=parameters, record=record, overrides=overrides,
-            )  # fmt: skip
+                what,
+                self._file.parent,
+                path,
+                signals=signals,
+                every=every,
+                tolerance=tolerance,
+                tolerances=tolerances,
+                ignore=ignore,
+                start=start,
+                stop=stop,
+                step=step,
+                inputs=inputs,
+                parameters=parameters,
+                record=record,
+                overrides=overrides,
+            )
             return self._update(call) if options.mode(self._config) == "update" else self._check(call)
         except CosimError as error:
             reason = str(error)
@@ -84,7 +106,9 @@ class FmuRegression:
         """Path of this call's baseline."""
         call = name or (str(len(self._calls) + 1) if self._calls else "")
         if call in self._calls:
-            pytest.fail(f"fmu_regression: this test has a baseline named {call!r} already; give another name=...", pytrace=False)
+            pytest.fail(
+                f"fmu_regression: this test has a baseline named {call!r} already; give another name=...", pytrace=False
+            )
         self._calls.append(call)
         node = self._node.nodeid.partition("::")[2] or self._node.name
         return options.baseline_folder(self._config, self._file) / f"{baseline_name(node, call)}.json"
@@ -98,7 +122,8 @@ class FmuRegression:
         found = call.check()
         if found.equal:
             self._keep(call.path, "equal", list(found.notes))
-            shutil.rmtree(self._artifacts(call.path), ignore_errors=True)  # of an earlier run: it would not speak of this one
+            # of an earlier run: it would not speak of this one
+            shutil.rmtree(self._artifacts(call.path), ignore_errors=True)
             return found
         files = self._draw(found, call.path)
         self._keep(call.path, "differs", call.worst(found), files)
@@ -145,7 +170,12 @@ class FmuRegression:
         return options.artifacts_folder(self._config) / self._file.stem / path.stem
 
     def _keep(
-        self, path: Path, status: Status, lines: Sequence[str] = (), files: Mapping[str, str] | None = None, staged: str = ""
+        self,
+        path: Path,
+        status: Status,
+        lines: Sequence[str] = (),
+        files: Mapping[str, str] | None = None,
+        staged: str = "",
     ) -> None:
         record = Record(self._node.nodeid, str(path), status, list(lines), dict(files or {}), staged)
         Records.of(self._config).add(record)

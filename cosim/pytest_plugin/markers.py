@@ -6,7 +6,8 @@ import pytest
 
 LINES = (
     "fmu_slow: takes long; skipped unless --fmu-slow is given",
-    "fmu_vendor(path): needs this file, relative to the test file; skipped where it is absent, unless --fmu-vendor=require",
+    "fmu_vendor(path): needs this file, relative to the test file; skipped where it is absent, unless "
+    "--fmu-vendor=require",
 )
 
 

@@ -17,8 +17,8 @@ def baseline_name(node: str, call: str = "") -> str:
         call: name or number of the call in a test that makes several; empty for the first without a name.
 
     Returns:
-        ``test_brakes-wet``, ``TestDrive.test_start``, ``test_brakes-wet@second``. Where characters had to be replaced, some
-        characters of a digest follow, so that two tests never share a baseline.
+        ``test_brakes-wet``, ``TestDrive.test_start``, ``test_brakes-wet@second``. Where characters had to be replaced,
+        some characters of a digest follow, so that two tests never share a baseline.
     """
     plain = re.sub(r"\[(.*)\]$", r"-\1", node, flags=re.DOTALL).replace("::", ".")
     name = _safe(plain) + (f"@{_safe(call)}" if call else "")

@@ -15,22 +15,36 @@ def add(parser: pytest.Parser) -> None:
     """Add options and settings to the parser of pytest."""
     group = parser.getgroup("fmu", "regression tests of FMUs and scenarios (fmu_regression)")
     group.addoption(
-        "--fmu-baseline", choices=MODES, default="check",
+        "--fmu-baseline",
+        choices=MODES,
+        default="check",
         help="check (default): fail where outputs differ from the baseline; update: write baselines, if no test fails; "
         "diff: show all differences with pictures, fail on none",
-    )  # fmt: skip
-    group.addoption("--fmu-baseline-force", action="store_true", help="with --fmu-baseline=update: write though tests failed")
-    group.addoption(
-        "--fmu-baseline-dir", metavar="DIR", help="folder of all baselines, instead of 'baselines' beside each test file"
     )
-    group.addoption("--fmu-artifacts", metavar="DIR", help="folder for pictures and pages of differences (default: .pytest_fmu)")
+    group.addoption(
+        "--fmu-baseline-force", action="store_true", help="with --fmu-baseline=update: write though tests failed"
+    )
+    group.addoption(
+        "--fmu-baseline-dir",
+        metavar="DIR",
+        help="folder of all baselines, instead of 'baselines' beside each test file",
+    )
+    group.addoption(
+        "--fmu-artifacts", metavar="DIR", help="folder for pictures and pages of differences (default: .pytest_fmu)"
+    )
     group.addoption("--fmu-slow", action="store_true", help="also run tests marked fmu_slow")
     group.addoption(
-        "--fmu-vendor", choices=("skip", "require"), default="skip",
+        "--fmu-vendor",
+        choices=("skip", "require"),
+        default="skip",
         help="tests marked fmu_vendor('file') whose file is absent: skip them (default), or fail them",
-    )  # fmt: skip
-    parser.addini("fmu_baseline_dir", "folder of all baselines, relative to the root; see --fmu-baseline-dir", default="")
-    parser.addini("fmu_artifacts", "folder for pictures and pages of differences, relative to the root", default=".pytest_fmu")
+    )
+    parser.addini(
+        "fmu_baseline_dir", "folder of all baselines, relative to the root; see --fmu-baseline-dir", default=""
+    )
+    parser.addini(
+        "fmu_artifacts", "folder for pictures and pages of differences, relative to the root", default=".pytest_fmu"
+    )
 
 
 def mode(config: pytest.Config) -> Mode:

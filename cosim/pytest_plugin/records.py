@@ -1,7 +1,7 @@
 """What each call of the fixture found: one small file each, in a folder that the workers of pytest-xdist share.
 
-Files, and not memory: a vendor's FMU may take its process with it, and what others found must not be lost. Standard library
-and pytest only.
+Files, and not memory: a vendor's FMU may take its process with it, and what others found must not be lost. Standard
+library and pytest only.
 """
 
 from __future__ import annotations
@@ -40,7 +40,8 @@ class Records:
     """The records of a session.
 
     Args:
-        shared: folder that the controller gave to this worker; None for a controller, which makes one when it is needed.
+        shared: folder that the controller gave to this worker; None for a controller, which makes one when it is
+        needed.
     """
 
     KEY: pytest.StashKey[Records] = pytest.StashKey()

@@ -51,11 +51,12 @@ def outcome_columns(outcomes: Iterable[Mapping[str, int]]) -> dict[str, str]:
 
 
 def accepted_stamps(events: Sequence[BaliseRecord], receiver: str | None = None) -> list[float]:
-    """Passing times of the telegrams that were used [s], in order.
+    """Crossing times of the telegrams that were used [s], in order.
 
     Args:
         events: the telegrams.
-        receiver: count what this component used; None for any receiver. A telegram without outcomes counts unless missed.
+        receiver: count what this component used; None for any receiver. A telegram without outcomes counts unless
+        missed.
     """
     stamps = set()
     for event in events:

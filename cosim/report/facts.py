@@ -1,10 +1,10 @@
 """What a report says of a run besides its numbers, taken from the summary; every entry may be missing.
 
-Entries read: ``scenario``, ``description`` (texts), ``start``, ``reached``, ``step``, ``wall_seconds`` [s], ``real_time_factor``
-[1], ``localisation`` (``method`` and ``reason``), ``warnings`` and ``notes`` (texts), ``components`` (mappings with ``name``,
-``kind``, ``fmi_version``, ``model`` and ``source``), ``certificates`` (by observer: ``aperiodic_limit`` [s], ``constant_limit``
-[s], ``max_gap`` [s], ``largest_gap_seen`` [s], ``holds`` and ``explanation``), ``seed_study`` (``seeds`` and ``rows``) and
-``versions``. Standard library only.
+Entries read: ``scenario``, ``description`` (texts), ``start``, ``reached``, ``step``, ``wall_seconds`` [s],
+``real_time_factor`` [1], ``localisation`` (``method`` and ``reason``), ``warnings`` and ``notes`` (texts),
+``components`` (mappings with ``name``, ``kind``, ``fmi_version``, ``model`` and ``source``), ``certificates`` (by
+observer: ``aperiodic_limit`` [s], ``constant_limit`` [s], ``max_gap`` [s], ``largest_gap_seen`` [s], ``holds`` and
+``explanation``), ``seed_study`` (``seeds`` and ``rows``) and ``versions``. Standard library only.
 """
 
 from __future__ import annotations
@@ -38,7 +38,9 @@ def number_entry(entries: Mapping[str, Any], key: str) -> float | None:
 
 
 def localisation(result: Result) -> str:
-    """How the passings were found and why so: from the summary, or else from the telegrams; empty where neither says."""
+    """How the crossings were found and why so: from the summary, or else from the telegrams; empty where neither
+    says.
+    """
     stated = mapping_entry(result, "localisation")
     if not stated:
         methods = sorted({event.method for event in result.events if event.method})

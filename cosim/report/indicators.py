@@ -1,4 +1,6 @@
-"""What the slip indicators said: how long they were on, and how soon after the rails became slippery. Imports NumPy only."""
+"""What the slip indicators said: how long they were on, and how soon after the rails became slippery. Imports NumPy
+only.
+"""
 
 from __future__ import annotations
 
@@ -73,7 +75,9 @@ def indicator_statistics(result: Result, spec: ReportSpec) -> list[IndicatorStat
         result: the run. spec: observers, low-adhesion zones, start of the evaluation.
     """
     found = ((observer, estimate(result, observer, "slip_indicator")) for observer in spec.observers)
-    return [_one(result.time, values, observer, spec) for observer, values in found if values is not None and len(values)]
+    return [
+        _one(result.time, values, observer, spec) for observer, values in found if values is not None and len(values)
+    ]
 
 
 def _one(time: np.ndarray, values: np.ndarray, observer: str, spec: ReportSpec) -> IndicatorStatistics:

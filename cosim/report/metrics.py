@@ -50,8 +50,8 @@ class PhaseMetrics:
 def error_size(time: np.ndarray, error: np.ndarray) -> ErrorSize:
     """Maximum and time-weighted root mean square of an error.
 
-    The square is integrated by the trapezoidal rule, so rows of the same time (before and after an event) count once, and
-    unevenly spaced rows by their share of the time.
+    The square is integrated by the trapezoidal rule, so rows of the same time (before and after an event) count once,
+    and unevenly spaced rows by their share of the time.
 
     Args:
         time: not decreasing [s], shape (rows,).

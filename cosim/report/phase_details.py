@@ -1,4 +1,6 @@
-"""More of each observer in each phase: slip, forces, errors around telegrams, indicator, telegrams. Imports NumPy only."""
+"""More of each observer in each phase: slip, forces, errors around telegrams, indicator, telegrams. Imports NumPy
+only.
+"""
 
 from __future__ import annotations
 
@@ -68,7 +70,13 @@ def _one(
         observer,
         phase.name,
         _rms(result, spec, phase, recorded(result, spec.true_slip), estimate(result, observer, "slip")),
-        _rms(result, spec, phase, recorded(result, spec.true_adhesion_force), estimate(result, observer, "adhesion_force")),
+        _rms(
+            result,
+            spec,
+            phase,
+            recorded(result, spec.true_adhesion_force),
+            estimate(result, observer, "adhesion_force"),
+        ),
         _rms(result, spec, phase, force, coupler_force(result, f"{observer}.")),
         *_around(speed, start, end),
         *_around(position, start, end),
@@ -77,7 +85,9 @@ def _one(
     )
 
 
-def _rms(result: Result, spec: ReportSpec, phase: Phase, true: np.ndarray | None, believed: np.ndarray | None) -> float | None:
+def _rms(
+    result: Result, spec: ReportSpec, phase: Phase, true: np.ndarray | None, believed: np.ndarray | None
+) -> float | None:
     if true is None or believed is None:
         return None
     rows = within(result.time, phase, spec.evaluate_after)

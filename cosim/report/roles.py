@@ -23,7 +23,9 @@ def estimate(result: Result, observer: str, signal: str) -> np.ndarray | None:
 
 
 def estimation_error(result: Result, spec: ReportSpec, observer: str, quantity: Quantity) -> np.ndarray | None:
-    """Estimate minus true value: speed [m/s] or position [m], shape (rows,), or None where one of them was not recorded."""
+    """Estimate minus true value: speed [m/s] or position [m], shape (rows,), or None where one of them was not
+    recorded.
+    """
     true = recorded(result, spec.true_speed if quantity == "speed" else spec.true_position)
     believed = estimate(result, observer, quantity)
     if true is None or believed is None:

@@ -1,4 +1,6 @@
-"""The roles of a result that was read back: as its summary tells them, or guessed from the names. Imports NumPy only."""
+"""The roles of a result that was read back: as its summary tells them, or guessed from the names. Imports NumPy
+only.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,8 @@ def spec_of(result: Result, fallback_title: str = "Co-simulation") -> ReportSpec
 
     Returns:
         The roles as they were stored, else from the names: an observer is a component with an ``innovation`` or a
-        ``slip_indicator`` beside a ``position`` or ``speed``; the plant is the first other component with both of these.
+        ``slip_indicator`` beside a ``position`` or ``speed``; the plant is the first other component with both of
+        these.
     """
     stored = mapping_entry(result, SPEC_ENTRY)
     title = result.summary.get("title")
@@ -50,7 +53,9 @@ def _stored(data: Mapping[str, Any], title: str) -> ReportSpec:
         **roles,
         observers=[str(name) for name in _list(data.get("observers"))],
         labels={name: str(text) for name, text in _mapping(data.get("labels")).items()},
-        phases=[Phase(str(p["name"]), float(p["start"]), float(p["end"])) for p in _list(data.get("phases")) if _is_phase(p)],
+        phases=[
+            Phase(str(p["name"]), float(p["start"]), float(p["end"])) for p in _list(data.get("phases")) if _is_phase(p)
+        ],
         zones=[(float(z[0]), float(z[1])) for z in _list(data.get("zones")) if _is_zone(z)],
         evaluate_after=_number(data.get("evaluate_after")),
         published=_numbers(data.get("published")),
@@ -90,7 +95,12 @@ def _number(value: Any) -> float:
 
 
 def _is_phase(value: Any) -> bool:
-    return isinstance(value, Mapping) and "name" in value and _is_number(value.get("start")) and _is_number(value.get("end"))
+    return (
+        isinstance(value, Mapping)
+        and "name" in value
+        and _is_number(value.get("start"))
+        and _is_number(value.get("end"))
+    )
 
 
 def _is_zone(value: Any) -> bool:

@@ -1,7 +1,8 @@
-"""The block of rows that a recorder fills, in memory that is a file: what is in it outlives the process, whatever ends that.
+"""The block of rows that a recorder fills, in memory that is a file: what is in it outlives the process, whatever ends
+that.
 
-The operating system keeps what was stored in a shared map also when the process is killed in the next instruction, so a row
-costs no call and none is lost. Touches only the file it is given.
+The operating system keeps what was stored in a shared map also when the process is killed in the next instruction, so a
+row costs no call and none is lost. Touches only the file it is given.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ class BlockFile:
     Args:
         path: of the file, which is made anew. rows: room. factors, offsets: of each column to SI, shape (width,).
 
-    `rows` is the block, shape (rows, width), in the units it is recorded in; `cells[COUNT]` says how many of its rows are
-    filled and `cells[FIRST]` which number in the whole table the first one has. Both are kept by whoever fills it.
+    `rows` is the block, shape (rows, width), in the units it is recorded in; `cells[COUNT]` says how many of its rows
+    are filled and `cells[FIRST]` which number in the whole table the first one has. Both are kept by whoever fills it.
 
     Raises:
         OSError: there is no space for it.

@@ -1,7 +1,7 @@
 """A result as a folder of files: table, events, messages, summary. Touches only the folder it is given.
 
-All files are written to a hidden folder beside their places first and moved there when they are complete: a full disk or a
-stopped program leaves the former files whole.
+All files are written to a hidden folder beside their places first and moved there when they are complete: a full disk
+or a stopped program leaves the former files whole.
 """
 
 from __future__ import annotations
@@ -48,10 +48,14 @@ def check_writable(directory: str | Path, formats: Sequence[str] = ()) -> Path:
         with tempfile.TemporaryFile(dir=folder) as file:
             file.write(b"results")
     except OSError as error:
-        raise OutputError(f"Results cannot be written to {folder}: {_reason(error)}. Choose another output folder.") from error
+        raise OutputError(
+            f"Results cannot be written to {folder}: {_reason(error)}. Choose another output folder."
+        ) from error
     for name in (*TABLES.values(), EVENTS, MESSAGES, SUMMARY):
         if (folder / name).is_dir():
-            raise OutputError(f"Results cannot be written to {folder}: {name} is a folder there. Choose another output folder.")
+            raise OutputError(
+                f"Results cannot be written to {folder}: {name} is a folder there. Choose another output folder."
+            )
     return folder
 
 
@@ -75,14 +79,15 @@ def write_results(result: Result, directory: str | Path, formats: Sequence[str] 
     Args:
         result: what to write.
         directory: the folder; created where it does not exist.
-        formats: formats of the table, any of ``csv``, ``mat``, ``npy``, ``parquet``, ``hdf5`` and ``modelica``. A table that an
-            earlier run left in another format is removed, since it would not belong to the other files.
+        formats: formats of the table, any of ``csv``, ``mat``, ``npy``, ``parquet``, ``hdf5`` and ``modelica``. A table
+            that an earlier run left in another format is removed, since it would not belong to the other files.
 
     Returns:
         Paths by what they hold: the formats, ``events``, ``messages``, ``summary``.
 
     Raises:
-        OutputError: a format is unknown or lacks a package, or a file cannot be written; former files are then still whole.
+        OutputError: a format is unknown or lacks a package, or a file cannot be written; former files are then still
+        whole.
     """
     check_formats(formats)
     folder = check_writable(directory)

@@ -16,9 +16,14 @@ from cosim.results.optional import optional_module
 from cosim.results.result import Result, SignalInfo
 
 EVENT_UNITS = {
-    "stamp": "s", "delivered_at": "s", "position": "m", "true_position": "m", "location_accuracy": "m",
-    "odometer_reading": "m/s", "time_bound": "s",
-}  # fmt: skip
+    "stamp": "s",
+    "delivered_at": "s",
+    "position": "m",
+    "true_position": "m",
+    "location_accuracy": "m",
+    "odometer_reading": "m/s",
+    "time_bound": "s",
+}
 
 
 def _chosen(result: Result, signals: Iterable[str] | None) -> list[SignalInfo]:
@@ -35,7 +40,8 @@ def to_pandas(result: Result, signals: Iterable[str] | None = None) -> Any:
         result: the result. signals: names of those wanted, in the order wanted; all by default.
 
     Returns:
-        `pandas.DataFrame`; ``attrs`` holds ``units``, ``display_units`` and ``descriptions`` by column, and ``failure``.
+        `pandas.DataFrame`; ``attrs`` holds ``units``, ``display_units`` and ``descriptions`` by column, and
+        ``failure``.
 
     Raises:
         KeyError: a signal was not recorded. OutputError: pandas is not installed.
@@ -74,8 +80,8 @@ def events_to_pandas(result: Result) -> Any:
         result: the result.
 
     Returns:
-        `pandas.DataFrame` with the columns of `cosim.results.result.BaliseRecord`, but a column ``outcome.NAME`` for each
-        receiver; ``attrs["units"]`` holds units by column.
+        `pandas.DataFrame` with the columns of `cosim.results.result.BaliseRecord`, but a column ``outcome.NAME`` for
+        each receiver; ``attrs["units"]`` holds units by column.
 
     Raises:
         OutputError: pandas is not installed.
@@ -92,8 +98,8 @@ def to_xarray(result: Result, signals: Iterable[str] | None = None) -> Any:
         result: the result. signals: names of those wanted; all by default.
 
     Returns:
-        `xarray.Dataset`: a variable each for the signals, with the attributes ``units`` (as the CF conventions call it),
-        ``long_name``, ``variability`` and, where there is one, ``display_unit``; the columns of the telegrams as
+        `xarray.Dataset`: a variable each for the signals, with the attributes ``units`` (as the CF conventions call
+        it), ``long_name``, ``variability`` and, where there is one, ``display_unit``; the columns of the telegrams as
         ``balise_stamp``, ``balise_position``, ...; ``failure`` as an attribute of the set.
 
     Raises:
@@ -102,7 +108,7 @@ def to_xarray(result: Result, signals: Iterable[str] | None = None) -> Any:
     xarray = optional_module("xarray", "frames", "Data sets")
     variables: dict[str, Any] = {
         s.name: ("time", np.array(result[s.name]), _attributes(s)) for s in _chosen(result, signals)
-    }  # fmt: skip
+    }
     for name, values in _event_columns(result).items():
         unit = {"units": EVENT_UNITS[name]} if name in EVENT_UNITS else {}
         variables[f"balise_{name}"] = ("event", values, unit)
@@ -121,8 +127,8 @@ def from_pandas(frame: Any) -> Result:
     """A result of a data frame whose index or column ``time`` is in seconds.
 
     Args:
-        frame: `pandas.DataFrame` of numbers; ``attrs["units"]`` and ``attrs["descriptions"]`` are used where they are. What is
-            not in SI units is converted.
+        frame: `pandas.DataFrame` of numbers; ``attrs["units"]`` and ``attrs["descriptions"]`` are used where they are.
+            What is not in SI units is converted.
 
     Raises:
         OutputError: there is no ``time``, it goes backwards, or a column holds no numbers.
@@ -133,9 +139,12 @@ def from_pandas(frame: Any) -> Result:
     units, descriptions = (frame.attrs.get(key, {}) for key in ("units", "descriptions"))
     columns = [_numbers(name, frame.iloc[:, place]) for place, name in enumerate(names)]
     return result_of_columns(
-        "the data frame", names, columns, {name: units.get(name) for name in names},
+        "the data frame",
+        names,
+        columns,
+        {name: units.get(name) for name in names},
         lambda name: SignalInfo(name, description=descriptions.get(name, "")),
-    )  # fmt: skip
+    )
 
 
 def _numbers(name: str, column: Any) -> np.ndarray:

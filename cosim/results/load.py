@@ -19,17 +19,18 @@ def load_result(path: str | Path) -> Result:
     """A result from a folder or a file; what kind of file it is is seen from what it holds.
 
     Args:
-        path: a results folder, one of the tables in it (units, telegrams and summary are then taken from the folder), or a
-            table by itself: CSV of ours, of fmpy, OpenModelica, Dymola, FMI-LS-REF or a spreadsheet; MATLAB; Modelica
-            trajectories (MAT, version 4); NumPy; Parquet; HDF5. Beside ``NAME.csv`` and ``NAME.npy``, telegrams are read from
-            ``NAME.events.csv`` where it exists.
+        path: a results folder, one of the tables in it (units, telegrams and summary are then taken from the folder),
+            or a table by itself: CSV of ours, of fmpy, OpenModelica, Dymola, FMI-LS-REF or a spreadsheet; MATLAB;
+            Modelica trajectories (MAT, version 4); NumPy; Parquet; HDF5. Beside ``NAME.csv`` and ``NAME.npy``,
+            telegrams are read from ``NAME.events.csv`` where it exists.
 
     Returns:
-        The result in SI units. ``summary["file"]`` and ``summary["events_recorded"]`` say where a single table came from and
-        whether telegrams were kept with it.
+        The result in SI units. ``summary["file"]`` and ``summary["events_recorded"]`` say where a single table came
+        from and whether telegrams were kept with it.
 
     Raises:
-        OutputError: nothing is there, or it cannot be read; the message names the file and the line, and what was expected.
+        OutputError: nothing is there, or it cannot be read; the message names the file and the line, and what was
+        expected.
     """
     source = Path(path)
     if source.is_dir():
@@ -49,7 +50,9 @@ def load_result(path: str | Path) -> Result:
         raise OutputError(f"{source} cannot be read: {error.strerror or error}.") from error
     except Exception as error:  # whatever a broken file leads the libraries into that read it
         text = str(error)
-        raise OutputError(text if str(source) in text else f"{source} cannot be read: {text or type(error).__name__}.") from error
+        raise OutputError(
+            text if str(source) in text else f"{source} cannot be read: {text or type(error).__name__}."
+        ) from error
 
 
 def _folder(folder: Path) -> Result:
@@ -57,7 +60,9 @@ def _folder(folder: Path) -> Result:
         return read_results(folder)
     tables = [name for name in TABLES.values() if (folder / name).is_file()]
     if tables:
-        raise OutputError(f"{folder} is not a results folder: {SUMMARY} is missing. For the table alone: {folder / tables[0]}.")
+        raise OutputError(
+            f"{folder} is not a results folder: {SUMMARY} is missing. For the table alone: {folder / tables[0]}."
+        )
     raise OutputError(f"{folder} is not a results folder: it holds neither {SUMMARY} nor a table. {_holds(folder)}")
 
 
@@ -90,7 +95,9 @@ def _reader(path: Path) -> Callable[[Path], Result]:
     elif start.startswith(b"MATLAB") or path.suffix.lower() == ".mat":
         from cosim.results.formats.foreign_mat import read_foreign_mat as read  # noqa: PLC0415
     elif start.startswith((b"PK\x03\x04", b"\x1f\x8b")):
-        raise OutputError(f"{path} is an archive (FMU, spreadsheet, zip or gzip), not a table. Unpack it, or export it as CSV.")
+        raise OutputError(
+            f"{path} is an archive (FMU, spreadsheet, zip or gzip), not a table. Unpack it, or export it as CSV."
+        )
     else:
         from cosim.results.formats.foreign_csv import read_foreign_csv as read  # noqa: PLC0415
     return read

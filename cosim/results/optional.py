@@ -13,7 +13,8 @@ def optional_module(name: str, extra: str, purpose: str) -> Any:
     """Import a package that comes with an extra of ours.
 
     Args:
-        name: of the module, e.g. ``pyarrow.parquet``. extra: of ours that brings it. purpose: what needs it, for the message.
+        name: of the module, e.g. ``pyarrow.parquet``. extra: of ours that brings it. purpose: what needs it, for the
+        message.
 
     Raises:
         OutputError: it is not installed; the message says what to install.
@@ -22,7 +23,9 @@ def optional_module(name: str, extra: str, purpose: str) -> Any:
         return import_module(name)
     except ImportError as error:
         package = name.partition(".")[0]
-        raise OutputError(f"{purpose} need the package {package} ({error}): pip install 'fmu-observer[{extra}]'.") from error
+        raise OutputError(
+            f"{purpose} need the package {package} ({error}): pip install 'fmu-observer[{extra}]'."
+        ) from error
 
 
 def is_installed(name: str) -> bool:

@@ -1,7 +1,8 @@
-"""The recorder: rows of values in memory and, past a stated size, in a file that nobody else sees. Touches no other file.
+"""The recorder: rows of values in memory and, past a stated size, in a file that nobody else sees. Touches no other
+file.
 
-Rows are copied once and never looked up. What does not fit into the stated memory goes to a `RowFile` block by block, so that
-a run of any length needs no more memory than that.
+Rows are copied once and never looked up. What does not fit into the stated memory goes to a `RowFile` block by block,
+so that a run of any length needs no more memory than that.
 """
 
 from __future__ import annotations
@@ -49,19 +50,25 @@ class Recorder:
         memory: rows stay in memory up to this size; beyond it they stream to a file [bytes].
         folder: where that file is; by default the one for large temporary files. It has no name there, and is
             gone with the recorder and its table whatever happens to the program.
-        every: keep each `every`-th communication point only, counted from the first. The last point, rows of events, and the
-            point that follows an event are always kept.
-        stream: writes rows where others see them while the run goes on, block by block and whenever its `seconds` have passed;
-            in memory is then no more than a block.
+        every: keep each `every`-th communication point only, counted from the first. The last point, rows of events,
+            and the point that follows an event are always kept.
+        stream: writes rows where others see them while the run goes on, block by block and whenever its `seconds` have
+            passed; in memory is then no more than a block.
 
-    `count` is the number of rows that are kept. Of a stream the block is first one row and is doubled whenever it is full, so
-    that a run that dies at once leaves whole files as well.
+    `count` is the number of rows that are kept. Of a stream the block is first one row and is doubled whenever it is
+    full, so that a run that dies at once leaves whole files as well.
     """
 
     def __init__(
-        self, signals: Sequence[SignalInfo], expected_rows: int, *, memory: float = MEMORY, folder: str | Path | None = None,
-        every: int = 1, stream: Stream | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        signals: Sequence[SignalInfo],
+        expected_rows: int,
+        *,
+        memory: float = MEMORY,
+        folder: str | Path | None = None,
+        every: int = 1,
+        stream: Stream | None = None,
+    ) -> None:
         self._dtype = table_dtype(["time", *(s.name for s in signals)])
         self._width = len(signals) + 1
         self._limit = max(int(memory // self._dtype.itemsize), FIRST_ROWS)
@@ -74,7 +81,8 @@ class Recorder:
         self.count = self._first = 0  # `_first`: first row of the block in memory; all before it are in the file
         self._seconds, self._due = inf, inf  # when rows are to be brought into the file at the latest [s]
         self._block: BlockFile | None = None
-        self._filled: Any = [0, 0]  # first row and rows of the block, kept where they outlive the process if it is a stream's
+        # first row and rows of the block, kept where they outlive the process if it is a stream's
+        self._filled: Any = [0, 0]
         if stream is None:
             self._use(np.empty((min(max(expected_rows // every + 1, FIRST_ROWS), self._limit), self._width)))
             return
@@ -87,7 +95,8 @@ class Recorder:
 
     @property
     def count_address(self) -> int | None:
-        """Where somebody who fills a `block` may say with each row how many are filled in all; None where nobody reads it.
+        """Where somebody who fills a `block` may say with each row how many are filled in all; None where nobody reads
+        it.
 
         They are counted from `block_start`.
         """
@@ -113,12 +122,15 @@ class Recorder:
         self._skipping = True
 
     def add_event(self, t: float, values: np.ndarray) -> None:
-        """Copy the row of an event within a step or at its end; it is kept whatever `every` says. Otherwise as `add`."""
+        """Copy the row of an event within a step or at its end; it is kept whatever `every` says. Otherwise as
+        `add`.
+        """
         self._append(t, values)
         self._after_event, self._skipping = True, False
 
     def block(self, rows: int) -> np.ndarray:
-        """Free rows to be filled by somebody else, who says with `commit` how many of them are communication points now.
+        """Free rows to be filled by somebody else, who says with `commit` how many of them are communication points
+        now.
 
         Args:
             rows: how many are wanted, at least 1.
@@ -152,7 +164,8 @@ class Recorder:
     def table(self) -> np.ndarray:
         """The rows as a structured array, shape (rows,), ``time`` first.
 
-        It is the recorder's own memory or, past the stated size, a map of its file of which only the pages in use are in memory:
+        It is the recorder's own memory or, past the stated size, a map of its file of which only the pages in use are
+        in memory:
         what is changed in the table is changed in the recorder.
         """
         if self._skipping:

@@ -42,7 +42,7 @@ class BaliseRecord:
         position: position told [m].
         true_position: position of the plant at the stamp [m].
         location_accuracy: Q_LOCACC told [m].
-        odometer_reading: odometer output at the passing [m/s], NaN without an odometer.
+        odometer_reading: odometer output at the crossing [m/s], NaN without an odometer.
         kind: ``true``, ``missed`` (read by nobody) or ``false`` (told, but no balise is there).
         method: localisation method that gave the stamp.
         time_bound: bound or estimate of the stamp's error [s], NaN where it is not known.
@@ -69,7 +69,8 @@ class Result:
 
     Args:
         table: structured array, first field ``time`` [s], then one float64 field ``component.signal`` for each recorded
-            signal. A row labelled t holds the values at t; an event gives two rows with the same time, before and after.
+            signal. A row labelled t holds the values at t; an event gives two rows with the same time, before and
+            after.
         signals: what each column is, in column order, without ``time``.
         events: the balise telegrams in order of delivery.
         summary: versions, parameters, certificates, methods, wall times, warnings; JSON-able.

@@ -1,4 +1,6 @@
-"""A file of rows; without a name it vanishes with its last user, however that one ends. Touches only the folder it is given."""
+"""A file of rows; without a name it vanishes with its last user, however that one ends. Touches only the folder it is
+given.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,8 @@ ZEROS = bytes(1 << 20)
 
 
 class RowFile:
-    """Rows of a fixed size on disk. Space is reserved before rows are accepted, so that what was accepted can be written.
+    """Rows of a fixed size on disk. Space is reserved before rows are accepted, so that what was accepted can be
+    written.
 
     Args:
         folder: where the file is; None for the one for large temporary files.
@@ -35,7 +38,7 @@ class RowFile:
 
     def __init__(
         self, folder: str | Path | None, row_bytes: int, rows: int, named: Path | None = None, offset: int = 0
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._row_bytes, self._offset = row_bytes, offset
         self._folder = named.parent if named is not None else Path(folder or _folder_for_large_files())
         self.count = self._reserved = 0
@@ -87,8 +90,10 @@ class RowFile:
     def _explained(self, error: OSError) -> OutputError:
         reason = error.strerror or str(error)
         return OutputError(
-            f"The recording outgrew its memory and cannot continue on disk, in {self._folder}: {reason}. What was recorded so "
-            "far is kept. Free the disk, choose another folder (the environment variable TMPDIR), or record less (record_every)."
+            f"The recording outgrew its memory and cannot continue on disk, in {self._folder}: {reason}. What was "
+            f"recorded so "
+            "far is kept. Free the disk, choose another folder (the environment variable TMPDIR), or record less "
+            "(record_every)."
         )
 
 

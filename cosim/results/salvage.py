@@ -19,8 +19,8 @@ def salvage(note: Mapping[str, Any], reason: str) -> str:
     """Keep what was computed.
 
     Args:
-        note: ``spare``: the folder that was streamed to; ``out``: that of the results, perhaps the same; ``formats`` of its
-            table. reason: why the run ended.
+        note: ``spare``: the folder that was streamed to; ``out``: that of the results, perhaps the same; ``formats`` of
+            its table. reason: why the run ended.
 
     Returns:
         What to tell the user.

@@ -12,9 +12,32 @@ from plant_models.hybrid.units import BASE_SYMBOLS, Unit, UnitError, parse_unit
 
 NAMED = {
     parse_unit(name).exponents: name
-    for name in ("1", "m", "m/s", "m/s2", "m/s3", "kg", "kg.m2", "s", "1/s", "K", "A", "rad", "rad/s", "rad/s2", "N", "J", "W",
-                 "Pa", "V", "N/m", "N.s/m", "N.s2/m2", "kg/s")
-}  # fmt: skip
+    for name in (
+        "1",
+        "m",
+        "m/s",
+        "m/s2",
+        "m/s3",
+        "kg",
+        "kg.m2",
+        "s",
+        "1/s",
+        "K",
+        "A",
+        "rad",
+        "rad/s",
+        "rad/s2",
+        "N",
+        "J",
+        "W",
+        "Pa",
+        "V",
+        "N/m",
+        "N.s/m",
+        "N.s2/m2",
+        "kg/s",
+    )
+}
 
 CHUNK = 65536  # rows converted at a time: a table may be larger than the memory
 UnitOf = Callable[[str], Unit | None]

@@ -1,8 +1,8 @@
 """The stream: the results folder of a run that is still going on, so that what was computed outlives the program.
 
-``table.npy`` is a whole NumPy file after every flush: rows are written first, their number in its header afterwards. Rows are
-in SI. Those since the last flush are in the block, a file as well. Telegrams are appended, messages are few and written anew.
-Until the run ends ``summary.json`` says that it has not. Touches only the folder it is given.
+``table.npy`` is a whole NumPy file after every flush: rows are written first, their number in its header afterwards.
+Rows are in SI. Those since the last flush are in the block, a file as well. Telegrams are appended, messages are few
+and written anew. Until the run ends ``summary.json`` says that it has not. Touches only the folder it is given.
 """
 
 from __future__ import annotations
@@ -41,7 +41,8 @@ class Stream:
 
     Args:
         directory: the folder; results that a former run left there are removed.
-        signals: what is recorded, in the components' own units. unit_of: the unit of a column, None where there is none.
+        signals: what is recorded, in the components' own units. unit_of: the unit of a column, None where there is
+        none.
         summary: what is known before the run.
         events: the telegrams so far, which only grow. logs: what the components have logged so far.
 
@@ -52,9 +53,14 @@ class Stream:
     """
 
     def __init__(
-        self, directory: str | Path, signals: Sequence[SignalInfo], unit_of: UnitOf, summary: Mapping[str, Any],
-        events: Callable[[], Sequence[BaliseRecord]], logs: Sequence[MessageLog],
-    ) -> None:  # fmt: skip
+        self,
+        directory: str | Path,
+        signals: Sequence[SignalInfo],
+        unit_of: UnitOf,
+        summary: Mapping[str, Any],
+        events: Callable[[], Sequence[BaliseRecord]],
+        logs: Sequence[MessageLog],
+    ) -> None:
         self.seconds = SECONDS
         self.directory = check_writable(directory)
         self.units = foreign_units(signals, unit_of)
@@ -81,8 +87,10 @@ class Stream:
             OutputError: there is no space.
         """
         units = [self.units.get(signal.name) for signal in self.signals]
-        factors, offsets = ([neutral, *(neutral if u is None else getattr(u, name) for u in units)]
-                            for neutral, name in ((1.0, "factor"), (0.0, "offset")))  # fmt: skip
+        factors, offsets = (
+            [neutral, *(neutral if u is None else getattr(u, name) for u in units)]
+            for neutral, name in ((1.0, "factor"), (0.0, "offset"))
+        )
         try:
             self._block = BlockFile(self.directory / BLOCK_FILE, rows, np.array(factors), np.array(offsets))
         except OSError as error:
@@ -117,14 +125,22 @@ class Stream:
             self._block.remove()
 
     def _begin(self, summary: Mapping[str, Any]) -> None:
-        """An empty result that says it has not ended; while its parts are brought together the folder has no summary."""
+        """An empty result that says it has not ended; while its parts are brought together the folder has no
+        summary.
+        """
         folder = self.directory
         try:
             for name in (SUMMARY, "report.html", BLOCK_FILE, *TABLES.values()):
                 (folder / name).unlink(missing_ok=True)
             write_events(folder / EVENTS, ())
             write_messages(folder / MESSAGES, ())
-            content = {"layout": LAYOUT, "ended": False, "failure": EXPLAINED, "signals": self.signals, "summary": dict(summary)}
+            content = {
+                "layout": LAYOUT,
+                "ended": False,
+                "failure": EXPLAINED,
+                "signals": self.signals,
+                "summary": dict(summary),
+            }
             write_summary(folder / SUMMARY, content)
         except OSError as error:
             raise OutputError(f"Results cannot be streamed to {folder}: {error.strerror or error}.") from error
@@ -171,7 +187,9 @@ class _StreamFile(RowFile):
         self._reserved = 0
 
     def _make_whole(self) -> None:
-        """What goes with the rows. The rows are safe by now: what the disk refuses here ends the run before it takes more."""
+        """What goes with the rows. The rows are safe by now: what the disk refuses here ends the run before it takes
+        more.
+        """
         try:
             if monotonic() - self._synced > SYNC_SECONDS:
                 os.fsync(self._file.fileno())
@@ -184,7 +202,8 @@ class _StreamFile(RowFile):
 
     def _explained(self, error: OSError) -> OutputError:
         return OutputError(
-            f"The run cannot be streamed to {self._folder} any further: {error.strerror or error}. What was recorded so far is "
+            f"The run cannot be streamed to {self._folder} any further: {error.strerror or error}. What was recorded "
+            f"so far is "
             "kept. Free the disk, choose another folder, or record less (record_every)."
         )
 

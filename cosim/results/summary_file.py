@@ -29,8 +29,8 @@ def jsonable(value: Any) -> Any:
     """`value` in JSON's own types.
 
     Args:
-        value: any nesting of mappings, sequences, dataclasses, enumerations, NumPy scalars and arrays; whatever is none of
-            these is written as its text.
+        value: any nesting of mappings, sequences, dataclasses, enumerations, NumPy scalars and arrays; whatever is none
+            of these is written as its text.
 
     Returns:
         Dictionaries with text keys, lists, strings, integers, finite floats, booleans and None.

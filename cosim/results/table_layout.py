@@ -33,7 +33,9 @@ def column_names(table: np.ndarray) -> tuple[str, ...]:
     """
     names = table.dtype.names
     if not names or names[0] != "time" or table.ndim != 1:
-        raise ValueError(f"A result table is a structured array of shape (rows,) whose first field is 'time'; got {table.dtype}.")
+        raise ValueError(
+            f"A result table is a structured array of shape (rows,) whose first field is 'time'; got {table.dtype}."
+        )
     for name in names:
         if table.dtype[name] != np.float64:
             raise ValueError(f"Column {name!r} of a result table must be float64; got {table.dtype[name]}.")

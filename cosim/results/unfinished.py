@@ -19,7 +19,8 @@ SPARE = ".unfinished"
 
 DID_NOT_END = "the run did not end"
 EXPLAINED = (
-    f"{DID_NOT_END}: it is still going on, or its program was stopped from outside or taken along by an FMU. The rows are those "
+    f"{DID_NOT_END}: it is still going on, or its program was stopped from outside or taken along by an FMU. The rows "
+    f"are those "
     "written until then."
 )
 
@@ -36,14 +37,18 @@ def read_unfinished(table: Path, events: Path, messages: Path, content: dict[str
     rows = _all_rows(table)
     reached = float(rows["time"][-1]) if len(rows) else None
     content["summary"] |= {"reached": reached, "rows": len(rows)}
-    content["failure"] = f"{content['failure']} They " + ("are none." if reached is None else f"end at t = {reached:g} s.")
+    content["failure"] = f"{content['failure']} They " + (
+        "are none." if reached is None else f"end at t = {reached:g} s."
+    )
     signals = [SignalInfo(**signal) for signal in content["signals"]]
     logged = read_messages(messages) if messages.exists() else []
     return Result(rows, signals, _whole_lines(events), messages=logged)
 
 
 def _all_rows(table: Path) -> np.ndarray:
-    """The rows of the table and those of the block, which may be on their way from one to the other while this is read."""
+    """The rows of the table and those of the block, which may be on their way from one to the other while this is
+    read.
+    """
     path = table.with_name(BLOCK_FILE)
     block = read_block(path) if path.exists() else None
     rows = read_grown(table)

@@ -1,4 +1,6 @@
-"""Warnings after a run: what became of telegrams, what components logged and changed for the whole program. Changes nothing."""
+"""Warnings after a run: what became of telegrams, what components logged and changed for the whole program. Changes
+nothing.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,8 @@ def warnings_after(
     """Texts that warn of what happened on the way.
 
     Args:
-        components: by name. telegrams: everything that was passed. changed_in_steps: what FMUs changed for the whole program.
+        components: by name. telegrams: everything that was passed. changed_in_steps: what FMUs changed for the whole
+        program.
     """
     yield from _trespasses(components, changed_in_steps)
     for name, component in components.items():

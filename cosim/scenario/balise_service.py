@@ -1,4 +1,4 @@
-"""The balise service of a run: who is watched, how passings are found, who is told."""
+"""The balise service of a run: who is watched, how crossings are found, who is told."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Any
 from cosim.balises.delivery import Receiver
 from cosim.balises.localise import Localiser, Method, choose, make_localiser
 from cosim.balises.plant_error import PlantError
+from cosim.balises.plant_monitor import PlantMonitor
 from cosim.balises.recorded import RecordedChannel, RecordedLayout, RecordedLocaliser
 from cosim.balises.service import BaliseService
 from cosim.balises.telegram import Channel, FalseTelegram
-from cosim.balises.watch import Watch
 from cosim.components.component import Component
 from cosim.components.recording import KIND as RECORDING
 from cosim.coupling.connection import SOURCES, split_name
@@ -66,13 +66,15 @@ def find_receivers(table: BalisesTable, components: Mapping[str, Component], pla
     for name in table.receivers:
         if name not in able:
             raise ScenarioError(
-                f"{where}: balises.receivers: {name!r} declares no event '{BALISE_EVENT}'; these do: {', '.join(able) or 'none'}."
+                f"{where}: balises.receivers: {name!r} declares no event '{BALISE_EVENT}'; these do: "
+                f"{', '.join(able) or 'none'}."
             )
     return table.receivers
 
 
 def watched_plant(table: BalisesTable, components: Mapping[str, Component], where: str) -> str:
-    """Name of the component whose position finds the balises; of recorded telegrams, for which none is needed, of a recording.
+    """Name of the component whose position finds the balises; of recorded telegrams, for which none is needed, of a
+    recording.
 
     Raises:
         ScenarioError: position and speed are not of one component, or are neither outputs nor locals.
@@ -87,7 +89,9 @@ def watched_plant(table: BalisesTable, components: Mapping[str, Component], wher
     plant, _ = split_name(table.position, components, f"{where}: balises.position")
     other, _ = split_name(table.speed, components, f"{where}: balises.speed")
     if plant != other:
-        raise ScenarioError(f"{where}: balises.position and balises.speed must be of one component, got {plant} and {other}.")
+        raise ScenarioError(
+            f"{where}: balises.position and balises.speed must be of one component, got {plant} and {other}."
+        )
     return _checked(table, plant, components, where, "position", "speed", "odometer")
 
 
@@ -102,9 +106,13 @@ def _checked(table: BalisesTable, plant: str, components: Mapping[str, Component
 
 
 def choose_method(
-    table: BalisesTable, component: Component, make: Callable[[], Component], starts: Mapping[str, Any],
-    start: float, step: float,
-) -> Choice:  # fmt: skip
+    table: BalisesTable,
+    component: Component,
+    make: Callable[[], Component],
+    starts: Mapping[str, Any],
+    start: float,
+    step: float,
+) -> Choice:
     """The localisation method: asked for, or the best that the probed plant allows.
 
     Args:
@@ -114,7 +122,8 @@ def choose_method(
     if table.layout == "recorded":
         return Choice("recorded", AS_RECORDED)
     asked: Method | None = None if table.method == "auto" else table.method
-    if asked is not None and asked in UNTOUCHED and component.tolerance is None:  # a tolerance tells of a solver: it is looked at
+    # a tolerance tells of a solver: it is looked at
+    if asked is not None and asked in UNTOUCHED and component.tolerance is None:
         return Choice(asked, ASKED_FOR, error=plant_error(table, asked, component, start))
     if component.kind == RECORDING:
         return Choice("rollback", PLAYED_BACK) if asked is None else Choice(asked, ASKED_FOR)
@@ -124,7 +133,8 @@ def choose_method(
     choice = Choice(method, why, report, error=plant_error(table, method, component, start, report))
     if asked is not None and choice.error.unknown:
         choice.warnings.append(
-            f"balises.method = '{asked}' although the probe of '{component.name}' advises '{chosen}': {reason}. How far the "
+            f"balises.method = '{asked}' although the probe of '{component.name}' advises '{chosen}': {reason}. How "
+            f"far the "
             f"instants are off is unknown (time_bound = nan): {choice.error.unknown}."
         )
     return choice
@@ -151,7 +161,9 @@ def plant_error(
 
 
 def _why_unknown(method: Method, report: ProbeReport | None, position: str, tolerance: float) -> str:
-    """Why nothing can be said of the plant's own error, if so; arguments as for `plant_error`, the position by its own name."""
+    """Why nothing can be said of the plant's own error, if so; arguments as for `plant_error`, the position by its own
+    name.
+    """
     if method == "early-return" and not tolerance:
         return "the plant itself says when it passed, and knows of no tolerance"
     if report is None or method in UNTOUCHED:
@@ -170,11 +182,11 @@ def make_service(
     """Everything about balises for the master."""
     planned = plan.find(plant)
     first = planned.columns.start
-    watch = Watch(planned, 0, 0)  # where telegrams are recorded nobody looks at them
+    watch = PlantMonitor(planned, 0, 0)  # where telegrams are recorded nobody looks at them
     if table.position is not None and table.speed is not None:
         position, speed = (plan.column(name) - first for name in (table.position, table.speed))
         scales = [_scale(planned.component, name, unit) for name, unit in ((table.position, "m"), (table.speed, "m/s"))]
-        watch = Watch(planned, position, speed, *scales)
+        watch = PlantMonitor(planned, position, speed, *scales)
     watch.error = choice.error
     localiser, channel = _sources(table, layout, watch, choice.method)
     told = [Receiver(plan.find(name), BALISE_EVENT, table.timing) for name in receivers]
@@ -182,8 +194,8 @@ def make_service(
     return BaliseService(localiser, channel, told, odometer, first + watch.position_column)
 
 
-def _sources(table: BalisesTable, layout: Layout, watch: Watch, method: Method) -> tuple[Localiser, Channel]:
-    """Who finds the passings, and what happens to the telegrams."""
+def _sources(table: BalisesTable, layout: Layout, watch: PlantMonitor, method: Method) -> tuple[Localiser, Channel]:
+    """Who finds the crossings, and what happens to the telegrams."""
     if isinstance(layout, RecordedLayout):
         return RecordedLocaliser(watch, layout), RecordedChannel(records=layout.records)
     channel = Channel(

@@ -73,7 +73,8 @@ def check_certificates(
     """Certificates of all observers that offer one.
 
     Args:
-        components: tables of the balise receivers by name. gap: what to expect. mode: ``warn``, ``require`` or ``ignore``.
+        components: tables of the balise receivers by name. gap: what to expect. mode: ``warn``, ``require`` or
+        ``ignore``.
 
     Returns:
         Certificates by component as plain data, and warnings.
@@ -89,7 +90,8 @@ def check_certificates(
         system = make_system(table, where)
         if not hasattr(system, "certify"):
             warnings.append(
-                f"{name}: not checked against the balise gaps; an FMU or a model without certificate cannot tell its limit."
+                f"{name}: not checked against the balise gaps; an FMU or a model without certificate cannot tell its "
+                f"limit."
             )
             continue
         certificates[name], doubt = _judge(name, table, system, gap)
@@ -105,7 +107,8 @@ def _judge(name: str, table: ComponentTable, system: Any, gap: ExpectedGap) -> t
     in_use = {"parameters": given_parameters(table), "preset": table.preset}
     certificate = system.certify(asked, **in_use)
     if gap.seconds is None and gap.distance is not None and certificate.aperiodic_limit == inf:
-        certificate = system.certify(max(asked, gap.distance / WALKING), **in_use)  # no limit so far: ask for gaps like these
+        # no limit so far: ask for gaps like these
+        certificate = system.certify(max(asked, gap.distance / WALKING), **in_use)
         if certificate.holds:
             return certificate.to_dict() | {"explanation": certificate.explain()}, []
     data: dict[str, Any] = certificate.to_dict() | {"explanation": certificate.explain()}
@@ -130,11 +133,14 @@ def _other_spacing(name: str, table: ComponentTable, system: Any, gap: ExpectedG
     values = system.unpack_parameters(parameter_values(system, given_parameters(table), table.preset))
     expected, error = float(values.expected_spacing), float(values.assumed_spacing_error)
     shortest, longest = gap.spacings
-    within = expected * (1.0 - error) <= shortest * (1.0 + ROUNDING) and longest <= expected * (1.0 + error) * (1.0 + ROUNDING)
+    within = expected * (1.0 - error) <= shortest * (1.0 + ROUNDING) and longest <= expected * (1.0 + error) * (
+        1.0 + ROUNDING
+    )
     if within or system.options.get("spacing") == "learnt":
         return []
     return [
-        f"{name}: expects balises every {expected:g} m within {100.0 * error:g} %, but the layout has them {shortest:g} to "
+        f"{name}: expects balises every {expected:g} m within {100.0 * error:g} %, but the layout has them "
+        f"{shortest:g} to "
         f"{longest:g} m apart; set expected_spacing and assumed_spacing_error, or let it learn the spacing."
     ]
 

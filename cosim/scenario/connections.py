@@ -15,8 +15,8 @@ BETWEEN_TARGETS = re.compile(r",(?![^\[\]]*\])")
 
 
 def parse_connections(items: Iterable[str | ConnectionTable], where: str) -> list[Link]:
-    """Links (source, target) from lines such as ``driver.effort -> locomotive.effort, observer.effort``, with a transformation
-    from tables.
+    """Links (source, target) from lines such as ``driver.effort -> locomotive.effort, observer.effort``, with a
+    transformation from tables.
 
     Raises:
         ScenarioError: a line has no arrow or an empty side.
@@ -29,7 +29,9 @@ def parse_connections(items: Iterable[str | ConnectionTable], where: str) -> lis
         source, arrow, targets = (part.strip() for part in item.partition("->"))
         names = [target.strip() for target in BETWEEN_TARGETS.split(targets)]
         if not arrow or not source or not all(names):
-            raise ScenarioError(f"{where}: connections, line {number}: {item!r} is not 'source.signal -> target.signal'.")
+            raise ScenarioError(
+                f"{where}: connections, line {number}: {item!r} is not 'source.signal -> target.signal'."
+            )
         links += [(source, name) for name in names]
     return links
 

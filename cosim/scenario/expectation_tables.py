@@ -77,12 +77,16 @@ class SignalExpectation(WindowExpectation):
         if self.min is not None and self.max is not None and self.min > self.max:
             raise ValueError(f"'min' ({self.min:g}) lies above 'max' ({self.max:g})")
         if self.final is not None and self.final[0] > self.final[1]:
-            raise ValueError(f"'final': the lowest value ({self.final[0]:g}) lies above the highest ({self.final[1]:g})")
+            raise ValueError(
+                f"'final': the lowest value ({self.final[0]:g}) lies above the highest ({self.final[1]:g})"
+            )
         return self
 
 
 class OnExpectation(Expectation):
-    """An indicator is on at a time at the latest, from the start of the window on; one that is on there already is on in time."""
+    """An indicator is on at a time at the latest, from the start of the window on; one that is on there already is on
+    in time.
+    """
 
     check: Literal["on"]
     signal: str
@@ -106,7 +110,9 @@ class OffExpectation(WindowExpectation):
 
 
 class TelegramsExpectation(WindowExpectation):
-    """So many balise telegrams at most were missed, false, rejected, late or undelivered; so many at least were used."""
+    """So many balise telegrams at most were missed, false, rejected, late or undelivered; so many at least were
+    used.
+    """
 
     check: Literal["telegrams"]
     of: Name | None = None

@@ -1,4 +1,6 @@
-"""Includes: a scenario file merged with the files it builds on, and where each of its values stands. Reads TOML files."""
+"""Includes: a scenario file merged with the files it builds on, and where each of its values stands. Reads TOML
+files.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +49,8 @@ def attribute(message: str, where: str, places: Mapping[Key, str]) -> str:
     """A message with the file in which the fault stands, where that is not the file that was loaded.
 
     Args:
-        message: lines such as ``my.toml: components.plant.fmu: ...``. where: the file that was loaded. places: see `Tables`.
+        message: lines such as ``my.toml: components.plant.fmu: ...``. where: the file that was loaded. places: see
+        `Tables`.
     """
     head = f"{where}: "
     lines = [line.removeprefix(head) if line.startswith(head) else None for line in message.split("\n")]
@@ -99,7 +102,8 @@ def read_tables(path: Path, chain: Sequence[Path] = ()) -> Tables:
         path: of the file. chain: the files that include it, outermost first.
 
     Raises:
-        ScenarioError: a file is missing or is not TOML, files include one another in a circle, something is to be removed that
+        ScenarioError: a file is missing or is not TOML, files include one another in a circle, something is to be
+        removed that
             is not there, or an override has no target.
     """
     if path.resolve() in [file.resolve() for file in chain]:
@@ -131,14 +135,18 @@ def _read(path: Path, chain: Sequence[Path]) -> dict[str, Any]:
 def _listed(given: Any, path: Path) -> list[str]:
     names = [given] if isinstance(given, str) else given
     if not isinstance(names, list) or not all(isinstance(name, str) and name for name in names):
-        raise ScenarioError(f"{path}: include: expected a list of files and names of shipped scenarios (got {given!r}).")
+        raise ScenarioError(
+            f"{path}: include: expected a list of files and names of shipped scenarios (got {given!r})."
+        )
     return names
 
 
 def _included(name: str, by: Path, chain: Sequence[Path]) -> Tables:
     """The tables of an included file, its paths absolute."""
     if is_package(name):
-        raise ScenarioError(f"{by}: include: {name} is a system structure package; only scenario files can be included.")
+        raise ScenarioError(
+            f"{by}: include: {name} is a system structure package; only scenario files can be included."
+        )
     try:
         file = find_file(name, by.parent)
     except ScenarioError as error:

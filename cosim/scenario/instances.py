@@ -1,4 +1,6 @@
-"""Instances: FMUs that may be instantiated only once in a process are not used twice. Reads descriptions, loads nothing."""
+"""Instances: FMUs that may be instantiated only once in a process are not used twice. Reads descriptions, loads
+nothing.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,9 @@ def check_instances(files: Mapping[str, Path], where: str) -> None:
         identity = (description.coSimulation.modelIdentifier, str(description.guid))
         if identity in first:
             raise CouplingError(
-                f"{where}: components {first[identity]!r} and {name!r} are the same FMU ({path.name}), which can be instantiated "
-                "only once per process (canBeInstantiatedOnlyOncePerProcess). Ask its vendor for one without this limit."
+                f"{where}: components {first[identity]!r} and {name!r} are the same FMU ({path.name}), which can be "
+                f"instantiated "
+                "only once per process (canBeInstantiatedOnlyOncePerProcess). Ask its vendor for one without this "
+                "limit."
             )
         first[identity] = name

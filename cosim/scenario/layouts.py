@@ -13,15 +13,23 @@ from cosim.scenario.tables import BalisesTable
 
 Layout = TrackLayout | InstantLayout | RecordedLayout
 TOLD_AS_RECORDED = (
-    "latency", "latency_jitter", "missed_fraction", "missed", "position_noise", "false_telegrams", "location_accuracy", "clock",
-)  # fmt: skip
+    "latency",
+    "latency_jitter",
+    "missed_fraction",
+    "missed",
+    "position_noise",
+    "false_telegrams",
+    "location_accuracy",
+    "clock",
+)
 
 
 def make_layout(table: BalisesTable, start: float, stop: float, folder: Path, where: str) -> Layout:
     """The balise layout of a scenario.
 
     Args:
-        table: its balise table. start, stop: of the run [s]. folder: start of relative paths. where: place for messages.
+        table: its balise table. start, stop: of the run [s]. folder: start of relative paths. where: place for
+        messages.
 
     Raises:
         ScenarioError: with file and key.
@@ -29,11 +37,15 @@ def make_layout(table: BalisesTable, start: float, stop: float, folder: Path, wh
     for false in table.false_telegrams:
         if not start < false.time <= stop:
             raise ScenarioError(
-                f"{where}: balises.false_telegrams: {false.time:g} s lies outside the run from {start:g} s to {stop:g} s."
+                f"{where}: balises.false_telegrams: {false.time:g} s lies outside the run from {start:g} s to {stop:g} "
+                f"s."
             )
     try:
         if table.layout == "aperiodic":
-            gaps = {k: getattr(table, k) for k in ("min_gap", "max_gap", "dropout_after", "dropout_fraction", "dropout_stretch")}
+            gaps = {
+                k: getattr(table, k)
+                for k in ("min_gap", "max_gap", "dropout_after", "dropout_fraction", "dropout_stretch")
+            }
             return aperiodic(stop, table.seed, start=start, **gaps)
         if table.layout == "instants":
             return InstantLayout(np.array(table.instants, dtype=float))

@@ -30,9 +30,13 @@ from cosim.scenario.tables import MasterTable
 
 
 def make_master(
-    table: ScenarioTable, plan: Plan, axis: TimeAxis, balises: BaliseService | None, progress: Callable[[float], None] | None,
+    table: ScenarioTable,
+    plan: Plan,
+    axis: TimeAxis,
+    balises: BaliseService | None,
+    progress: Callable[[float], None] | None,
     choice: AlgorithmChoice,
-) -> Master:  # fmt: skip
+) -> Master:
     """The master that a scenario asks for.
 
     Args:
@@ -44,11 +48,16 @@ def make_master(
         CouplingError: the components cannot do what is asked for; they are named.
     """
     master = Master(
-        plan, axis, balises, progress, algorithm=lambda plan: make_algorithm(table.master, plan, choice),
-        control=_control(table.master), stepper=table.master.stepper,
+        plan,
+        axis,
+        balises,
+        progress,
+        algorithm=lambda plan: make_algorithm(table.master, plan, choice),
+        control=_control(table.master),
+        stepper=table.master.stepper,
         recorder=partial(Recorder, every=table.master.record_every, memory=1e6 * table.master.record_memory),
         events=table.master.events,
-    )  # fmt: skip
+    )
     _check_rates(table, choice)
     _set_rates(table, plan, axis, balises)
     master.choose_stepper()
@@ -73,14 +82,17 @@ def make_algorithm(table: MasterTable, plan: Plan, choice: AlgorithmChoice) -> A
 
 
 def stepping_groups(
-    table: ScenarioTable, components: Mapping[str, Component], connections: Sequence[Connection], plant: str,
+    table: ScenarioTable,
+    components: Mapping[str, Component],
+    connections: Sequence[Connection],
+    plant: str,
     receivers: Iterable[str],
-) -> list[Group]:  # fmt: skip
+) -> list[Group]:
     """The components in the groups and the order in which a scenario steps them.
 
-    Before the receivers of telegrams must come the plant, and the odometer whose reading the telegrams carry. First where that is
-    free comes the train: the watched plant, else what the report holds observers against; last come those with `every`, so that
-    they find the newest inputs.
+    Before the receivers of telegrams must come the plant, and the odometer whose reading the telegrams carry. First
+    where that is free comes the train: the watched plant, else what the report holds observers against; last come those
+    with `every`, so that they find the newest inputs.
 
     Args:
         table: the scenario. components: by name. connections: checked. plant: watched for balises, or empty.
@@ -116,7 +128,8 @@ def _check_rates(table: ScenarioTable, choice: AlgorithmChoice) -> None:
     for name in (name for loop in choice.iterated for name in loop):
         if table.components[name].every != 1:
             raise CouplingError(
-                f"{name}: every = {table.components[name].every} is not possible: it is part of a loop that is iterated, whose "
+                f"{name}: every = {table.components[name].every} is not possible: it is part of a loop that is "
+                f"iterated, whose "
                 "components take the same steps."
             )
 

@@ -1,7 +1,8 @@
 """Merging the tables of one scenario file into those of the files it includes. Plain data only; touches no files.
 
-Later wins, table by table: tables are merged key by key, everything else is replaced, and ``false`` removes a table. Connections
-are appended: a later one to the same input replaces the earlier, and ``-> component.input`` leaves that input free.
+Later wins, table by table: tables are merged key by key, everything else is replaced, and ``false`` removes a table.
+Connections are appended: a later one to the same input replaces the earlier, and ``-> component.input`` leaves that
+input free.
 """
 
 from __future__ import annotations
@@ -63,7 +64,8 @@ def join(earlier: Sequence[Line], later: Sequence[Line], removed: Iterable[str])
     """Earlier and later connections together.
 
     Args:
-        earlier, later: connections as written, lines or tables. removed: components that are gone, with their connections.
+        earlier, later: connections as written, lines or tables. removed: components that are gone, with their
+        connections.
 
     Raises:
         ScenarioError: an input is to be left free that nothing is connected to.
@@ -73,7 +75,9 @@ def join(earlier: Sequence[Line], later: Sequence[Line], removed: Iterable[str])
     for item, _ in later:
         for target in _targets(item) if _frees(item) else ():
             if target not in targets:
-                raise ScenarioError(f"connections: {item!r}: no included file connects this input; {nearest(target, targets)}")
+                raise ScenarioError(
+                    f"connections: {item!r}: no included file connects this input; {nearest(target, targets)}"
+                )
     kept = [(left, place) for item, place in earlier if (left := _without(item, taken, gone)) is not None]
     return [*kept, *((item, place) for item, place in later if not _frees(item))]
 

@@ -15,8 +15,8 @@ from cosim.components.loading import load_block, load_fmu
 from cosim.components.recording import RecordingComponent, load_recording
 from cosim.components.recording_data import Recording
 from cosim.errors import ScenarioError, nearest
-from cosim.scenario.realisations import FAULTS, Request, Tell, cannot_build, realise
-from cosim.scenario.tables import ComponentTable, Realisation
+from cosim.scenario.backends import FAULTS, Request, Tell, cannot_build, realise
+from cosim.scenario.tables import Backend, ComponentTable
 from fmu_observer.event_protocol import EventProtocol
 from plant_models.hybrid import HybridSystem
 
@@ -58,19 +58,23 @@ def component_factories(
     span: tuple[float, float],
     tolerance: float | str | None = None,
 ) -> tuple[dict[str, Callable[[], Component]], list[str]]:
-    """For each component a function that makes a fresh one, called once for the run and perhaps once for the probe; and notes.
+    """For each component a function that makes a fresh one, called once for the run and perhaps once for the probe; and
+    notes.
 
     Args:
         tables: of the components. folder: paths are relative to it. where: place for messages.
         tell: told of FMUs that are built. span: start and stop of the run [s], which recordings must cover.
-        tolerance: of the FMUs whose table says nothing else; see `cosim.components.described.Described.choose_tolerance`.
+        tolerance: of the FMUs whose table says nothing else; see
+        `cosim.components.described.Described.choose_tolerance`.
 
     Raises:
         ScenarioError, FmuLoadError: a component cannot be made.
     """
     places = {name: f"{where}: components.{name}" for name in tables}
     systems = {name: system for name in tables if (system := make_system(tables[name], places[name])) is not None}
-    requests = {name: Request(tables[name], _lasting(tables[name], system), places[name]) for name, system in systems.items()}
+    requests = {
+        name: Request(tables[name], _lasting(tables[name], system), places[name]) for name, system in systems.items()
+    }
     made = realise(requests, tell)
     factories: dict[str, Callable[[], Component]] = {}
     for name, table in tables.items():
@@ -79,7 +83,9 @@ def component_factories(
             factories[name] = partial(RecordingComponent, name, recording)
             made.notes += left_out_note(name, recording)
         elif name in systems and name not in made.files:
-            factories[name] = partial(load_block, systems[name], name, _version(made.kinds[name]), **_block_arguments(table))
+            factories[name] = partial(
+                load_block, systems[name], name, _version(made.kinds[name]), **_block_arguments(table)
+            )
         else:
             path = made.files[name] if name in systems else (folder / str(table.fmu)).resolve()
             told = None if name in systems else tolerance if table.tolerance is None else table.tolerance
@@ -89,7 +95,7 @@ def component_factories(
 
 def open_recording(
     name: str, table: ComponentTable, folder: Path, where: str, span: tuple[float, float] | None = None
-) -> Recording:  # fmt: skip
+) -> Recording:
     """What a component plays back.
 
     Args:
@@ -109,7 +115,7 @@ def left_out_note(name: str, recording: Recording) -> list[str]:
     return [f"{name}: columns that cannot be played back are left out. {columns}."] if columns else []
 
 
-def _version(kind: Realisation) -> Literal[2, 3]:
+def _version(kind: Backend) -> Literal[2, 3]:
     return 2 if kind.endswith("2") else 3
 
 
@@ -118,7 +124,9 @@ def _block_arguments(table: ComponentTable) -> dict[str, Any]:
 
 
 def _lasting(table: ComponentTable, system: HybridSystem) -> HybridSystem:
-    """The first system of the same class and options in this process: what has been traced need not be traced for each run."""
+    """The first system of the same class and options in this process: what has been traced need not be traced for each
+    run.
+    """
     return _systems.setdefault((type(system), repr(sorted(table.options.items()))), system)
 
 
@@ -128,7 +136,9 @@ def protocol_parameters(table: ComponentTable, component: Component, where: str)
     Raises:
         ScenarioError: the component has no such parameter.
     """
-    given: dict[str, float | str] = {name: getattr(table, name) for name in sorted(table.model_fields_set & LATE_PARAMETERS)}
+    given: dict[str, float | str] = {
+        name: getattr(table, name) for name in sorted(table.model_fields_set & LATE_PARAMETERS)
+    }
     for name in given:
         if name not in component.variables:
             why = "what it does with late events is its own choice" if component.events else "it is told of no events"
@@ -136,7 +146,9 @@ def protocol_parameters(table: ComponentTable, component: Component, where: str)
     return given if component.kind == "FMU" else {}
 
 
-def native_fmu(system: HybridSystem, version: Any, preset: str | None, where: str, protocol: EventProtocol | None = None) -> Path:
+def native_fmu(
+    system: HybridSystem, version: Any, preset: str | None, where: str, protocol: EventProtocol | None = None
+) -> Path:
     """The FMU of a shipped system, built where it was not yet.
 
     Args:
@@ -153,11 +165,15 @@ def native_fmu(system: HybridSystem, version: Any, preset: str | None, where: st
 
 
 def _chosen_options(factory: type[HybridSystem], options: Mapping[str, Any], where: str) -> dict[str, Any]:
-    """The options as the system names them: a whole number may be written 2.0, but truth values and numbers are not the same."""
+    """The options as the system names them: a whole number may be written 2.0, but truth values and numbers are not the
+    same.
+    """
     chosen: dict[str, Any] = {}
     for key, value in options.items():
         if key not in factory.option_choices:
-            raise ScenarioError(f"{where}: {factory.name} has no option {key!r}; {nearest(key, factory.option_choices)}")
+            raise ScenarioError(
+                f"{where}: {factory.name} has no option {key!r}; {nearest(key, factory.option_choices)}"
+            )
         choices = factory.option_choices[key]
         same = [choice for choice in choices if choice == value and isinstance(choice, bool) == isinstance(value, bool)]
         if choices and not same:

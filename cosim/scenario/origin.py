@@ -1,4 +1,6 @@
-"""The origin of an outcome: the scenario as it was run, and the files of others that it uses. Looks at files, changes none."""
+"""The origin of an outcome: the scenario as it was run, and the files of others that it uses. Looks at files, changes
+none.
+"""
 
 from __future__ import annotations
 
@@ -35,12 +37,17 @@ class ForeignFile:
 
     @property
     def parts(self) -> list[Path]:
-        """The files that belong to it: of results all that tells of the run, whether the folder is named or a table in it."""
+        """The files that belong to it: of results all that tells of the run, whether the folder is named or a table in
+        it.
+        """
         folder = self.path if self.path.is_dir() else self.path.parent
         if self.path.is_dir():
             return sorted(p for p in folder.iterdir() if p.is_file() and _tells_of_results(p))
         if (folder / "summary.json").is_file() and self.path.name.startswith("table."):
-            return [self.path, *(folder / n for n in ("summary.json", "events.csv", "messages.csv") if (folder / n).is_file())]
+            return [
+                self.path,
+                *(folder / n for n in ("summary.json", "events.csv", "messages.csv") if (folder / n).is_file()),
+            ]
         return [self.path]
 
 

@@ -68,7 +68,8 @@ class Outcome:
         """The outcome itself, where the run reached its end and all its expectations are met: the last line of a test.
 
         Raises:
-            UnmetError: the run ended early, or something is not met; the message lists it. It is an `AssertionError` too.
+            UnmetError: the run ended early, or something is not met; the message lists it. It is an `AssertionError`
+            too.
         """
         faults = [f"The run ended early: {self.failure}"] if self.failure is not None else []
         faults += [self.expectations_text()] if self.unmet else []
@@ -90,8 +91,8 @@ class Outcome:
         Args:
             directory: the folder; results that an earlier run left there are replaced.
             report: whether to write the page as well.
-            files_up_to: FMUs, recordings and other files of the scenario up to this size are copied to ``made_from/files``; of
-                larger ones path and hash are noted [bytes].
+            files_up_to: FMUs, recordings and other files of the scenario up to this size are copied to
+                ``made_from/files``; of larger ones path and hash are noted [bytes].
 
         Returns:
             Paths by kind.
@@ -111,5 +112,6 @@ class Outcome:
         if report:
             paths["report"] = write_report(self.result, self.spec, directory)
         else:
-            (Path(directory) / "report.html").unlink(missing_ok=True)  # of an earlier run: it would not speak of these results
+            # of an earlier run: it would not speak of these results
+            (Path(directory) / "report.html").unlink(missing_ok=True)
         return paths

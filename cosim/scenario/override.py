@@ -57,7 +57,9 @@ def _component_key(rest: str) -> tuple[str, ...]:
 
 
 def flat(tables: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
-    """Names and values of nested tables: ``[overrides]`` takes ``"plant.mass" = 1.0`` and ``plant.mass = 1.0`` alike."""
+    """Names and values of nested tables: ``[overrides]`` takes ``"plant.mass" = 1.0`` and ``plant.mass = 1.0``
+    alike.
+    """
     for name, value in tables.items():
         if isinstance(value, Mapping):
             yield from flat(value, f"{before}{name}.")

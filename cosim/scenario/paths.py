@@ -1,4 +1,6 @@
-"""Paths in the tables of a scenario: which keys hold one, and how all of them move to another folder. Touches no files."""
+"""Paths in the tables of a scenario: which keys hold one, and how all of them move to another folder. Touches no
+files.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,9 @@ def absolute(path: str | Path, folder: str | Path) -> str:
 
 
 def relative(path: str | Path, folder: str | Path) -> str:
-    """The path as seen from `folder`, with ``/`` on every system; the absolute one where there is none (another drive)."""
+    """The path as seen from `folder`, with ``/`` on every system; the absolute one where there is none (another
+    drive).
+    """
     place = Path(path)
     target = place.parent.resolve() / place.name  # a link to a file stays a link
     try:

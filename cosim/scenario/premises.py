@@ -17,7 +17,10 @@ from cosim.scenario.tables import ComponentTable
 from fmu_observer.observers.parameter_values import parameter_values
 
 COUNT, TIME = "premise_violations", "premise_outside_time"
-ADVICE = "the nearest vertices stood in for it there. Widen the bounds and design the gains anew, or take this as a model error."
+ADVICE = (
+    "the nearest vertices stood in for it there. Widen the bounds and design the gains anew, or take this as a "
+    "model error."
+)
 
 
 def premise_findings(
@@ -30,8 +33,8 @@ def premise_findings(
         components: tables by name. connections: where inputs come from.
 
     Returns:
-        Findings by component, for the summary; and a warning for each that has left its model. Below the lowest vertex of a
-        train, where it starts and stops, the drag is too small to matter: that is found and not warned of.
+        Findings by component, for the summary; and a warning for each that has left its model. Below the lowest vertex
+        of a train, where it starts and stops, the drag is too small to matter: that is found and not warned of.
     """
     findings: dict[str, dict[str, Any]] = {}
     warnings = []
@@ -45,7 +48,10 @@ def premise_findings(
         elif seen is not None and (seen["seconds_below"] or seen["seconds_above"]):
             findings[name] = seen
             if seen["seconds_above"]:
-                text = f"its premise {seen['premise']} was above {seen['bounds'][1]:g} m/s for {seen['seconds_above']:.3g} s"
+                text = (
+                    f"its premise {seen['premise']} was above {seen['bounds'][1]:g} m/s for "
+                    f"{seen['seconds_above']:.3g} s"
+                )
                 warnings.append(f"{name}: {text}; {ADVICE}")
     return findings, warnings
 
@@ -59,7 +65,9 @@ def _counted(table: np.ndarray, name: str) -> dict[str, Any] | None:
     return found | ({"samples": int(table[f"{name}.{COUNT}"][-1])} if f"{name}.{COUNT}" in fields else {})
 
 
-def _seen(table: np.ndarray, name: str, component: ComponentTable, connections: Sequence[Connection]) -> dict[str, Any] | None:
+def _seen(
+    table: np.ndarray, name: str, component: ComponentTable, connections: Sequence[Connection]
+) -> dict[str, Any] | None:
     """What the recorded rows tell of a train observer: each value counts until the next row."""
     if not hasattr(shipped().get(component.observer or ""), "premise_range"):
         return None
@@ -75,7 +83,9 @@ def _seen(table: np.ndarray, name: str, component: ComponentTable, connections: 
 
 
 def _column(table: np.ndarray, name: str, signal: str, connections: Sequence[Connection]) -> np.ndarray | None:
-    """Recorded values of an output, or of the output an input comes from, in the unit of the input; None where not recorded."""
+    """Recorded values of an output, or of the output an input comes from, in the unit of the input; None where not
+    recorded.
+    """
     fields = table.dtype.names or ()
     if f"{name}.{signal}" in fields:
         return np.asarray(table[f"{name}.{signal}"], dtype=float)

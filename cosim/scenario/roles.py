@@ -1,4 +1,6 @@
-"""Roles: which signals a report uses. Those it is told exist and are what they should be; others follow from the coupling."""
+"""Roles: which signals a report uses. Those it is told exist and are what they should be; others follow from the
+coupling.
+"""
 
 from __future__ import annotations
 
@@ -36,18 +38,21 @@ def roles_of_balises(balises: BalisesTable | None) -> dict[str, str]:
 
 def inferred_roles(
     table: ScenarioTable, components: Mapping[str, Component], connections: Sequence[Connection], plant: str
-) -> dict[str, str]:  # fmt: skip
+) -> dict[str, str]:
     """The roles that the report table leaves open, as far as balises and connections tell them.
 
     Args:
         table: the scenario. components: by name. connections: checked. plant: that passes the balises; empty for none.
 
     Returns:
-        Signals by role: true position, true speed and odometer from the balises; slip and adhesion force from outputs of the
-        plant that are called so; the odometer from what all observers listen to; the reference from the one output called so.
+        Signals by role: true position, true speed and odometer from the balises; slip and adhesion force from outputs
+        of the plant that are called so; the odometer from what all observers listen to; the reference from the one
+        output called so.
     """
     of_the_plant = {role: f"{plant}.{signal}" for role, signal in OF_THE_PLANT.items()} if plant else {}
-    references = (f"{name}.{REFERENCE}" for name, component in components.items() if REFERENCE in component.names("output"))
+    references = (
+        f"{name}.{REFERENCE}" for name, component in components.items() if REFERENCE in component.names("output")
+    )
     listening = {(name, ODOMETER) for name, component in table.components.items() if component.observer is not None}
     heard = {".".join(connection.source) for connection in connections if connection.target in listening}
     told = of_the_plant | {REFERENCE: _only(references), ODOMETER: _only(heard)} | roles_of_balises(table.balises)

@@ -30,11 +30,11 @@ from cosim.expectations.check import check_expectations
 from cosim.expectations.judge import judge
 from cosim.master.algorithms.choose import AlgorithmChoice, choose_algorithm
 from cosim.master.axis import TimeAxis
-from cosim.master.lines.draw import draw_lines
+from cosim.master.interpolation.draw import draw_lines
 from cosim.master.master import Master, close
 from cosim.process.interruption import Interruption
 from cosim.process.sentinel import limited_calls
-from cosim.report.doubts import result_doubts
+from cosim.report.result_warnings import result_warnings
 from cosim.report.spec import Phase, ReportSpec
 from cosim.results.recorder import Recorder
 from cosim.results.result import BaliseRecord, Result, SignalInfo
@@ -43,13 +43,13 @@ from cosim.scenario.after_run import warnings_after
 from cosim.scenario.balise_service import Choice, choose_method, find_receivers, make_service, watched_plant
 from cosim.scenario.certificates import check_certificates, expected_gap
 from cosim.scenario.connections import parse_connections
+from cosim.scenario.coupling_warnings import coupling_warnings, late_telegram_warnings, lines_note
 from cosim.scenario.instances import check_instances
 from cosim.scenario.layouts import Layout, make_layout
 from cosim.scenario.master import idle_settings, make_master, stepping_groups
 from cosim.scenario.models import component_factories, protocol_parameters
 from cosim.scenario.outcome import INTERRUPTED, Outcome
 from cosim.scenario.premises import premise_findings
-from cosim.scenario.remarks import coupling_remarks, late_telegram_doubts, lines_note
 from cosim.scenario.roles import ROLES, check_roles, inferred_roles, signals_to_record, with_roles
 from cosim.scenario.schema import ScenarioTable, step_count
 from cosim.scenario.starts import start_values
@@ -69,22 +69,31 @@ Streaming = tuple[Path, Callable[[], None]]
 
 
 def run_scenario(
-    table: ScenarioTable, name: str, folder: Path, where: str, progress: Progress | None = None, warn: Warn | None = None,
-    call_log: Path | None = None, building: Warn | None = None, stream: Streaming | None = None,
-    doubts: Sequence[str] = (), finish: Callable[[Outcome], Outcome] = lambda outcome: outcome,
-) -> Outcome:  # fmt: skip
+    table: ScenarioTable,
+    name: str,
+    folder: Path,
+    where: str,
+    progress: Progress | None = None,
+    warn: Warn | None = None,
+    call_log: Path | None = None,
+    building: Warn | None = None,
+    stream: Streaming | None = None,
+    doubts: Sequence[str] = (),
+    finish: Callable[[Outcome], Outcome] = lambda outcome: outcome,
+) -> Outcome:
     """Run a scenario to its end or to its first failure.
 
     Args:
         table: validated scenario. name: its name. folder: start of relative paths. where: place for messages.
         progress: called with the time reached and the end [s].
-        warn: told of everything doubtful as soon as it is known, before the run where it can be; by default the log ``cosim``.
+        warn: told of everything doubtful as soon as it is known, before the run where it can be; by default the log
+        ``cosim``.
         call_log: where calls are logged, where the scenario asks for that; by default `CALL_LOG` in the working folder.
         building: told of FMUs that are built before the run, as they are done; by default the log, as information.
         stream: the folder that rows are written to as they come; None to keep them in memory.
         doubts: warnings from before, which have been told already.
-        finish: called with the outcome before any component is closed, since an FMU may take the process along there; what it
-            returns is returned.
+        finish: called with the outcome before any component is closed, since an FMU may take the process along there;
+            what it returns is returned.
 
     Raises:
         CosimError: the scenario cannot be set up; failures on the way are in the outcome.
@@ -140,7 +149,11 @@ class _Setup:
         table = self.table
         for text in idle_settings(table.master):
             self._warn(text)
-        layout = None if table.balises is None else make_layout(table.balises, table.start, table.stop, self.folder, self.where)
+        layout = (
+            None
+            if table.balises is None
+            else make_layout(table.balises, table.start, table.stop, self.folder, self.where)
+        )
         pairs = parse_connections(table.connections, self.where)
         self._load_components()
         clocks, pairs = connect_clocks(pairs, self.components)
@@ -149,7 +162,9 @@ class _Setup:
         check_roles(table, self.components, self.where)
         roles = inferred_roles(table, self.components, connections, plant)
         table = with_roles(table, roles)
-        self.notes += [f"Roles that the report was not told: {', '.join(map(' = '.join, roles.items()))}."] if roles else []
+        self.notes += (
+            [f"Roles that the report was not told: {', '.join(map(' = '.join, roles.items()))}."] if roles else []
+        )
         table = self.table = check_expectations(table, self.components, receivers, self.where)
         groups = stepping_groups(table, self.components, connections, plant, receivers)
         self.algorithm = choose_algorithm(table.master.algorithm, groups, self.components)
@@ -159,7 +174,7 @@ class _Setup:
             self._check_certificates(layout, receivers)
         self._instantiate(starts, connections)
         self.plan = make_plan(self.components, connections, order, signals_to_record(table), clocks)
-        doubts, notes = coupling_remarks(table, self.components, connections)
+        doubts, notes = coupling_warnings(table, self.components, connections)
         for doubt in doubts:
             self._warn(doubt)
         self.notes += notes
@@ -224,14 +239,17 @@ class _Setup:
         summary = run_summary(self.name, self.table, self.plan, master, self.setup_seconds)
         events = [] if self.service is None else self._all_telegrams(self.service)
         spec, (table, signals) = self._report_spec(), self._in_si()
-        for warning in result_doubts(Result(table, signals, failure=failure), spec):
+        for warning in result_warnings(Result(table, signals, failure=failure), spec):
             self._warn(warning)
         for warning in warnings_after(self.components, events, changed_in_steps):
             self._warn(warning)
         if self.call_log is not None and self.call_log.broken is not None:
             self._warn(self.call_log.broken)
         summary |= self._balise_summary([e.stamp for e in events if e.kind == "true"])
-        summary |= {"certificates": self.certificates, "premises": premises} | {"warnings": self.warnings, "notes": self.notes}
+        summary |= {"certificates": self.certificates, "premises": premises} | {
+            "warnings": self.warnings,
+            "notes": self.notes,
+        }
         summary["report"] = asdict(spec)  # so that the folder tells which signal plays which role
         if interruption.came:
             failure = failure or INTERRUPTED
@@ -294,11 +312,13 @@ class _Setup:
         table = self.table.balises
         assert table is not None
         assert self.plan is not None
-        self.choice = choose_method(table, self.components[plant], self.factories[plant], starts, self.axis.start, self.axis.step)
+        self.choice = choose_method(
+            table, self.components[plant], self.factories[plant], starts, self.axis.start, self.axis.step
+        )
         for warning in self.choice.warnings:
             self._warn(warning)
         self.notes.append(f"Balises localised by '{self.choice.method}': {self.choice.reason}.")
-        for warning in late_telegram_doubts(table, self.components, receivers):
+        for warning in late_telegram_warnings(table, self.components, receivers):
             self._warn(warning)
         self.service = make_service(table, layout, self.plan, plant, receivers, self.choice)
 
@@ -344,7 +364,13 @@ class _Setup:
     def _balise_summary(self, stamps: list[float]) -> dict[str, Any]:
         """Method, probe, and the gaps that really occurred against what is certified."""
         if self.choice is None or self.service is None:
-            return {"localisation": None, "probe": None, "redo_differences": None, "largest_gap": None, "undelivered": 0}
+            return {
+                "localisation": None,
+                "probe": None,
+                "redo_differences": None,
+                "largest_gap": None,
+                "undelivered": 0,
+            }
         gap = max((b - a for a, b in pairwise([self.axis.start, *sorted(stamps)])), default=None)
         for name, certificate in self.certificates.items():
             limit = certificate["aperiodic_limit"]

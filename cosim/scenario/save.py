@@ -1,6 +1,8 @@
-"""Saving: a scenario as the text of a scenario file, complete in itself. Touches the file it is given, and FMUs out of packages.
+"""Saving: a scenario as the text of a scenario file, complete in itself. Touches the file it is given, and FMUs out of
+packages.
 
-Included files and overrides are already in the tables; what was never given is not written, so that defaults stay defaults.
+Included files and overrides are already in the tables; what was never given is not written, so that defaults stay
+defaults.
 """
 
 from __future__ import annotations
@@ -20,7 +22,9 @@ from cosim.scenario.schema import ScenarioTable
 
 
 def plain(value: Any) -> Any:
-    """The value in the types that TOML has: NumPy's numbers and arrays, tuples and paths become numbers, lists and texts."""
+    """The value in the types that TOML has: NumPy's numbers and arrays, tuples and paths become numbers, lists and
+    texts.
+    """
     if isinstance(value, Mapping):
         return {str(key): plain(entry) for key, entry in value.items() if entry is not None}
     if isinstance(value, np.ndarray | np.generic):
@@ -52,7 +56,8 @@ def save_scenario(table: ScenarioTable, folder: Path, path: Path, unpacked: Path
 
     Args:
         table: the validated scenario. folder: start of its relative paths. path: of the file, ending in ``.toml``.
-        unpacked: a folder that lasts no longer than this process; files in it are copied to ``NAME_files`` beside the new file.
+        unpacked: a folder that lasts no longer than this process; files in it are copied to ``NAME_files`` beside the
+        new file.
 
     Returns:
         The path.

@@ -65,8 +65,8 @@ class Scenario:
         A file is merged with those it names under ``include``; its ``[overrides]`` are applied last.
 
         Args:
-            name_or_path: ``freight_profile_d``, ``my.toml``, ``system.ssp``, or ``system.ssp#Variant`` for a structure in it; or
-                a results folder, for the scenario that it was made from.
+            name_or_path: ``freight_profile_d``, ``my.toml``, ``system.ssp``, or ``system.ssp#Variant`` for a structure
+                in it; or a results folder, for the scenario that it was made from.
             strict: whether an SSP whose form is not as the standard wants it is refused; else the run warns of it.
 
         Raises:
@@ -99,18 +99,25 @@ class Scenario:
 
     @classmethod
     def fmu(
-        cls, path: str | Path, *, stop: float | None = None, step: float | None = None, start: float | None = None,
-        inputs: Mapping[str, Any] | str | Path | None = None, parameters: Mapping[str, Any] | None = None,
-        record: Sequence[str] = (), name: str = "fmu",
-    ) -> Scenario:  # fmt: skip
+        cls,
+        path: str | Path,
+        *,
+        stop: float | None = None,
+        step: float | None = None,
+        start: float | None = None,
+        inputs: Mapping[str, Any] | str | Path | None = None,
+        parameters: Mapping[str, Any] | None = None,
+        record: Sequence[str] = (),
+        name: str = "fmu",
+    ) -> Scenario:
         """A scenario of one FMU alone: for a look at it, or for a regression test of its outputs.
 
         Args:
             path: of the FMU, relative to where the user stands.
-            stop: end of the run [s]. start: its begin [s]. step: communication step [s]. Where not given, those of the FMU's
-                default experiment; without a step there, a thousandth of the run.
-            inputs: values by name, which are held; or a table (CSV, MAT, ...) or results folder whose columns are played back
-                into the inputs of the same names, on lines between its rows.
+            stop: end of the run [s]. start: its begin [s]. step: communication step [s]. Where not given, those of the
+                FMU's default experiment; without a step there, a thousandth of the run.
+            inputs: values by name, which are held; or a table (CSV, MAT, ...) or results folder whose columns are
+                played back into the inputs of the same names, on lines between its rows.
             parameters: start values by name.
             record: variables to record besides the outputs.
             name: of the component: its outputs are recorded as ``name.output``.
@@ -130,7 +137,8 @@ class Scenario:
         """The text of a scenario file that runs identically; files it included and overrides are in it.
 
         Args:
-            folder: where the file will stand: paths in the text are relative to it. Where not given they stay as they are,
+            folder: where the file will stand: paths in the text are relative to it. Where not given they stay as they
+            are,
                 relative to the folder of this scenario.
 
         Raises:
@@ -139,7 +147,8 @@ class Scenario:
         return scenario_text(self.table(), self.folder, None if folder is None else Path(folder))
 
     def save(self, path: str | Path) -> Path:
-        """Write a scenario file that runs identically. FMUs that came out of an SSP are copied to ``NAME_files`` beside it.
+        """Write a scenario file that runs identically. FMUs that came out of an SSP are copied to ``NAME_files`` beside
+        it.
 
         Args:
             path: of the file, ending in ``.toml``; an existing one is replaced. Paths in it become relative to it.
@@ -207,7 +216,8 @@ class Scenario:
 
         Args:
             check: what is checked: ``speed_error``, ``signal``, ``on``, ``telegrams``, ...
-            table: its keys as in a file; ``start`` and ``end`` may stand for ``from``, which Python keeps for itself, and ``to``.
+            table: its keys as in a file; ``start`` and ``end`` may stand for ``from``, which Python keeps for itself,
+            and ``to``.
         """
         self._data["expect"] = [*self._data.get("expect", []), {"check": check, **table}]
         return self
@@ -215,7 +225,8 @@ class Scenario:
     def set(self, name: str, value: Any) -> Self:
         """Override one value.
 
-        That is ``component.parameter``, ``balises.key``, ``master.key``, ``report.key`` or a top-level key such as ``stop``.
+        That is ``component.parameter``, ``balises.key``, ``master.key``, ``report.key`` or a top-level key such as
+        ``stop``.
 
         Raises:
             ScenarioError: there is no such component or table.
@@ -250,9 +261,13 @@ class Scenario:
             return parse_scenario(self._data, self.where)
 
     def vary(
-        self, values: Mapping[str, Iterable[Any] | Range] | Sequence[Mapping[str, Any]], mode: Mode = "grid", *,
-        count: int | None = None, seed: int = 0,
-    ) -> Sweep:  # fmt: skip
+        self,
+        values: Mapping[str, Iterable[Any] | Range] | Sequence[Mapping[str, Any]],
+        mode: Mode = "grid",
+        *,
+        count: int | None = None,
+        seed: int = 0,
+    ) -> Sweep:
         """A sweep: this scenario with some values changed, many times over.
 
         ::
@@ -262,9 +277,11 @@ class Scenario:
             result.write("results/masses")
 
         Args:
-            values: names as for `set`, each with the values it takes; or a list of variations, each a mapping of names to values.
-            mode: ``grid``: every combination, the last name changes quickest; ``zip``: first with first, second with second;
-                ``latin`` (Latin hypercube) and ``random``: `count` points of `cosim.studies.sampling.uniform` ranges and lists.
+            values: names as for `set`, each with the values it takes; or a list of variations, each a mapping of names
+            to values.
+            mode: ``grid``: every combination, the last name changes quickest; ``zip``: first with first, second with
+                second; ``latin`` (Latin hypercube) and ``random``: `count` points of `cosim.studies.sampling.uniform`
+                ranges and lists.
             count: number of points, for ``latin`` and ``random``. seed: of the points.
 
         Raises:
@@ -276,11 +293,16 @@ class Scenario:
         return make_sweep(self, values, mode, count, seed)
 
     def run(
-        self, progress: Callable[[float, float], None] | None = None, overrides: Mapping[str, Any] | None = None,
-        warn: Callable[[str], None] | None = None, call_log: str | Path | None = None,
-        building: Callable[[str], None] | None = None, stream: str | Path | None = None,
-        finished: Callable[[Outcome], None] | None = None, spare: str | Path | None = None,
-    ) -> Outcome:  # fmt: skip
+        self,
+        progress: Callable[[float, float], None] | None = None,
+        overrides: Mapping[str, Any] | None = None,
+        warn: Callable[[str], None] | None = None,
+        call_log: str | Path | None = None,
+        building: Callable[[str], None] | None = None,
+        stream: str | Path | None = None,
+        finished: Callable[[Outcome], None] | None = None,
+        spare: str | Path | None = None,
+    ) -> Outcome:
         """Run it.
 
         Args:
@@ -289,14 +311,15 @@ class Scenario:
             warn: told of everything doubtful as soon as it is known, before the run where it can be; by default the log
                 ``cosim``, which Python shows on the error stream. All warnings are in the outcome as well.
             call_log: a file to log every call of every component to, as `master.log_calls` asks for.
-            building: told of the FMUs of shipped models that are built for the first time, some seconds each; by default the
-                log ``cosim``, as information.
-            stream: a results folder to which everything is written while the run goes on, so that it outlives the program; what
-                an earlier run left there is removed when the first step is about to be taken. The table is written as
-                ``table.npy``; `Outcome.write` adds other formats only where the scenario asks for them.
-            finished: called with the outcome before the components are closed, which is what is returned as well: what it writes
-                is not lost where an FMU crashes while it is freed.
-            spare: a folder to which rows are written as for `stream`, only in case the process dies: whoever gives it removes it.
+            building: told of the FMUs of shipped models that are built for the first time, some seconds each; by
+                default the log ``cosim``, as information.
+            stream: a results folder to which everything is written while the run goes on, so that it outlives the
+                program; what an earlier run left there is removed when the first step is about to be taken. The table
+                is written as ``table.npy``; `Outcome.write` adds other formats only where the scenario asks for them.
+            finished: called with the outcome before the components are closed, which is what is returned as well: what
+                it writes is not lost where an FMU crashes while it is freed.
+            spare: a folder to which rows are written as for `stream`, only in case the process dies: whoever gives it
+            removes it.
 
         Returns:
             The outcome: result, report roles, warnings; also for a run that failed on the way (see `Outcome.failure`).

@@ -55,8 +55,12 @@ class ScenarioTable(Table):
             raise ValueError("a scenario needs at least one component")
         for name, component in self.components.items():
             if component.substeps > 1:
-                check_resolution(f"components.{name}: one of {component.substeps} substeps,", self.step / component.substeps,
-                                 self.start, self.stop)  # fmt: skip
+                check_resolution(
+                    f"components.{name}: one of {component.substeps} substeps,",
+                    self.step / component.substeps,
+                    self.start,
+                    self.stop,
+                )
         if self.master.smallest_step is not None:
             check_resolution("master.smallest_step", self.master.smallest_step, self.start, self.stop)
         return self
@@ -77,7 +81,9 @@ def step_count(start: float, stop: float, step: float) -> int:
     if not stop > start:
         raise ValueError(f"stop ({stop!r} s) must lie behind start ({start!r} s)")
     if (stop - start) / step > MAX_STEPS:
-        raise ValueError(f"step {step!r} s from {start!r} s to {stop!r} s: more than {MAX_STEPS:g} steps; use a larger step")
+        raise ValueError(
+            f"step {step!r} s from {start!r} s to {stop!r} s: more than {MAX_STEPS:g} steps; use a larger step"
+        )
     check_resolution("step", step, start, stop)
     count = round((stop - start) / step)
     if count < 1 or abs(start + count * step - stop) > 1e-9 * max(1.0, abs(stop)):
@@ -121,7 +127,11 @@ def parse_scenario(data: dict[str, Any], where: str) -> ScenarioTable:
     try:
         return ScenarioTable.model_validate(data)
     except ValidationError as error:
-        lines = [_explain(dict(item)) for item in error.errors() if item["loc"][-1:] not in (("list[float]",), ("list[str]",))]
+        lines = [
+            _explain(dict(item))
+            for item in error.errors()
+            if item["loc"][-1:] not in (("list[float]",), ("list[str]",))
+        ]
         raise ScenarioError(f"{where}: " + f"\n{where}: ".join(lines)) from error
 
 

@@ -20,9 +20,15 @@ SOURCE = "inputs"
 
 
 def single_tables(
-    path: Path, name: str, start: float | None, stop: float | None, step: float | None,
-    inputs: Mapping[str, Any] | str | Path | None, parameters: Mapping[str, Any], record: Sequence[str],
-) -> tuple[dict[str, Any], list[str]]:  # fmt: skip
+    path: Path,
+    name: str,
+    start: float | None,
+    stop: float | None,
+    step: float | None,
+    inputs: Mapping[str, Any] | str | Path | None,
+    parameters: Mapping[str, Any],
+    record: Sequence[str],
+) -> tuple[dict[str, Any], list[str]]:
     """The tables of a scenario of one FMU, and what is doubtful about it; arguments as for `Scenario.fmu`.
 
     Raises:
@@ -54,7 +60,8 @@ def single_tables(
 def run_times(
     description: ModelDescription, start: float | None, stop: float | None, step: float | None, where: str
 ) -> tuple[float, float, float]:
-    """Start, stop and step [s]: as given, else of the FMU's default experiment; without its step, a thousandth of the run.
+    """Start, stop and step [s]: as given, else of the FMU's default experiment; without its step, a thousandth of the
+    run.
 
     Raises:
         ScenarioError: there is no stop, or the step does not divide the run.
@@ -102,5 +109,7 @@ def _matches(source: Path, component: Component, where: str) -> tuple[list[str],
             f"{source.name}: no column is named as an input of {where}. Columns: {', '.join(columns) or 'none'}; "
             f"inputs: {', '.join(sorted(inputs)) or 'none'}."
         )
-    doubts = [f"{source.name}: columns that are no inputs of {where} are not used: {', '.join(unused)}."] if unused else []
+    doubts = (
+        [f"{source.name}: columns that are no inputs of {where} are not used: {', '.join(unused)}."] if unused else []
+    )
     return [f"{SOURCE}.{name} -> {component.name}.{name}" for name in used], doubts

@@ -23,12 +23,13 @@ def given_values(table: ScenarioTable) -> dict[str, list[str]]:
 def start_values(component: Component, parameters: Mapping[str, Any]) -> dict[str, StartValue]:
     """Start values by name, structural parameters first, each of its variable's type.
 
-    A list for a vector of scalars sets ``name[1]``, ``name[2]``, ..., a number for one sets all its elements; an array of FMI 3
-    takes a list, nested or row by row, or one value for all. A text is a text, the name of an item of an enumeration, or the
-    bytes of a binary in hexadecimal.
+    A list for a vector of scalars sets ``name[1]``, ``name[2]``, ..., a number for one sets all its elements; an array
+    of FMI 3 takes a list, nested or row by row, or one value for all. A text is a text, the name of an item of an
+    enumeration, or the bytes of a binary in hexadecimal.
 
     Raises:
-        CouplingError: a name is unknown (the nearest are suggested), or a value is not of the variable's type or lies outside
+        CouplingError: a name is unknown (the nearest are suggested), or a value is not of the variable's type or lies
+        outside
             what the component declares.
     """
     starts: dict[str, StartValue] = {}

@@ -1,4 +1,6 @@
-"""Streaming a run of a scenario to a results folder: how the folder says from the first step on what it is made from."""
+"""Streaming a run of a scenario to a results folder: how the folder says from the first step on what it is made
+from.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,8 @@ def streaming_to(directory: str | Path, origin: Origin) -> Streaming:
 
 
 def finish_stream(outcome: Outcome, directory: str | Path, warn: Callable[[str], None]) -> Outcome:
-    """Write what only the end of a run tells. Where the disk refuses, the folder keeps what was streamed, and a warning says so.
+    """Write what only the end of a run tells. Where the disk refuses, the folder keeps what was streamed, and a warning
+    says so.
 
     Returns:
         The outcome, whose table is written as ``npy``, and in other formats only where the scenario asks for them.

@@ -17,11 +17,11 @@ from cosim.diagnostics.inspect import group_index, make_links, make_part, rate_t
 from cosim.diagnostics.structure import Balises, Link, Structure
 from cosim.errors import CosimError, CouplingError
 from cosim.master.algorithms.choose import AlgorithmChoice, choose_algorithm
+from cosim.scenario.backends import intended
 from cosim.scenario.balise_service import find_receivers, watched_plant
 from cosim.scenario.connections import parse_connections
 from cosim.scenario.master import stepping_groups
 from cosim.scenario.models import make_system, open_recording
-from cosim.scenario.realisations import intended
 from cosim.scenario.schema import ScenarioTable
 from cosim.scenario.starts import given_values
 from cosim.scenario.tables import ComponentTable
@@ -34,7 +34,8 @@ def scenario_structure(table: ScenarioTable, name: str, folder: Path, where: str
         table: the scenario. name: its name. folder: start of relative paths. where: place for messages.
 
     Raises:
-        CosimError: a component, connection or balise role that cannot be. A loop that nothing here solves is told, not refused.
+        CosimError: a component, connection or balise role that cannot be. A loop that nothing here solves is told, not
+        refused.
     """
     try:
         return _structure(table, name, folder, where)
@@ -76,7 +77,7 @@ def _structure(table: ScenarioTable, name: str, folder: Path, where: str) -> Str
 
 def describe_component(
     name: str, table: ComponentTable, folder: Path, where: str, span: tuple[float, float] | None = None
-) -> Component:  # fmt: skip
+) -> Component:
     """A component that can be asked and not stepped.
 
     Args:
@@ -93,10 +94,11 @@ def describe_component(
     elif system is None:
         component = describe_fmu((folder / str(table.fmu)).resolve(), name)
     else:
-        realisation = intended(table, system)
-        version: Any = int(realisation[-1])
-        component = load_block(system, name, version, preset=table.preset)  # the exported FMU carries the same description
-        component.kind = "block" if realisation.startswith("block") else "FMU"
+        backend = intended(table, system)
+        version: Any = int(backend[-1])
+        # the exported FMU carries the same description
+        component = load_block(system, name, version, preset=table.preset)
+        component.kind = "block" if backend.startswith("block") else "FMU"
     component.configure(table.parameters)
     return component
 
@@ -127,4 +129,6 @@ def _warnings(table: ScenarioTable, components: Mapping[str, Component], connect
     free = unconnected_inputs(connections, components.values(), given_values(table))
     silent = undeclared(components.values())
     texts = [f"Unconnected inputs keep their start values: {', '.join(free)}."] if free else []
-    return texts + ([f"Declare no dependencies, direct feedthrough assumed absent: {', '.join(silent)}."] if silent else [])
+    return texts + (
+        [f"Declare no dependencies, direct feedthrough assumed absent: {', '.join(silent)}."] if silent else []
+    )

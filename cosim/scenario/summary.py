@@ -9,7 +9,7 @@ from typing import Any
 
 from cosim.components.component import Component
 from cosim.coupling.plan import Plan
-from cosim.diagnostics.tally import tally_table
+from cosim.diagnostics.call_statistics import call_statistics_table
 from cosim.master.master import Master
 from cosim.scenario.schema import ScenarioTable
 from cosim.scenario.tables import ComponentTable
@@ -39,7 +39,8 @@ def run_summary(name: str, table: ScenarioTable, plan: Plan, master: Master, set
     """Scenario, times, components, versions.
 
     Args:
-        name: of the scenario. table: the scenario. plan, master: after the run. setup_seconds: wall time of the set-up [s].
+        name: of the scenario. table: the scenario. plan, master: after the run. setup_seconds: wall time of the set-up
+        [s].
     """
     axis, timing = master.axis, master.timing
     reached = float(master.recorder.table()["time"][-1]) if master.recorder.count else axis.start
@@ -94,7 +95,7 @@ def _component(component: Component, table: ComponentTable) -> dict[str, Any]:
         "source": component.source,
         "calls": component.calls,
         "seconds": component.seconds,
-        "cost": tally_table(component.calls, component.seconds, component.tallies),
+        "cost": call_statistics_table(component.calls, component.seconds, component.call_statistics),
         "messages": [message.text for message in component.messages.kept()[-MESSAGES_SHOWN:]],
         "message_counts": dict(component.messages.counts),
         "events": None if outcomes is None else dict(outcomes),

@@ -21,7 +21,9 @@ def _start(value: Any) -> Any:
 
 
 Start = Annotated[Any, PlainValidator(_start)]
-"""A number, truth value, text or item of an enumeration, bytes in hexadecimal; a list of them for a vector, nested for arrays."""
+"""A number, truth value, text or item of an enumeration, bytes in hexadecimal; a list of them for a vector, nested for
+arrays.
+"""
 
 
 def _tolerance(value: Any) -> float | str:
@@ -34,7 +36,7 @@ def _tolerance(value: Any) -> float | str:
 
 Tolerance = Annotated[float | Literal["none"], PlainValidator(_tolerance)]
 """Relative tolerance of the solvers in FMUs."""
-Realisation = Literal["fmu3", "fmu2", "block3", "block2"]
+Backend = Literal["fmu3", "fmu2", "block3", "block2"]
 
 
 class Table(BaseModel):
@@ -52,7 +54,7 @@ class ComponentTable(Table):
     recording: str | None = None
     component: str | None = None
     interpolation: Literal["linear", "hold"] = "linear"
-    realisation: Realisation | None = Field(default=None, alias="as")
+    backend: Backend | None = Field(default=None, alias="as")
     preset: str | None = None
     options: dict[str, str | int | float | bool] = {}
     parameters: dict[str, Start] = {}
@@ -70,17 +72,20 @@ class ComponentTable(Table):
         given = [k for k in ("fmu", "model", "observer", "recording") if getattr(self, k) is not None]
         if len(given) != 1:
             raise ValueError(
-                "give exactly one of 'fmu' (a path), 'model' (a shipped plant), 'observer' (a shipped observer) or 'recording' "
+                "give exactly one of 'fmu' (a path), 'model' (a shipped plant), 'observer' (a shipped observer) or "
+                "'recording' "
                 "(a results folder or a table)"
             )
-        if given == ["fmu"] and (self.preset or self.options or self.realisation):
+        if given == ["fmu"] and (self.preset or self.options or self.backend):
             raise ValueError("'preset', 'options' and 'as' belong to shipped models; an FMU takes 'parameters' only")
         if given != ["fmu"] and self.tolerance is not None:
             raise ValueError("'tolerance' belongs to an FMU; shipped models have the parameter 'internal_step' instead")
         if given != ["recording"] and {"component", "interpolation"} & self.model_fields_set:
             raise ValueError("'component' and 'interpolation' belong to a recording")
-        if given == ["recording"] and (self.preset or self.options or self.realisation or self.parameters):
-            raise ValueError("a recording takes 'component' and 'interpolation', no 'parameters', 'preset', 'options' or 'as'")
+        if given == ["recording"] and (self.preset or self.options or self.backend or self.parameters):
+            raise ValueError(
+                "a recording takes 'component' and 'interpolation', no 'parameters', 'preset', 'options' or 'as'"
+            )
         return self
 
 
@@ -92,7 +97,7 @@ class FalseTelegramTable(Table):
 
 
 class BalisesTable(Table):
-    """Balises: where they are, how the passings are found, what happens to the telegrams."""
+    """Balises: where they are, how the crossings are found, what happens to the telegrams."""
 
     position: str | None = None
     speed: str | None = None
@@ -127,9 +132,13 @@ class BalisesTable(Table):
 
     @model_validator(mode="after")
     def _layout_complete(self) -> BalisesTable:
-        needed = {"spacing": "spacing", "positions": "positions", "csv": "file", "recorded": "file", "instants": "instants"}.get(
-            self.layout
-        )
+        needed = {
+            "spacing": "spacing",
+            "positions": "positions",
+            "csv": "file",
+            "recorded": "file",
+            "instants": "instants",
+        }.get(self.layout)
         if needed is not None and getattr(self, needed) is None:
             raise ValueError(f"layout '{self.layout}' needs '{needed}'")
         if self.layout == "spacing" and self.track_end is None:
@@ -138,7 +147,9 @@ class BalisesTable(Table):
         if self.layout != "recorded" and lacking:
             raise ValueError(f"layout '{self.layout}' needs {' and '.join(map(repr, lacking))}, outputs of the plant")
         if len(lacking) == 1:
-            raise ValueError(f"give both 'position' and 'speed', or with layout 'recorded' neither; {lacking[0]!r} is missing")
+            raise ValueError(
+                f"give both 'position' and 'speed', or with layout 'recorded' neither; {lacking[0]!r} is missing"
+            )
         return self
 
 

@@ -1,4 +1,6 @@
-"""TOML files that people edit: read as they come from any editor, with faults said in words. Reads only the file it is given."""
+"""TOML files that people edit: read as they come from any editor, with faults said in words. Reads only the file it is
+given.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ def read_toml(path: Path) -> dict[str, Any]:
     """
     data = path.read_bytes()
     if data.startswith(ARCHIVE):
-        raise ValueError("it is an archive (an FMU?), not a text file; for an FMU 'cosim new' writes a scenario to start from")
+        raise ValueError(
+            "it is an archive (an FMU?), not a text file; for an FMU 'cosim new' writes a scenario to start from"
+        )
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -1,7 +1,7 @@
 """Parameter bindings: from parameter sets at any level of nested systems to start values of FMU variables.
 
-Names are resolved and precedence is decided as SSP 2.0, section 5.3.3 says: later bindings before earlier ones, outer systems
-before inner ones. Values are converted to the units of the variables.
+Names are resolved and precedence is decided as SSP 2.0, section 5.3.3 says: later bindings before earlier ones, outer
+systems before inner ones. Values are converted to the units of the variables.
 """
 
 from __future__ import annotations
@@ -66,7 +66,8 @@ def start_values(nets: Nets, lapses: Lapses) -> Starts:
         ScenarioError: a value that does not fit its variable, or a mapping to what does not exist.
     """
     applying = _Applying(nets, lapses)
-    for path in sorted(nets.elements, key=len, reverse=True):  # what is applied later counts, and outer systems count most
+    # what is applied later counts, and outer systems count most
+    for path in sorted(nets.elements, key=len, reverse=True):
         for binding in nets.elements[path].bindings:
             applying.apply(binding, path)
     return applying.starts
@@ -85,7 +86,9 @@ class _Applying:
         if binding.mapping is None:
             for name, parameter in parameters.items():
                 if not self.assign(Given(parameter), name, path):
-                    self.lapses.tell(parameter.node, f"parameter {name!r} is {self.nothing(name, path)}, so it is ignored.")
+                    self.lapses.tell(
+                        parameter.node, f"parameter {name!r} is {self.nothing(name, path)}, so it is ignored."
+                    )
             return
         for entry in binding.mapping:
             if entry.source not in parameters:
@@ -156,7 +159,9 @@ class _Applying:
 
 
 def _targets(element: Element, path: Path, name: str) -> Iterator[Point]:
-    """What a hierarchical name can mean: a variable of a component, or connectors of systems and all that lies below."""
+    """What a hierarchical name can mean: a variable of a component, or connectors of systems and all that lies
+    below.
+    """
     if isinstance(element, ComponentElement) or name in element.connectors:
         yield Point(path, name)
     if isinstance(element, SystemElement):

@@ -1,4 +1,6 @@
-"""Common content (SSC): types, units, enumerations, transformations, as all parts of SSP write them. Reads elements only."""
+"""Common content (SSC): types, units, enumerations, transformations, as all parts of SSP write them. Reads elements
+only.
+"""
 
 from __future__ import annotations
 
@@ -19,8 +21,11 @@ FAMILIES: dict[str, str] = {
 """What a type of SSP or FMI is, whatever its size."""
 RAD = BASE_SYMBOLS.index("rad")  # the last one
 TRANSFORMATIONS = (
-    "LinearTransformation", "BooleanMappingTransformation", "IntegerMappingTransformation", "EnumerationMappingTransformation",
-)  # fmt: skip
+    "LinearTransformation",
+    "BooleanMappingTransformation",
+    "IntegerMappingTransformation",
+    "EnumerationMappingTransformation",
+)
 
 
 @dataclass(frozen=True)
@@ -36,7 +41,8 @@ class Type:
     """Type of a connector, a dictionary entry or a parameter.
 
     Args:
-        name: as written, for example ``Float64``. unit: of a real number, where one is given. enumeration: name of its type.
+        name: as written, for example ``Float64``. unit: of a real number, where one is given. enumeration: name of its
+        type.
     """
 
     name: str
@@ -76,9 +82,9 @@ Step = Linear | ValueMap
 class UnitTable:
     """The units that a file defines, by name.
 
-    A file that uses what it does not define is read as far as that has one meaning: no name is no unit, and brackets around a
-    name are not part of it. What is left is a name only, whatever others mean by it: a number with it can go where the name is
-    the same or none, and nowhere else.
+    A file that uses what it does not define is read as far as that has one meaning: no name is no unit, and brackets
+    around a name are not part of it. What is left is a name only, whatever others mean by it: a number with it can go
+    where the name is the same or none, and nowhere else.
 
     Args:
         root: root element of the file. prefix: of its own namespace. lapses: told of what is used and not defined.
@@ -106,16 +112,24 @@ class UnitTable:
             return None if name is None else NamedUnit(name, self._units[name])
         bare = name.strip().removeprefix("[").removesuffix("]").strip()
         if not bare:
-            self._lapses.forgive(node, f"unit {name!r} is not defined in this file; taken as no unit: no number is converted.")
+            self._lapses.forgive(
+                node, f"unit {name!r} is not defined in this file; taken as no unit: no number is converted."
+            )
             return None
         unit = self._units.get(bare)
-        taken = f"taken as {bare!r}" + ("" if unit else ", whose numbers go only where the unit has the same name or none")
+        taken = f"taken as {bare!r}" + (
+            "" if unit else ", whose numbers go only where the unit has the same name or none"
+        )
         known = ", ".join(map(repr, self._units)) or "none"
-        self._lapses.forgive(node, f"unit {name!r} is not defined in this file, whose Units element has {known}; {taken}.")
+        self._lapses.forgive(
+            node, f"unit {name!r} is not defined in this file, whose Units element has {known}; {taken}."
+        )
         return NamedUnit(bare, unit)
 
     def _compare(self, name: str, node: Node) -> None:
-        """Tell of a unit that is defined otherwise than everybody understands its name: numbers follow the definition."""
+        """Tell of a unit that is defined otherwise than everybody understands its name: numbers follow the
+        definition.
+        """
         usual, defined = _usual(name), self._units[name]
         if usual is not None and not _same(usual, defined):
             meant = f"unit {name!r} is defined as {_formula(defined)}, usually it is {_formula(usual)}"
@@ -172,7 +186,10 @@ def _usual(name: str) -> Unit | None:
 
 
 def _same(one: Unit, other: Unit) -> bool:
-    close = [math.isclose(a, b, rel_tol=1e-6, abs_tol=1e-12) for a, b in ((one.factor, other.factor), (one.offset, other.offset))]
+    close = [
+        math.isclose(a, b, rel_tol=1e-6, abs_tol=1e-12)
+        for a, b in ((one.factor, other.factor), (one.offset, other.offset))
+    ]
     return all(close) and one.exponents[:RAD] == other.exponents[:RAD]  # a radian is a number: written or not
 
 

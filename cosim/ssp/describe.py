@@ -47,7 +47,11 @@ def text_of_package(data: dict[str, Any]) -> str:
     lines = [f"{data['name']}: {data['description']}".rstrip(": ")]
     lines += [f"SSP {data['SSP version']}, variants: {', '.join(data['variants'])}"]
     times = {key: "not given" if data[key] is None else f"{data[key]:g} s" for key in ("start", "stop", "step")}
-    lines += [", ".join(f"{key} {text}" for key, text in times.items()), "system:", *(f"  {line}" for line in data["system"])]
+    lines += [
+        ", ".join(f"{key} {text}" for key, text in times.items()),
+        "system:",
+        *(f"  {line}" for line in data["system"]),
+    ]
     lines += ["components of the scenario:", *(f"  {name}" for name in data["components"])]
     lines += ["connections:", *(f"  {_line(item)}" for item in data["connections"])]
     lines += ["doubts:", *(f"  {doubt}" for doubt in data["doubts"])] if data["doubts"] else []
@@ -60,7 +64,9 @@ def _tree(element: Element, depth: int) -> Iterator[str]:
         kind = element.member
     elif isinstance(element, DictionaryReference):
         kind = f"signal dictionary {element.dictionary}"
-    connectors = {k: [c.name for c in element.connectors.values() if c.kind == k] for k in ("input", "output", "parameter")}
+    connectors = {
+        k: [c.name for c in element.connectors.values() if c.kind == k] for k in ("input", "output", "parameter")
+    }
     shown = "; ".join(f"{k}s {', '.join(names)}" for k, names in connectors.items() if names)
     yield f"{'  ' * depth}{element.name} ({kind})" + (f": {shown}" if shown else "")
     if isinstance(element, SystemElement):

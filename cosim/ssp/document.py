@@ -1,4 +1,5 @@
-"""Documents: the XML files of SSP, parsed, checked against the schemas of the standard, and every fault with file and line.
+"""Documents: the XML files of SSP, parsed, checked against the schemas of the standard, and every fault with file and
+line.
 
 Touches lxml and the schema files beside it, nothing else of the package. The schemas are those of the standard
 (Modelica Association Project SSP, BSD 2-clause; each holds its licence).
@@ -51,13 +52,15 @@ def parse(text: bytes, file: str, kind: str, undeclared: Callable[[str, str], No
 
     Args:
         text: its content. file: its name for messages. kind: ``ssd``, ``ssv``, ``ssm`` or ``ssb``.
-        undeclared: told of each prefix that is used and not declared, and of the namespace that is taken for it; without it
-            such a file is refused.
+        undeclared: told of each prefix that is used and not declared, and of the namespace that is taken for it;
+            without it such a file is refused.
 
     Raises:
         ScenarioError: it is not XML, of another kind or version, or not as the schema wants it; with the line.
     """
-    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True, remove_pis=True)
+    parser = etree.XMLParser(
+        resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True, remove_pis=True
+    )
     try:
         root = etree.fromstring(text, parser, base_url=file)
     except etree.XMLSyntaxError as error:
@@ -68,7 +71,9 @@ def parse(text: bytes, file: str, kind: str, undeclared: Callable[[str, str], No
             return parse(_declared(text, prefixes), file, kind)
         raise ScenarioError(f"{file}, line {error.lineno}: not readable as XML: {error.msg}.") from error
     if root.getroottree().docinfo.doctype:
-        raise ScenarioError(f"{file}: holds a document type declaration; files of SSP have none, and it may hide anything.")
+        raise ScenarioError(
+            f"{file}: holds a document type declaration; files of SSP have none, and it may hide anything."
+        )
     return validated(root, file, kind)
 
 

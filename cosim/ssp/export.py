@@ -1,4 +1,6 @@
-"""Export: a scenario becomes a system structure package that other tools can read, and this one reads back to the same run."""
+"""Export: a scenario becomes a system structure package that other tools can read, and this one reads back to the same
+run.
+"""
 
 from __future__ import annotations
 
@@ -14,10 +16,10 @@ from fmpy.model_description import ModelDescription
 from cosim.balises.layout import TrackLayout
 from cosim.components.loading import describe_fmu
 from cosim.errors import CosimError, CouplingError, OutputError, ScenarioError, nearest
+from cosim.scenario.backends import NATIVE
 from cosim.scenario.connections import parse_connections
 from cosim.scenario.layouts import make_layout
 from cosim.scenario.models import LATE_PARAMETERS, make_system, native_fmu
-from cosim.scenario.realisations import NATIVE
 from cosim.scenario.schema import ScenarioTable
 from cosim.scenario.starts import start_values
 from cosim.scenario.tables import ComponentTable
@@ -93,7 +95,8 @@ class _Exporter:
         """All files."""
         if self.table.balises is not None and self.table.balises.layout == "recorded":
             raise ScenarioError(
-                f"{self.where}: balises: recorded telegrams cannot be exported; lay the balises by 'positions' or 'instants'."
+                f"{self.where}: balises: recorded telegrams cannot be exported; lay the balises by 'positions' or "
+                f"'instants'."
             )
         for name, component in self.table.components.items():
             self.parts[name] = self.part(name, component)
@@ -101,9 +104,13 @@ class _Exporter:
         if reader is not None:
             self.parts[reader.name] = self.part(reader.name, reader.table)
         root = root_of(
-            "ssd", "SystemStructureDescription", self.version,
-            name=self.table.title, description=self.table.description.strip(), generationTool=TOOL,
-        )  # fmt: skip
+            "ssd",
+            "SystemStructureDescription",
+            self.version,
+            name=self.table.title,
+            description=self.table.description.strip(),
+            generationTool=TOOL,
+        )
         system = child(root, "ssd", "System", name=self.name)
         elements = child(system, "ssd", "Elements")
         for name, part in self.parts.items():
@@ -115,24 +122,31 @@ class _Exporter:
         self.files[DEFAULT_VARIANT] = text_of(root)
 
     def reader(self) -> Reader | None:
-        """The component that tells the others of balises in a tool that knows of none, where one is needed and can be made."""
+        """The component that tells the others of balises in a tool that knows of none, where one is needed and can be
+        made.
+        """
         balises = self.table.balises
         if balises is None:
             return None
         layout = make_layout(balises, self.table.start, self.table.stop, self.folder, self.where)
-        listed = isinstance(layout, TrackLayout) and (balises.layout == "spacing" or len(layout.positions) <= MOST_BALISES)
+        listed = isinstance(layout, TrackLayout) and (
+            balises.layout == "spacing" or len(layout.positions) <= MOST_BALISES
+        )
         if not isinstance(layout, TrackLayout) or not listed:
             why = f"layout '{balises.layout}' says when balises are passed and not where"
             if isinstance(layout, TrackLayout):
                 why = f"a reader holds at most {MOST_BALISES} balises and there are {len(layout.positions)}"
             LOG.warning(
-                "%s: other tools will tell the observers of no balises, for no reader could be added: %s.", self.where, why
+                "%s: other tools will tell the observers of no balises, for no reader could be added: %s.",
+                self.where,
+                why,
             )
             return None
         faces = {name: part.face for name, part in self.parts.items()}
         taken = {link[1] for link in parse_connections(self.table.connections, self.where)}
         newest = max(
-            (3 for face in faces.values() if is_told_by_counts(face) and face.description.fmiVersion[0] == "3"), default=2
+            (3 for face in faces.values() if is_told_by_counts(face) and face.description.fmiVersion[0] == "3"),
+            default=2,
         )
         return make_reader(balises, layout, faces, taken, newest)
 
@@ -141,14 +155,15 @@ class _Exporter:
         place = f"{self.where}: components.{name}"
         if component.recording is not None:
             raise ScenarioError(
-                f"{place}: a recording is no FMU, and a system structure package holds FMUs; export the scenario with the plant "
+                f"{place}: a recording is no FMU, and a system structure package holds FMUs; export the scenario with "
+                f"the plant "
                 "that was recorded, or leave the recording out and connect its signals in the other tool."
             )
         system = make_system(component, place)
         if system is None:
             fmu = (self.folder / str(component.fmu)).resolve()
         else:
-            version = 2 if self.version == "1.0" else int((component.realisation or NATIVE)[-1])
+            version = 2 if self.version == "1.0" else int((component.backend or NATIVE)[-1])
             # A master that knows no event mode can tell an FMU of events by counts only.
             counts = None if self.table.balises is None else EventProtocol("counts")
             fmu = native_fmu(system, version, component.preset, place, counts if system.triggered_events else None)
@@ -224,8 +239,8 @@ class _Exporter:
     def add_parameter(self, parent: Node, face: Face, name: str, values: list[Any], shape: Sequence[int]) -> None:
         """One parameter in the words of SSP: a number, an item by its name.
 
-        Numbers are in the unit of the variable, which the standard takes where none is written; a Float64 with a unit is not read
-        by OMSimulator (November 2025).
+        Numbers are in the unit of the variable, which the standard takes where none is written; a Float64 with a unit
+        is not read by OMSimulator (November 2025).
         """
         if name not in face.variables:
             raise ScenarioError(f"{self.where}: {face.what} has no variable {name!r}; {nearest(name, face.variables)}")
@@ -236,7 +251,9 @@ class _Exporter:
             names = {number: item for item, number in face.items(name).items()}
             values = [v if isinstance(v, str) else names.get(int(v), v) for v in values]
         if shape and self.version == "1.0":
-            raise ScenarioError(f"{self.where}: {face.what}: {name} is an array, which SSP 1.0 does not know; use version 2.0.")
+            raise ScenarioError(
+                f"{self.where}: {face.what}: {name} is an array, which SSP 1.0 does not know; use version 2.0."
+            )
         add_parameter(parent, name, kind, values, shape)
 
     def add_connections(self, system: Node, written: Sequence[Any]) -> None:
@@ -245,7 +262,9 @@ class _Exporter:
         holder = child(system, "ssd", "Connections") if links else None
         for source, target, *given in links:
             ends = [self.end(name, causality) for name, causality in ((source, "output"), (target, "input"))]
-            attributes = {f"{side}{key}": text for side, end in zip(("start", "end"), ends, strict=True) for key, text in end}
+            attributes = {
+                f"{side}{key}": text for side, end in zip(("start", "end"), ends, strict=True) for key, text in end
+            }
             transformation = given[0] if given else None
             if transformation is not None and not transformation.convert_units:
                 attributes["suppressUnitConversion"] = "true"
@@ -257,7 +276,9 @@ class _Exporter:
         """The attributes of one end of a connection."""
         component, _, signal = name.partition(".")
         if component not in self.parts:
-            raise ScenarioError(f"{self.where}: connections: no component {component!r}; {nearest(component, self.parts)}")
+            raise ScenarioError(
+                f"{self.where}: connections: no component {component!r}; {nearest(component, self.parts)}"
+            )
         variables = self.parts[component].face.variables
         known = [v for v, variable in variables.items() if variable.causality == causality]
         found = ELEMENT_OF_ARRAY.fullmatch(signal)
@@ -267,7 +288,9 @@ class _Exporter:
             hint = nearest(signal, known)
             raise ScenarioError(f"{self.where}: connections: {component} has no {causality} {signal!r}; {hint}")
         if self.version == "1.0":
-            raise ScenarioError(f"{self.where}: connections: {name} is an element of an array, which SSP 1.0 does not know.")
+            raise ScenarioError(
+                f"{self.where}: connections: {name} is an element of an array, which SSP 1.0 does not know."
+            )
         return [("Element", component), ("Connector", found[1]), ("Indices", found[2].replace(",", " "))]
 
     def add_transformation(self, node: Node, source: str, target: str, given: Any) -> None:
@@ -283,7 +306,9 @@ class _Exporter:
         if (given.factor, given.offset) != (1.0, 0.0):
             domain = {"Boolean": [0.0, 1.0], "Enumeration": self.item_numbers(source)}.get(family)
             if domain is None:
-                raise ScenarioError(f"{self.where}: connection to {target}: SSP knows no factor for type {family}; use 'values'.")
+                raise ScenarioError(
+                    f"{self.where}: connection to {target}: SSP knows no factor for type {family}; use 'values'."
+                )
             values = {value: given.factor * value + given.offset for value in domain}
         if values:
             kind = "Boolean" if family == "Boolean" else INTEGER
@@ -307,6 +332,8 @@ class _Exporter:
             try:
                 self.files[BALISES_FILE] = (self.folder / balises.file).read_bytes()
             except OSError as error:
-                raise ScenarioError(f"{self.where}: balises.file: {balises.file} cannot be read: {error.strerror}.") from error
+                raise ScenarioError(
+                    f"{self.where}: balises.file: {balises.file} cannot be read: {error.strerror}."
+                ) from error
             own["balises"] = own["balises"] | {"file": BALISES_FILE}
         return own

@@ -1,4 +1,6 @@
-"""Faces: what the FMU of a component says of its variables, as far as connections and parameters need it. Loads no library."""
+"""Faces: what the FMU of a component says of its variables, as far as connections and parameters need it. Loads no
+library.
+"""
 
 from __future__ import annotations
 
@@ -71,7 +73,8 @@ class Face:
         if kind not in ("unspecified", causality):
             fail(
                 connector.node,
-                f"connector {connector.name!r} is of kind {kind!r}, the variable of {self.what} has causality {causality!r}.",
+                f"connector {connector.name!r} is of kind {kind!r}, the variable of {self.what} has causality "
+                f"{causality!r}.",
             )
         if connector.type is not None and connector.type.family != FAMILIES[variable.type]:
             fail(

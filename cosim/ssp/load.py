@@ -120,7 +120,9 @@ def _component(nets: Nets, path: Path, parameters: Mapping[str, Any], lapses: La
     extras = {key: value for key, value in element.extras.items() if key != READS_BALISES}
     made = extras.pop(DIGEST, None)
     if made is not None and made != digest(element.fmu):
-        lapses.tell(element.node, f"{element.member} is not the FMU that the annotation speaks of; it is used as it is.")
+        lapses.tell(
+            element.node, f"{element.member} is not the FMU that the annotation speaks of; it is used as it is."
+        )
         extras = {key: value for key, value in extras.items() if key not in ORIGIN}
     if "model" not in extras and "observer" not in extras:
         extras["fmu"] = str(element.fmu)
@@ -129,7 +131,9 @@ def _component(nets: Nets, path: Path, parameters: Mapping[str, Any], lapses: La
 
 
 def _takes_our_place(nets: Nets, path: Path, structure: Structure) -> bool:
-    """Whether a component is a balise reader that was added for other tools; the balises of the structure's annotation do it."""
+    """Whether a component is a balise reader that was added for other tools; the balises of the structure's annotation
+    do it.
+    """
     element = nets.elements[path]
     assert isinstance(element, ComponentElement)
     added = element.extras.get(READS_BALISES) is True and "balises" in structure.extras
@@ -139,7 +143,9 @@ def _takes_our_place(nets: Nets, path: Path, structure: Structure) -> bool:
 def _experiment(structure: Structure, nets: Nets, tables: Mapping[str, Any]) -> dict[str, float]:
     """Start, stop and step, as far as they are known: from the structure, from annotations, or else from the FMUs."""
     experiments = [face.description.defaultExperiment for face in nets.faces.values()]
-    times = {k: [t for e in experiments if (t := _finite(getattr(e, k, None))) is not None] for k in ("stopTime", "stepSize")}
+    times = {
+        k: [t for e in experiments if (t := _finite(getattr(e, k, None))) is not None] for k in ("stopTime", "stepSize")
+    }
     start = 0.0 if structure.start is None else structure.start
     stop = structure.stop if structure.stop is not None else max(times["stopTime"], default=None)
     known = {"start": start} | ({} if stop is None else {"stop": stop})

@@ -87,7 +87,8 @@ class Binding:
     """A parameter set applied to an element.
 
     Args:
-        parameters: names with the prefix of the binding. mapping: entries, or None where all apply under their own names.
+        parameters: names with the prefix of the binding. mapping: entries, or None where all apply under their own
+        names.
     """
 
     parameters: tuple[Parameter, ...]

@@ -1,4 +1,5 @@
-"""Nets: the connections of nested systems followed from each input back to what drives it, through every system on the way.
+"""Nets: the connections of nested systems followed from each input back to what drives it, through every system on the
+way.
 
 Flattens; changes nothing. The directions follow the table "Allowed Connections" of SSP 2.0, section 5.4.2.
 """
@@ -114,7 +115,8 @@ class Nets:
         root: the root system. lapses: told of names that an FMU gives twice.
 
     Raises:
-        ScenarioError: a connector that does not exist or does not fit its FMU, a connection without direction, two drivers of
+        ScenarioError: a connector that does not exist or does not fit its FMU, a connection without direction, two
+        drivers of
             one connector, or connections in a circle.
     """
 
@@ -162,7 +164,10 @@ class Nets:
                 entries = self._system(owner).dictionaries[element.dictionary]
                 for name, connector in element.connectors.items():
                     if name not in entries:
-                        fail(connector.node, f"dictionary {element.dictionary!r} has no entry {name!r}; {nearest(name, entries)}")
+                        fail(
+                            connector.node,
+                            f"dictionary {element.dictionary!r} has no entry {name!r}; {nearest(name, entries)}",
+                        )
                     members.setdefault((owner, element.dictionary, name), []).append(Point(path, name))
         return members
 
@@ -229,7 +234,9 @@ class Nets:
         return Chain(point, tuple(hops))
 
     def _driver(self, point: Point) -> Hop | None:
-        """The connection into a point: its own, that of the whole array, or that of the dictionary entry it stands for."""
+        """The connection into a point: its own, that of the whole array, or that of the dictionary entry it stands
+        for.
+        """
         if point in self.incoming:
             return self.incoming[point]
         if point.indices and point.whole in self.incoming:
@@ -242,7 +249,10 @@ class Nets:
                 drivers = [m for m in members if m in self.incoming]
                 if len(drivers) > 1:
                     names = " and ".join(map(str, drivers))
-                    fail(self.connector(point).node, f"the signal {point.name!r} of {dictionary!r} has two sources, at {names}.")
+                    fail(
+                        self.connector(point).node,
+                        f"the signal {point.name!r} of {dictionary!r} has two sources, at {names}.",
+                    )
                 return Hop(drivers[0], point, False, None, self.connector(point).node) if drivers else None
         return None
 
@@ -255,8 +265,8 @@ def _walk(element: Element, path: Path) -> Iterator[tuple[Path, Element]]:
 
 
 def flat_names(paths: Iterable[Path]) -> dict[Path, str]:
-    """A legal, unique component name for each path: its parts joined by ``__``, other characters than letters, digits and ``_``
-    replaced.
+    """A legal, unique component name for each path: its parts joined by ``__``, other characters than letters, digits
+    and ``_`` replaced.
     """
     names: dict[Path, str] = {}
     for path in paths:

@@ -1,4 +1,5 @@
-"""Packages: an `.ssp` archive is looked at before anything of it is unpacked; its members are found by the URIs of the standard.
+"""Packages: an `.ssp` archive is looked at before anything of it is unpacked; its members are found by the URIs of the
+standard.
 
 Touches archives and a folder of its own for what is unpacked, which is removed when nothing needs it any more.
 """
@@ -65,11 +66,15 @@ class Package:
         except NotAnFmuError as error:
             raise ScenarioError(str(error).replace("an FMU must not", "a system structure package must not")) from error
         except (zipfile.BadZipFile, OSError, EOFError, ValueError, NotImplementedError) as error:
-            raise ScenarioError(f"{title} is not a readable SSP: not a zip archive, or a broken one ({error}).") from error
+            raise ScenarioError(
+                f"{title} is not a readable SSP: not a zip archive, or a broken one ({error})."
+            ) from error
         self.sizes = {entry.filename: entry.file_size for entry in entries if not entry.is_dir()}
         if DEFAULT_VARIANT not in self.sizes:
             found = ", ".join(sorted(self.sizes)[:8]) or "nothing"
-            raise ScenarioError(f"{title} is not an SSP: it has no {DEFAULT_VARIANT} at its top level; it holds {found}.")
+            raise ScenarioError(
+                f"{title} is not an SSP: it has no {DEFAULT_VARIANT} at its top level; it holds {found}."
+            )
 
     @property
     def variants(self) -> list[str]:
@@ -84,7 +89,9 @@ class Package:
             ScenarioError: it is too large or damaged.
         """
         if self.sizes[name] > MAX_XML_BYTES:
-            raise ScenarioError(f"{self.title}: {name} has {self.sizes[name] / 1e6:.0f} MB; XML of at most 64 MB is read.")
+            raise ScenarioError(
+                f"{self.title}: {name} has {self.sizes[name] / 1e6:.0f} MB; XML of at most 64 MB is read."
+            )
         with self._opened(name) as source:
             return source.read()
 
@@ -112,7 +119,11 @@ class Package:
         """
         parts = urlsplit(uri)
         if parts.scheme or parts.netloc or parts.path.startswith("/"):
-            fail(node, f"source {uri!r}: only files within the package can be used, by relative URIs such as 'resources/a.fmu'.")
+            fail(
+                node,
+                f"source {uri!r}: only files within the package can be used, by relative URIs such as "
+                f"'resources/a.fmu'.",
+            )
         name = posixpath.normpath(posixpath.join(posixpath.dirname(base), unquote(parts.path)))
         if name.startswith("../"):
             fail(node, f"source {uri!r} leads out of the package.")

@@ -1,4 +1,5 @@
-"""Pipes: what becomes of a number on its way from one variable to another: units, linear transformations, tables of values.
+"""Pipes: what becomes of a number on its way from one variable to another: units, linear transformations, tables of
+values.
 
 Pure functions on numbers and units; knows neither systems nor FMUs.
 """
@@ -54,7 +55,9 @@ class Pipe:
             return pipe._affine(step.factor, step.offset)
         if isinstance(step, ValueMap):
             if (pipe.factor, pipe.offset) != (1.0, 0.0):
-                fail(node, "a table of values behind a unit conversion or a linear transformation cannot be carried out.")
+                fail(
+                    node, "a table of values behind a unit conversion or a linear transformation cannot be carried out."
+                )
             return replace(pipe, maps=(*pipe.maps, step))
         return pipe
 
@@ -85,7 +88,11 @@ class Pipe:
         if one is None or other is None:
             unknown = (self.unit if one is None else unit).name
             between = f"from {self.unit.name!r} to {unit.name!r}"
-            fail(node, f"nothing defines the unit {unknown!r}, so numbers cannot be brought {between}; define it in its Units.")
+            fail(
+                node,
+                f"nothing defines the unit {unknown!r}, so numbers cannot be brought {between}; define it in its "
+                f"Units.",
+            )
         if one == other:
             return self
         try:
@@ -111,7 +118,9 @@ def numeric(maps: tuple[ValueMap, ...], node: Node) -> dict[float, float]:
     return table
 
 
-def by_items(maps: tuple[ValueMap, ...], source: Mapping[str, int], target: Mapping[str, int], node: Node) -> dict[float, float]:
+def by_items(
+    maps: tuple[ValueMap, ...], source: Mapping[str, int], target: Mapping[str, int], node: Node
+) -> dict[float, float]:
     """Tables of item names in a row as a table of numbers; an item without an entry keeps its name, or else its number.
 
     Args:
@@ -131,8 +140,12 @@ def by_items(maps: tuple[ValueMap, ...], source: Mapping[str, int], target: Mapp
     return table
 
 
-def simplest(table: Mapping[float, float], domain: frozenset[float]) -> tuple[float, float] | tuple[tuple[float, float], ...]:
-    """A table as ``(factor, offset)`` where that does the same on its domain, else as its entries that change something."""
+def simplest(
+    table: Mapping[float, float], domain: frozenset[float]
+) -> tuple[float, float] | tuple[tuple[float, float], ...]:
+    """A table as ``(factor, offset)`` where that does the same on its domain, else as its entries that change
+    something.
+    """
     affine = as_affine(table, domain)
     if affine is not None:
         return affine

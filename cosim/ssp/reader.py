@@ -1,7 +1,7 @@
 """The balise reader of an exported system: it tells the observers of balises where no master does.
 
-Other tools know nothing of balises. The FMU `balise_reader`, wired to the watched plant and to every observer that is told by
-counts, finds them from position and speed. Read back, the package's own master takes its place.
+Other tools know nothing of balises. The FMU `balise_reader`, wired to the watched plant and to every observer that is
+told by counts, finds them from position and speed. Read back, the package's own master takes its place.
 """
 
 from __future__ import annotations
@@ -49,7 +49,9 @@ def make_reader(
         table: of the balises. layout: where they lie. faces: of all components.
         taken: inputs that have a source, as ``component.input``. version: of FMI.
     """
-    told = [n for n, face in faces.items() if is_told_by_counts(face) and (table.receivers is None or n in table.receivers)]
+    told = [
+        n for n, face in faces.items() if is_told_by_counts(face) and (table.receivers is None or n in table.receivers)
+    ]
     told = [n for n in told if not {f"{n}.{BALISE_EVENT}_{field}" for field in TOLD} & taken]
     if not told or table.position is None or table.speed is None:
         return None
@@ -69,7 +71,9 @@ def _track(table: BalisesTable, places: list[float]) -> tuple[dict[str, Any], di
     if table.layout == "spacing":
         return {}, {"first_balise": places[0], "balise_spacing": table.spacing, "balise_total": len(places)}
     capacity = PAGE * ceil(len(places) / PAGE)  # few different FMUs, so that most need not be built
-    return {"layout": "positions", "balise_capacity": capacity}, {"positions": places + [UNUSED] * (capacity - len(places))}
+    return {"layout": "positions", "balise_capacity": capacity}, {
+        "positions": places + [UNUSED] * (capacity - len(places))
+    }
 
 
 def is_told_by_counts(face: Face) -> bool:

@@ -1,6 +1,7 @@
 """Communication steps in annotations of other tools: SSP itself has no word for them. Reads elements only.
 
-Read are those of OSP (libcosim), Vico and OMSimulator, by the names of their elements: the files do not agree on namespaces.
+Read are those of OSP (libcosim), Vico and OMSimulator, by the names of their elements: the files do not agree on
+namespaces.
 """
 
 from __future__ import annotations
@@ -14,7 +15,9 @@ FIXED = ("FixedStepAlgorithm", "FixedStepMaster")
 VARIABLE = ("VariableStepAlgorithm", "VariableStepMaster", "VariableStepSolver")
 LENGTHS = ("baseStepSize", "stepSize")
 HOLDERS = ("ssd:DefaultExperiment/ssd:Annotations", "ssd:System/ssd:Annotations", "ssd:Annotations")
-"""Where they stand: of the whole run, in the order in which they count. Those of nested systems and of components do not."""
+"""Where they stand: of the whole run, in the order in which they count. Those of nested systems and of components do
+not.
+"""
 
 
 def read_step(root: Node, lapses: Lapses) -> float | None:
@@ -27,7 +30,9 @@ def read_step(root: Node, lapses: Lapses) -> float | None:
         name = short(node.tag)
         length = next((node.get(key) for key in LENGTHS if node.get(key) is not None), "")
         if name in VARIABLE:
-            lapses.tell(node, f"the annotation asks for {name}, which is not carried out; the communication step is fixed.")
+            lapses.tell(
+                node, f"the annotation asks for {name}, which is not carried out; the communication step is fixed."
+            )
         elif name in FIXED:
             try:
                 step = float(length)

@@ -68,8 +68,10 @@ class _Reader:
         self.package, self.member, self.root, self.outer = package, member, root, outer
         self.units = UnitTable(root, "ssd", package.lapses)
         self.readers: dict[str, Callable[[Node], Element]] = {
-            "Component": self.component, "System": self.system, "SignalDictionaryReference": self.reference,
-        }  # fmt: skip
+            "Component": self.component,
+            "System": self.system,
+            "SignalDictionaryReference": self.reference,
+        }
 
     def system(self, node: Node) -> SystemElement:
         """A system and all it holds."""
@@ -80,29 +82,43 @@ class _Reader:
                 fail(child, f"system {node.get('name')!r} has two elements named {element.name!r}.")
             elements[element.name] = element
         return SystemElement(
-            node.get("name"), self.connectors(node), self.bindings(node), node,
+            node.get("name"),
+            self.connectors(node),
+            self.bindings(node),
+            node,
             elements=elements,
             wires=[self.wire(child) for child in find_all(node, "ssd:Connections/ssd:Connection")],
             dictionaries=self.dictionaries(node),
-        )  # fmt: skip
+        )
 
     def component(self, node: Node) -> Element:
         """A component: an FMU, or a structure of its own."""
         kind, source = node.get("type", FMU).partition(";")[0].strip(), node.get("source")
         if kind not in (FMU, DEFINITION, PACKAGE):
-            fail(node, f"component {node.get('name')!r} is of type {kind!r}; FMUs ({FMU}) and nested structures can be run.")
+            fail(
+                node,
+                f"component {node.get('name')!r} is of type {kind!r}; FMUs ({FMU}) and nested structures can be run.",
+            )
         if source is None:
             fail(node, f"component {node.get('name')!r} has no source: nothing says what it does, so it cannot be run.")
         if kind != FMU:
             return self._nested(node, kind, source)
         implementation = node.get("implementation", "any")
         if implementation not in IMPLEMENTATIONS:
-            fail(node, f"component {node.get('name')!r} asks for {implementation}; this master steps co-simulation FMUs only.")
+            fail(
+                node,
+                f"component {node.get('name')!r} asks for {implementation}; this master steps co-simulation FMUs only.",
+            )
         member = self.package.member(node, source, self.member)
         return ComponentElement(
-            node.get("name"), self.connectors(node), self.bindings(node, member), node,
-            fmu=self.package.file(member), member=member, extras=read_extras(node),
-        )  # fmt: skip
+            node.get("name"),
+            self.connectors(node),
+            self.bindings(node, member),
+            node,
+            fmu=self.package.file(member),
+            member=member,
+            extras=read_extras(node),
+        )
 
     def reference(self, node: Node) -> DictionaryReference:
         """A signal dictionary reference."""
@@ -124,7 +140,11 @@ class _Reader:
     def wire(self, node: Node) -> Wire:
         """A connection."""
         start, end = (
-            End(self.element(node, f"{side}Element"), node.get(f"{side}Connector"), _indices(node.get(f"{side}Indices", "")))
+            End(
+                self.element(node, f"{side}Element"),
+                node.get(f"{side}Connector"),
+                _indices(node.get(f"{side}Indices", "")),
+            )
             for side in ("start", "end")
         )
         return Wire(start, end, flag(node, "suppressUnitConversion"), read_transformation(node), node)
@@ -133,12 +153,18 @@ class _Reader:
         """The element that one end of a connection names; None for the system itself."""
         name: str | None = node.get(key)
         if name == "":  # no element can have that name
-            self.package.lapses.forgive(node, f'{key}="" names no element; taken as the system itself, for which it is left out.')
+            self.package.lapses.forgive(
+                node, f'{key}="" names no element; taken as the system itself, for which it is left out.'
+            )
         return name or None
 
     def bindings(self, node: Node, component: str | None = None) -> list[Binding]:
-        """The parameter bindings of an element in their order. `component`: the member that is the component's source."""
-        return [self._binding(child, component) for child in find_all(node, "ssd:ParameterBindings/ssd:ParameterBinding")]
+        """The parameter bindings of an element in their order. `component`: the member that is the component's
+        source.
+        """
+        return [
+            self._binding(child, component) for child in find_all(node, "ssd:ParameterBindings/ssd:ParameterBinding")
+        ]
 
     def dictionaries(self, node: Node) -> dict[str, dict[str, Connector]]:
         """The signal dictionaries of a system, their entries by name."""
@@ -150,14 +176,18 @@ class _Reader:
             units = UnitTable(root, "ssb", self.package.lapses)
             entries = find_all(root, "ssb:DictionaryEntry")
             found[child.get("name")] = {
-                e.get("name"): Connector(e.get("name"), "inout", read_type(e, units), len(find_all(e, "ssc:Dimension")), e)
+                e.get("name"): Connector(
+                    e.get("name"), "inout", read_type(e, units), len(find_all(e, "ssc:Dimension")), e
+                )
                 for e in entries
             }
         return found
 
     def _binding(self, node: Node, component: str | None) -> Binding:
         holder = find(node, "ssd:ParameterValues")
-        parameters = read_parameter_set(self._part(node, "ssv", component, holder), node.get("prefix", ""), self.package.lapses)
+        parameters = read_parameter_set(
+            self._part(node, "ssv", component, holder), node.get("prefix", ""), self.package.lapses
+        )
         mapping: tuple[Entry, ...] | None = None
         mapped = find(node, "ssd:ParameterMapping")
         if mapped is not None:
@@ -197,7 +227,9 @@ class _Reader:
         member = self.package.member(node, path, self.member)
         package = self.package
         if kind == PACKAGE:
-            package = Package(self.package.file(member), _title(self.package, member), self.package.unpacked, self.package.lapses)
+            package = Package(
+                self.package.file(member), _title(self.package, member), self.package.unpacked, self.package.lapses
+            )
             member = fragment or DEFAULT_VARIANT
             if member not in package.sizes:
                 fail(node, f"{path} has no {member!r}; {nearest(member, package.variants)}")

@@ -19,7 +19,9 @@ TOOL = "fmu-observer"
 
 @dataclass
 class Definitions:
-    """Units and enumerations that one file uses; where two FMUs mean different things by one name, the second gets a new name."""
+    """Units and enumerations that one file uses; where two FMUs mean different things by one name, the second gets a
+    new name.
+    """
 
     units: dict[str, Unit] = field(default_factory=dict)
     enumerations: dict[str, Mapping[str, int]] = field(default_factory=dict)
@@ -86,7 +88,9 @@ def add_connector(
     if FAMILIES[kind] == REAL and unit is not None:
         attributes["unit"] = definitions.unit(unit)
     if kind == "Enumeration" and items:
-        attributes["name"] = definitions.enumeration(getattr(variable.declaredType, "name", None) or variable.name, items)
+        attributes["name"] = definitions.enumeration(
+            getattr(variable.declaredType, "name", None) or variable.name, items
+        )
     if kind == "Clock" and variable.intervalVariability:
         attributes["intervalVariability"] = str(variable.intervalVariability)
     if kind != "Enumeration" or items:  # the schema knows no enumeration without items; a type may be left out
@@ -99,7 +103,8 @@ def add_parameter(parent: Node, name: str, kind: str, values: Sequence[Any], sha
     """A parameter of a parameter set.
 
     Args:
-        parent: ``Parameters`` element. kind: type in the words of SSP. values: in row-major order. shape: empty for a scalar.
+        parent: ``Parameters`` element. kind: type in the words of SSP. values: in row-major order. shape: empty for a
+        scalar.
     """
     node = child(parent, "ssv", "Parameter", name=name)
     texts = [_text(value, FAMILIES[kind]) for value in values]

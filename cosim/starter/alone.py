@@ -37,7 +37,9 @@ def alone(look: Look, fmu: str, target: str) -> list[str]:
         "",
     ]
     if inputs:
-        lines += comment("Inputs at their start values. Change them here, or play back a table with a column for each (below).")
+        lines += comment(
+            "Inputs at their start values. Change them here, or play back a table with a column for each (below)."
+        )
         lines.append(f"[components.{NAME}.parameters]")
         lines += [_input(look, v) for v in inputs[:LISTED] if v.valueReference not in hidden]
         names = [v.name for v in inputs if v.type in NUMERIC_TYPES and v.valueReference not in hidden]
@@ -70,7 +72,10 @@ def _input(look: Look, variable: ModelVariable) -> str:
     try:
         start_values(look.component, {variable.name: value})
     except CosimError as error:
-        return f"# {entry(variable.name, value)}{remark} - its own start value does not fit it: {one_line(str(error), 200)}"
+        return (
+            f"# {entry(variable.name, value)}{remark} - its own start value does not fit it: "
+            f"{one_line(str(error), 200)}"
+        )
     return entry(variable.name, value) + remark
 
 
@@ -103,10 +108,18 @@ def _playback(names: list[str]) -> list[str]:
 
 def _hints(look: Look, target: str) -> list[str]:
     outputs = [s.name for s in look.outputs]
-    lines = comment("Nothing here looks like the position or speed of a train, so no observer and no balises are set up.")
+    lines = comment(
+        "Nothing here looks like the position or speed of a train, so no observer and no balises are set up."
+    )
     lines += ["#", "# For a regression test, put this into test_fmu.py beside this file and run pytest:", "#"]
     lines += ["#     def test_outputs(fmu_regression):", f"#         fmu_regression({target!r})", "#"]
     if outputs:
         lines += comment("Or let the run judge itself; cosim run then ends with 1 where this does not hold:")
-        lines += ["#", "# [[expect]]", '# check = "signal"', f'# signal = "{NAME}.{one_line(outputs[0])}"', "# max = 1.0"]
+        lines += [
+            "#",
+            "# [[expect]]",
+            '# check = "signal"',
+            f'# signal = "{NAME}.{one_line(outputs[0])}"',
+            "# max = 1.0",
+        ]
     return lines

@@ -1,4 +1,6 @@
-"""Guesses: which signals of an FMU are its position, speed, wheel speed and effort, and how sure that is. Knows no files."""
+"""Guesses: which signals of an FMU are its position, speed, wheel speed and effort, and how sure that is. Knows no
+files.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,8 @@ class Signal:
     """A numeric scalar variable, or an element of an array, as the description has it.
 
     Args:
-        name: its name. unit: name of its unit, or None. meaning: of the unit; None without one, or where nobody understands it.
+        name: its name. unit: name of its unit, or None. meaning: of the unit; None without one, or where nobody
+        understands it.
         description: one line. start: its start value as a number, or None. type: of FMI.
     """
 
@@ -83,7 +86,8 @@ def guess(quantity: Quantity, signals: Sequence[Signal], taken: Sequence[str] = 
     """
     rated = [(_rate(quantity, signal), signal) for signal in signals if signal.name not in taken]
     fitting = sorted(
-        ((rate, s) for rate, s in rated if rate[0] > 0), key=lambda pair: (-pair[0][0], not pair[1].name.startswith(f"{part}."))
+        ((rate, s) for rate, s in rated if rate[0] > 0),
+        key=lambda pair: (-pair[0][0], not pair[1].name.startswith(f"{part}.")),
     )
     if not fitting:
         return None

@@ -1,4 +1,6 @@
-"""A look into an FMU: its variables as signals to guess from. Reads the model description; nothing is unpacked or executed."""
+"""A look into an FMU: its variables as signals to guess from. Reads the model description; nothing is unpacked or
+executed.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,8 @@ class Look:
 
     Args:
         path: of the file. component: to be asked for variables and units; it cannot be stepped.
-        inputs, outputs, parameters, hidden: numeric scalars, and the elements of short arrays; hidden ones are local variables,
+        inputs, outputs, parameters, hidden: numeric scalars, and the elements of short arrays; hidden ones are local
+        variables,
             which may be read like outputs.
         unread: inputs and outputs that no connection of numbers can reach (texts, clocks, long arrays), a line each.
         runs_here: whether it has a library for this platform.
@@ -77,7 +80,8 @@ def _demand_co_simulation(path: Path, description: ModelDescription) -> None:
     kinds = {"modelExchange": "model exchange", "scheduledExecution": "scheduled execution"}
     offered = " and ".join(text for key, text in kinds.items() if getattr(description, key, None) is not None)
     raise FmuLoadError(
-        f"{path} offers {offered or 'no interface'} only; this master steps co-simulation FMUs. Ask its maker for an export for "
+        f"{path} offers {offered or 'no interface'} only; this master steps co-simulation FMUs. Ask its maker for an "
+        f"export for "
         "co-simulation (most tools offer both)."
     )
 

@@ -26,7 +26,8 @@ class Starter:
     """A starter scenario.
 
     Args:
-        text: of the file. kind: ``train``, ``observer`` or ``alone``. remarks: what the user should be told, a line each.
+        text: of the file. kind: ``train``, ``observer`` or ``alone``. remarks: what the user should be told, a line
+        each.
     """
 
     text: str
@@ -94,7 +95,9 @@ def _check_observer(observer: str | None) -> None:
         return
     able = [name for name, system in OBSERVERS.items() if {s.name for s in system().inputs} >= WANTED]
     if observer not in able:
-        raise ScenarioError(f"No observer {observer!r} that listens to an effort and an odometer; {nearest(observer, able)}")
+        raise ScenarioError(
+            f"No observer {observer!r} that listens to an effort and an odometer; {nearest(observer, able)}"
+        )
 
 
 def _head(look: Look, target: str, kind: str) -> list[str]:
@@ -103,8 +106,10 @@ def _head(look: Look, target: str, kind: str) -> list[str]:
     about += f", made with {one_line(description.generationTool)}" if description.generationTool else ""
     lines = comment(f"A starter scenario for {about}.")
     if kind != "alone":
-        lines += comment("What stands here was guessed from the FMU's description; nothing of it was executed. "
-                         "Behind each guess is said how sure it is: confirm it by editing. Then:")  # fmt: skip
+        lines += comment(
+            "What stands here was guessed from the FMU's description; nothing of it was executed. "
+            "Behind each guess is said how sure it is: confirm it by editing. Then:"
+        )
     lines += [
         "#",
         f"#   cosim show {target}    # how it hangs together",
@@ -126,6 +131,13 @@ def _remarks(look: Look, kind: str, roles: PlantRoles, observer: str | None) -> 
     if kind != "train" and observer is not None:
         yield f"{observer} was not used."
     if kind == "train":
-        found = {"position": roles.position, "speed": roles.speed, "wheel speed": roles.wheel_speed, "effort": roles.effort}
+        found = {
+            "position": roles.position,
+            "speed": roles.speed,
+            "wheel speed": roles.wheel_speed,
+            "effort": roles.effort,
+        }
         for what, role in found.items():
-            yield f"{what}: " + ("not found" if role is None else f"{role.signal.name} ({role.sureness}, {role.reason})")
+            yield f"{what}: " + (
+                "not found" if role is None else f"{role.signal.name} ({role.sureness}, {role.reason})"
+            )

@@ -1,4 +1,6 @@
-"""Lines of a starter scenario: values, keys, comments and connections as TOML. Texts of vendors cannot leave their line."""
+"""Lines of a starter scenario: values, keys, comments and connections as TOML. Texts of vendors cannot leave their
+line.
+"""
 
 from __future__ import annotations
 
@@ -56,7 +58,9 @@ def listing(title: str, signals: Sequence[Signal]) -> list[str]:
     width = max((len(one_line(s.name)) for s in signals[:LISTED]), default=0)
     lines = [f"# {title} ({len(signals)}):"]
     for s in signals[:LISTED]:
-        lines.append(f"#   {one_line(s.name):<{width}}  [{one_line(s.unit or '-')}]  {one_line(s.description)}".rstrip())
+        lines.append(
+            f"#   {one_line(s.name):<{width}}  [{one_line(s.unit or '-')}]  {one_line(s.description)}".rstrip()
+        )
     more = len(signals) - LISTED
     return lines + ([f"#   ... and {more} more, see: cosim info"] if more > 0 else [])
 

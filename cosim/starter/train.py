@@ -19,7 +19,9 @@ RADIUS = 0.5
 ASSUMED = {"position": "m", "true_position": "m", "speed": "m/s", "true_speed": "m/s", "true_adhesion_force": "N"}
 ODOMETER = ("[components.odometer]", 'model = "odometer"', "parameters = { noise_std = 0.01, seed = 1 }  # [m/s]", "")
 PRESETS = {DEFAULT_OBSERVER: "long_gaps"}
-"""What is offered beside balises laid by distance, whose gaps nobody knows beforehand: gains that no gap makes unstable."""
+"""What is offered beside balises laid by distance, whose gaps nobody knows beforehand: gains that no gap makes
+unstable.
+"""
 
 
 def train(look: Look, fmu: str, roles: PlantRoles, observer: str) -> list[str]:
@@ -35,7 +37,11 @@ def train(look: Look, fmu: str, roles: PlantRoles, observer: str) -> list[str]:
         f"{entry('stop', stop)}  # [s]",
         f"{entry('step', step)}  # [s] {source}",
         "",
-        *([] if roles.effort else comment("No input was found that drives the train (an effort in N), so there is no driver.")),
+        *(
+            []
+            if roles.effort
+            else comment("No input was found that drives the train (an effort in N), so there is no driver.")
+        ),
         "connections = [",
         *links,
         "]",
@@ -51,7 +57,9 @@ def train(look: Look, fmu: str, roles: PlantRoles, observer: str) -> list[str]:
 
 
 def train_times(look: Look) -> tuple[float, float, str]:
-    """Stop and step [s], and where the step comes from: the FMU's own where it says so and it is one to communicate at."""
+    """Stop and step [s], and where the step comes from: the FMU's own where it says so and it is one to communicate
+    at.
+    """
     fixed = read_capabilities(look.description).fixedInternalStepSize
     advised = look.description.defaultExperiment
     for length, source in (
@@ -68,7 +76,8 @@ def train_times(look: Look) -> tuple[float, float, str]:
     return HORIZON, STEP, "communication step"
 
 
-# -- connections --------------------------------------------------------------------------------------------------------
+# -- connections
+# --------------------------------------------------------------------------------------------------------
 
 
 def _links(roles: PlantRoles) -> list[Link]:
@@ -77,7 +86,12 @@ def _links(roles: PlantRoles) -> list[Link]:
         links.append(_from_driver(roles.effort))
     elif roles.applied is not None:
         links.append(
-            Link(f"{PLANT}.{roles.applied.signal.name}", [f"{OBSERVER}.effort"], guessed(roles.applied), _factor(roles.applied))
+            Link(
+                f"{PLANT}.{roles.applied.signal.name}",
+                [f"{OBSERVER}.effort"],
+                guessed(roles.applied),
+                _factor(roles.applied),
+            )
         )
     links.append(_to_odometer(roles))
     readers = ["driver.odometer"] if roles.effort is not None else []
@@ -120,7 +134,8 @@ def _factor(found: Guess) -> float | None:
     return None if found.signal.readable else 1.0
 
 
-# -- components ---------------------------------------------------------------------------------------------------------
+# -- components
+# ---------------------------------------------------------------------------------------------------------
 
 
 def _plant(look: Look, fmu: str, roles: PlantRoles) -> list[str]:
@@ -133,9 +148,12 @@ def _plant(look: Look, fmu: str, roles: PlantRoles) -> list[str]:
     lines += comment("Other inputs keep their start values, and so do parameters; take away a # to set one.")
     lines += [f"[components.{PLANT}.parameters]"]
     lines += [
-        f"# {entry(s.name, s.start or 0.0)}  # [{one_line(s.unit or '-')}] input: {one_line(s.description)}" for s in others[:10]
+        f"# {entry(s.name, s.start or 0.0)}  # [{one_line(s.unit or '-')}] input: {one_line(s.description)}"
+        for s in others[:10]
     ]
-    lines += [f"# {entry(s.name, s.start)}  # [{one_line(s.unit or '-')}] {one_line(s.description)}" for s in settings[:20]]
+    lines += [
+        f"# {entry(s.name, s.start)}  # [{one_line(s.unit or '-')}] {one_line(s.description)}" for s in settings[:20]
+    ]
     lines += [f"# ... and {len(settings) - 20} more, see: cosim info"] if len(settings) > 20 else []
     return [*lines, ""]
 
@@ -144,8 +162,11 @@ def _driver(roles: PlantRoles) -> list[str]:
     if roles.effort is None:
         return []
     return [
-        *comment("A driver who follows a speed profile by the odometer: 50 km/h in 20 s, hold. Its gains suit 90 t; scale them "
-                 "and the effort limit with the mass of your train."),
+        *comment(
+            "A driver who follows a speed profile by the odometer: 50 km/h in 20 s, hold. Its gains suit 90 t; scale "
+            "them "
+            "and the effort limit with the mass of your train."
+        ),
         "[components.driver]",
         'model = "driver"',
         "",
@@ -154,7 +175,7 @@ def _driver(roles: PlantRoles) -> list[str]:
         "# profile_time = [0.0, 20.0, 65.0, 85.0, 85.0, 85.0, 85.0, 85.0]  # [s]",
         "# profile_speed = [0.0, 13.9, 13.9, 0.0, 0.0, 0.0, 0.0, 0.0]  # [m/s]",
         "",
-    ]  # fmt: skip
+    ]
 
 
 def observer_table(observer: str, mass: Guess | None) -> list[str]:
@@ -175,18 +196,24 @@ def observer_table(observer: str, mass: Guess | None) -> list[str]:
 def _mass(found: Guess | None, otherwise: object) -> str:
     start = None if found is None else found.signal.start
     if found is None or start is None or not start > 0.0:
-        return f"{entry('mass', otherwise)}  # [kg] WRITE THE MASS OF YOUR TRAIN: the FMU has no parameter that looks like it"
+        return (
+            f"{entry('mass', otherwise)}  # [kg] WRITE THE MASS OF YOUR TRAIN: the FMU has no parameter that looks "
+            f"like it"
+        )
     factor = found.signal.meaning.factor if found.signal.meaning is not None else 1.0
     said = guessed(found).strip().removeprefix("# ")
     return f"{entry('mass', start * factor)}  # [kg] start value of {one_line(found.signal.name)}; {said}"
 
 
-# -- balises, report, expectations --------------------------------------------------------------------------------------
+# -- balises, report, expectations
+# --------------------------------------------------------------------------------------
 
 
 def _balises(position: Guess | None, speed: Guess | None) -> list[str]:
     """The table of balises; as comment where they cannot be found."""
-    lacking = [what for what, found in (("position", position), ("speed", speed)) if found is None or not found.signal.readable]
+    lacking = [
+        what for what, found in (("position", position), ("speed", speed)) if found is None or not found.signal.readable
+    ]
     lines = [
         "[balises]",
         _role("position", position),
@@ -197,12 +224,14 @@ def _balises(position: Guess | None, speed: Guess | None) -> list[str]:
         "first = 50.0  # [m]",
         "track_end = 5000.0  # [m]",
         "expected_speed = 5.0  # [m/s] the slowest, to predict the gaps between balises for the certificate",
-        "latency = 0.05  # [s] from passing to delivery",
+        "latency = 0.05  # [s] from crossing to delivery",
         "",
     ]
     if not lacking:
         return lines
-    words = f"No output was found for the train's {' and '.join(lacking)} (or its unit is not understood): balises need it."
+    words = (
+        f"No output was found for the train's {' and '.join(lacking)} (or its unit is not understood): balises need it."
+    )
     return [*comment(words + " Write its name and take away the #."), *(f"# {line}" if line else "" for line in lines)]
 
 
@@ -231,7 +260,10 @@ def _report(roles: PlantRoles) -> list[str]:
 def expectations(observers: Sequence[str] = (OBSERVER,)) -> list[str]:
     """A hint how the run becomes a test."""
     return [
-        *comment("What the run must fulfil; cosim run ends with 1 where it does not. Write your own limit and take away the #."),
+        *comment(
+            "What the run must fulfil; cosim run ends with 1 where it does not. Write your own limit and take away the "
+            "#."
+        ),
         "# [[expect]]",
         '# check = "speed_error"',
         f'# of = "{observers[0]}"',

@@ -21,8 +21,9 @@ def error_measures(outcome: Outcome) -> dict[str, float]:
     """Largest and root-mean-square errors of every observer over the evaluated part of the run.
 
     Returns:
-        ``observer.speed_error_max``, ``observer.speed_error_rms`` [m/s] and the same of the position [m], where recorded;
-        NaN for a run that failed, whose errors are those of another stretch of time, and where too few rows are judged.
+        ``observer.speed_error_max``, ``observer.speed_error_rms`` [m/s] and the same of the position [m], where
+        recorded; NaN for a run that failed, whose errors are those of another stretch of time, and where too few rows
+        are judged.
     """
     result, spec = outcome.result, outcome.spec
     measures: dict[str, float] = {}

@@ -1,4 +1,5 @@
-"""What one observer is worth in one run: errors by phase and at balises, slip indications, certificate, telegrams, cost.
+"""What one observer is worth in one run: errors by phase and at balises, slip indications, certificate, telegrams,
+cost.
 
 Reads results; runs nothing.
 """
@@ -46,7 +47,8 @@ class CertifiedGap:
 
     Args:
         limit: gaps that vary are certified up to here [s]; None where that is not known.
-        expected: longest gap to expect before the run [s], None where it cannot be known. seen: longest that occurred [s].
+        expected: longest gap to expect before the run [s], None where it cannot be known. seen: longest that occurred
+        [s].
     """
 
     limit: float | None
@@ -116,8 +118,9 @@ class ObserverScore:
         data["cost_us"] = self.cost
         if self.certificate is not None:
             data["certificate"] |= {
-                "holds_expected": self.certificate.holds_expected, "holds_seen": self.certificate.holds_seen,
-            }  # fmt: skip
+                "holds_expected": self.certificate.holds_expected,
+                "holds_seen": self.certificate.holds_seen,
+            }
         return data
 
 
@@ -149,11 +152,13 @@ def measured(result: Result, spec: ReportSpec, name: str) -> dict[str, Any]:
 def error_at_balises(result: Result, spec: ReportSpec, name: str, quantity: Quantity) -> ErrorAtBalises | None:
     """Errors of an observer on the row before each telegram that it used, from `evaluate_after` on; None without any.
 
-    A row pair of the same time stands at each delivery, before and after; of an observer that could not be stopped there the
-    last row before it counts.
+    A row pair of the same time stands at each delivery, before and after; of an observer that could not be stopped
+    there the last row before it counts.
     """
     error = estimation_error(result, spec, name, quantity)
-    times = [e.delivered_at for e in result.events if e.outcomes.get(name) in USED and e.delivered_at >= spec.evaluate_after]
+    times = [
+        e.delivered_at for e in result.events if e.outcomes.get(name) in USED and e.delivered_at >= spec.evaluate_after
+    ]
     if error is None or not times:
         return None
     rows = np.searchsorted(result.time, np.array(times) - TIME_TOLERANCE)

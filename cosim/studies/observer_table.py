@@ -1,4 +1,6 @@
-"""The main table of a comparison of observers: rows of numbers, cells as text, lines of equal width. Touches no file."""
+"""The main table of a comparison of observers: rows of numbers, cells as text, lines of equal width. Touches no
+file.
+"""
 
 from __future__ import annotations
 
@@ -18,15 +20,18 @@ def main_row(score: ObserverScore) -> dict[str, Any]:
     delays = score.indicator.delays if score.indicator is not None else ()
     return {
         "observer": score.label,
-        "rms v [m/s]": speed and speed.rms, "max |v| [m/s]": speed and speed.max_abs,
-        "rms p [m]": position and position.rms, "max |p| [m]": position and position.max_abs,
-        "at balises rms v [m/s]": at_v and at_v.rms, "at balises rms p [m]": at_p and at_p.rms,
+        "rms v [m/s]": speed and speed.rms,
+        "max |v| [m/s]": speed and speed.max_abs,
+        "rms p [m]": position and position.rms,
+        "max |p| [m]": position and position.max_abs,
+        "at balises rms v [m/s]": at_v and at_v.rms,
+        "at balises rms p [m]": at_p and at_p.rms,
         "slip seen after [s]": "/".join("-" if d is None else number(d) for d in delays) or None,
         "false alarms": score.false_alarms,
         "certified [s]": None if score.certificate is None else score.certificate.limit,
         "holds": certified(score.certificate),
         "cost [us/step]": score.cost,
-    }  # fmt: skip
+    }
 
 
 def certified(certificate: CertifiedGap | None) -> str | None:
@@ -50,6 +55,8 @@ def aligned(rows: Sequence[Mapping[str, str]]) -> str:
         return ""
     table = [list(rows[0]), *(list(row.values()) for row in rows)]
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    lines = ["  ".join(text.rjust(w) if i else text.ljust(w) for i, (text, w) in enumerate(zip(row, widths, strict=True)))
-             for row in table]  # fmt: skip
+    lines = [
+        "  ".join(text.rjust(w) if i else text.ljust(w) for i, (text, w) in enumerate(zip(row, widths, strict=True)))
+        for row in table
+    ]
     return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])

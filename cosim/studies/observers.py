@@ -47,7 +47,8 @@ class Candidate:
 
     Args:
         name: in the benchmark. table: how it is made. sources: where its inputs come from.
-        origin: ``scenario`` or ``defaults``. settings: what was assumed, in words. misfit: why it cannot be coupled, or empty.
+        origin: ``scenario`` or ``defaults``. settings: what was assumed, in words. misfit: why it cannot be coupled, or
+        empty.
     """
 
     name: str
@@ -110,9 +111,12 @@ class ObserverBenchmark:
     def to_data(self) -> dict[str, Any]:
         """Plain data."""
         return {
-            "scenario": self.scenario, "title": self.spec.title, "steps": self.steps, "notes": list(self.notes),
+            "scenario": self.scenario,
+            "title": self.spec.title,
+            "steps": self.steps,
+            "notes": list(self.notes),
             "observers": [score.to_data() for score in self.scores],
-        }  # fmt: skip
+        }
 
     def write(self, directory: str | Path) -> dict[str, Path]:
         """Write page, picture and data to a folder.
@@ -129,18 +133,24 @@ class ObserverBenchmark:
 
 
 def benchmark_observers(
-    scenario: Scenario, observers: Sequence[str] | None = None, *, record: str | Path | None = None,
-    recorded: str | Path | None = None, repeat: int = 1, progress: Progress | None = None,
+    scenario: Scenario,
+    observers: Sequence[str] | None = None,
+    *,
+    record: str | Path | None = None,
+    recorded: str | Path | None = None,
+    repeat: int = 1,
+    progress: Progress | None = None,
     warn: Callable[[str], None] | None = None,
-) -> ObserverBenchmark:  # fmt: skip
+) -> ObserverBenchmark:
     """Run the plant side of a scenario once and play it back to several observers, each alone.
 
     Args:
         scenario: with or without observers of its own.
-        observers: names of components of the scenario or of shipped observers. None: the scenario's own, and all shipped train
-            observers whose inputs and event the scenario can serve.
+        observers: names of components of the scenario or of shipped observers. None: the scenario's own, and all
+            shipped train observers whose inputs and event the scenario can serve.
         record: folder for the recording, an ordinary results folder; by default it is thrown away.
-        recorded: folder of an earlier recording (or of any run of this scenario) to be played back instead of a new run.
+        recorded: folder of an earlier recording (or of any run of this scenario) to be played back instead of a new
+        run.
         repeat: runs of each observer; the cost per step is the median of them.
         progress: called with what is done now, the number done and the number in all.
         warn: told of what is doubtful about the recorded run.
@@ -176,9 +186,14 @@ def benchmark_observers(
     title = sides.table.title
     spec = next((o.spec for o in judge.outcomes.values()), ReportSpec(title=title))
     return ObserverBenchmark(
-        scenario.name, ReportSpec(**{**vars(spec), "title": title, "observers": []}), tuple(scores), tuple(notes),
-        judge.steps, judge.outcomes, interrupted,
-    )  # fmt: skip
+        scenario.name,
+        ReportSpec(**{**vars(spec), "title": title, "observers": []}),
+        tuple(scores),
+        tuple(notes),
+        judge.steps,
+        judge.outcomes,
+        interrupted,
+    )
 
 
 def _record(scenario: Scenario, folder: Path, warn: Callable[[str], None] | None, *, keep: bool) -> None:
@@ -198,24 +213,25 @@ def _loop_notes(sides: Sides, recording: Result) -> list[str]:
     if sides.in_loop:
         names = ", ".join(sides.in_loop)
         notes.append(
-            f"{names} acts on the train in this scenario: the run was recorded with it in the loop, and every observer only "
+            f"{names} acts on the train in this scenario: the run was recorded with it in the loop, and every observer "
+            f"only "
             "listens to that run. What the train would do with another one in the loop is not told."
         )
     steps = step_count(sides.table.start, sides.table.stop, sides.table.step)
     if len(recording.time) < steps + 1:
         notes.append(
-            f"The recording has {len(recording.time)} rows for {steps} steps; inputs between them are interpolated, and numbers "
+            f"The recording has {len(recording.time)} rows for {steps} steps; inputs between them are interpolated, "
+            f"and numbers "
             "differ from those of a run by that."
         )
     return notes
 
 
-# -- who takes part -----------------------------------------------------------------------------------------------------
+# -- who takes part
+# -----------------------------------------------------------------------------------------------------
 
 
-def find_candidates(
-    scenario: Scenario, sides: Sides, names: Sequence[str] | None
-) -> tuple[list[Candidate], list[str]]:  # fmt: skip
+def find_candidates(scenario: Scenario, sides: Sides, names: Sequence[str] | None) -> tuple[list[Candidate], list[str]]:
     """The observers to be judged, and notes on what was assumed and left out.
 
     Args:
@@ -268,10 +284,14 @@ def _shipped(sides: Sides, name: str) -> Candidate:
 def _assumed(system: Any, facts: Mapping[str, tuple[float, str]]) -> str:
     given = ", ".join(f"{fact} = {value:g} ({why})" for fact, (value, why) in facts.items())
     units = {s.name: (s.start, s.unit) for s in system.parameter_signals}
-    rest = ", ".join(f"{f} = {units[f][0]:g}" + (f" {units[f][1]}" if units[f][1] != "1" else "") for f in FACTS
-                     if f in units and f not in facts)  # fmt: skip
+    rest = ", ".join(
+        f"{f} = {units[f][0]:g}" + (f" {units[f][1]}" if units[f][1] != "1" else "")
+        for f in FACTS
+        if f in units and f not in facts
+    )
     return (
-        f"not set in the scenario, gains at their defaults; told {given or 'nothing of the train'}; assumed {rest or 'nothing'}."
+        f"not set in the scenario, gains at their defaults; told {given or 'nothing of the train'}; assumed "
+        f"{rest or 'nothing'}."
     )
 
 
@@ -287,13 +307,16 @@ def _misfit(sides: Sides, system: Any, sources: Iterable[str]) -> str:
     return ""
 
 
-# -- judging ------------------------------------------------------------------------------------------------------------
+# -- judging
+# ------------------------------------------------------------------------------------------------------------
 
 
 class _Judge:
     """Runs observers one by one beside a recording."""
 
-    def __init__(self, scenario: Scenario, sides: Sides, folder: Path, repeat: int, tell: Callable[[str, int], None]) -> None:
+    def __init__(
+        self, scenario: Scenario, sides: Sides, folder: Path, repeat: int, tell: Callable[[str, int], None]
+    ) -> None:
         self.scenario, self.sides, self.folder, self.repeat, self.tell = scenario, sides, folder, repeat, tell
         table = sides.table
         self.steps = step_count(table.start, table.stop, table.step)
@@ -317,11 +340,16 @@ class _Judge:
 
     def score(self, candidate: Candidate, done: int) -> ObserverScore:
         """The score of one observer; one that fails has the reason in it."""
-        labelled = {"label": candidate.table.label or candidate.name, "model": candidate.model, "origin": candidate.origin}
+        labelled = {
+            "label": candidate.table.label or candidate.name,
+            "model": candidate.model,
+            "origin": candidate.origin,
+        }
         known: dict[str, Any] = labelled | {
-            "settings": candidate.settings, "in_loop": candidate.name in self.sides.in_loop,
+            "settings": candidate.settings,
+            "in_loop": candidate.name in self.sides.in_loop,
             "certificate": self._certificate(candidate),
-        }  # fmt: skip
+        }
         if candidate.misfit:
             return ObserverScore(candidate.name, failure=f"cannot be coupled: {candidate.misfit}", **known)
         try:
@@ -338,7 +366,9 @@ class _Judge:
             outcome = scenario.run(warn=_silent)
             if outcome.failure == INTERRUPTED:
                 raise KeyboardInterrupt
-            reached = max(round((outcome.result.summary["reached"] - self.sides.table.start) / self.sides.table.step), 1)
+            reached = max(
+                round((outcome.result.summary["reached"] - self.sides.table.start) / self.sides.table.step), 1
+            )
             costs.append(MICROSECONDS * outcome.result.summary["seconds"][name] / reached)
         self.outcomes[name] = outcome
         kind = next(c["kind"] for c in outcome.result.summary["components"] if c["name"] == name)
@@ -359,7 +389,9 @@ class _Judge:
         if self._expected is None or candidate.table.observer is None:
             return None
         try:
-            found, _ = check_certificates({candidate.name: candidate.table}, self._expected, "warn", self.scenario.where)
+            found, _ = check_certificates(
+                {candidate.name: candidate.table}, self._expected, "warn", self.scenario.where
+            )
         except (CosimError, ValueError, ArithmeticError):
             return None  # parameters that cannot be: the run of this observer says so
         if candidate.name not in found:

@@ -1,7 +1,8 @@
-"""A scenario in two halves: the plant side, to be recorded once, and observers that listen to the recording. Runs nothing.
+"""A scenario in two halves: the plant side, to be recorded once, and observers that listen to the recording. Runs
+nothing.
 
-Plant side is every component that is no observer, what observers listen to, and whatever acts on those: an observer in the loop
-belongs to it too.
+Plant side is every component that is no observer, what observers listen to, and whatever acts on those: an observer in
+the loop belongs to it too.
 """
 
 from __future__ import annotations
@@ -56,7 +57,9 @@ class Sides:
     def template(self) -> dict[str, Link]:
         """Where an input of this name comes from in this scenario: as for its observers, else as for the plant side."""
         found: dict[str, Link] = {}
-        odometer = self.table.report.odometer or (self.table.balises.odometer if self.table.balises is not None else None)
+        odometer = self.table.report.odometer or (
+            self.table.balises.odometer if self.table.balises is not None else None
+        )
         for name in (*self.observers, *self.plant):
             for signal, link in self.sources(name).items():
                 if link[0].partition(".")[0] in self.plant:
@@ -108,7 +111,8 @@ def _ancestors(roots: Iterable[str], links: Iterable[Link], components: Iterable
     return tuple(name for name in components if name in found)
 
 
-# -- the two halves -----------------------------------------------------------------------------------------------------
+# -- the two halves
+# -----------------------------------------------------------------------------------------------------
 
 
 def recording_scenario(scenario: Scenario, sides: Sides) -> Scenario:
@@ -128,7 +132,7 @@ def recording_scenario(scenario: Scenario, sides: Sides) -> Scenario:
 
 def playback_scenario(
     scenario: Scenario, sides: Sides, folder: Path, name: str, observer: ComponentTable, sources: Mapping[str, Link]
-) -> Scenario:  # fmt: skip
+) -> Scenario:
     """One observer beside the recording.
 
     Args:
@@ -149,15 +153,23 @@ def playback_scenario(
     if master.get("algorithm") == "iterate":
         del master["algorithm"]  # there is no loop any more
     data: dict[str, Any] = {
-        "title": f"{table.title}: {observer.label or name}", "start": table.start, "stop": table.stop, "step": table.step,
-        "certificates": "ignore", "components": components | {name: _table(observer)},
+        "title": f"{table.title}: {observer.label or name}",
+        "start": table.start,
+        "stop": table.stop,
+        "step": table.step,
+        "certificates": "ignore",
+        "components": components | {name: _table(observer)},
         "connections": [connection(link, f"{name}.{signal}") for signal, link in sources.items()],
-        "master": master, "report": report,
-    }  # fmt: skip
+        "master": master,
+        "report": report,
+    }
     if balises is not None:
         data["balises"] = {
-            **watched, "timing": balises.timing, "layout": "recorded", "file": str(folder.resolve()),
-        }  # fmt: skip
+            **watched,
+            "timing": balises.timing,
+            "layout": "recorded",
+            "file": str(folder.resolve()),
+        }
     return _scenario(scenario, data)
 
 
@@ -167,9 +179,13 @@ def connection(link: Link, target: str) -> str | dict[str, Any]:
         return f"{link[0]} -> {target}"
     given = link[2]
     return {
-        "from": link[0], "to": target, "factor": given.factor, "offset": given.offset,
-        "units": "convert" if given.convert_units else "ignore", "values": [list(pair) for pair in given.table],
-    }  # fmt: skip
+        "from": link[0],
+        "to": target,
+        "factor": given.factor,
+        "offset": given.offset,
+        "units": "convert" if given.convert_units else "ignore",
+        "values": [list(pair) for pair in given.table],
+    }
 
 
 def _heard(sides: Sides) -> dict[str, set[str]]:
@@ -205,7 +221,8 @@ def _table(table: Any) -> dict[str, Any]:
     return data
 
 
-# -- observers ----------------------------------------------------------------------------------------------------------
+# -- observers
+# ----------------------------------------------------------------------------------------------------------
 
 FACTS = ("mass", "davis_a", "davis_b", "davis_c", "wheel_radius", "wheel_inertia", "n_axles")
 """What every train observer is told of the train."""
@@ -213,7 +230,11 @@ FACTS = ("mass", "davis_a", "davis_b", "davis_c", "wheel_radius", "wheel_inertia
 
 def train_observers() -> dict[str, type[TrainObserver]]:
     """The shipped train observers by name."""
-    return {n: kind for n, kind in fmu_observer.OBSERVERS.items() if isinstance(kind, type) and issubclass(kind, TrainObserver)}
+    return {
+        n: kind
+        for n, kind in fmu_observer.OBSERVERS.items()
+        if isinstance(kind, type) and issubclass(kind, TrainObserver)
+    }
 
 
 def known_facts(sides: Sides) -> dict[str, tuple[float, str]]:

@@ -33,7 +33,9 @@ class Range:
 
     def __post_init__(self) -> None:
         if not (isfinite(self.low) and isfinite(self.high) and self.low < self.high):
-            raise ScenarioError(f"A range needs two finite ends, the lower one first (got {self.low!r} and {self.high!r}).")
+            raise ScenarioError(
+                f"A range needs two finite ends, the lower one first (got {self.low!r} and {self.high!r})."
+            )
         if self.kind == "log" and not self.low > 0.0:
             raise ScenarioError(f"A logarithmic range begins above zero (got {self.low!r}).")
 
@@ -92,14 +94,17 @@ def variations(
 def _check_count(count: int) -> None:
     if count > MOST:
         raise ScenarioError(
-            f"vary: {count} variations are more than {MOST}; give fewer values, or mode 'latin' (--samples) with fewer points."
+            f"vary: {count} variations are more than {MOST}; give fewer values, or mode 'latin' (--samples) with fewer "
+            f"points."
         )
 
 
 def _listed(values: Any) -> list[Variation]:
     rows = list(values) if isinstance(values, Iterable) and not isinstance(values, str) else []
     if not rows or not all(isinstance(row, Mapping) and row for row in rows):
-        raise ScenarioError("vary: expected names with lists of values, or a list of tables such as [{'plant.mass': 70e3}, ...].")
+        raise ScenarioError(
+            "vary: expected names with lists of values, or a list of tables such as [{'plant.mass': 70e3}, ...]."
+        )
     return [plain(row) for row in rows]
 
 
@@ -107,11 +112,14 @@ def _choices(name: str, given: Any, ranges: bool) -> Any:
     """The values of one name as a list; a range as it is, where it may be one."""
     if isinstance(given, Range):
         if not ranges:
-            raise ScenarioError(f"vary: {name}: a range is sampled; use mode='latin' or 'random' with count=..., or give a list.")
+            raise ScenarioError(
+                f"vary: {name}: a range is sampled; use mode='latin' or 'random' with count=..., or give a list."
+            )
         return given
     if isinstance(given, str | bytes | Mapping) or not isinstance(given, Iterable):
         raise ScenarioError(f"vary: {name}: expected a list of values (got {given!r}).")
-    entries = [plain(entry) for entry in islice(given, MOST + 1)]  # an endless or huge iterable is not listed to its end
+    # an endless or huge iterable is not listed to its end
+    entries = [plain(entry) for entry in islice(given, MOST + 1)]
     _check_count(len(given) if isinstance(given, Sized) else len(entries))
     if not entries:
         raise ScenarioError(f"vary: {name}: the list of values is empty.")
@@ -129,7 +137,9 @@ def _sampled(choices: Mapping[str, Any], mode: Mode, count: int | None, seed: in
         points = qmc.LatinHypercube(d=len(choices), seed=seed).random(count)
     else:
         points = np.random.default_rng(seed).random((count, len(choices)))
-    return [{name: _pick(given, float(u)) for (name, given), u in zip(choices.items(), row, strict=True)} for row in points]
+    return [
+        {name: _pick(given, float(u)) for (name, given), u in zip(choices.items(), row, strict=True)} for row in points
+    ]
 
 
 def _pick(given: Any, share: float) -> Any:

@@ -41,11 +41,17 @@ class SeedStudy:
         rows = []
         for observer, phase in self.errors:
             low, median, high = self.quartiles(observer, phase)
-            rows.append({
-                "observer": self.spec.labels.get(observer, observer), "phase": phase, "lower quartile": low, "median": median,
-                "upper quartile": high, "independent": self.spec.independent.get(observer, {}).get(phase),
-                "published": self.spec.published.get(observer, {}).get(phase),
-            })  # fmt: skip
+            rows.append(
+                {
+                    "observer": self.spec.labels.get(observer, observer),
+                    "phase": phase,
+                    "lower quartile": low,
+                    "median": median,
+                    "upper quartile": high,
+                    "independent": self.spec.independent.get(observer, {}).get(phase),
+                    "published": self.spec.published.get(observer, {}).get(phase),
+                }
+            )
         return rows
 
     def text(self) -> str:
@@ -80,7 +86,8 @@ def seed_study(scenario: Scenario, seeds: Iterable[int], tell: Callable[[int, in
     chosen = list(seeds)
     study: SeedStudy | None = None
     sweep = scenario.copy().set("certificates", "ignore").vary({"balises.seed": chosen})
-    for run in sweep.each(progress=tell):  # what is doubtful is said once, by the scenario's own run, and not for every seed
+    # what is doubtful is said once, by the scenario's own run, and not for every seed
+    for run in sweep.each(progress=tell):
         if run.outcome is None or run.failure is not None:
             raise RunError(f"Seed {chosen[run.number]}: {run.failure}")
         study = study or SeedStudy(run.outcome.spec, chosen)

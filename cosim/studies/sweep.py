@@ -1,4 +1,6 @@
-"""A sweep: one scenario run many times with some values changed, here or in several processes. Touches the folder it is given."""
+"""A sweep: one scenario run many times with some values changed, here or in several processes. Touches the folder it is
+given.
+"""
 
 from __future__ import annotations
 
@@ -49,8 +51,8 @@ class Sweep:
         """Run all variations and hand each over as soon as it is done, so that none needs to be kept.
 
         Args:
-            workers: processes at a time; 1 runs in this process. In processes of their own, a run that crashes fails alone;
-                results do not depend on their number.
+            workers: processes at a time; 1 runs in this process. In processes of their own, a run that crashes fails
+                alone; results do not depend on their number.
             progress: called with the number done and the number in all.
 
         Yields:
@@ -63,7 +65,9 @@ class Sweep:
             raise ScenarioError(f"A sweep needs at least one worker (got workers={workers}).")
         jobs = [_Job(self.scenario, settings) for settings in self.variations]
         one_by_one = ((number, attempt(_run, job)) for number, job in enumerate(jobs))
-        for done, (number, answer) in enumerate(one_by_one if workers == 1 else in_processes(_run, jobs, workers), start=1):
+        for done, (number, answer) in enumerate(
+            one_by_one if workers == 1 else in_processes(_run, jobs, workers), start=1
+        ):
             if progress is not None:
                 progress(done, len(jobs))
             run = _entry(number, self.variations[number], answer)
@@ -72,18 +76,26 @@ class Sweep:
                 raise KeyboardInterrupt
 
     def run(
-        self, workers: int = 1, *, progress: Progress | None = None, measure: Mapping[str, Measure] | None = None,
-        units: Mapping[str, str] | None = None, keep: bool = True, directory: str | Path | None = None,
-    ) -> SweepResult:  # fmt: skip
+        self,
+        workers: int = 1,
+        *,
+        progress: Progress | None = None,
+        measure: Mapping[str, Measure] | None = None,
+        units: Mapping[str, str] | None = None,
+        keep: bool = True,
+        directory: str | Path | None = None,
+    ) -> SweepResult:
         """Run all variations; one that fails does not stop the others.
 
         Args:
-            workers: processes at a time; 1 runs in this process. A script that uses more needs ``if __name__ == "__main__":``.
+            workers: processes at a time; 1 runs in this process. A script that uses more needs
+            ``if __name__ == "__main__":``.
             progress: called with the number done and the number in all.
             measure: own numbers to take of each outcome, ``{"name": function}``; called in this process.
             units: of these numbers, by name, for pictures.
             keep: keep the outcomes in memory; without them only measures are left, and what is in `directory`.
-            directory: where each run is written as soon as it is done, ``run_000``, ``run_001``, ..., with an index at the end,
+            directory: where each run is written as soon as it is done, ``run_000``, ``run_001``, ..., with an index at
+            the end,
                 also where the sweep is interrupted.
 
         Returns:
@@ -108,9 +120,12 @@ class Sweep:
 
 
 def make_sweep(
-    scenario: Scenario, values: Mapping[str, Iterable[Any] | Range] | Sequence[Mapping[str, Any]], mode: Mode,
-    count: int | None, seed: int,
-) -> Sweep:  # fmt: skip
+    scenario: Scenario,
+    values: Mapping[str, Iterable[Any] | Range] | Sequence[Mapping[str, Any]],
+    mode: Mode,
+    count: int | None,
+    seed: int,
+) -> Sweep:
     """A sweep whose every variation is a valid scenario; arguments as for `Scenario.vary`.
 
     Raises:

@@ -19,11 +19,22 @@ if TYPE_CHECKING:
     from cosim.studies.sweep_result import SweepResult, SweepRun
 
 SETTING_UNITS = {
-    "start": "s", "stop": "s", "step": "s", "balises.spacing": "m", "balises.first": "m", "balises.min_gap": "s",
-    "balises.max_gap": "s", "balises.dropout_after": "s", "balises.expected_speed": "m/s", "balises.location_accuracy": "m",
-    "balises.latency": "s", "balises.latency_jitter": "s", "balises.track_start": "m", "balises.track_end": "m",
+    "start": "s",
+    "stop": "s",
+    "step": "s",
+    "balises.spacing": "m",
+    "balises.first": "m",
+    "balises.min_gap": "s",
+    "balises.max_gap": "s",
+    "balises.dropout_after": "s",
+    "balises.expected_speed": "m/s",
+    "balises.location_accuracy": "m",
+    "balises.latency": "s",
+    "balises.latency_jitter": "s",
+    "balises.track_start": "m",
+    "balises.track_end": "m",
     "report.evaluate_after": "s",
-}  # fmt: skip
+}
 LINES_NAMED = 8
 """More lines than these are drawn, but not named in a legend."""
 
@@ -45,7 +56,8 @@ def sweep_figure(result: SweepResult, measure: str | None, against: str | None, 
     for place, (label, runs) in enumerate(groups.items()):
         x, y = _points(runs, against, measure, ticks)
         style = OBSERVER_LINES[place % len(OBSERVER_LINES)]
-        style = style | {"linestyle": ""} if others and len(groups) == 1 else style  # neighbours differ in more than this value
+        # neighbours differ in more than this value
+        style = style | {"linestyle": ""} if others and len(groups) == 1 else style
         ax.plot(x, y, marker="o", markersize=4, label=label or None, **style)
     if ticks is not None:
         ax.set_xticks(range(len(ticks)), ticks)
@@ -93,11 +105,15 @@ def _groups(runs: Sequence[SweepRun], others: Sequence[str]) -> dict[str, list[S
     """Runs by what else was varied; all in one where that would be a line for each run."""
     groups: dict[str, list[SweepRun]] = {}
     for run in runs:
-        groups.setdefault(", ".join(f"{name} = {setting_text(run.settings.get(name))}" for name in others), []).append(run)
+        groups.setdefault(", ".join(f"{name} = {setting_text(run.settings.get(name))}" for name in others), []).append(
+            run
+        )
     return {"": list(runs)} if len(groups) == len(runs) else groups
 
 
-def _points(runs: Sequence[SweepRun], against: str, measure: str, ticks: Sequence[str] | None) -> tuple[np.ndarray, np.ndarray]:
+def _points(
+    runs: Sequence[SweepRun], against: str, measure: str, ticks: Sequence[str] | None
+) -> tuple[np.ndarray, np.ndarray]:
     """Places on the axes, in order of the varied value."""
     values = [run.settings.get(against) for run in runs]
     x = np.array([float(v) for v in values] if ticks is None else [float(ticks.index(str(v))) for v in values])  # type: ignore[arg-type]

@@ -101,4 +101,6 @@ def _folder(run: SweepRun, directory: Path) -> str | None:
 
 
 def _worth_drawing(result: SweepResult) -> bool:
-    return bool(result.measures) and len({json.dumps(jsonable(run.settings), sort_keys=True) for run in result.runs}) > 1
+    return (
+        bool(result.measures) and len({json.dumps(jsonable(run.settings), sort_keys=True) for run in result.runs}) > 1
+    )

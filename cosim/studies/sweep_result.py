@@ -160,7 +160,8 @@ class SweepResult:
         return sweep_figure(self, measure, against, ax)
 
     def write(self, directory: str | Path) -> dict[str, Path]:
-        """Write a results folder for each run (``run_000``, ...), the table as ``index.csv`` and ``index.json``, and a picture.
+        """Write a results folder for each run (``run_000``, ...), the table as ``index.csv`` and ``index.json``, and a
+        picture.
 
         Returns:
             Paths by kind.

@@ -1,6 +1,8 @@
-"""Workers: tasks done in processes of their own, so that one that crashes takes nothing else with it. Knows no scenarios.
+"""Workers: tasks done in processes of their own, so that one that crashes takes nothing else with it. Knows no
+scenarios.
 
-Processes are started afresh (spawn): FMUs are not safe in threads, and a copied process would share their libraries' state.
+Processes are started afresh (spawn): FMUs are not safe in threads, and a copied process would share their libraries'
+state.
 """
 
 from __future__ import annotations
@@ -100,7 +102,9 @@ class _Worker:
             return self.pipe.recv()
         except (EOFError, ConnectionResetError):
             self.process.join(STOP_SECONDS)
-            return Died(self._last.noted or ": ".join(filter(None, (self._last.words(), _how_it_ended(self.process.exitcode)))))
+            return Died(
+                self._last.noted or ": ".join(filter(None, (self._last.words(), _how_it_ended(self.process.exitcode))))
+            )
 
     def stop(self) -> None:
         """Let it end; it has nothing to do."""

@@ -13,7 +13,10 @@ TABLE_4_5 = {  # largest coefficient, optimal slip [%]
     "nominal": ((0.3894, 10.0), (0.3474, 8.0), (0.3027, 4.8), (0.2769, 4.0), (0.2594, 3.2), (0.2449, 3.2)),
     "degraded": ((0.2188, 30.4), (0.1961, 20.0), (0.1713, 14.4), (0.1566, 12.0), (0.1463, 9.6), (0.1387, 7.2)),
 }
-ON_A_GRID = "the printed slips are multiples of 0.8 %, picked on a coarse grid of a flat maximum; ours is the continuous maximum"
+ON_A_GRID = (
+    "the printed slips are multiples of 0.8 %, picked on a coarse grid of a flat maximum; ours is the "
+    "continuous maximum"
+)
 
 
 def main() -> None:

@@ -1,4 +1,6 @@
-"""The discrete matrices of the unknown-input observer, as printed and as they follow from the printed model: (3.89)-(3.91)."""
+"""The discrete matrices of the unknown-input observer, as printed and as they follow from the printed model:
+(3.89)-(3.91).
+"""
 
 from __future__ import annotations
 
@@ -8,10 +10,16 @@ from sheet import Sheet
 from fmu_observer.design.uio_design import discretise, uio_matrices
 
 MASS, SPEED, PERIOD = 90e3, 50.0 / 3.6, 0.1
-PRINTED = np.array([
-    [1, 0.1, 0.1, 0.005, 0.005, 0.0002], [0, 0.9999, 0, 0.1, 0, 0.005], [0, 0, 1, 0, 0.1, 0],
-    [0, 0, 0, 1, 0, 0.1], [0, 0, 0, 0, 1, 0], [0, 0, 0, 0, 0, 1],
-])  # fmt: skip
+PRINTED = np.array(
+    [
+        [1, 0.1, 0.1, 0.005, 0.005, 0.0002],
+        [0, 0.9999, 0, 0.1, 0, 0.005],
+        [0, 0, 1, 0, 0.1, 0],
+        [0, 0, 0, 1, 0, 0.1],
+        [0, 0, 0, 0, 1, 0],
+        [0, 0, 0, 0, 0, 1],
+    ]
+)
 WRONG_COLUMN = "printed with the disturbance in column 3; in column 4 the printed A_d comes out, to its rounding"
 
 
@@ -26,7 +34,11 @@ def main() -> None:
         A_d, B_d = discretise(matrix, B, PERIOD)
         rank = np.linalg.matrix_rank(np.vstack([C @ np.linalg.matrix_power(A_d, k) for k in range(6)]))
         sheet.add(
-            f"largest difference of A_d to the print, {reading}", "1", 0.0, float(np.abs(A_d - PRINTED).max()), WRONG_COLUMN
+            f"largest difference of A_d to the print, {reading}",
+            "1",
+            0.0,
+            float(np.abs(A_d - PRINTED).max()),
+            WRONG_COLUMN,
         )
         sheet.add(f"rank of observability, {reading}", "1", 6.0, float(rank), WRONG_COLUMN)
         if reading == "repaired":

@@ -1,4 +1,6 @@
-"""Four observers beside the locomotive on profile B: the other consistent reading of the printed protocol, 50 m/s and 3 km."""
+"""Four observers beside the locomotive on profile B: the other consistent reading of the printed protocol, 50 m/s and 3
+km.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Levant's differentiator: its gains in both readings of Table 1.1, accuracy by order, exponents of the error with noise."""
+"""Levant's differentiator: its gains in both readings of Table 1.1, accuracy by order, exponents of the error with
+noise.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,8 @@ from plant_models.hybrid import Runtime
 STEP = 1e-3  # [s]
 TABLE_1_1 = ("1.1", "1.1 1.5", "1.1 2.12 2", "1.1 3.06 4.18 3", "1.1 4.57 9.3 10.03 5", "1.1 6.75 20.26 32.24 23.72 7")
 READING = (
-    "no errors are published. At a step of 0.1 ms an independent implementation gave 0, 5e-5, 4e-4 for n = 2, and with the "
+    "no errors are published. At a step of 0.1 ms an independent implementation gave 0, 5e-5, 4e-4 for n = 2, and with "
+    "the "
     "gains in the printed order 0.20, 0.59, 1.41"
 )
 EXPONENT = "Theorem 3 gives the order of the error; two decades of noise, and constants that differ between their ends"
@@ -51,7 +54,9 @@ def sine_errors(rows: np.ndarray, step: float = STEP, last: float = 6.0) -> np.n
 
 
 def exponents(order: int) -> np.ndarray:
-    """Slopes of log error over log noise between 1e-4 and 1e-2, for the slowest noise that cannot be told from the signal."""
+    """Slopes of log error over log noise between 1e-4 and 1e-2, for the slowest noise that cannot be told from the
+    signal.
+    """
     step, t, sizes = 4e-4, 4e-4 * np.arange(30_000), (1e-4, 1e-2)
     noisy = (np.sin(t) + eps * np.cos(eps ** (-1.0 / (order + 1)) * t) for eps in sizes)
     low, high = (sine_errors(followed(order, signal, step, 2.0), step) for signal in noisy)
@@ -63,7 +68,10 @@ def main() -> None:
     sheet = Sheet(__file__, "Levant's differentiator", "Bouchama 2024, (1.14), Theorem 3, Table 1.1")
     for order, printed in enumerate(TABLE_1_1):
         sheet.add(
-            f"gains of order {order}, the last equation first", "1", printed, " ".join(f"{g:g}" for g in LEVANT_GAINS[order])
+            f"gains of order {order}, the last equation first",
+            "1",
+            printed,
+            " ".join(f"{g:g}" for g in LEVANT_GAINS[order]),
         )
     signal = np.sin(STEP * np.arange(20_000))
     figure, axis = plt.subplots(figsize=(6, 4), layout="constrained")
@@ -83,7 +91,14 @@ def main() -> None:
     for order in (1, 2):
         for i, exponent in enumerate(exponents(order)):
             published = (order + 1 - i) / (order + 1)
-            sheet.add(f"exponent of the noise, derivative {i}, order {order}", "1", published, exponent, EXPONENT, repeats=0.05)
+            sheet.add(
+                f"exponent of the noise, derivative {i}, order {order}",
+                "1",
+                published,
+                exponent,
+                EXPONENT,
+                repeats=0.05,
+            )
     axis.set(xlabel="derivative", ylabel="largest error, last 6 s [1]")
     axis.set_xticks(range(6))
     axis.grid(alpha=0.3)

@@ -33,7 +33,9 @@ def followed(system: SignalDifferentiator, tau: float, seconds: float = 20.0) ->
 
 def main() -> None:
     """Errors at a coarse and a fine period."""
-    sheet = Sheet(__file__, "Implicit and explicit filtering differentiator", "Bouchama 2024, (1.16), (1.36), Theorem 5")
+    sheet = Sheet(
+        __file__, "Implicit and explicit filtering differentiator", "Bouchama 2024, (1.16), (1.36), Theorem 5"
+    )
     figure, axes = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
     for axis, tau in zip(axes, INDEPENDENT, strict=True):
         why = f"no errors are published; an independent implementation gave, at {tau:g} s: {INDEPENDENT[tau]}"
@@ -42,7 +44,8 @@ def main() -> None:
             found = np.abs(rows - np.stack([np.sin(t), np.cos(t)], 1))
             largest = found[len(found) // 2 :].max(axis=0)
             for what, error in zip(("signal", "derivative"), largest, strict=True):
-                sheet.add(f"error of the {what}, {label}, period {tau:g} s", "1", None, error, why, repeats=0.3)  # chatter
+                # chatter
+                sheet.add(f"error of the {what}, {label}, period {tau:g} s", "1", None, error, why, repeats=0.3)
             axis.semilogy(t, np.maximum(found[:, 1], 1e-9), lw=0.7, label=label)
         axis.set(title=f"period {tau:g} s", xlabel="time [s]", ylabel="error of the derivative [1]")
         axis.grid(alpha=0.3)

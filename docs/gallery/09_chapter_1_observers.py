@@ -1,4 +1,6 @@
-"""The observers of chapter 1 beside the pendulum: how fast each finds angle and rate. The thesis prints no numbers for them."""
+"""The observers of chapter 1 beside the pendulum: how fast each finds angle and rate. The thesis prints no numbers for
+them.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,8 @@ from fmu_observer.observers.sampled import (
 from plant_models.benchmarks import Pendulum
 
 TIMES = (2.0, 10.0)  # [s]
-OBSERVERS: dict[str, tuple[Any, dict[str, float], str]] = {  # system, parameters, independent numbers where there are some
+# system, parameters, independent numbers where there are some
+OBSERVERS: dict[str, tuple[Any, dict[str, float], str]] = {
     "O2 Thau, continuous": (Thau, {}, ""),  # the gain of O3 with theta = 2
     "O3 high gain, continuous": (HighGain, {"theta": 2.0}, "6.0e-2 and 4.7e-9"),
     "O7 Takagi-Sugeno, continuous": (TakagiSugenoLuenberger, {}, ""),

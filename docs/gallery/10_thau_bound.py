@@ -1,4 +1,6 @@
-"""Thau's condition: the printed bound (1.8), the valid one, and a nonlinearity between the two that makes the error grow."""
+"""Thau's condition: the printed bound (1.8), the valid one, and a nonlinearity between the two that makes the error
+grow.
+"""
 
 from __future__ import annotations
 

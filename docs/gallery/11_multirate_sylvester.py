@@ -14,7 +14,9 @@ from fmu_observer.observers.sampled import MultirateSylvester
 
 START = (0.3, 0.05, 0.2, 0.4, 0.1)
 GAPS = {"position_sample": 0.1, "angle_sample": 0.15}  # [s]
-INDEPENDENT = "no plant is printed; an independent implementation gave 4e-16 and, on a plant of its own, 1.4e-4, 4.5e-9, 2.8e-13"
+INDEPENDENT = (
+    "no plant is printed; an independent implementation gave 4e-16 and, on a plant of its own, 1.4e-4, 4.5e-9, 2.8e-13"
+)
 
 
 def seen(values: Any, _noise: Any) -> dict[str, Any]:
@@ -36,7 +38,8 @@ def main() -> None:
     residual = unless_rounding(observer.condition().values["residual"], 1e-13)
     sheet.add("relative residual of (1.46)", "1", None, residual, INDEPENDENT)
     sheet.add("fastest growth of the plant", "1/s", None, np.linalg.eigvals(model.A).real.max(), "the plant is ours")
-    balance = model.B.T @ solve_continuous_are(model.A, model.B, np.eye(5), np.eye(1))  # held upright, by its true state
+    # held upright, by its true state
+    balance = model.B.T @ solve_continuous_are(model.A, model.B, np.eye(5), np.eye(1))
     pair = Together(ModelPlant(model, START, balance), observer, seen)
     instants = {event: list(np.round(np.arange(gap, 12.0, gap), 3)) for event, gap in GAPS.items()}
     t, found = errors(pair, 12.0, instants)

@@ -16,14 +16,19 @@ from fmu_observer.observers.sampled import ExponentialGain
 NAME = "triangularisable_example"
 CHAIN_GAINS = {"theta": 1.0, "high_gain": (0.4034, 0.0, 0.0, 0.4020, 0.0407, 0.0, 0.0, 0.0404)}  # printed, row by row
 CURVES = (
-    "published as curves, sampling pattern not available. An independent implementation gave 0.088, 0.018, 0.0032 at 0.5, "
+    "published as curves, sampling pattern not available. An independent implementation gave 0.088, 0.018, 0.0032 at "
+    "0.5, "
     "1, 2 s with a peak of 43, and for (2.42) 8.0, 4.6, 2.2 with a peak of 10.5"
 )
 PREMISES = (
-    "published: the error goes to zero. That is so with estimated premises only; printed are weights frozen at the samples. An "
+    "published: the error goes to zero. That is so with estimated premises only; printed are weights frozen at the "
+    "samples. An "
     "independent implementation gave 1.45 frozen and 0.90 live, at another sampling pattern"
 )
-NOISY = "published as curves: with noise up to 0.3 an independent implementation gave 18 to 21 and, for (2.42), 1.1; K_i2 is 2600"
+NOISY = (
+    "published as curves: with noise up to 0.3 an independent implementation gave 18 to 21 and, for (2.42), 1.1; "
+    "K_i2 is 2600"
+)
 RUNS = {f"Takagi-Sugeno, {premise} premises": premise for premise in ("estimated", "live", "frozen")}
 
 
@@ -60,7 +65,9 @@ def main() -> None:
         "Takagi-Sugeno, estimated premises": followed(NAME, "estimated", **noise),
         "CDO (2.42)": chain(**noise),
     }.items():
-        sheet.add(f"largest error norm, 15 to 20 s, noise up to 0.3, {label}", "1", None, final_quarter(t, found)[0], NOISY)
+        sheet.add(
+            f"largest error norm, 15 to 20 s, noise up to 0.3, {label}", "1", None, final_quarter(t, found)[0], NOISY
+        )
     axis.set(xlabel="time [s]", ylabel="norm of the error [1]")
     axis.grid(alpha=0.3)
     axis.legend(fontsize=8)

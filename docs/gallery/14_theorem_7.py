@@ -1,4 +1,6 @@
-"""Theorem 7: where it has a solution, and the attenuation gamma; gains are compared by gamma, for they depend on the solver."""
+"""Theorem 7: where it has a solution, and the attenuation gamma; gains are compared by gamma, for they depend on the
+solver.
+"""
 
 from __future__ import annotations
 
@@ -22,10 +24,12 @@ INDEPENDENT = (
 )
 FEASIBLE = "published: gains that come from Theorem 7 at this gap and this eta"
 E1_WHY = (
-    "the error under the printed gains of E1 decays with 0.703 1/s at one vertex, and Theorem 7 proves a decay of eta = 1 1/s"
+    "the error under the printed gains of E1 decays with 0.703 1/s at one vertex, and Theorem 7 proves a decay of "
+    "eta = 1 1/s"
 )
 TRAIN_WHY = (
-    "at 0.5 s no gains are found for eta = 3 1/s; an independent implementation found none either, and some up to about 1.5"
+    "at 0.5 s no gains are found for eta = 3 1/s; an independent implementation found none either, and some up to "
+    "about 1.5"
     " 1/s. The printed gains satisfy the theorem up to about 0.1 s, and are unstable from 0.286 s on"
 )
 
@@ -83,7 +87,9 @@ def main() -> None:
 
 
 def quickly(gap: float, eta: float) -> Theorem7Design | None:
-    """The train's design; it ends between 0.77 and 0.86 of eta times the gap, and to find that there is none takes long."""
+    """The train's design; it ends between 0.77 and 0.86 of eta times the gap, and to find that there is none takes
+    long.
+    """
     return designed(TRAIN, float(gap), eta) if eta * gap < 0.76 else None
 
 

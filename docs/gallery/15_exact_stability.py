@@ -1,4 +1,6 @@
-"""Exact stability of the printed Takagi-Sugeno gains: the contraction from sample to sample, and the gaps they stand."""
+"""Exact stability of the printed Takagi-Sugeno gains: the contraction from sample to sample, and the gaps they
+stand.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +19,10 @@ EXAMPLES = {  # gap of the thesis [s], independent: contraction by vertex, first
 }
 DECAYS = (3.0, 6.0, 8.0, 9.9, 12.0, 15.0)  # [1/s]
 LIMITS = (
-    "published: stable at mixed gaps up to 0.5 s for eta = 3 1/s. An independent implementation gave 0.286, 0.50, 0.73, "
-    "0.985, 1.28 s for constant gaps at eta = 3, 6, 8, 9.9, 12 1/s and 0.286, 0.496, 0.713, 0.779, 0.740, 0.637 s for mixed"
+    "published: stable at mixed gaps up to 0.5 s for eta = 3 1/s. An independent implementation gave 0.286, 0.50, "
+    "0.73, "
+    "0.985, 1.28 s for constant gaps at eta = 3, 6, 8, 9.9, 12 1/s and 0.286, 0.496, 0.713, 0.779, 0.740, 0.637 s for "
+    "mixed"
     " ones up to 15 1/s"
 )
 
@@ -44,13 +48,17 @@ def decays(sheet: Sheet) -> dict[float, tuple[float, float]]:
         published = (0.5, 0.5) if eta == 3.0 else (None, None)
         for words, claim, limit in zip(("constant", "mixed"), published, limits[eta], strict=True):
             measured = limit if np.isfinite(limit) else "none found"
-            sheet.add(f"printed gains of the train, eta {eta:g} 1/s: limit for {words} gaps", "s", claim, measured, LIMITS)
+            sheet.add(
+                f"printed gains of the train, eta {eta:g} 1/s: limit for {words} gaps", "s", claim, measured, LIMITS
+            )
     return limits
 
 
 def main() -> None:
     """The tables, and the growth over the gap by eta."""
-    sheet = Sheet(__file__, "Exact stability of the printed Takagi-Sugeno gains", "Bouchama 2024, sections 2.5.1, 2.5.2, (3.48)")
+    sheet = Sheet(
+        __file__, "Exact stability of the printed Takagi-Sugeno gains", "Bouchama 2024, sections 2.5.1, 2.5.2, (3.48)"
+    )
     examples(sheet)
     limits = decays(sheet)
     figure, (growth, stable) = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")

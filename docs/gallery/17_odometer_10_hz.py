@@ -15,7 +15,9 @@ SCENARIOS = {"D": "freight_profile_d_10_hz", "B": "freight_profile_b_10_hz"}
 def main() -> None:
     """Largest speed errors in both zones, and the errors over time."""
     sheet = Sheet(
-        __file__, "Train on profiles D and B, odometer at 10 Hz", "Bouchama 2024, (3.50), section 3.5, Figures 3.18-3.23"
+        __file__,
+        "Train on profiles D and B, odometer at 10 Hz",
+        "Bouchama 2024, (3.50), section 3.5, Figures 3.18-3.23",
     )
     figure, axes = plt.subplots(2, 1, figsize=(8, 6), sharex=True, layout="constrained")
     for axis, (profile, scenario) in zip(axes, SCENARIOS.items(), strict=True):

@@ -1,4 +1,6 @@
-"""Balises laid by distance: constant gains against one that follows the expected gap. The thesis lays its balises by time."""
+"""Balises laid by distance: constant gains against one that follows the expected gap. The thesis lays its balises by
+time.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +18,10 @@ TRAIN = {"n_axles": 4, "davis_b": 32.0, "davis_c": 1.7}
 LOST = 100.0  # [m/s], faster than any train
 WHY = (
     "theta = 8 1/s is published for balises by time, 0.5 s at most; balises by distance are not in the thesis. An "
-    "independent implementation found theta = 8 1/s to diverge from 8.7 m on, theta = 2 1/s to live to 25 m with transients"
-    " of 61 m/s, and the adaptive gain to end with errors up to 0.003 m/s from 2 m to 100 m, each with the adhesion force "
+    "independent implementation found theta = 8 1/s to diverge from 8.7 m on, theta = 2 1/s to live to 25 m with "
+    "transients"
+    " of 61 m/s, and the adaptive gain to end with errors up to 0.003 m/s from 2 m to 100 m, each with the adhesion "
+    "force "
     "known"
 )
 
@@ -27,7 +31,10 @@ def run(spacing: float) -> Outcome:
     s = Scenario(stop=90.0, step=0.02, certificates="ignore")
     profile = {"profile_time": [*PROFILE[0], *[90.0] * 3], "profile_speed": [*PROFILE[1], *[START] * 3]}
     s.add(
-        "train", model="locomotive", preset="chapter_3_four_axles", parameters={"train_speed": START, "wheel_rate": START / 0.575}
+        "train",
+        model="locomotive",
+        preset="chapter_3_four_axles",
+        parameters={"train_speed": START, "wheel_rate": START / 0.575},
     )
     s.add("driver", model="driver", parameters=profile)
     for name, theta in (("fixed_8", 8.0), ("fixed_2", 2.0)):
@@ -54,7 +61,9 @@ def main() -> None:
             last = float(error[t > 70.0].max())
             # The largest error of a differentiator that chatters.
             measured = last if last < LOST else "diverges"
-            sheet.add(f"largest speed error, 70 to 90 s, {spacing:g} m, {label}", "m/s", None, measured, WHY, repeats=0.2)
+            sheet.add(
+                f"largest speed error, 70 to 90 s, {spacing:g} m, {label}", "m/s", None, measured, WHY, repeats=0.2
+            )
             axis.semilogy(t[::5], np.clip(error[::5], 1e-5, 1e4), lw=0.7, label=label)
         axis.set(title=f"{spacing:g} m", xlabel="time [s]")
         axis.grid(alpha=0.3)

@@ -1,4 +1,6 @@
-"""Augmented observers behind a train of five vehicles: speed error and coupler force by the noise of the satellite receiver."""
+"""Augmented observers behind a train of five vehicles: speed error and coupler force by the noise of the satellite
+receiver.
+"""
 
 from __future__ import annotations
 
@@ -23,14 +25,17 @@ RECEIVERS = {  # preset of the receiver, time constant of the drift [s]
 GAINS = {1.0: "theta = 1 1/s", 0.5: "theta = 0.5 1/s"}
 PUBLISHED = {"high gain": "0.14 and 0.15", "Takagi-Sugeno": "0.17 and 0.33"}
 WHY = (
-    "published on measured runs, whose data are not available: mean speed errors of 0.14 and 0.15 km/h (high gain) and 0.17"
+    "published on measured runs, whose data are not available: mean speed errors of 0.14 and 0.15 km/h (high gain) and "
+    "0.17"
     " and 0.33 km/h (Takagi-Sugeno) in Sc1 and Sc2, with a receiver of 0.5 m; gains are not printed. An independent "
-    "implementation gave 0.082 km/h without noise, 1.06 with 0.5 m of white noise at theta = 1 1/s, and 0.56 at 0.5 1/s. "
+    "implementation gave 0.082 km/h without noise, 1.06 with 0.5 m of white noise at theta = 1 1/s, and 0.56 at 0.5 "
+    "1/s. "
     "With white noise neither gain comes near what is published; with a drift of the same size it does, more over ten "
     "minutes than over one. One seed of 80 s each"
 )
 FORCE = (
-    "no coupler force is printed as a number; an independent implementation gave 14.92 kN and, with couplers that ring, 8 "
+    "no coupler force is printed as a number; an independent implementation gave 14.92 kN and, with couplers that "
+    "ring, 8 "
     "kN rms; here it is the lag at the two changes of the effort"
 )
 
@@ -47,7 +52,9 @@ def journey() -> dict[str, np.ndarray]:
     train.set("x", **train.system.rolling(0.5))  # type: ignore[attr-defined]
     reached = (CRUISE - 0.5) / 0.5
     profile = {"profile_time": [0.0, reached, *[STOP] * 6], "profile_speed": [0.5, CRUISE, *[CRUISE] * 6]}
-    driver = Bench(Driver(), **{f"{name}[{i + 1}]": v for name, values in profile.items() for i, v in enumerate(values)})
+    driver = Bench(
+        Driver(), **{f"{name}[{i + 1}]": v for name, values in profile.items() for i, v in enumerate(values)}
+    )
     start = float(166e3 * 9.81 * UPHILL + 1.7e3)  # the hold at the start
     driver.set("x", integral=start, developed_effort=start)
     driver.set("u", odometer=0.5)
@@ -117,7 +124,9 @@ def main() -> None:
                 sheet.add(name, "km/h", published, float(error[late].mean()), WHY, repeats=0.03)
                 if preset == "ideal" and theta == 1.0:
                     hold = way["time"] > 40.0
-                    sheet.add(f"mean force of coupler and gradient, {family}", "kN", None, found[hold, 1].mean() / 1e3, FORCE)
+                    sheet.add(
+                        f"mean force of coupler and gradient, {family}", "kN", None, found[hold, 1].mean() / 1e3, FORCE
+                    )
                     rms = np.sqrt(np.mean((found[late, 1] - true[late]) ** 2)) / 1e3
                     sheet.add(f"rms error of that force, {family}", "kN", None, rms, FORCE, repeats=0.05)
                     forces.plot(way["time"][::10], found[::10, 1] / 1e3, lw=0.8, label=family)

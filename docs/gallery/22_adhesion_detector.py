@@ -1,4 +1,6 @@
-"""The adhesion-condition detector: the maps of Table 4.5, its worked example, and the threshold that its rule amounts to."""
+"""The adhesion-condition detector: the maps of Table 4.5, its worked example, and the threshold that its rule amounts
+to.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +13,12 @@ from fmu_observer.detection import AdhesionDetector, degraded_map, nominal_map, 
 
 KMH = 1.0 / 3.6
 SPEEDS = (5, 10, 20, 30, 40, 50)  # [km/h], of Table 4.5
-GRID = "the printed slips are multiples of 0.8 %, two of them cut off; ours is the continuous maximum of the same curves"
+GRID = (
+    "the printed slips are multiples of 0.8 %, two of them cut off; ours is the continuous maximum of the same curves"
+)
 MIXED = (
-    "the example sets a slip (3.49), relative to the odometer, against optima relative to the train speed; converted, 35 % "
+    "the example sets a slip (3.49), relative to the odometer, against optima relative to the train speed; converted, "
+    "35 % "
     "are 54 %. The verdict is the same at 35 %, but from 18 % on it is not"
 )
 CONDITIONS = {1.0: "nominal", 2.0: "degraded"}
@@ -48,10 +53,21 @@ def main() -> None:
     for name, published, distance in zip(("nominal", "degraded"), (25.0, 4.6), printed, strict=True):
         sheet.add(f"example, 5 km/h, slip 35 %: distance to the {name} optimum", "%", published, distance)
     sheet.add("example, 5 km/h, slip 35 %, as printed", "", "degraded", verdict(0.35, "speed", "as_published"))
-    sheet.add("the same, slip relative to the odometer and converted", "", "degraded", verdict(0.35, "odometer", "polach"))
+    sheet.add(
+        "the same, slip relative to the odometer and converted", "", "degraded", verdict(0.35, "odometer", "polach")
+    )
     sheet.add("5 km/h, slip 18 %, as printed", "", None, verdict(0.18, "speed", "as_published"), MIXED)
-    sheet.add("5 km/h, slip 18 %, relative to the odometer and converted", "", None, verdict(0.18, "odometer", "polach"), MIXED)
-    kmh, middle = np.array(nominal_map().speeds) / KMH, np.array(nominal_map().slips) + np.array(degraded_map().slips) - 0.01
+    sheet.add(
+        "5 km/h, slip 18 %, relative to the odometer and converted",
+        "",
+        None,
+        verdict(0.18, "odometer", "polach"),
+        MIXED,
+    )
+    kmh, middle = (
+        np.array(nominal_map().speeds) / KMH,
+        np.array(nominal_map().slips) + np.array(degraded_map().slips) - 0.01,
+    )
     axis.plot(kmh[4:16], 50.0 * middle[4:16], "k--", label="threshold of the rule")
     axis.set(xlabel="speed [km/h]", ylabel="slip relative to the train speed [%]")
     axis.grid(alpha=0.3)

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from sheet import Sheet
 from shipped import run
-from train_scenarios import NOT_PRINTED, SOURCE, SPEED_ERRORS, figure, indicated, mean_speed_error, sanding_time, slide, yes
+from train_scenarios import (
+    NOT_PRINTED,
+    SOURCE,
+    SPEED_ERRORS,
+    figure,
+    indicated,
+    mean_speed_error,
+    sanding_time,
+    slide,
+    yes,
+)
 
 if __name__ == "__main__":
     sheet = Sheet(__file__, "Sc1: observer-based control, 35 km/h, clear water", SOURCE)
@@ -13,5 +23,7 @@ if __name__ == "__main__":
     sheet.add("sand requested", "", "no", yes(sanding_time(outcome) > 0.0))
     sheet.add("largest slip", "%", None, 100.0 * slide(outcome).largest, NOT_PRINTED, repeats=0.1)
     for name, published in (("multirate_cdo", 0.14), ("takagi_sugeno_cdo", 0.17)):
-        sheet.add(f"mean speed error, {name}", "km/h", published, mean_speed_error(outcome, name), SPEED_ERRORS, repeats=0.05)
+        sheet.add(
+            f"mean speed error, {name}", "km/h", published, mean_speed_error(outcome, name), SPEED_ERRORS, repeats=0.05
+        )
     sheet.finish(figure({"Sc1": outcome}))

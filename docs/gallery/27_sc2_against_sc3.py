@@ -6,7 +6,9 @@ from sheet import Sheet
 from shipped import run
 from train_scenarios import SOURCE, connections_with, figure, sanding_time, slide, stopped
 
-COMPARED = "the thesis compares the two in words; by the odometer's count the spinning wheels of Sc2 run ahead of the train"
+COMPARED = (
+    "the thesis compares the two in words; by the odometer's count the spinning wheels of Sc2 run ahead of the train"
+)
 BY_OBSERVER = {"odometer.distance -> mission.position": "multirate_cdo.position -> mission.position"}
 
 if __name__ == "__main__":

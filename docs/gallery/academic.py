@@ -1,4 +1,6 @@
-"""What the scripts of chapter 2's academic examples share: the plants, what their observers see of them, sizes of errors."""
+"""What the scripts of chapter 2's academic examples share: the plants, what their observers see of them, sizes of
+errors.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,8 @@ STOP = 20.0
 
 
 def followed(example: str, premise: Any, seed: int = 0, **options: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Times and errors of the Takagi-Sugeno observer with the printed gains; noise on the continuous output by `options`.
+    """Times and errors of the Takagi-Sugeno observer with the printed gains; noise on the continuous output by
+    `options`.
 
     The seed is that of the instants and of the noise.
     """

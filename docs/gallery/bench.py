@@ -1,4 +1,6 @@
-"""What scripts without a scenario share: systems whose signals have names, a plant beside an observer, sampling instants."""
+"""What scripts without a scenario share: systems whose signals have names, a plant beside an observer, sampling
+instants.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +52,9 @@ class Bench:
 
 
 class ModelPlant(HybridSystem):
-    """The plant that an observer model describes, under a state feedback of its true state; outputs are states and inputs."""
+    """The plant that an observer model describes, under a state feedback of its true state; outputs are states and
+    inputs.
+    """
 
     name, description, source = "model_plant", "A plant that is what its observer believes", "docs/gallery"
     inputs = (input_signal("unused", "1"),)
@@ -71,20 +75,27 @@ class ModelPlant(HybridSystem):
 
 
 class Together(HybridSystem):
-    """Plant and observer as one system, so that continuous outputs reach the observer without delay; outputs are the errors.
+    """Plant and observer as one system, so that continuous outputs reach the observer without delay; outputs are the
+    errors.
 
     Args:
-        plant, observer: the observer's first states estimate all states of the plant. seen: inputs of the observer from the
-            plant's outputs and the noise, an input of the whole. step: internal step [s]. preset, overrides: of the observer.
+        plant, observer: the observer's first states estimate all states of the plant. seen: inputs of the observer from
+            the plant's outputs and the noise, an input of the whole. step: internal step [s]. preset, overrides: of the
+            observer.
     """
 
     name, description, source = "together", "A plant and its observer", "docs/gallery"
     inputs = (input_signal("noise", "1"),)
 
     def __init__(
-        self, plant: HybridSystem, observer: HybridSystem, seen: Seen, step: float = 1e-3, preset: str | None = None,
+        self,
+        plant: HybridSystem,
+        observer: HybridSystem,
+        seen: Seen,
+        step: float = 1e-3,
+        preset: str | None = None,
         **overrides: Any,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.plant, self.observer, self.seen, self.order = plant, observer, seen, plant.state_count
         self.internal_step = step
         values = parameter_values(observer, overrides, preset)
@@ -121,13 +132,18 @@ class Together(HybridSystem):
 
 
 def errors(
-    pair: Together, stop: float, samples: Mapping[str, Sequence[float]] | None = None, noise: float = 0.0, hold: float = 0.01,
+    pair: Together,
+    stop: float,
+    samples: Mapping[str, Sequence[float]] | None = None,
+    noise: float = 0.0,
+    hold: float = 0.01,
     seed: int = 0,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+) -> tuple[np.ndarray, np.ndarray]:
     """Run plant and observer together.
 
     Args:
-        pair: both. stop: end [s]. samples: instants by event [s]. noise: bound of the uniform noise, renewed every `hold` [s].
+        pair: both. stop: end [s]. samples: instants by event [s]. noise: bound of the uniform noise, renewed every
+        `hold` [s].
 
     Returns:
         Times every `hold`, shape (K,), and errors, shape (K, n).
@@ -156,7 +172,9 @@ def unless_rounding(value: float, floor: float) -> float | str:
 
 
 def sampling(longest: float, stop: float, seed: int = 0, loss: float = np.inf) -> list[float]:
-    """Instants [s] with gaps uniform in [0.2, 1] of the longest; after `loss` 15 % of them 1.2 to 2 times longer [ours]."""
+    """Instants [s] with gaps uniform in [0.2, 1] of the longest; after `loss` 15 % of them 1.2 to 2 times longer
+    [ours].
+    """
     return list(_instants(longest, stop, np.random.default_rng(seed), loss))
 
 

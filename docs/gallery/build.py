@@ -1,7 +1,7 @@
 """Runs every numbered script of the gallery and writes the page ``docs/gallery.md`` with its figures.
 
-``python docs/gallery/build.py`` runs all, with names as arguments only those. The numbers stay in ``docs/gallery/numbers``; the
-tests run the scripts again and compare.
+``python docs/gallery/build.py`` runs all, with names as arguments only those. The numbers stay in
+``docs/gallery/numbers``; the tests run the scripts again and compare.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ NUMBERS = HERE / "numbers"
 PICTURES = HERE.parent / "images" / "gallery"
 HEAD = """# Gallery
 
-One script for every figure or table of Bouchama 2024 that its data allow, each with published beside measured. Figures of the
-thesis were not available as data, so plots are ours; "–" means that nothing is printed. Run one with
+One script for every figure or table of Bouchama 2024 that its data allow, each with published beside measured. Figures of
+the thesis were not available as data, so plots are ours; "–" means that nothing is printed. Run one with
 
     python docs/gallery/01_polach_maps.py
 
-which prints its table and leaves a figure in `results/gallery`. This page is written by `python docs/gallery/build.py`; the tests
-run all scripts and compare their numbers.
-"""
+which prints its table and leaves a figure in `results/gallery`. This page is written by `python docs/gallery/build.py`; the
+tests run all scripts and compare their numbers.
+"""  # noqa: E501
 
 
 def scripts() -> list[Path]:

@@ -1,7 +1,8 @@
-"""A sheet of the gallery: what was published beside what is measured here, with a reason where they differ, and a figure.
+"""A sheet of the gallery: what was published beside what is measured here, with a reason where they differ, and a
+figure.
 
-Used by the numbered scripts of this folder. A script makes one sheet and ends with ``sheet.finish()``, which prints the table and
-leaves ``NN_name.json`` and ``NN_name.png`` in the folder given by ``--out``, or in ``results/gallery``.
+Used by the numbered scripts of this folder. A script makes one sheet and ends with ``sheet.finish()``, which prints the
+table and leaves ``NN_name.json`` and ``NN_name.png`` in the folder given by ``--out``, or in ``results/gallery``.
 """
 
 from __future__ import annotations
@@ -52,7 +53,8 @@ class Sheet:
     """Collects lines and a figure of one script.
 
     Args:
-        script: the script's ``__file__``. title: of the page. source: figures, tables or equations of the thesis it is about.
+        script: the script's ``__file__``. title: of the page. source: figures, tables or equations of the thesis it is
+        about.
     """
 
     def __init__(self, script: str, title: str, source: str) -> None:
@@ -60,7 +62,9 @@ class Sheet:
         self.title, self.source = title, source
         self.lines: list[Line] = []
         parser = argparse.ArgumentParser(description=title)
-        parser.add_argument("--out", type=Path, default=Path("results/gallery"), help="folder for the table and the figure")
+        parser.add_argument(
+            "--out", type=Path, default=Path("results/gallery"), help="folder for the table and the figure"
+        )
         self.out: Path = parser.parse_args().out
 
     def add(

@@ -19,7 +19,8 @@ OBSERVERS = {
     "discrete_uio": ("S5 unknown inputs", {}),
 }
 NO_DATA = (
-    "profile, balise pattern, noise and several gains of the thesis are not printed, and its protocol contradicts itself: only "
+    "profile, balise pattern, noise and several gains of the thesis are not printed, and its protocol contradicts "
+    "itself: only "
     "the order of magnitude can agree; S1 and S5 come without numbers"
 )
 
@@ -36,7 +37,9 @@ def compare(script: str, scenario: str, title: str) -> None:
     sheet.finish(_figure(outcome))
 
 
-def add_largest_errors(sheet: Sheet, outcome: Outcome, prefix: str = "", repeats: Mapping[str, float] | None = None) -> None:
+def add_largest_errors(
+    sheet: Sheet, outcome: Outcome, prefix: str = "", repeats: Mapping[str, float] | None = None
+) -> None:
     """Lines with the largest speed error of each observer in both zones.
 
     Args:

@@ -1,7 +1,7 @@
 """What the scripts of the multi-vehicle train share: run a scenario of Table 4.4, measure its story, draw it.
 
-Slips are relative to the wheel's speed, (4.14), with the true speed of the train, and counted above 10 km/h, where the scenarios
-judge them.
+Slips are relative to the wheel's speed, (4.14), with the true speed of the train, and counted above 10 km/h, where the
+scenarios judge them.
 """
 
 from __future__ import annotations
@@ -22,11 +22,13 @@ WATER, EFFORT_LIMIT = (20.0, 250.0), 350e3  # [m], [N]
 AXLES = range(1, 5)
 EFFORTS = {"command": "controller.effort", "let through": "anti_slip.effort", "adhesion": "train.adhesion_force"}
 NOT_PRINTED = (
-    "rail, gradient, departure, receiver, gains and thresholds are not printed, so ours: the story can agree, instants and "
+    "rail, gradient, departure, receiver, gains and thresholds are not printed, so ours: the story can agree, instants "
+    "and "
     "percentages cannot"
 )
 SPEED_ERRORS = (
-    "the receiver's noise, the observers' gains and the time over which the mean is taken are not printed; ours is from the "
+    "the receiver's noise, the observers' gains and the time over which the mean is taken are not printed; ours is "
+    "from the "
     "departure to the stop, and the observers have to learn the coupler force anew at every change of the effort"
 )
 
@@ -36,8 +38,10 @@ class Slide:
     """Slip of the locomotive's axles.
 
     Args:
-        largest: slip of the first axle [1]. axles: most axles beyond 15 % at once. together: time for which all four are [s].
-        onset: first instant at which an axle is beyond 15 %, after the departure [s]; nan where none is. end: last one [s].
+        largest: slip of the first axle [1]. axles: most axles beyond 15 % at once. together: time for which all four
+        are [s].
+        onset: first instant at which an axle is beyond 15 %, after the departure [s]; nan where none is. end: last one
+        [s].
         lost: energy lost between wheels and rails [J].
     """
 
@@ -77,7 +81,9 @@ def mean_speed_error(outcome: Outcome, observer: str) -> float:
 
 
 def indicated(outcome: Outcome) -> tuple[float, float]:
-    """When the excessive-slip indicator goes on, after the departure [s] (nan: never), and for how long it is on [s]."""
+    """When the excessive-slip indicator goes on, after the departure [s] (nan: never), and for how long it is on
+    [s].
+    """
     t, on = outcome["time"], outcome["excessive_slip.slip_indicator"] > 1.5
     return (float(t[on][0] - DEPARTURE) if on.any() else np.nan), float(np.trapezoid(on.astype(float), t))
 

@@ -1,4 +1,5 @@
-"""How accurate the shipped plants are at an internal step: each against its own equations by SciPy at 1e-10, through events.
+"""How accurate the shipped plants are at an internal step: each against its own equations by SciPy at 1e-10, through
+events.
 
 `python docs/studies/accuracy.py` prints the table of `docs/accuracy.md`.
 """
@@ -37,17 +38,37 @@ ROLLING = {"train_speed": 5.0, "wheel_rate": 5.0 / 0.575, "effort": 60e3}
 PULLING = {**Train().rolling(10.0), "effort": 60e3, "zone_from[1]": 20.0, "zone_to[1]": 60.0}
 SEEN = ("position", "speed", "wheel_speed")
 JOURNEYS = (
-    Journey("locomotive", "60 kN from 5 m/s, two zones", 30.0, SEEN, {**ROLLING, "zone_from[3]": 0.0, "zone_to[3]": 0.0,
-            "zone_from[2]": 25.0, "zone_to[2]": 28.0}),
-    Journey("locomotive", "60 kN from rest", 30.0, SEEN, {"effort": 60e3, **{f"zone_{e}[{i}]": 0.0 for e in ("from", "to")
-            for i in (1, 2, 3)}}),
-    Journey("locomotive", "braked by 60 kN to a stop", 30.0, SEEN, {"train_speed": 10.0, "effort": -60e3,
-            "wheel_rate": 10.0 / 0.575, **{f"zone_{e}[{i}]": 0.0 for e in ("from", "to") for i in (1, 2, 3)}}),
+    Journey(
+        "locomotive",
+        "60 kN from 5 m/s, two zones",
+        30.0,
+        SEEN,
+        {**ROLLING, "zone_from[3]": 0.0, "zone_to[3]": 0.0, "zone_from[2]": 25.0, "zone_to[2]": 28.0},
+    ),
+    Journey(
+        "locomotive",
+        "60 kN from rest",
+        30.0,
+        SEEN,
+        {"effort": 60e3, **{f"zone_{e}[{i}]": 0.0 for e in ("from", "to") for i in (1, 2, 3)}},
+    ),
+    Journey(
+        "locomotive",
+        "braked by 60 kN to a stop",
+        30.0,
+        SEEN,
+        {
+            "train_speed": 10.0,
+            "effort": -60e3,
+            "wheel_rate": 10.0 / 0.575,
+            **{f"zone_{e}[{i}]": 0.0 for e in ("from", "to") for i in (1, 2, 3)},
+        },
+    ),
     Journey("train", "60 kN from 10 m/s, one zone", 8.0, (*SEEN, "coupler_force[1]"), PULLING),
     Journey("pendulum", "swings from 1 rad", 10.0, (), {"state": 1.0}),
     Journey("triangularisable_plant", "as printed", 10.0, ()),
     Journey("non_triangularisable_plant", "as printed", 10.0, ()),
-)  # fmt: skip
+)
 
 
 def errors(journey: Journey, factors: tuple[float, ...] | None = None) -> list[dict[str, float]]:
@@ -123,12 +144,21 @@ class _Solved:
 
     def _piece(self, t: float, end: float, x: np.ndarray, held: np.ndarray) -> Any:
         stiff = self._system.method == "rosenbrock"
-        options: dict[str, Any] = {"jac": lambda s, y: np.asarray(self._call(self._jacobian, s, y, held))} if stiff else {}
+        options: dict[str, Any] = (
+            {"jac": lambda s, y: np.asarray(self._call(self._jacobian, s, y, held))} if stiff else {}
+        )
         return solve_ivp(
-            lambda s, y: self._call(self._derivative, s, y, held).ravel(), (t, end), x, method="Radau" if stiff else "DOP853",
-            rtol=RTOL, atol=ATOL, events=[self._event(j, held) for j in range(len(held))] or None, dense_output=True,
-            max_step=0.25, **options,
-        )  # fmt: skip
+            lambda s, y: self._call(self._derivative, s, y, held).ravel(),
+            (t, end),
+            x,
+            method="Radau" if stiff else "DOP853",
+            rtol=RTOL,
+            atol=ATOL,
+            events=[self._event(j, held) for j in range(len(held))] or None,
+            dense_output=True,
+            max_step=0.25,
+            **options,
+        )
 
     def _whole(self, x: np.ndarray) -> np.ndarray:
         return np.concatenate([x, self._runtime.x[len(x) :]])

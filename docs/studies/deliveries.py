@@ -118,7 +118,10 @@ class Added(Locomotive):
 class OtherDefault(Locomotive):
     """Mass 1 % larger by default; nobody sets it."""
 
-    presets: Mapping[str, Any] = {**Locomotive.presets, "chapter_3": {**Locomotive.presets["chapter_3"], "mass": 90.9e3}}
+    presets: Mapping[str, Any] = {
+        **Locomotive.presets,
+        "chapter_3": {**Locomotive.presets["chapter_3"], "mass": 90.9e3},
+    }
 
 
 class HalfStep(Locomotive):

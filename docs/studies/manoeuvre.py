@@ -1,7 +1,7 @@
 """The run of the mutation study: the shipped locomotive under a given effort, and balises on its way.
 
-Beside the locomotive there are two small helpers: what commands the effort, and what is told of balises. All three are native
-FMUs, so the compiled stepper runs them.
+Beside the locomotive there are two small helpers: what commands the effort, and what is told of balises. All three are
+native FMUs, so the compiled stepper runs them.
 """
 
 from __future__ import annotations
@@ -82,8 +82,9 @@ class Conditions:
 
     Args:
         train: the plant. parameters: its start values that are other than in the baseline. instants: of the effort [s].
-        balises: positions [m]. telegrams: further keys of the balises. step: communication step [s]. order: of the components.
-        fmi_version: 2 or 3. realisation: ``fmu`` or ``block``. stepper: ``auto``, ``python`` or ``compiled``.
+        balises: positions [m]. telegrams: further keys of the balises. step: communication step [s]. order: of the
+        components.
+        fmi_version: 2 or 3. backend: ``fmu`` or ``block``. stepper: ``auto``, ``python`` or ``compiled``.
     """
 
     train: HybridSystem = LOCOMOTIVE
@@ -94,7 +95,7 @@ class Conditions:
     step: float = STEP
     order: Sequence[str] = ORDER
     fmi_version: int = 3
-    realisation: str = "fmu"
+    backend: str = "fmu"
     stepper: str = "auto"
 
     def run(self) -> Result:
@@ -115,19 +116,24 @@ class Conditions:
             "profile": {"instant": list(self.instants)},
             "train": {**PARAMETERS, **self.parameters},
             "register": {},
-        }  # fmt: skip
+        }
         made = Scenario(stop=STOP, step=self.step)
         for name in self.order:
             made.add(name, **self._table(systems[name]), parameters=parameters[name])
         made.connect("profile.effort -> train.effort")
         made.balises(
-            position="train.position", speed="train.speed", layout="positions", positions=list(self.balises), **self.telegrams
+            position="train.position",
+            speed="train.speed",
+            layout="positions",
+            positions=list(self.balises),
+            **self.telegrams,
         )
-        # Jacobi: an effort counts from its own instant on. In sequence it would count from one communication step before.
+        # Jacobi: an effort counts from its own instant on. In sequence it would count from one communication step
+        # before.
         return made.master(algorithm="jacobi", stepper=self.stepper)
 
     def _table(self, system: HybridSystem) -> dict[str, Any]:
-        if self.realisation == "fmu":
+        if self.backend == "fmu":
             return {"fmu": str(fmus.cached_fmu(system, 2 if self.fmi_version == 2 else 3))}
         return {"model": system.name, "as": f"block{self.fmi_version}"}
 

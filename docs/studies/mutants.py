@@ -25,7 +25,8 @@ class Mutation:
     """One change.
 
     Args:
-        group: what kind of change. change: in a few words. make: does it. why: it is not caught by default, where it is not.
+        group: what kind of change. change: in a few words. make: does it. why: it is not caught by default, where it is
+        not.
         harmless: whether it should pass.
     """
 
@@ -51,7 +52,9 @@ WITHOUT_INFLUENCE: Mapping[str, str] = {
 
 
 def parameter_mutations(share: float) -> Iterator[Mutation]:
-    """Every number among the parameters of the locomotive, larger by a share; smaller where it is as large as it may be."""
+    """Every number among the parameters of the locomotive, larger by a share; smaller where it is as large as it may
+    be.
+    """
     for signal in LOCOMOTIVE.parameters:
         given = PARAMETERS.get(signal.name, signal.start)
         values = np.atleast_1d(np.asarray(given, dtype=float))
@@ -70,7 +73,9 @@ def condition_mutations() -> Iterator[Mutation]:
     group = "conditions and events"
     late = [*INSTANTS[:2], INSTANTS[2] + STEP, *INSTANTS[3:]]
     yield Mutation(group, "initial speed +1 %", _under(parameters={"train_speed": 1.01 * PARAMETERS["train_speed"]}))
-    yield Mutation(group, "initial speed of the wheel +1 %", _under(parameters={"wheel_rate": 1.01 * PARAMETERS["wheel_rate"]}))
+    yield Mutation(
+        group, "initial speed of the wheel +1 %", _under(parameters={"wheel_rate": 1.01 * PARAMETERS["wheel_rate"]})
+    )
     yield Mutation(group, "one step of the effort one sample late", _under(instants=late))
     for end in ("zone_from", "zone_to"):
         moved = [PARAMETERS[end][0] + STEP, *PARAMETERS[end][1:]]
@@ -86,7 +91,7 @@ def condition_mutations() -> Iterator[Mutation]:
 
 
 def _under(**conditions: Any) -> Make:
-    return lambda _reference, _realisation: Conditions(**conditions).run()
+    return lambda _reference, _backend: Conditions(**conditions).run()
 
 
 # -- new deliveries -------------------------------------------------------------------------------------------------
@@ -111,7 +116,7 @@ def delivery_mutations() -> Iterator[Mutation]:
 
 
 def _delivery(kind: type[HybridSystem]) -> Make:
-    return lambda _reference, realisation: Conditions(train=kind(), realisation=realisation).run()
+    return lambda _reference, backend: Conditions(train=kind(), backend=backend).run()
 
 
 # -- rows -----------------------------------------------------------------------------------------------------------
@@ -155,11 +160,11 @@ def _below(share: float) -> str:
 
 
 def _rows(change: Callable[[np.ndarray], np.ndarray]) -> Make:
-    return lambda reference, _realisation: replace(reference, table=change(reference.table))
+    return lambda reference, _backend: replace(reference, table=change(reference.table))
 
 
 def _column(change: Callable[..., np.ndarray], name: str = SIGNAL) -> Make:
-    def make(reference: Result, _realisation: str) -> Result:
+    def make(reference: Result, _backend: str) -> Result:
         table = reference.table.copy()
         table[name] = change(table[name])
         return replace(reference, table=table)
@@ -204,7 +209,7 @@ def _shifted(seconds: float) -> Callable[[np.ndarray], np.ndarray]:
     return change
 
 
-def _late_stamp(reference: Result, _realisation: str) -> Result:
+def _late_stamp(reference: Result, _backend: str) -> Result:
     first, *others = reference.events
     return replace(reference, events=[replace(first, stamp=first.stamp + STEP), *others])
 
@@ -219,7 +224,7 @@ def _as_float32(table: np.ndarray) -> np.ndarray:
 def _through_csv(times: str) -> Make:
     """Written as other tools do, with units in the headings, and read again; a table keeps no telegrams."""
 
-    def make(reference: Result, _realisation: str) -> Result:
+    def make(reference: Result, _backend: str) -> Result:
         units = {info.name: info.unit for info in reference.signals}
         names = list(reference.table.dtype.names or ())
         headings = [f"{name} [{units.get(name, 's')}]" for name in names]
@@ -236,5 +241,9 @@ def _through_csv(times: str) -> Make:
 def all_mutations() -> list[Mutation]:
     """All of them, in the order of the page."""
     return [
-        *parameter_mutations(0.01), *parameter_mutations(0.001), *condition_mutations(), *delivery_mutations(), *row_mutations(),
-    ]  # fmt: skip
+        *parameter_mutations(0.01),
+        *parameter_mutations(0.001),
+        *condition_mutations(),
+        *delivery_mutations(),
+        *row_mutations(),
+    ]

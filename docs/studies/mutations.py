@@ -2,8 +2,8 @@
 
     python docs/studies/mutations.py
 
-does all of it (a minute; it builds nineteen FMUs) and rewrites the tables in ``docs/mutation_study.md``. This folder holds
-studies of the package itself, whose tables stand in the pages; the tests recompute a part of each and compare.
+does all of it (a minute; it builds nineteen FMUs) and rewrites the tables in ``docs/mutation_study.md``. This folder
+holds studies of the package itself, whose tables stand in the pages; the tests recompute a part of each and compare.
 """
 
 from __future__ import annotations

@@ -34,8 +34,8 @@ def repetitions() -> list[Repetition]:
         Repetition("Python stepper", 3, Conditions(stepper="python").run),
         Repetition("components in another order", 3, Conditions(order=ORDER[::-1]).run),
         Repetition("FMI 2.0 instead of 3.0", 3, Conditions(fmi_version=2).run),
-        Repetition("Python blocks, FMI 3.0", 2, Conditions(realisation="block").run),
-        Repetition("Python blocks, FMI 2.0", 1, Conditions(realisation="block", fmi_version=2).run),
+        Repetition("Python blocks, FMI 3.0", 2, Conditions(backend="block").run),
+        Repetition("Python blocks, FMI 2.0", 1, Conditions(backend="block", fmi_version=2).run),
         Repetition("new process", 2, in_new_process),
         Repetition("new process, components in another order, Python stepper", 1, lambda: in_new_process("reversed")),
     ]
@@ -44,13 +44,17 @@ def repetitions() -> list[Repetition]:
 def other_steps() -> Iterator[Repetition]:
     """Communication steps that should agree with that of the baseline."""
     for step in STEPS:
-        yield Repetition(f"communication step {1000.0 * step:g} ms instead of {1000.0 * STEP:g} ms", 1, Conditions(step=step).run)
+        yield Repetition(
+            f"communication step {1000.0 * step:g} ms instead of {1000.0 * STEP:g} ms", 1, Conditions(step=step).run
+        )
 
 
 def in_new_process(how: str = "") -> Result:
     """The unchanged run in a process of its own, handed back in a results folder."""
     with TemporaryDirectory() as folder:
-        subprocess.run([sys.executable, str(Path(__file__)), folder, *filter(None, [how])], check=True, capture_output=True)
+        subprocess.run(
+            [sys.executable, str(Path(__file__)), folder, *filter(None, [how])], check=True, capture_output=True
+        )
         return load_result(folder)
 
 

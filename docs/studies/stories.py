@@ -1,9 +1,11 @@
 """Which parts of the stories of Sc1 to Sc4 come out, over the seeds of the receiver and over rails that nobody printed.
 
-``python docs/studies/stories.py`` prints the tables of docs/multi_vehicle_train.md (15 minutes on two cores). Three studies:
+``python docs/studies/stories.py`` prints the tables of docs/multi_vehicle_train.md (15 minutes on two cores). Three
+studies:
 
 - ``theta``: the observers' gain is chosen on Sc1 with seeds that no other table here uses;
-- ``receiver``: the shipped scenarios with 20 seeds of the receiver, the only noise in them (`10_hz` has an odometer without any);
+- ``receiver``: the shipped scenarios with 20 seeds of the receiver, the only noise in them (`10_hz` has an odometer
+  without any);
 - ``rails``: Sc2, whose loop hears no receiver, with seeds, rails and the phase of the odometer drawn together, within
   what the page says is usual.
 """
@@ -133,7 +135,8 @@ def choice_table(errors: Mapping[tuple[str, float], Sequence[float]]) -> str:
     thetas = list(dict.fromkeys(theta for _, theta in errors))
     lines = ["| theta [1/s] | " + " | ".join(f"{theta:g}" for theta in thetas) + " |", "|---" * (1 + len(thetas)) + "|"]
     lines += [
-        f"| {name} | " + " | ".join(f"{np.median(errors[name, theta]):.3f}" for theta in thetas) + " |" for name in OBSERVERS
+        f"| {name} | " + " | ".join(f"{np.median(errors[name, theta]):.3f}" for theta in thetas) + " |"
+        for name in OBSERVERS
     ]
     return "\n".join(lines)
 

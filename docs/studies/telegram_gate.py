@@ -1,10 +1,11 @@
 """The gate against true and false telegrams: every train observer, clean and slippery rails, balises near and far.
 
-``python docs/studies/telegram_gate.py`` prints the tables of docs/telegram_gate.md and draws docs/images/telegram_gate.png.
+``python docs/studies/telegram_gate.py`` prints the tables of docs/telegram_gate.md and draws
+docs/images/telegram_gate.png.
 
-The plant is run once on each rail; the observers run beside the recording, with gains certified for the longest gap between two
-balises (the adaptive one by its rule, the discrete one with its fixed gains). At each true telegram the gate is also asked what
-it would say to a false one there: a position that is off by so much.
+The plant is run once on each rail; the observers run beside the recording, with gains certified for the longest gap
+between two balises (the adaptive one by its rule, the discrete one with its fixed gains). At each true telegram the
+gate is also asked what it would say to a false one there: a position that is off by so much.
 """
 
 from __future__ import annotations
@@ -39,7 +40,9 @@ SHARE = 1.5  # of the adaptive gain: theta_min times the longest gap
 
 @dataclass(frozen=True)
 class Recording:
-    """A run of the plant: instants [s], efforts held from them on [N], odometer [m/s] and true position [m], shape (k,)."""
+    """A run of the plant: instants [s], efforts held from them on [N], odometer [m/s] and true position [m], shape
+    (k,).
+    """
 
     t: np.ndarray
     effort: np.ndarray
@@ -64,13 +67,16 @@ def record(rails: str, stop: float = 95.0) -> Recording:
     none = {"zone_from": [1e6, 1e6 + 2.0, 1e6 + 4.0], "zone_to": [1e6 + 1.0, 1e6 + 3.0, 1e6 + 5.0]}
     shipped = Scenario.load(SCENARIO).table().components
     driver = {"preset": shipped["driver"].preset, "parameters": dict(shipped["driver"].parameters)}
-    scenario.add("locomotive", model="locomotive", preset="chapter_3", parameters=zones if rails == "slippery" else none)
+    scenario.add(
+        "locomotive", model="locomotive", preset="chapter_3", parameters=zones if rails == "slippery" else none
+    )
     scenario.add("odometer", model="odometer", parameters={"sample_period": STEP})
     scenario.add("driver", model="driver", **driver)
     scenario.connect(
-        "driver.effort -> locomotive.effort", "locomotive.wheel_speed -> odometer.wheel_speed",
+        "driver.effort -> locomotive.effort",
+        "locomotive.wheel_speed -> odometer.wheel_speed",
         "odometer.reading -> driver.odometer",
-    )  # fmt: skip
+    )
     run = scenario.run(warn=lambda _text: None)
     names = ("time", "driver.effort", "odometer.reading", "locomotive.position")
     return Recording(*(np.asarray(run[name], dtype=float) for name in names))
@@ -94,16 +100,18 @@ def gains(observer: TrainObserver, spacing: float, longest: float) -> Mapping[st
     return found or {}
 
 
-def passings(recording: Recording, spacing: float, start: float) -> tuple[np.ndarray, np.ndarray]:
+def crossings(recording: Recording, spacing: float, start: float) -> tuple[np.ndarray, np.ndarray]:
     """When the balises are passed [s], and where they lie [m]."""
     places = np.arange(max(start, 0.02) * spacing, recording.position[-1] - 0.5, spacing)
     moving = np.concatenate([[True], np.diff(recording.position) > 0.0])
     return np.interp(places, recording.position[moving], recording.t[moving]), places
 
 
-def follow(observer: TrainObserver, recording: Recording, spacing: float, start: float, **gate: float) -> list[Telegram]:
+def follow(
+    observer: TrainObserver, recording: Recording, spacing: float, start: float, **gate: float
+) -> list[Telegram]:
     """Run an observer beside the recording, its gate rejecting, and note every telegram."""
-    stamps, places = passings(recording, spacing, start)
+    stamps, places = crossings(recording, spacing, start)
     longest = float(np.diff(stamps, prepend=0.0).max())
     runtime = Runtime(observer)
     overrides = {**TRAIN, **gains(observer, spacing, longest), "gate": 2.0, **gate}
@@ -134,13 +142,17 @@ def _told(observer: TrainObserver, runtime: Runtime, place: float, p: Any) -> Te
 
 
 def accepted_false(telegrams: Sequence[Telegram], offsets: Iterable[float]) -> np.ndarray:
-    """Share of false telegrams that would have been used, by offset: forward and backward, at every telegram once settled."""
+    """Share of false telegrams that would have been used, by offset: forward and backward, at every telegram once
+    settled.
+    """
     settled = [t for t in telegrams if t.settled]
     innovation, limit = (np.array([getattr(t, name) for t in settled]) for name in ("innovation", "limit"))
-    return np.array([
-        np.mean([np.abs(innovation + sign * offset) <= limit for sign in (-1.0, 1.0)]) if settled else np.nan
-        for offset in offsets
-    ])  # fmt: skip
+    return np.array(
+        [
+            np.mean([np.abs(innovation + sign * offset) <= limit for sign in (-1.0, 1.0)]) if settled else np.nan
+            for offset in offsets
+        ]
+    )
 
 
 def missed_true(telegrams: Sequence[Telegram]) -> float:
@@ -156,31 +168,43 @@ def study(
     recordings = {rails: record(rails) for rails in RAILS}
     return {
         (rails, name, spacing): [
-            t for start in starts for t in follow(OBSERVERS[name](), recordings[rails], spacing, start)  # type: ignore[arg-type]
+            t
+            for start in starts
+            for t in follow(OBSERVERS[name](), recordings[rails], spacing, start)  # type: ignore[arg-type]
         ]
-        for rails in RAILS for name in observers for spacing in spacings
-    }  # fmt: skip
+        for rails in RAILS
+        for name in observers
+        for spacing in spacings
+    }
 
 
 def tables(results: Mapping[Any, list[Telegram]]) -> str:
     """Missed true and accepted false telegrams as markdown."""
-    head = "| rails | observer | spacing [m] | true telegrams | missed true | " + " | ".join(f"+-{o:g} m" for o in TOLD_OFFSETS)
+    head = "| rails | observer | spacing [m] | true telegrams | missed true | " + " | ".join(
+        f"+-{o:g} m" for o in TOLD_OFFSETS
+    )
     lines = [head + " |", "|" + "---|" * (5 + len(TOLD_OFFSETS))]
     for (rails, name, spacing), telegrams in results.items():
         shares = " | ".join(f"{100.0 * share:.3g}" for share in accepted_false(telegrams, TOLD_OFFSETS))
         missed = f"{100.0 * missed_true(telegrams):.3g}"
-        lines.append(f"| {rails} | `{name}` | {spacing:g} | {sum(t.settled for t in telegrams)} | {missed} | {shares} |")
+        lines.append(
+            f"| {rails} | `{name}` | {spacing:g} | {sum(t.settled for t in telegrams)} | {missed} | {shares} |"
+        )
     return "\n".join(lines)
 
 
 def draw(results: Mapping[Any, list[Telegram]], path: Path = PICTURE) -> None:
-    """Accepted false telegrams over the offset, one panel for each rail and spacing, and missed true ones beside the name."""
+    """Accepted false telegrams over the offset, one panel for each rail and spacing, and missed true ones beside the
+    name.
+    """
     import matplotlib as mpl  # noqa: PLC0415 - only to draw
 
     mpl.use("Agg")
     import matplotlib.pyplot as plt  # noqa: PLC0415
 
-    figure, axes = plt.subplots(len(RAILS), len(SPACINGS), figsize=(15, 7), sharex=True, sharey=True, layout="constrained")
+    figure, axes = plt.subplots(
+        len(RAILS), len(SPACINGS), figsize=(15, 7), sharex=True, sharey=True, layout="constrained"
+    )
     for row, rails in zip(axes, RAILS, strict=True):
         for ax, spacing in zip(row, SPACINGS, strict=True):
             missed = 0.0

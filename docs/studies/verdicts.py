@@ -1,4 +1,6 @@
-"""Holds the runs of the mutation study against baselines, as the fixture `fmu_regression` does; the verdicts are rows."""
+"""Holds the runs of the mutation study against baselines, as the fixture `fmu_regression` does; the verdicts are
+rows.
+"""
 
 from __future__ import annotations
 
@@ -52,15 +54,17 @@ class Row:
 
 @dataclass(frozen=True)
 class Judge:
-    """The unchanged result and its baselines, read back from their files: one for each of `RELATIVE`, and a thinned one."""
+    """The unchanged result and its baselines, read back from their files: one for each of `RELATIVE`, and a thinned
+    one.
+    """
 
     reference: Result
     baselines: Sequence[Baseline]
     thinned: Baseline
 
-    def mutation(self, mutation: Mutation, realisation: str = "fmu") -> Row:
+    def mutation(self, mutation: Mutation, backend: str = "fmu") -> Row:
         """Change one thing and compare."""
-        result = mutation.make(self.reference, realisation)
+        result = mutation.make(self.reference, backend)
         return self._row(mutation.group, mutation.change, result, mutation.why, mutation.harmless)
 
     def repetition(self, repetition: Repetition) -> Iterator[Row]:

@@ -9,7 +9,16 @@ from fmu_observer.block.variables import BlockError
 from fmu_observer.event_protocol import LATE_POLICIES, LatePolicy
 from plant_models.hybrid import HybridSystem
 
-__all__ = ["LATE_POLICIES", "BlockCallError", "BlockError", "FMI2Block", "FMI3Block", "Face", "LatePolicy", "make_block"]
+__all__ = [
+    "LATE_POLICIES",
+    "BlockCallError",
+    "BlockError",
+    "FMI2Block",
+    "FMI3Block",
+    "Face",
+    "LatePolicy",
+    "make_block",
+]
 
 
 FACES: dict[int, type[FMI2Block] | type[FMI3Block]] = {2: FMI2Block, 3: FMI3Block}

@@ -29,16 +29,19 @@ _log = logging.getLogger(__name__)
 
 
 EventsMark = tuple[Mark | None, tuple[list[Stamped], list[float], list[int], Counters] | None]
-"""Where the events stood: journal, and queue, stamps, counts seen and counters where something waits; see `Events.mark`."""
+"""Where the events stood: journal, and queue, stamps, counts seen and counters where something waits; see
+`Events.mark`.
+"""
 
 
 class Events:
     """Triggered events of one runtime.
 
-    `stamps`, `counts` and `active` (FMI 3: numbers of the active clocks) are set from outside, as are, before time runs, the two
-    parameters in `protocol`: the number of the late policy, from one, and how far back it can go [s]. `listener` is told what is
-    wrong with an event; where there is none, Python's log is. `seen` are the counts
-    already taken notice of, `queue` the events whose stamp lies ahead, `journal` the past for replay, where the policy needs it.
+    `stamps`, `counts` and `active` (FMI 3: numbers of the active clocks) are set from outside, as are, before time
+    runs, the two parameters in `protocol`: the number of the late policy, from one, and how far back it can go [s].
+    `listener` is told what is wrong with an event; where there is none, Python's log is. `seen` are the counts
+    already taken notice of, `queue` the events whose stamp lies ahead, `journal` the past for replay, where the policy
+    needs it.
 
     Args:
         system: the hybrid system. runtime: its runtime.
@@ -109,7 +112,8 @@ class Events:
         communicate(self._runtime, self.journal)
 
     def tick(self) -> bool:
-        """The events of the active clocks happen, in declared order, their payload in the inputs, their stamp in `stamps` (unset:
+        """The events of the active clocks happen, in declared order, their payload in the inputs, their stamp in
+        `stamps` (unset:
         now); a stamp ahead waits. Whether there were any."""
         ticked = sorted(self.active)
         self.active.clear()
@@ -183,8 +187,11 @@ def _payload_positions(system: HybridSystem) -> dict[str, tuple[int, ...]]:
 
 
 def _given_positions(system: HybridSystem, runtime: Runtime) -> np.ndarray:
-    """Where in the runtime's memory stands what is set from outside: inputs and payloads (not the noises), and parameters."""
+    """Where in the runtime's memory stands what is set from outside: inputs and payloads (not the noises), and
+    parameters.
+    """
     states, inputs = len(runtime.x), len(runtime.u)
     return np.array(
-        [*range(states, states + width(exposed_inputs(system))), *range(states + inputs, len(runtime.memory))], dtype=np.intp
+        [*range(states, states + width(exposed_inputs(system))), *range(states + inputs, len(runtime.memory))],
+        dtype=np.intp,
     )

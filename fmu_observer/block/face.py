@@ -1,6 +1,7 @@
 """What the two FMI faces share: identity, folder, refused calls, prepared calls, saved states and the life cycle.
 
-fmpy's tools recognise an FMU by its class, so the faces subclass fmpy's slaves and replace every call; no library is loaded.
+fmpy's tools recognise an FMU by its class, so the faces subclass fmpy's slaves and replace every call; no library is
+loaded.
 """
 
 from __future__ import annotations
@@ -69,17 +70,18 @@ def refused(function: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[
 class Face:
     """State and life cycle common to the FMI 2 and the FMI 3 face of a block.
 
-    A new block is in the mode *instantiated*; `instantiate` makes a used one new again. Calls that the standard does not
-    allow in a mode are refused with a `BlockCallError`, as the exported FMU refuses them.
+    A new block is in the mode *instantiated*; `instantiate` makes a used one new again. Calls that the standard does
+    not allow in a mode are refused with a `BlockCallError`, as the exported FMU refuses them.
 
     Args:
         system: the hybrid system to present.
         preset: preset whose values are the start values.
         instance_name: name used in messages; the system's name by default.
-        late_policy: what to do with events stamped in the past: ``replay``, ``reject`` or ``late``; the start value of the
-            parameter of that name.
+        late_policy: what to do with events stamped in the past: ``replay``, ``reject`` or ``late``; the start value of
+            the parameter of that name.
         replay_horizon: how far back ``replay`` can go [s]; the start value of the parameter of that name.
-        announcement: how events are announced, ``clocks`` (FMI 3 only) or ``counts``; None for what is usual in the version.
+        announcement: how events are announced, ``clocks`` (FMI 3 only) or ``counts``; None for what is usual in the
+        version.
 
     Raises:
         ValueError: the preset, the policy or the announcement is unknown, or the horizon is not a time.
@@ -89,10 +91,15 @@ class Face:
     real_type: ClassVar[str]
 
     def __init__(
-        self, system: HybridSystem, *, preset: str | None = None, instance_name: str | None = None,
-        late_policy: LatePolicy = "replay", replay_horizon: float = DEFAULT_REPLAY_HORIZON,
+        self,
+        system: HybridSystem,
+        *,
+        preset: str | None = None,
+        instance_name: str | None = None,
+        late_policy: LatePolicy = "replay",
+        replay_horizon: float = DEFAULT_REPLAY_HORIZON,
         announcement: Announcement | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.system = system
         try:
             protocol = EventProtocol(announcement, late_policy, replay_horizon)
@@ -191,14 +198,17 @@ class Face:
     def prepared_set(self, references: Sequence[int], values: np.ndarray) -> Callable[[], None]:
         """A call without arguments that sets real variables from `values`, shape (len(references),).
 
-        It does what `setReal` / `setFloat64` does; quick where all are inputs (but not payload), the mode is not checked then.
+        It does what `setReal` / `setFloat64` does; quick where all are inputs (but not payload), the mode is not
+        checked then.
         """
         if self._all_have_role("input", references, values):
             return self.instance.input_writer(references, values)
         set_values = getattr(self, f"set{self.real_type}")
         return lambda: set_values(references, values.tolist())
 
-    def directional_derivative(self, unknowns: Sequence[int], knowns: Sequence[int], seed: Sequence[float]) -> list[float]:
+    def directional_derivative(
+        self, unknowns: Sequence[int], knowns: Sequence[int], seed: Sequence[float]
+    ) -> list[float]:
         """Exact directional derivatives of real outputs and derivatives, see `Sensitivity.directional`."""
         self.instance.require_alive()
         if self.mode == "instantiated":

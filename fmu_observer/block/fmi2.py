@@ -34,12 +34,15 @@ class FMI2Block(Face, FMU2Slave):
         environment = getattr(callbacks, "componentEnvironment", None)
 
         def listener(text: str) -> None:
-            logger(environment, name, FMI_WARNING, WARNINGS, text.replace("%", "%%").encode())  # it takes what printf takes
+            # it takes what printf takes
+            logger(environment, name, FMI_WARNING, WARNINGS, text.replace("%", "%%").encode())
 
         self.instance.events.listener = listener if logger else None
 
     @refused
-    def setupExperiment(self, tolerance: float | None = None, startTime: float = 0.0, stopTime: float | None = None) -> None:
+    def setupExperiment(
+        self, tolerance: float | None = None, startTime: float = 0.0, stopTime: float | None = None
+    ) -> None:
         """Fix the start time [s]."""
         self.instance.require("instantiated")
         self.instance.set_up(startTime)
@@ -54,9 +57,11 @@ class FMI2Block(Face, FMU2Slave):
 
     @refused
     def doStep(
-        self, currentCommunicationPoint: float, communicationStepSize: float,
+        self,
+        currentCommunicationPoint: float,
+        communicationStepSize: float,
         noSetFMUStatePriorToCurrentPoint: bool = True,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Advance by one communication step [s], through the events announced since the last one."""
         self.instance.step(currentCommunicationPoint, communicationStepSize)
 

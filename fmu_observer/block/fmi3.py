@@ -18,9 +18,9 @@ class FMI3Block(Face, FMU3Slave):
     """A hybrid system with the call surface of an FMI 3.0 co-simulation slave.
 
     An event: `enterEventMode`, `setClock`, payload and, where it happened earlier, ``<event>_time`` by `setFloat64`,
-    `updateDiscreteStates`, `enterStepMode`; with ``announcement="counts"`` as in FMI 2, and event mode has nothing to do. A
-    block on which `instantiate` was never called (fmpy's `simulate_fmu` does not) uses event mode as soon as its caller does.
-    Arguments as for `Face`.
+    `updateDiscreteStates`, `enterStepMode`; with ``announcement="counts"`` as in FMI 2, and event mode has nothing to
+    do. A block on which `instantiate` was never called (fmpy's `simulate_fmu` does not) uses event mode as soon as its
+    caller does. Arguments as for `Face`.
     """
 
     fmi_version = 3
@@ -32,9 +32,15 @@ class FMI3Block(Face, FMU3Slave):
 
     @refused
     def instantiate(
-        self, visible: bool = False, loggingOn: bool = False, eventModeUsed: bool = False, earlyReturnAllowed: bool = False,
-        logMessage: Any = None, intermediateUpdate: Any = None, requiredIntermediateVariables: Any = None,
-    ) -> None:  # fmt: skip
+        self,
+        visible: bool = False,
+        loggingOn: bool = False,
+        eventModeUsed: bool = False,
+        earlyReturnAllowed: bool = False,
+        logMessage: Any = None,
+        intermediateUpdate: Any = None,
+        requiredIntermediateVariables: Any = None,
+    ) -> None:
         """Start values; `eventModeUsed` and `earlyReturnAllowed` as in FMI 3."""
         self.instance.reset()
         self.instance.events.listener = (
@@ -45,7 +51,9 @@ class FMI3Block(Face, FMU3Slave):
 
     @refused
     def setDebugLogging(self, loggingOn: bool, categories: Sequence[str]) -> None:
-        """Nothing to switch: what is wrong is raised, or logged by Python's `logging`. Unknown categories are refused."""
+        """Nothing to switch: what is wrong is raised, or logged by Python's `logging`. Unknown categories are
+        refused.
+        """
         known = [category.name for category in self.model_description.logCategories]
         for name in categories:
             if name not in known:
@@ -75,7 +83,9 @@ class FMI3Block(Face, FMU3Slave):
         """From event mode to step mode."""
         self.instance.require("event")
         if self.instance.events.active:
-            names = ", ".join(self.system.triggered_events[number].name for number in sorted(self.instance.events.active))
+            names = ", ".join(
+                self.system.triggered_events[number].name for number in sorted(self.instance.events.active)
+            )
             raise BlockError(f"clock {names} is active; call updateDiscreteStates first, or the event is lost.")
         self.instance.mode = "step"
 
@@ -109,10 +119,13 @@ class FMI3Block(Face, FMU3Slave):
 
     @refused
     def doStep(
-        self, currentCommunicationPoint: float, communicationStepSize: float,
+        self,
+        currentCommunicationPoint: float,
+        communicationStepSize: float,
         noSetFMUStatePriorToCurrentPoint: bool = True,
-    ) -> tuple[bool, bool, bool, float]:  # fmt: skip
-        """Advance by one communication step [s], or, where early return is allowed, to the first periodic instant inside it.
+    ) -> tuple[bool, bool, bool, float]:
+        """Advance by one communication step [s], or, where early return is allowed, to the first periodic instant
+        inside it.
 
         Returns:
             (eventHandlingNeeded, terminateSimulation, earlyReturn, lastSuccessfulTime).
@@ -152,7 +165,9 @@ class FMI3Block(Face, FMU3Slave):
         """Set the late policy by its number."""
         self.instance.set_whole(vr, values, INT64)
 
-    def fmi3SetFloat64(self, _component: object, vr: Iterable[int], _n: int, values: Iterable[float], _n_values: int) -> None:
+    def fmi3SetFloat64(
+        self, _component: object, vr: Iterable[int], _n: int, values: Iterable[float], _n_values: int
+    ) -> None:
         """The low-level setter used by fmpy's `Input`."""
         self.setFloat64(list(vr), list(values))
 
@@ -165,15 +180,18 @@ class FMI3Block(Face, FMU3Slave):
 
     @refused
     def exitInitializationMode(self) -> None:
-        """End initialisation; time begins to run. A warning where nobody will be able to tell the events of the block."""
+        """End initialisation; time begins to run. A warning where nobody will be able to tell the events of the
+        block.
+        """
         super().exitInitializationMode()
         if self._event_mode_used is False and self.system.triggered_events and not self._counts_events:
             names = ", ".join(event.name for event in self.system.triggered_events)
             self.instance.events.warn(
                 "%s: eventModeUsed is False, but events (%s) are announced by clocks: none can be told; a block with "
                 "announcement='counts' (an FMU built with `--events counts`) is for masters without event mode",
-                self.instanceName, names,
-            )  # fmt: skip
+                self.instanceName,
+                names,
+            )
 
     # -- internals --------------------------------------------------------------------------------------------------
 

@@ -1,7 +1,7 @@
 """The instance behind a block: a runtime with its events, its variables by value reference, and the mode of its life.
 
-Both FMI faces (`fmi2`, `fmi3`) drive this one; it knows value references and modes, and nothing of fmpy's classes. What it
-refuses it refuses with a reason; the face adds the name, the call and the time.
+Both FMI faces (`fmi2`, `fmi3`) drive this one; it knows value references and modes, and nothing of fmpy's classes. What
+it refuses it refuses with a reason; the face adds the name, the call and the time.
 """
 
 from __future__ import annotations
@@ -102,7 +102,8 @@ class Instance:
         """Set whole numbers that have one of these roles; nothing is set unless everything may be.
 
         Raises:
-            BlockError: a value reference is unknown or of another type, the variable cannot be set now, or not to this value.
+            BlockError: a value reference is unknown or of another type, the variable cannot be set now, or not to this
+            value.
         """
         if len(references) != len(values):
             raise BlockError(f"{len(references)} value references but {len(values)} values; all variables are scalars.")
@@ -161,7 +162,9 @@ class Instance:
         self.variables.touch()
         horizon = self.events.protocol[1]
         if not (isfinite(horizon) and horizon >= 0.0):
-            raise BlockError(f"time cannot run with parameter replay_horizon = {horizon!r}; expected zero or more seconds.")
+            raise BlockError(
+                f"time cannot run with parameter replay_horizon = {horizon!r}; expected zero or more seconds."
+            )
         self.events.restore_past(())  # as the policy has it that was set
         self.events.seen = list(self.events.counts)  # what stands there already is no event
         try:
@@ -184,7 +187,8 @@ class Instance:
 
         Raises:
             BlockError: the block is not in step mode, `t` is not the current time, or `h` is not positive.
-            StepDiscarded: the model fails, its state is not finite afterwards, or the step is so large that no end of it is to be
+            StepDiscarded: the model fails, its state is not finite afterwards, or the step is so large that no end of
+            it is to be
                 seen; the block stands where it stood before.
         """
         if self.mode != "step":
@@ -206,7 +210,9 @@ class Instance:
             self.events.undo(mark)
             self.discarded = True
             reason = error if isinstance(error, BlockError) else _model_failure(error)
-            raise StepDiscarded(f"{reason} The step is undone.") from reason.__cause__ or (None if reason is error else error)
+            raise StepDiscarded(f"{reason} The step is undone.") from reason.__cause__ or (
+                None if reason is error else error
+            )
         self.discarded = False
         return due is not None
 
@@ -250,7 +256,9 @@ class Instance:
         horizon = state.protocol[1]
         started = state.mode not in BEFORE_TIME
         if started and not (isfinite(horizon) and horizon >= 0.0 and self._timing.can_run(state.runtime)):
-            raise BlockError("time cannot run on from this state: its parameters, its clock or its horizon are damaged.")
+            raise BlockError(
+                "time cannot run on from this state: its parameters, its clock or its horizon are damaged."
+            )
         return state
 
     def load(self, state: BlockState) -> None:
@@ -339,9 +347,12 @@ class Instance:
 
     def _check_finite(self) -> None:
         x = self.runtime.x
-        if not isfinite(sum(x.tolist())) and not np.isfinite(x).all():  # the first is quick, the second right for huge states too
+        # the first is quick, the second right for huge states too
+        if not isfinite(sum(x.tolist())) and not np.isfinite(x).all():
             broken = scalar_names(self.system.states)[int(np.flatnonzero(~np.isfinite(x))[0])]
-            raise BlockError(f"state {broken} is not a finite number; check inputs, payloads, parameters and internal_step.")
+            raise BlockError(
+                f"state {broken} is not a finite number; check inputs, payloads, parameters and internal_step."
+            )
 
 
 def _model_failure(error: Exception) -> BlockError:

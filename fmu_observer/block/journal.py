@@ -21,7 +21,8 @@ SMALLEST_PRUNING = 256
 PRUNING_MARGIN = 1e-6
 """What ended so much before the horizon [s] is out of reach whatever the tolerance."""
 
-ROUNDING_ULPS = 4.0  # a master's k*H and the sum t + H at which a step ended differ by so many units in the last place at most
+# a master's k*H and the sum t + H at which a step ended differ by so many units in the last place at most
+ROUNDING_ULPS = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +43,8 @@ class Stamped:
 
 
 class Record(NamedTuple):
-    """One thing the runtime did: an advance from `t` to a later `until` [s], with `event` a jump at `t`, else a communication.
+    """One thing the runtime did: an advance from `t` to a later `until` [s], with `event` a jump at `t`, else a
+    communication.
 
     `memory` (state, inputs, parameters) and `ticks` are the runtime's before it.
     """
@@ -105,7 +107,8 @@ class Journal:
         return ""
 
     def cut(self, stamp: float) -> list[Record]:
-        """Take out the record in which `stamp` [s] lies (at the border of two, to rounding, the later) and all that follow.
+        """Take out the record in which `stamp` [s] lies (at the border of two, to rounding, the later) and all that
+        follow.
 
         Returns:
             The records taken out, oldest first.

@@ -88,8 +88,8 @@ def replay(runtime: Runtime, journal: Journal, event: Stamped, given: np.ndarray
         tolerance: how far the stamp may lie before the first record [s].
 
     Returns:
-        An empty text, or, with nothing changed, the reason why memory does not reach back to the stamp; and the verdict on the
-        event. Those after it are judged anew.
+        An empty text, or, with nothing changed, the reason why memory does not reach back to the stamp; and the verdict
+        on the event. Those after it are judged anew.
     """
     reason = journal.out_of_reach(event.stamp, tolerance, runtime.t)
     if reason:

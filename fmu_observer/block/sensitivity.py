@@ -1,4 +1,5 @@
-"""Directional derivatives of a block: how its outputs and derivatives change with time, inputs, states and parameters, exactly.
+"""Directional derivatives of a block: how its outputs and derivatives change with time, inputs, states and parameters,
+exactly.
 
 One evaluation of the traced tangent with the whole seed vector, as in the exported FMU.
 """
@@ -29,8 +30,11 @@ class Sensitivity:
         self.system, self.variables = system, variables
         self._table = VariableTable.of(system)
 
-    def directional(self, runtime: Runtime, unknowns: Sequence[int], knowns: Sequence[int], seed: Sequence[float]) -> list[float]:
-        """For every unknown the sum of its partial derivatives by the knowns, each times its seed; dry friction is held as it is.
+    def directional(
+        self, runtime: Runtime, unknowns: Sequence[int], knowns: Sequence[int], seed: Sequence[float]
+    ) -> list[float]:
+        """For every unknown the sum of its partial derivatives by the knowns, each times its seed; dry friction is held
+        as it is.
 
         Args:
             runtime: where they are taken.
@@ -42,7 +46,8 @@ class Sensitivity:
             One number for each unknown.
 
         Raises:
-            BlockError: the system cannot be traced, a variable is none of these, the seed has another length, or the equations
+            BlockError: the system cannot be traced, a variable is none of these, the seed has another length, or the
+            equations
                 have no finite derivative here.
         """
         if not self.system.traceable:
@@ -57,7 +62,9 @@ class Sensitivity:
         values = [float(value) for value in self._tangent(runtime, seeds)[rows]]
         for reference, value in zip(unknowns, values, strict=True):
             if not isfinite(value):
-                raise BlockError(f"the directional derivative of {self._variable(reference).name} is not a finite number here.")
+                raise BlockError(
+                    f"the directional derivative of {self._variable(reference).name} is not a finite number here."
+                )
         return values
 
     # -- internals --------------------------------------------------------------------------------------------------
@@ -95,7 +102,9 @@ class Sensitivity:
 
     def _variable(self, reference: int) -> ModelVariable:
         if not self._table.time <= reference < self._table.end:
-            raise BlockError(f"there is no variable with value reference {reference}; the last one is {self._table.end - 1}.")
+            raise BlockError(
+                f"there is no variable with value reference {reference}; the last one is {self._table.end - 1}."
+            )
         return referenced(self.variables, reference)[0]
 
 

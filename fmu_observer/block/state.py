@@ -1,7 +1,7 @@
 """Saved states: everything that decides the future of a block, as a value and as bytes.
 
-The bytes are JSON; arrays of floats stand in it as base64 of little-endian doubles, so that every bit comes back, on any
-machine. Bytes from outside are checked before anything is built from them.
+The bytes are JSON; arrays of floats stand in it as base64 of little-endian doubles, so that every bit comes back, on
+any machine. Bytes from outside are checked before anything is built from them.
 """
 
 from __future__ import annotations
@@ -109,7 +109,9 @@ def deserialize(content: bytes, shape: Shape) -> BlockState:
     except BlockError:
         raise
     except (ValueError, LookupError, TypeError, AttributeError, OverflowError, RecursionError) as error:
-        raise BlockError(f"these bytes are not the serialised state of a block ({type(error).__name__}: {error}).") from error
+        raise BlockError(
+            f"these bytes are not the serialised state of a block ({type(error).__name__}: {error})."
+        ) from error
 
 
 def check_owner(token: str, expected: str) -> None:
@@ -172,7 +174,9 @@ def _event(entry: Sequence[Any], shape: Shape) -> Stamped:
 
 
 def _integers(values: Sequence[Any], count: int, allowed: range | None = None) -> tuple[int, ...]:
-    whole = len(values) == count and all(type(value) is int and (allowed is None or value in allowed) for value in values)
+    whole = len(values) == count and all(
+        type(value) is int and (allowed is None or value in allowed) for value in values
+    )
     if not whole:
         raise ValueError(f"expected {count} whole numbers, got {values!r}")
     return tuple(values)

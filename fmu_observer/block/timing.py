@@ -1,4 +1,5 @@
-"""How a runtime is driven through time, seen from its parameters: how much work a step is, and whether time can run at all.
+"""How a runtime is driven through time, seen from its parameters: how much work a step is, and whether time can run at
+all.
 
 Reads the runtime's parameters and clock; moves nothing.
 """
@@ -38,7 +39,9 @@ class Timing:
             for event in system.periodic_events
         ]
 
-    def count_steps(self, end: float, t: float, t0: float, p: Sequence[float] | np.ndarray, ticks: Sequence[int]) -> float:
+    def count_steps(
+        self, end: float, t: float, t0: float, p: Sequence[float] | np.ndarray, ticks: Sequence[int]
+    ) -> float:
         """Internal steps, or instants of one periodic event, up to `end` [s]; the larger of the two.
 
         Args:
@@ -53,9 +56,13 @@ class Timing:
         return count
 
     def plain_step(self, p: Sequence[float] | np.ndarray) -> float:
-        """Communication steps up to this [s] are far from the bound, so that nobody needs to count; 0 where that is not sure."""
+        """Communication steps up to this [s] are far from the bound, so that nobody needs to count; 0 where that is not
+        sure.
+        """
         shortest = min(float(p[i]) for i in (self.step_position, *(period for period, _ in self._periodic)))
-        return 0.1 * MOST_INTERNAL_STEPS * shortest if GRID_TOLERANCE * float(p[self.step_position]) <= shortest else 0.0
+        return (
+            0.1 * MOST_INTERNAL_STEPS * shortest if GRID_TOLERANCE * float(p[self.step_position]) <= shortest else 0.0
+        )
 
     def can_run(self, snapshot: Snapshot) -> bool:
         """Whether time can run on from a snapshot of a runtime whose time has begun."""

@@ -20,9 +20,23 @@ if TYPE_CHECKING:
 
 Mode = Literal["instantiated", "initialization", "event", "step", "terminated", "freed"]
 Role = Literal[
-    "time", "input", "payload", "output", "integer_output", "state", "fixed", "tunable", "clock", "count", "stamp", "policy",
-    "horizon", "outcome", "derivative", "indicator",
-]  # fmt: skip
+    "time",
+    "input",
+    "payload",
+    "output",
+    "integer_output",
+    "state",
+    "fixed",
+    "tunable",
+    "clock",
+    "count",
+    "stamp",
+    "policy",
+    "horizon",
+    "outcome",
+    "derivative",
+    "indicator",
+]
 
 COMPUTED: frozenset[Role] = frozenset({"output", "integer_output", "derivative", "indicator"})
 BEFORE_TIME: tuple[Mode, ...] = ("instantiated", "initialization")
@@ -80,7 +94,9 @@ class Variables:
         self._places = [Place("time", "time", None, 0), *_system_places(system, runtime)]
         for number, event in enumerate(system.triggered_events):
             count, stamp = event.implied_names
-            trigger = Place(count, "count", events, number) if counts_events else Place(event.name, "clock", events, number)
+            trigger = (
+                Place(count, "count", events, number) if counts_events else Place(event.name, "clock", events, number)
+            )
             self._places += [trigger, Place(stamp, "stamp", events.stamps, number)]
         if system.triggered_events:
             self._places.append(Place("late_policy", "policy", events.protocol, 0))
@@ -115,7 +131,9 @@ class Variables:
             BlockError: there is none.
         """
         if not self.table.time <= reference < self.table.end:
-            raise BlockError(f"there is no variable with value reference {reference}; the last one is {self.table.end - 1}.")
+            raise BlockError(
+                f"there is no variable with value reference {reference}; the last one is {self.table.end - 1}."
+            )
         return self._places[reference - FIRST_REFERENCE]
 
     def readable(self, reference: int) -> Place:
@@ -126,7 +144,9 @@ class Variables:
         """
         place = self.place(reference)
         if place.role in NOT_REAL:
-            raise BlockError(f"{place.name} (value reference {reference}) is not a real variable but {NOT_REAL[place.role]}.")
+            raise BlockError(
+                f"{place.name} (value reference {reference}) is not a real variable but {NOT_REAL[place.role]}."
+            )
         return place
 
     def whole(self, reference: int, roles: Sequence[Role]) -> Place:
@@ -207,7 +227,9 @@ def _places(signals: Sequence[Signal], values: Any, role: Callable[[int], Role])
 
 
 def _settable_modes(counts_events: bool) -> dict[Role, tuple[Mode, ...]]:
-    """What comes with an event is set before the step where it is announced by a count, in event mode where by a clock."""
+    """What comes with an event is set before the step where it is announced by a count, in event mode where by a
+    clock.
+    """
     at_events: Mode = "step" if counts_events else "event"
     return {
         "input": (*BEFORE_TIME, "event", "step"),

@@ -1,4 +1,6 @@
-"""Certificates: exact stability checks of sampled observers, recomputed in NumPy and never taken from a solver's status."""
+"""Certificates: exact stability checks of sampled observers, recomputed in NumPy and never taken from a solver's
+status.
+"""
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error, with_switching_noted
 from fmu_observer.certificates.certificate import Certificate

@@ -1,9 +1,11 @@
-"""Certificate of a high gain that follows the train's speed: one Lyapunov function for all gaps, gains and changes of gain.
+"""Certificate of a high gain that follows the train's speed: one Lyapunov function for all gaps, gains and changes of
+gain.
 
-In units of the gain in force, ``eps = (e_p, e_v / theta)``, a gap of length g is the transition Phi(theta g) of the gain 1. At a
-balise the gain changes, and eps_2 with it. What combinations of ``x = theta g`` and ``m = theta_k / theta_(k+1)`` can occur
-follows from bounds on speed, acceleration and spacing. It uses the transitions of `sampled_error` and the candidates of
-`quadratic`, and believes only what it recomputes. Ours; the thesis has constant gains only.
+In units of the gain in force, ``eps = (e_p, e_v / theta)``, a gap of length g is the transition Phi(theta g) of the
+gain 1. At a balise the gain changes, and eps_2 with it. What combinations of ``x = theta g`` and
+``m = theta_k / theta_(k+1)`` can occur follows from bounds on speed, acceleration and spacing. It uses the transitions
+of `sampled_error` and the candidates of `quadratic`, and believes only what it recomputes. Ours; the thesis has
+constant gains only.
 """
 
 from __future__ import annotations
@@ -37,7 +39,8 @@ SMALLEST_GAP = 1e-3  # [s]; below it the limit counts as zero
 
 @dataclass(frozen=True)
 class GainAdaptation:
-    """``theta = clip(ratio v / d, theta_min, theta_max)`` at each balise, and what is assumed of train and track; hashable.
+    """``theta = clip(ratio v / d, theta_min, theta_max)`` at each balise, and what is assumed of train and track;
+    hashable.
 
     Attributes:
         ratio: theta times the gap that is expected [1]. theta_min, theta_max: limits of the gain [1/s].
@@ -47,7 +50,8 @@ class GainAdaptation:
         acceleration: largest acceleration and deceleration of the train [m/s2].
         speed_tolerance: largest relative error of the speed that theta is computed from, at most 1 [1].
         spacing_tolerance: largest relative difference between a spacing and the expected one, below 1 [1].
-        learnt: whether d is a spacing measured earlier, which may be off to one side while the next is off to the other.
+        learnt: whether d is a spacing measured earlier, which may be off to one side while the next is off to the
+        other.
     """
 
     ratio: float
@@ -76,11 +80,14 @@ class GainAdaptation:
         """Speed [m/s] below which the longest spacing takes longer than `max_gap` [s]; assumed everywhere."""
         return self.spacing * (1.0 + self.spacing_tolerance) / max_gap
 
-    def expected_share(self, shortest: np.ndarray, longest: np.ndarray, max_gap: float) -> tuple[np.ndarray, np.ndarray]:
+    def expected_share(
+        self, shortest: np.ndarray, longest: np.ndarray, max_gap: float
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Smallest and largest ``v g / d``, speed at either end of a gap g, over all gaps from `shortest` to `longest`.
 
-        The smallest is reached by a train that gains speed all the way (or stays at the slowest speed), the largest by one that
-        loses it until it has the slowest speed. Both are unimodal in g, so ends and turning point give the extremes.
+        The smallest is reached by a train that gains speed all the way (or stays at the slowest speed), the largest by
+        one that loses it until it has the slowest speed. Both are unimodal in g, so ends and turning point give the
+        extremes.
 
         Args:
             shortest, longest: [s], shape (count,). max_gap: longest gap of all [s].
@@ -99,12 +106,15 @@ class GainAdaptation:
         high = np.where(peak <= _time_for(far, v, a), braking, crawling) / d
         widest, narrowest = (1.0 + self.spacing_tolerance, 1.0 - self.spacing_tolerance) if self.learnt else (1.0, 1.0)
         with np.errstate(divide="ignore"):
-            return low * (1.0 - self.speed_tolerance) / widest, high * (1.0 + self.speed_tolerance) / np.float64(narrowest)
+            return low * (1.0 - self.speed_tolerance) / widest, high * (1.0 + self.speed_tolerance) / np.float64(
+                narrowest
+            )
 
 
 @dataclass(frozen=True)
 class _Cells:
-    """Cells of x and the changes of gain possible in them: x from ``x[i]`` to ``x[i + 1]``, m between `smallest` and `largest`.
+    """Cells of x and the changes of gain possible in them: x from ``x[i]`` to ``x[i + 1]``, m between `smallest` and
+    `largest`.
 
     Where `changing` is false, the gain is at its upper limit before and after the balise, so that m = 1.
     """
@@ -199,7 +209,8 @@ class _Grid:
         start = flow_condition(vertex.continuous_limit)
         self._unchanged = start.joined(transition_condition(self._transitions, self._x))
         self._cells = np.flatnonzero(cells.changing & (np.arange(CELLS) > 0))  # at x = 0 no gain changes
-        self._changes = np.stack([cells.smallest[self._cells], cells.largest[self._cells]])  # the condition is convex in m
+        # the condition is convex in m
+        self._changes = np.stack([cells.smallest[self._cells], cells.largest[self._cells]])
         self._first = np.clip(self._cells - 2, 0, CELLS - 4)  # the cell and its neighbours: four points
 
     def condition(self, cells: Sequence[int]) -> Condition:
@@ -211,21 +222,29 @@ class _Grid:
         return reduce(Condition.joined, parts)
 
     def judge(self, P: np.ndarray) -> tuple[float, int]:
-        """Largest eigenvalue on the grid with a bound for what lies between its points, and the cell where it is largest."""
+        """Largest eigenvalue on the grid with a bound for what lies between its points, and the cell where it is
+        largest.
+        """
         unchanged = inequalities(self._unchanged, P)
         largest = np.linalg.eigvalsh(unchanged)[:, -1]
-        found = (float(largest.max()) + 0.125 * _bend(np.diff(unchanged, 2, axis=0)), min(int(largest.argmax()), CELLS - 1))
+        found = (
+            float(largest.max()) + 0.125 * _bend(np.diff(unchanged, 2, axis=0)),
+            min(int(largest.argmax()), CELLS - 1),
+        )
         for change in self._changes if len(self._cells) else ():
             points = np.stack([inequalities(self._changed(self._first + k, change), P) for k in range(4)])
             here = np.arange(len(self._cells))
             ends = points[self._cells - 1 - self._first, here], points[self._cells - self._first, here]
             largest = np.maximum(*(np.linalg.eigvalsh(end)[:, -1] for end in ends))
-            worst = float(largest.max()) + 0.125 * _bend(np.diff(points, 2, axis=0))  # see aperiodic: bound between grid points
+            # see aperiodic: bound between grid points
+            worst = float(largest.max()) + 0.125 * _bend(np.diff(points, 2, axis=0))
             found = max(found, (worst, int(self._cells[largest.argmax()])))
         return found
 
     def _changed(self, at: np.ndarray, change: np.ndarray) -> Condition:
-        """Inequalities of ``theta eps' P eps`` over transitions and the changes ``m = theta_k / theta_(k+1)`` after them."""
+        """Inequalities of ``theta eps' P eps`` over transitions and the changes ``m = theta_k / theta_(k+1)`` after
+        them.
+        """
         scale = np.stack([change**-0.5, change**0.5], axis=1)
         return transition_condition(scale[:, :, None] * self._transitions[at], self._x[at])
 
@@ -235,5 +254,7 @@ def _bend(second_differences: np.ndarray) -> float:
 
 
 def _time_for(distance: float, speed: float, acceleration: float) -> float:
-    """Time [s] over a distance [m] from a speed [m/s] under constant acceleration [m/s2]; by symmetry also down to that speed."""
+    """Time [s] over a distance [m] from a speed [m/s] under constant acceleration [m/s2]; by symmetry also down to that
+    speed.
+    """
     return 2.0 * distance / (speed + sqrt(speed * speed + 2.0 * acceleration * distance))

@@ -23,7 +23,8 @@ from fmu_observer.certificates.quadratic import (
 )
 from fmu_observer.certificates.switching import SwitchingError
 
-MARGIN = 1e-6  # smallest recomputed decrease, in scaled coordinates, that counts: a thousand times the rounding of the check
+# smallest recomputed decrease, in scaled coordinates, that counts: a thousand times the rounding of the check
+MARGIN = 1e-6
 SHORTEST_HORIZON = 20.0  # [s]
 COARSE, FINE = 12, 2400  # gaps a vertex for finding the Lyapunov matrix, and for checking it
 CUTS = 4
@@ -43,23 +44,27 @@ class Decrease:
 def certify_sampled_error(
     vertices: tuple[GapError, ...], max_gap: float, error_model: str, *, switching: bool = False
 ) -> Certificate:
-    """Certificate of an observer whose error is that of one of the vertices over each gap, or at any time one between them.
+    """Certificate of an observer whose error is that of one of the vertices over each gap, or at any time one between
+    them.
 
     Args:
         vertices: error equations, one for each corner of what is uncertain, all of one size.
         max_gap: longest gap asked for [s].
         error_model: the error equations in words, and what they leave out.
-        switching: the error equations may change at any time within a gap, to any of the vertices' hull; what is certified holds
-            for that. Otherwise they change from gap to gap only.
+        switching: the error equations may change at any time within a gap, to any of the vertices' hull; what is
+            certified holds for that. Otherwise they change from gap to gap only.
 
     Returns:
         The certificate, without observer and preset.
 
     Raises:
-        ValueError: the vertices are errors of different components; they are `switching` and do not share one linear reset.
+        ValueError: the vertices are errors of different components; they are `switching` and do not share one linear
+        reset.
     """
     if not all(vertices[0].comparable(vertex) for vertex in vertices):
-        raise ValueError("Certificate: the vertices must be errors of the same components, reset in the same way; they are not.")
+        raise ValueError(
+            "Certificate: the vertices must be errors of the same components, reset in the same way; they are not."
+        )
     horizon = max(SHORTEST_HORIZON, 4.0 * max_gap)
     constant_limit = first_unstable_gap(vertices, horizon)
     found = common_decrease(vertices, max_gap, switching)
@@ -79,7 +84,8 @@ def certify_sampled_error(
 
 
 def with_switching_noted(certificate: Certificate, vertices: tuple[GapError, ...], what: str) -> Certificate:
-    """The certificate of errors constant over each gap, with a note whether it holds where they change within gaps as well.
+    """The certificate of errors constant over each gap, with a note whether it holds where they change within gaps as
+    well.
 
     Args:
         certificate: of `vertices`. what: changes, in the plural, for the words.
@@ -95,7 +101,8 @@ def with_switching_noted(certificate: Certificate, vertices: tuple[GapError, ...
 def aperiodic_limit(vertices: tuple[GapError, ...], horizon: float, switching: bool = False) -> float:
     """Longest gap [s] up to which one quadratic Lyapunov function covers all gaps; inf if it covers the horizon.
 
-    By bisection: a function that covers a set of gaps covers every smaller one. With `switching` see `certify_sampled_error`.
+    By bisection: a function that covers a set of gaps covers every smaller one. With `switching` see
+    `certify_sampled_error`.
     """
     bound = min(first_unstable_gap(vertices, horizon), horizon)
     if bound == horizon and common_decrease(vertices, horizon, switching).margin > MARGIN:
@@ -111,8 +118,8 @@ def aperiodic_limit(vertices: tuple[GapError, ...], horizon: float, switching: b
 def common_decrease(vertices: tuple[GapError, ...], longest: float, switching: bool) -> Decrease:
     """Seek one P for all vertices and all gaps in (0, longest] on a coarse grid, and recompute on a fine one.
 
-    Where the fine grid finds a gap that the candidate does not cover, that gap joins the coarse grid. What is switching is judged
-    at the centre of the vertices, with the most that changes within a gap may add to it.
+    Where the fine grid finds a gap that the candidate does not cover, that gap joins the coarse grid. What is switching
+    is judged at the centre of the vertices, with the most that changes within a gap may add to it.
     """
     scale = _scaling(vertices)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -155,7 +162,8 @@ def _conditions(vertex: GapError, longest: float, count: int, scale: np.ndarray)
     """
     scaling = scale[None, :] / scale[:, None]
     limit = vertex.continuous_limit
-    if limit is None:  # the resets alone contract: nothing to divide by the gap, and no gap shorter than the first of the grid
+    # the resets alone contract: nothing to divide by the gap, and no gap shorter than the first of the grid
+    if limit is None:
         return transition_condition(vertex.transitions(longest, count + 1)[1] * scaling)
     gaps, matrices = vertex.transitions(longest, count)
     start = flow_condition(limit * scaling / vertex.rate)
@@ -165,8 +173,8 @@ def _conditions(vertex: GapError, longest: float, count: int, scale: np.ndarray)
 def _largest_between(values: np.ndarray) -> float:
     """Largest eigenvalue on the grid and between its points.
 
-    Between two points a smooth matrix lies below its chord plus ``d^2/8`` of the norm of its second derivative, and that is
-    what the second differences on the grid estimate.
+    Between two points a smooth matrix lies below its chord plus ``d^2/8`` of the norm of its second derivative, and
+    that is what the second differences on the grid estimate.
     """
     bend = np.linalg.norm(np.diff(values, 2, axis=0), axis=(1, 2)).max()
     return float(np.linalg.eigvalsh(values)[:, -1].max() + 0.125 * bend)

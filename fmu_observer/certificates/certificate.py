@@ -14,19 +14,22 @@ class Certificate:
     Attributes:
         max_gap: longest gap asked for [s].
         horizon: longest gap searched for the two limits [s].
-        constant_limit: first constant gap at which the error grows from balise to balise [s]; inf if none up to the horizon.
-        aperiodic_limit: longest gap such that one common quadratic Lyapunov function covers every mixture of gaps up to it [s];
-            inf if all up to the horizon are covered. Between the two limits mixtures of gaps may make the error grow.
+        constant_limit: first constant gap at which the error grows from balise to balise [s]; inf if none up to the
+        horizon.
+        aperiodic_limit: longest gap such that one common quadratic Lyapunov function covers every mixture of gaps up to
+            it [s]; inf if all up to the horizon are covered. Between the two limits mixtures of gaps may make the
+            error grow.
         spectral_radius: largest factor per balise at the constant gap `max_gap` [1].
-        quadratic_margin: smallest relative decrease of the Lyapunov function over all gaps up to `max_gap`, recomputed on a grid
-            much finer than the one it was found on, less a bound for what lies between [1]; positive when certified, -inf when
-            there is no candidate at all.
+        quadratic_margin: smallest relative decrease of the Lyapunov function over all gaps up to `max_gap`, recomputed
+            on a grid much finer than the one it was found on, less a bound for what lies between [1]; positive when
+            certified, -inf when there is no candidate at all.
         holds: the aperiodic certificate stands at `max_gap`, and so do the further conditions in `notes`.
         error_model: the error equations used, and what they leave out.
         observer: model name. preset: preset started from. parameters: the values that decide stability.
         notes: further conditions checked.
         event: what the gaps lie between, for the words.
-        lyapunov_matrix: P of the Lyapunov function ``e' P e`` at `max_gap`, rows of shape (n, n); empty when there is none.
+        lyapunov_matrix: P of the Lyapunov function ``e' P e`` at `max_gap`, rows of shape (n, n); empty when there is
+        none.
     """
 
     max_gap: float
@@ -63,15 +66,20 @@ class Certificate:
     def _verdict(self) -> str:
         gap = f"{self.max_gap:.4g} s"
         if self.holds:
-            return f"stable for every sequence of {self.event} gaps up to {gap} (limit {self._limit(self.aperiodic_limit)})"
+            return (
+                f"stable for every sequence of {self.event} gaps up to {gap} (limit "
+                f"{self._limit(self.aperiodic_limit)})"
+            )
         if self.spectral_radius >= 1.0:
             return (
-                f"UNSTABLE at a constant {self.event} gap of {gap}: the error grows {self.spectral_radius:.4g} times from "
+                f"UNSTABLE at a constant {self.event} gap of {gap}: the error grows {self.spectral_radius:.4g} times "
+                f"from "
                 f"{self.event} to {self.event}; constant gaps are stable below: {self._limit(self.constant_limit)}; "
                 f"mixed gaps are certified up to: {self._limit(self.aperiodic_limit)}"
             )
         return (
-            f"NOT CERTIFIED for mixed {self.event} gaps up to {gap}: that constant gap is stable, but sequences of different "
+            f"NOT CERTIFIED for mixed {self.event} gaps up to {gap}: that constant gap is stable, but sequences of "
+            f"different "
             f"gaps are certified only up to: {self._limit(self.aperiodic_limit)}"
         )
 

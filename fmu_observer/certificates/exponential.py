@@ -1,7 +1,7 @@
 """Matrix exponential of small matrices by matrix products alone.
 
-Certificates need hundreds of exponentials of 3 by 3 matrices. SciPy's goes through threaded LAPACK, which on a busy machine
-costs milliseconds a call whatever the size; products of small matrices do not.
+Certificates need hundreds of exponentials of 3 by 3 matrices. SciPy's goes through threaded LAPACK, which on a busy
+machine costs milliseconds a call whatever the size; products of small matrices do not.
 """
 
 from __future__ import annotations

@@ -30,7 +30,9 @@ class GapError(ABC):
     @property
     @abstractmethod
     def continuous_limit(self) -> np.ndarray | None:
-        """Error matrix for infinitely frequent samples, shape (n, n); None where a sample does not leave an error as it is."""
+        """Error matrix for infinitely frequent samples, shape (n, n); None where a sample does not leave an error as it
+        is.
+        """
 
     @property
     def rate(self) -> float:
@@ -52,16 +54,22 @@ class GapError(ABC):
 
     @abstractmethod
     def transitions(self, longest: float, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Transitions at `count` equidistant gaps in (0, longest]: gaps of shape (count,), matrices of shape (count, n, n)."""
+        """Transitions at `count` equidistant gaps in (0, longest]: gaps of shape (count,), matrices of shape (count, n,
+        n).
+        """
 
     def spectral_radius(self, gap: float) -> float:
-        """Factor by which the error grows per sample at a constant gap [1]; stable below 1, inf beyond the range of numbers."""
+        """Factor by which the error grows per sample at a constant gap [1]; stable below 1, inf beyond the range of
+        numbers.
+        """
         transition = self.transition(gap)
         return float(np.abs(np.linalg.eigvals(transition)).max()) if np.isfinite(transition).all() else inf
 
 
 class GeneratorError(GapError):
-    """A sampled error with one constant generator between samples: the transition is its exponential, closed over a sample."""
+    """A sampled error with one constant generator between samples: the transition is its exponential, closed over a
+    sample.
+    """
 
     @property
     @abstractmethod
@@ -83,7 +91,9 @@ class GeneratorError(GapError):
             return np.asarray(self.close(small_exponential(self.generator * gap)[None])[0])
 
     def transitions(self, longest: float, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Transitions at `count` equidistant gaps in (0, longest]: gaps of shape (count,), matrices of shape (count, n, n)."""
+        """Transitions at `count` equidistant gaps in (0, longest]: gaps of shape (count,), matrices of shape (count, n,
+        n).
+        """
         powers = matrix_powers(small_exponential(self.generator * (longest / count)), count)
         with np.errstate(over="ignore", invalid="ignore"):  # an unstable error may leave the range of numbers
             return longest / count * np.arange(1, count + 1), self.close(powers)
@@ -105,14 +115,15 @@ def matrix_powers(step: np.ndarray, count: int) -> np.ndarray:
 def first_unstable_gap(vertices: Sequence[GapError], horizon: float) -> float:
     """First constant gap at which some vertex is seen unstable, by scanning (0, horizon] and bisection.
 
-    It is a scan of `SCAN_POINTS` gaps: a window of instability narrower than their distance, as lightly damped errors have, can
-    lie between two of them. What is guaranteed is the limit of `aperiodic`.
+    It is a scan of `SCAN_POINTS` gaps: a window of instability narrower than their distance, as lightly damped errors
+    have, can lie between two of them. What is guaranteed is the limit of `aperiodic`.
 
     Args:
         vertices: error equations. horizon: longest gap searched [s].
 
     Returns:
-        The gap [s]; 0 if even infinitely frequent samples do not stabilise, inf if no gap up to the horizon is unstable.
+        The gap [s]; 0 if even infinitely frequent samples do not stabilise, inf if no gap up to the horizon is
+        unstable.
     """
     return min(_first_unstable_gap_of(vertex, horizon) for vertex in vertices)
 

@@ -1,7 +1,8 @@
-"""The impulsive error: whatever flows linearly between samples and is reset linearly at them, seen from sample to sample.
+"""The impulsive error: whatever flows linearly between samples and is reset linearly at them, seen from sample to
+sample.
 
-``d zeta = G zeta`` between samples, ``zeta+ = R zeta`` at them. What a reset forgets (a held innovation, a predicted output) does
-not count from sample to sample: the transition is reduced to the range of R.
+``d zeta = G zeta`` between samples, ``zeta+ = R zeta`` at them. What a reset forgets (a held innovation, a predicted
+output) does not count from sample to sample: the transition is reduced to the range of R.
 """
 
 from __future__ import annotations
@@ -22,13 +23,13 @@ Rows = tuple[tuple[float, ...], ...]
 class ImpulsiveError(GeneratorError):
     """Error equations ``d zeta = generator zeta``, ``zeta+ = reset zeta`` at samples; a hashable value.
 
-    With ``reset = U V`` (rank factorisation, V the reduced row echelon form, so that its coordinates are components of zeta) the
-    transition over a gap is ``V exp(G gap) U``: it has the non-zero eigenvalues of ``exp(G gap) R``.
+    With ``reset = U V`` (rank factorisation, V the reduced row echelon form, so that its coordinates are components of
+    zeta) the transition over a gap is ``V exp(G gap) U``: it has the non-zero eigenvalues of ``exp(G gap) R``.
 
     Attributes:
         generator_rows: G, rows of shape (N, N) [1/s]. reset_rows: R, rows of shape (N, N).
-        levels: how many times each component of zeta is differentiated against the first, shape (N,): its size grows with that
-            power of the rate. For scaling alone; () for none.
+        levels: how many times each component of zeta is differentiated against the first, shape (N,): its size grows
+            with that power of the rate. For scaling alone; () for none.
     """
 
     generator_rows: Rows
@@ -44,11 +45,15 @@ class ImpulsiveError(GeneratorError):
         """
         G, R = np.asarray(generator, dtype=float), np.asarray(reset, dtype=float)
         if G.ndim != 2 or G.shape[0] != G.shape[1] or G.shape != R.shape:
-            raise ValueError(f"Impulsive error: generator {G.shape} and reset {R.shape} must be square and of one size.")
+            raise ValueError(
+                f"Impulsive error: generator {G.shape} and reset {R.shape} must be square and of one size."
+            )
         if levels and len(levels) != len(G):
             raise ValueError(f"Impulsive error: {len(levels)} levels for {len(G)} components.")
         if not np.abs(R).max() > 0.0:
-            raise ValueError("Impulsive error: the reset is zero, every sample ends all errors; there is nothing to certify.")
+            raise ValueError(
+                "Impulsive error: the reset is zero, every sample ends all errors; there is nothing to certify."
+            )
         return cls(rows_of(G), rows_of(R), tuple(levels))
 
     @classmethod
@@ -93,7 +98,9 @@ class ImpulsiveError(GeneratorError):
 
     @cached_property
     def continuous_limit(self) -> np.ndarray | None:
-        """``V G U`` where a repeated reset changes nothing (``V U = I``), else None: infinitely many resets act at once."""
+        """``V G U`` where a repeated reset changes nothing (``V U = I``), else None: infinitely many resets act at
+        once.
+        """
         repeated = self.kept @ self.spread
         if np.abs(repeated - np.eye(self.size)).max() > 1e-9:
             return None
@@ -114,7 +121,11 @@ class ImpulsiveError(GeneratorError):
 
     def comparable(self, other: GapError) -> bool:
         """Whether both resets read the same of zeta."""
-        return isinstance(other, ImpulsiveError) and self.kept.shape == other.kept.shape and np.allclose(self.kept, other.kept)
+        return (
+            isinstance(other, ImpulsiveError)
+            and self.kept.shape == other.kept.shape
+            and np.allclose(self.kept, other.kept)
+        )
 
     def close(self, exponentials: np.ndarray) -> np.ndarray:
         """Exponentials of shape (count, N, N) as transitions ``V exp U`` of shape (count, n, n)."""

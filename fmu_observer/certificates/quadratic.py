@@ -31,8 +31,8 @@ class QuadraticForm:
 class Condition:
     """Inequalities ``M_j' P N_j + N_j' P M_j - w_j P < 0``: arrays M, N of shape (count, n, n) and w of shape (count,).
 
-    A discrete transition F asks ``F' P F - P < 0`` (M = F / 2, N = F, w = 1), a flow A asks ``A' P + P A < 0`` (M = A, N = I,
-    w = 0).
+    A discrete transition F asks ``F' P F - P < 0`` (M = F / 2, N = F, w = 1), a flow A asks ``A' P + P A < 0`` (M = A,
+    N = I, w = 0).
     """
 
     M: np.ndarray
@@ -51,7 +51,9 @@ class Condition:
 
 
 def transition_condition(matrices: np.ndarray, weights: Array = 1.0) -> Condition:
-    """``(F' P F - P) / weight < 0`` for transitions of shape (count, n, n) and weights of shape (count,) or a number."""
+    """``(F' P F - P) / weight < 0`` for transitions of shape (count, n, n) and weights of shape (count,) or a
+    number.
+    """
     scale = 1.0 / np.broadcast_to(np.asarray(weights, dtype=float), (len(matrices),))
     return Condition(0.5 * scale[:, None, None] * matrices, matrices, scale)
 

@@ -1,4 +1,6 @@
-"""The error of an observer whose gain comes from a Riccati equation, settled at a constant gap, seen from sample to sample."""
+"""The error of an observer whose gain comes from a Riccati equation, settled at a constant gap, seen from sample to
+sample.
+"""
 
 from __future__ import annotations
 
@@ -20,12 +22,13 @@ SETTLED = 1e-12  # relative change of a doubling step
 class RiccatiError(GapError):
     """``de = drift e`` between samples, ``e+ = (I - K C) e`` at them, K settled at the gap itself; a hashable value.
 
-    K is that of ``dP = F P + P F' + Q``, ``inv(P+) = inv(P-) + gap C' inv(R) C`` when every gap is the same: the solution of a
-    discrete Riccati equation, for all gaps at once by the doubling algorithm. For ``gap -> 0`` it is that of the continuous one.
+    K is that of ``dP = F P + P F' + Q``, ``inv(P+) = inv(P-) + gap C' inv(R) C`` when every gap is the same: the
+    solution of a discrete Riccati equation, for all gaps at once by the doubling algorithm. For ``gap -> 0`` it is that
+    of the continuous one.
 
     Attributes:
-        drift: rows of shape (n, n) [1/s], how the error really moves. believed: F, rows of shape (n, n) [1/s], how the observer
-            thinks it moves. C: rows of shape (q, n).
+        drift: rows of shape (n, n) [1/s], how the error really moves. believed: F, rows of shape (n, n) [1/s], how the
+            observer thinks it moves. C: rows of shape (q, n).
         Q: rows of shape (n, n). R: rows of shape (q, q).
         levels: as of `ImpulsiveError`.
     """
@@ -39,7 +42,13 @@ class RiccatiError(GapError):
 
     @classmethod
     def of(
-        cls, drift: np.ndarray, believed: np.ndarray, C: np.ndarray, Q: np.ndarray, R: np.ndarray, levels: tuple[int, ...]
+        cls,
+        drift: np.ndarray,
+        believed: np.ndarray,
+        C: np.ndarray,
+        Q: np.ndarray,
+        R: np.ndarray,
+        levels: tuple[int, ...],
     ) -> RiccatiError:
         """From arrays."""
         return cls(rows_of(drift), rows_of(believed), rows_of(C), rows_of(Q), rows_of(R), levels)
@@ -113,9 +122,11 @@ def _settled(flows: np.ndarray, information: np.ndarray, noises: np.ndarray) -> 
 
 
 def _noises(F: np.ndarray, Q: np.ndarray, flows: np.ndarray, step: float) -> np.ndarray:
-    """``int_0^(k step) exp(F s) Q exp(F' s) ds`` for k = 1 .. count, shape (count, n, n); one step by Van Loan's exponential.
+    """``int_0^(k step) exp(F s) Q exp(F' s) ds`` for k = 1 .. count, shape (count, n, n); one step by Van Loan's
+    exponential.
 
-    The rest follows from ``Q(a + b) = Q(b) + exp(F b) Q(a) exp(F' b)``, which stays accurate where a long exponential would not.
+    The rest follows from ``Q(a + b) = Q(b) + exp(F b) Q(a) exp(F' b)``, which stays accurate where a long exponential
+    would not.
     """
     n = len(F)
     both = small_exponential(np.block([[-F, Q], [np.zeros((n, n)), F.T]]) * step)

@@ -25,7 +25,8 @@ CUTS = 6
 
 @dataclass(frozen=True)
 class TwoRateError:
-    """Error equations ``de = A e`` with jumps ``e -= K_1 e_i`` at odometer samples and ``e -= K_2 e_j`` at balises; hashable.
+    """Error equations ``de = A e`` with jumps ``e -= K_1 e_i`` at odometer samples and ``e -= K_2 e_j`` at balises;
+    hashable.
 
     Attributes:
         A: rows of shape (n, n) [1/s].
@@ -134,7 +135,9 @@ def _common_decrease(error: TwoRateError, samples: int) -> tuple[float, np.ndarr
     fine = error.products(samples, FINE_PHASES) * (scale[None, :] / scale[:, None])
     shape = fine.shape
     condition = transition_condition(fine.reshape(-1, *shape[2:]))
-    coarse = np.arange(len(condition.w)).reshape(shape[:2])[:: max(1, samples // 8), :: FINE_PHASES // COARSE_PHASES].ravel()
+    coarse = (
+        np.arange(len(condition.w)).reshape(shape[:2])[:: max(1, samples // 8), :: FINE_PHASES // COARSE_PHASES].ravel()
+    )
     chosen = set(map(int, coarse))
     best: tuple[float, np.ndarray | None] = (-inf, None)
     for _ in range(CUTS):

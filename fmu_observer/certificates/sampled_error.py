@@ -1,7 +1,7 @@
 """The sampled error: how an estimation error moves from one balise to the next, exactly.
 
-Between balises ``de = drift e - gain c``, ``dc = -decay c``, and at a balise ``c = C e`` with C the first unit row. One matrix
-exponential gives the transition over a gap; no bound, no approximation.
+Between balises ``de = drift e - gain c``, ``dc = -decay c``, and at a balise ``c = C e`` with C the first unit row. One
+matrix exponential gives the transition over a gap; no bound, no approximation.
 """
 
 from __future__ import annotations

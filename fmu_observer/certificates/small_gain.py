@@ -1,8 +1,9 @@
-"""Independent samples: how long gaps may be when every measurement comes at its own instants, by a small-gain condition.
+"""Independent samples: how long gaps may be when every measurement comes at its own instants, by a small-gain
+condition.
 
-A predicted sample whose error is reset to zero at its own instants is the integral of its error rate since then. As an operator
-on signals of finite energy this integral has at most the gain ``2 gap / pi`` (Mirkin, IEEE TAC 2007, by Wirtinger's inequality),
-whatever the instants of the others do.
+A predicted sample whose error is reset to zero at its own instants is the integral of its error rate since then. As an
+operator on signals of finite energy this integral has at most the gain ``2 gap / pi`` (Mirkin, IEEE TAC 2007, by
+Wirtinger's inequality), whatever the instants of the others do.
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ def independent_gap_limit(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.nda
     """Gap below which ``dz = A z + B w``, ``dw = C z + D w``, every w_i reset to zero at its own instants, is stable.
 
     With ``v = C z + D w`` and ``w = Delta v``, ``|Delta_i| <= 2 gap / pi``, it is stable where the peak gain of
-    ``C inv(s I - A) B + D`` is below ``pi / (2 gap)``; the peak is the least over diagonal scalings of a few steps. Sufficient,
-    not necessary: the true limit may be longer.
+    ``C inv(s I - A) B + D`` is below ``pi / (2 gap)``; the peak is the least over diagonal scalings of a few steps.
+    Sufficient, not necessary: the true limit may be longer.
 
     Args:
         A: Hurwitz, shape (r, r). B: shape (r, m). C: shape (m, r). D: shape (m, m).
@@ -49,8 +50,8 @@ def independent_gap_limit(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.nda
 def _confirmed(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, bound: float) -> float:
     """The bound, raised until the peak gain is below it; inf where that cannot be confirmed.
 
-    The gain reaches the bound at a frequency w exactly if i w is an eigenvalue of the Hamiltonian matrix (Boyd, Balakrishnan,
-    Kabamba, Math. Control Signals Syst. 2 (1989) 207-219).
+    The gain reaches the bound at a frequency w exactly if i w is an eigenvalue of the Hamiltonian matrix (Boyd,
+    Balakrishnan, Kabamba, Math. Control Signals Syst. 2 (1989) 207-219).
     """
     for _ in range(RAISES):
         inside = np.linalg.inv(bound**2 * np.eye(D.shape[1]) - D.T @ D)
@@ -66,7 +67,9 @@ def _confirmed(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, bound
 
 
 def _scaled_peak(responses: np.ndarray) -> tuple[float, np.ndarray]:
-    """Least peak of the largest singular value of ``inv(S) H S`` that a few sweeps over diagonal S find, and S; any will do."""
+    """Least peak of the largest singular value of ``inv(S) H S`` that a few sweeps over diagonal S find, and S; any
+    will do.
+    """
     scale = np.ones(responses.shape[1])
     best = _peak(responses, scale)
     for factor in (4.0, 2.0, 1.4, 1.1, 1.03):

@@ -1,9 +1,11 @@
-"""Error equations that change within a gap: how far the error may then stray from that of the centre, as a bound on norms.
+"""Error equations that change within a gap: how far the error may then stray from that of the centre, as a bound on
+norms.
 
-The certificates of `aperiodic` judge transitions over whole gaps, each with one generator from sample to sample. Where slopes or
-weights may move at any time between those of the vertices, the flow is the differential inclusion ``d zeta = (G0 + D(t)) zeta``
-with D(t) in the hull of the vertices' distances from the centre G0. Variation of constants gives the transition as that of the
-centre plus ``E``, and a Volterra inequality bounds E in the norm of a Lyapunov matrix.
+The certificates of `aperiodic` judge transitions over whole gaps, each with one generator from sample to sample. Where
+slopes or weights may move at any time between those of the vertices, the flow is the differential inclusion
+``d zeta = (G0 + D(t)) zeta`` with D(t) in the hull of the vertices' distances from the centre G0. Variation of
+constants gives the transition as that of the centre plus ``E``, and a Volterra inequality bounds E in the norm of a
+Lyapunov matrix.
 """
 
 from __future__ import annotations
@@ -44,7 +46,8 @@ class SwitchingError:
         known = [vertex for vertex in vertices if isinstance(vertex, GeneratorError)]
         if len(known) < len(vertices) or not all(np.array_equal(v.reset, known[0].reset) for v in known):
             raise ValueError(
-                "Certificate: changes within a gap can be judged only where all vertices flow linearly and share one reset."
+                "Certificate: changes within a gap can be judged only where all vertices flow linearly and share one "
+                "reset."
             )
         generators = np.stack([vertex.generator for vertex in known])
         middle = 0.5 * (generators.min(axis=0) + generators.max(axis=0))
@@ -53,10 +56,12 @@ class SwitchingError:
     def growth(self, P: np.ndarray, longest: float, gaps: np.ndarray) -> np.ndarray:
         """What changes within the gap add to ``V+ / V`` at most, V the quadratic function of `P`, over the gap [1/s].
 
-        With ``f = |F0|`` and ``e >= |E|`` in the norm of P, ``|F0 + E|^2 <= f^2 + 2 f e + e^2``: the last two, over the gap.
+        With ``f = |F0|`` and ``e >= |E|`` in the norm of P, ``|F0 + E|^2 <= f^2 + 2 f e + e^2``: the last two, over the
+        gap.
 
         Args:
-            P: positive definite, shape (n, n). longest: longest gap [s]. gaps: rising, from 0 to `longest` [s], shape (count,).
+            P: positive definite, shape (n, n). longest: longest gap [s]. gaps: rising, from 0 to `longest` [s], shape
+            (count,).
 
         Returns:
             Shape (count,); at a gap of zero the limit.
@@ -70,7 +75,9 @@ class SwitchingError:
             return np.zeros(len(gaps))
         into, out = sizes[:, None] * into, out / sizes[None, :]
         step = longest / POINTS
-        flow = np.concatenate([np.eye(len(sizes))[None], matrix_powers(small_exponential(self.centre.generator * step), POINTS)])
+        flow = np.concatenate(
+            [np.eye(len(sizes))[None], matrix_powers(small_exponential(self.centre.generator * step), POINTS)]
+        )
         after = root @ self.centre.kept
         seen = _norms(out @ flow @ before)
         kernel, effect = strength * _norms(out @ flow @ into), strength * _norms(after @ flow @ into)
@@ -83,7 +90,9 @@ class SwitchingError:
 
 
 def _directions(distances: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
-    """Bases B (N, r) and C (q, N) of what distances D of shape (count, N, N) act on and see; the largest ``|B' D C'|``."""
+    """Bases B (N, r) and C (q, N) of what distances D of shape (count, N, N) act on and see; the largest
+    ``|B' D C'|``.
+    """
     into = _basis(np.concatenate(list(distances), axis=1))
     out = _basis(np.concatenate([d.T for d in distances], axis=1)).T
     return into, max((float(np.linalg.norm(into.T @ d @ out.T, 2)) for d in distances if into.size), default=0.0), out

@@ -16,7 +16,8 @@ from fmu_observer.certificates import Certificate, SampledError, certify_sampled
 from fmu_observer.certificates.aperiodic import aperiodic_limit
 
 ORDER = 4
-UNIT_POLES = (-0.5, -0.8, -1.25, -2.0)  # [ours] real, geometric mean -1; unequal ones bear longer gaps than four equal ones
+# [ours] real, geometric mean -1; unequal ones bear longer gaps than four equal ones
+UNIT_POLES = (-0.5, -0.8, -1.25, -2.0)
 HORIZON = 20.0  # [s] at unit poles
 
 
@@ -27,7 +28,8 @@ class PositionGains:
     Attributes:
         gains: ``g_1 ... g_4`` [1/s^i], shape (4,). decay: decay rate of the innovation [1/s].
         certificate: for the gap designed for.
-        noise_to_speed: standard deviation of the speed error over that of white position noise, at the design gap [1/s].
+        noise_to_speed: standard deviation of the speed error over that of white position noise, at the design gap
+        [1/s].
     """
 
     gains: tuple[float, ...]
@@ -54,7 +56,9 @@ def position_gains(poles: Sequence[float] | np.ndarray, drag_slope: float = 0.0)
     """
     values = np.asarray(poles)
     if values.shape != (ORDER,) or not np.all(np.isfinite(values)) or values.real.max() >= 0.0:
-        raise ValueError(f"position_gains: expected {ORDER} finite poles with negative real parts [1/s], got {tuple(poles)}.")
+        raise ValueError(
+            f"position_gains: expected {ORDER} finite poles with negative real parts [1/s], got {tuple(poles)}."
+        )
     A = augmented_matrix(drag_slope)
     observability = np.stack([np.linalg.matrix_power(A, k)[0] for k in range(ORDER)])
     polynomial = sum(c * np.linalg.matrix_power(A, ORDER - k) for k, c in enumerate(np.real(np.poly(values))))
@@ -77,10 +81,11 @@ def sampled_errors(
 def design_for_gap(
     max_gap: float, drag_slopes: Sequence[float] = (0.0,), margin: float = 0.1, unit_poles: Sequence[float] = UNIT_POLES
 ) -> PositionGains:
-    """The fastest gains with poles proportional to `unit_poles` that are certified for every mixture of gaps up to a limit.
+    """The fastest gains with poles proportional to `unit_poles` that are certified for every mixture of gaps up to a
+    limit.
 
-    Without drag the limit is inversely proportional to the speed of the poles, so one certificate at unit poles gives the scale;
-    the result is certified again with its drag. The decay is the first gain, as in (1.47).
+    Without drag the limit is inversely proportional to the speed of the poles, so one certificate at unit poles gives
+    the scale; the result is certified again with its drag. The decay is the first gain, as in (1.47).
 
     Args:
         max_gap: longest gap between two samples [s]. drag_slopes: ``(b + 2 c v) / M`` at its extremes [1/s].
@@ -94,19 +99,24 @@ def design_for_gap(
     unit = position_gains(unit_poles)
     limit = aperiodic_limit(sampled_errors(unit.tolist(), float(unit[0]), (0.0,)), HORIZON)
     if limit in (0.0, inf):
-        raise ValueError(f"design_for_gap: no gap is certified for poles like {tuple(unit_poles)}; choose better damped ones.")
+        raise ValueError(
+            f"design_for_gap: no gap is certified for poles like {tuple(unit_poles)}; choose better damped ones."
+        )
     scale = limit / ((1.0 + margin) * max_gap)
     gains = position_gains(scale * np.asarray(unit_poles))
     errors = sampled_errors(gains.tolist(), float(gains[0]), drag_slopes)
-    certificate = certify_sampled_error(errors, max_gap, "four-state error of the augmented observer at the given drag slopes")
+    certificate = certify_sampled_error(
+        errors, max_gap, "four-state error of the augmented observer at the given drag slopes"
+    )
     return PositionGains(tuple(map(float, gains)), float(gains[0]), certificate, noise_to_speed(errors[0], max_gap))
 
 
 def noise_to_speed(error: SampledError, gap: float) -> float:
-    """Standard deviation of the speed error, just before a sample, over that of white noise on positions at a constant gap [1/s].
+    """Standard deviation of the speed error, just before a sample, over that of white noise on positions at a constant
+    gap [1/s].
 
-    Exact: the noise enters the innovation, ``e+ = Phi e - Gamma n``, and the stationary covariance solves a discrete Lyapunov
-    equation; inf where the gap is unstable.
+    Exact: the noise enters the innovation, ``e+ = Phi e - Gamma n``, and the stationary covariance solves a discrete
+    Lyapunov equation; inf where the gap is unstable.
 
     Args:
         error: error equations. gap: between two samples [s].

@@ -1,4 +1,5 @@
-"""The sufficient bounds printed for high-gain observers at samples, beside the exact limits. Plain NumPy and the certificates.
+"""The sufficient bounds printed for high-gain observers at samples, beside the exact limits. Plain NumPy and the
+certificates.
 
 The printed bounds are correct and far too small to design with: they are here so that a reader can see by how much.
 """
@@ -25,9 +26,10 @@ class BoundRow:
     """One line of the table of bounds: the longest gap each formula allows at one gain.
 
     Attributes:
-        theta: high gain [1/s]. by_1_52, by_3_32, by_3_67, by_3_87: longest gap by that formula [s]; negative where the gain is
-            too small for the formula.
-        constant: first unstable constant gap, exact [s]. aperiodic: longest gap certified for every mixture of gaps [s].
+        theta: high gain [1/s]. by_1_52, by_3_32, by_3_67, by_3_87: longest gap by that formula [s]; negative where the
+            gain is too small for the formula.
+        constant: first unstable constant gap, exact [s]. aperiodic: longest gap certified for every mixture of gaps
+        [s].
     """
 
     theta: float
@@ -49,7 +51,8 @@ def lipschitz_constant(mass: float, davis_b: float, davis_c: float, top_speed: f
 
 
 def gain_matrix(n: int = 2) -> np.ndarray:
-    """P with ``P + A' P + P A = C' C``, A the shift matrix, of which ``K = inv(P) C'``: Bouchama 2024, (3.29), repaired.
+    """P with ``P + A' P + P A = C' C``, A the shift matrix, of which ``K = inv(P) C'``: Bouchama 2024, (3.29),
+    repaired.
 
     The print has ``A - K C`` in place of A, which makes P negative definite.
 
@@ -94,7 +97,8 @@ def smallest_theta_3_31(lipschitz: float) -> float:
 def longest_gap_3_32(theta: float, lipschitz: float) -> float:
     """``(theta - 2 beta/theta) / (2 sqrt(5) theta^2 sqrt(lambda_max/lambda_min))`` [s], Bouchama 2024, (3.32).
 
-    The eigenvalues are those of `gain_matrix`, and ``sqrt(5) = |K|`` of K = (2, 1). Negative below `smallest_theta_3_31`.
+    The eigenvalues are those of `gain_matrix`, and ``sqrt(5) = |K|`` of K = (2, 1). Negative below
+    `smallest_theta_3_31`.
 
     Args:
         theta: high gain [1/s]. lipschitz: beta [1/s].
@@ -105,7 +109,8 @@ def longest_gap_3_32(theta: float, lipschitz: float) -> float:
 def longest_gap_3_67(theta: float, lipschitz: float = 0.0) -> float:
     """``(theta - 2 beta/theta) / (2 theta (theta + beta) |K| sqrt(lambda_max/lambda_min))`` [s], Bouchama 2024, (3.67).
 
-    The bound of the wheel stage. Its beta is undefined in print; the equations give 0, for the stage has no nonlinear term.
+    The bound of the wheel stage. Its beta is undefined in print; the equations give 0, for the stage has no nonlinear
+    term.
 
     Args:
         theta: high gain [1/s]. lipschitz: beta [1/s].
@@ -114,7 +119,8 @@ def longest_gap_3_67(theta: float, lipschitz: float = 0.0) -> float:
 
 
 def longest_gap_3_87(theta: float, lipschitz: float) -> float:
-    """``(theta - 2 beta/theta) / (2 theta^2 |K| sqrt(lambda_max/lambda_min))`` [s], Bouchama 2024, (3.87): (3.32) once more.
+    """``(theta - 2 beta/theta) / (2 theta^2 |K| sqrt(lambda_max/lambda_min))`` [s], Bouchama 2024, (3.87): (3.32) once
+    more.
 
     Args:
         theta: high gain [1/s]. lipschitz: beta [1/s].
@@ -126,8 +132,8 @@ def bound_table(thetas: Sequence[float] = THETAS, lipschitz: float = 0.0) -> tup
     """Printed bounds beside the exact limits of the double integrator with K = (2, 1).
 
     Args:
-        thetas: high gains [1/s], positive. lipschitz: Lipschitz constant of the resistance [1/s], in the formulas and as a
-            drag slope between 0 and it in the exact limits.
+        thetas: high gains [1/s], positive. lipschitz: Lipschitz constant of the resistance [1/s], in the formulas and
+            as a drag slope between 0 and it in the exact limits.
 
     Raises:
         ValueError: a gain is not positive.
@@ -137,7 +143,9 @@ def bound_table(thetas: Sequence[float] = THETAS, lipschitz: float = 0.0) -> tup
 
 def bound_text(rows: Sequence[BoundRow]) -> str:
     """The table as plain text, one line a gain, all gaps in seconds."""
-    head = f"{'theta':>6} {'(1.52)':>8} {'(3.32)':>8} {'(3.67)':>8} {'(3.87)':>8} {'mixed gaps':>11} {'constant gap':>13}"
+    head = (
+        f"{'theta':>6} {'(1.52)':>8} {'(3.32)':>8} {'(3.67)':>8} {'(3.87)':>8} {'mixed gaps':>11} {'constant gap':>13}"
+    )
     lines = [
         f"{row.theta:6.3g} {row.by_1_52:8.4f} {row.by_3_32:8.4f} {row.by_3_67:8.4f} {row.by_3_87:8.4f} "
         f"{row.aperiodic:11.4f} {row.constant:13.4f}"

@@ -40,7 +40,9 @@ def certified_gains(
 
 
 def balise_family(theta: float) -> Gains:
-    """T-S gains that do what the high gain theta [1/s] does: ``K_1 = (2 theta, theta^2)``, decay ``2 theta``, no odometer."""
+    """T-S gains that do what the high gain theta [1/s] does: ``K_1 = (2 theta, theta^2)``, decay ``2 theta``, no
+    odometer.
+    """
     return {
         "innovation_decay": 2.0 * theta,
         "balise_gain_position": 2.0 * theta,

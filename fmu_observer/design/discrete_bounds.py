@@ -1,4 +1,6 @@
-"""How nonlinear a discrete Luenberger observer may be: a small-gain condition on the unit circle. Plain NumPy and SciPy."""
+"""How nonlinear a discrete Luenberger observer may be: a small-gain condition on the unit circle. Plain NumPy and
+SciPy.
+"""
 
 from __future__ import annotations
 
@@ -20,10 +22,9 @@ class DiscreteBound:
     """The small-gain condition ``lipschitz < bound``, both per period [1].
 
     Attributes:
-        spectral_radius: of ``A_d - L C``. bound: smallest singular value of ``z I - (A_d - L C)`` on the unit circle, less what
-        may lie
-            between the points of the grid. lipschitz: of what the transition over one period adds to A_d. scale: of the
-            coordinates.
+        spectral_radius: of ``A_d - L C``. bound: smallest singular value of ``z I - (A_d - L C)`` on the unit circle,
+            less what may lie between the points of the grid. lipschitz: of what the transition over one period adds to
+            A_d. scale: of the coordinates.
     """
 
     spectral_radius: float
@@ -56,8 +57,8 @@ def circle_distance(closed: np.ndarray, points: int = POINTS) -> float:
 def transition_lipschitz(model: ObserverModel, period: float, scale: float) -> float:
     """Bound of the Lipschitz constant of ``transition(x) - exp(A_c T) x``, A_c the centre, in scaled coordinates.
 
-    ``exp(mu T) (exp(rho T) - 1)`` by Gronwall's lemma, mu the logarithmic norm of A_c and rho the constant of ``phi`` about its
-    centre.
+    ``exp(mu T) (exp(rho T) - 1)`` by Gronwall's lemma, mu the logarithmic norm of A_c and rho the constant of ``phi``
+    about its centre.
     """
     centre = centre_of(model)
     A = scaled(centre, scale)
@@ -71,8 +72,8 @@ def transition_lipschitz(model: ObserverModel, period: float, scale: float) -> f
 def discrete_bound(model: ObserverModel, gain: np.ndarray, period: float) -> DiscreteBound:
     """The condition for a gain L of shape (n, q) at a period [s], in the best coordinates of a grid of scales.
 
-    ``e+ = (A_d - L C) e + g`` with ``|g| <= lipschitz |e|`` decays when the loop gain is below one (small-gain theorem; quadratic
-    stability for norm-bounded uncertainty asks the same).
+    ``e+ = (A_d - L C) e + g`` with ``|g| <= lipschitz |e|`` decays when the loop gain is below one (small-gain theorem;
+    quadratic stability for norm-bounded uncertainty asks the same).
     """
     closed = expm(centre_of(model) * period) - gain @ model.C
     radius = float(np.abs(np.linalg.eigvals(closed)).max())
@@ -80,6 +81,10 @@ def discrete_bound(model: ObserverModel, gain: np.ndarray, period: float) -> Dis
         return DiscreteBound(radius, 0.0, transition_lipschitz(model, period, 1.0), 1.0)
     if model.phi is None or model.lipschitz == 0.0:
         return DiscreteBound(radius, circle_distance(closed), 0.0, 1.0)
-    margins = [circle_distance(scaled(closed, s), FEW) / transition_lipschitz(model, period, s) for s in map(float, SCALES)]
+    margins = [
+        circle_distance(scaled(closed, s), FEW) / transition_lipschitz(model, period, s) for s in map(float, SCALES)
+    ]
     scale = float(SCALES[int(np.argmax(margins))])
-    return DiscreteBound(radius, circle_distance(scaled(closed, scale)), transition_lipschitz(model, period, scale), scale)
+    return DiscreteBound(
+        radius, circle_distance(scaled(closed, scale)), transition_lipschitz(model, period, scale), scale
+    )

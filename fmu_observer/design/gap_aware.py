@@ -1,7 +1,8 @@
-"""Gains for the balise gaps that a track and a range of speeds will bring: chosen by closed form, believed by certificate.
+"""Gains for the balise gaps that a track and a range of speeds will bring: chosen by closed form, believed by
+certificate.
 
-Nothing here is needed at run time. The functions ask the observers' own `certify`; the rules of choice are ours, the families
-of gains are those of Bouchama 2024, (3.24)-(3.48).
+Nothing here is needed at run time. The functions ask the observers' own `certify`; the rules of choice are ours, the
+families of gains are those of Bouchama 2024, (3.24)-(3.48).
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ Trust = Literal["balises", "odometer"]
 
 DEFAULT_MARGIN = 0.1
 THETA_MAX = 8.0  # [1/s], the thesis's gain
-FAR = {"innovation_decay": 3.0, "odometer_gain_position": 0.7, "odometer_gain_speed": 1.6}  # [ours], see docs/certificates.md
+# [ours], see docs/certificates.md
+FAR = {"innovation_decay": 3.0, "odometer_gain_position": 0.7, "odometer_gain_speed": 1.6}
 SHARE_AT_BALISE = 0.8  # of the position error that a balise takes away in the end, with the gains FAR
 
 
@@ -85,8 +87,8 @@ def balise_gaps(spacing: float | Sequence[float], speeds: tuple[float, float]) -
     """The gaps that balises bring.
 
     Args:
-        spacing: distance between balises [m], or the positions of all of them [m], increasing; the place where a journey begins
-            may stand as the first.
+        spacing: distance between balises [m], or the positions of all of them [m], increasing; the place where a
+            journey begins may stand as the first.
         speeds: slowest and fastest speed at which balises are passed [m/s].
 
     Raises:
@@ -95,19 +97,24 @@ def balise_gaps(spacing: float | Sequence[float], speeds: tuple[float, float]) -
     slowest, fastest = (float(speed) for speed in speeds)
     if not (0.0 < slowest <= fastest < inf):
         raise ValueError(
-            f"Balise gaps: expected 0 < slowest <= fastest speed [m/s], got {slowest:g} and {fastest:g}. A train that may stand "
+            f"Balise gaps: expected 0 < slowest <= fastest speed [m/s], got {slowest:g} and {fastest:g}. A train that "
+            f"may stand "
             "still between balises has no longest gap; give the slowest speed at which the estimate must be right."
         )
-    distances = [float(spacing)] if isinstance(spacing, int | float) else _distances([float(place) for place in spacing])
+    distances = (
+        [float(spacing)] if isinstance(spacing, int | float) else _distances([float(place) for place in spacing])
+    )
     if not all(isfinite(distance) and distance > 0.0 for distance in distances):
         raise ValueError(f"Balise gaps: the spacing must be positive and finite [m], got {spacing!r}.")
     return BaliseGaps(min(distances), max(distances), slowest, fastest)
 
 
 def design_high_gain(
-    spacing: float | Sequence[float], speeds: tuple[float, float], observer: HighGainTrainObserver | None = None,
+    spacing: float | Sequence[float],
+    speeds: tuple[float, float],
+    observer: HighGainTrainObserver | None = None,
     margin: float = DEFAULT_MARGIN,
-) -> GainDesign:  # fmt: skip
+) -> GainDesign:
     """The largest constant theta certified for every mixture of the gaps.
 
     Args:
@@ -127,15 +134,18 @@ def design_high_gain(
 
 
 def design_takagi_sugeno(
-    spacing: float | Sequence[float], speeds: tuple[float, float], trust: Trust = "balises", margin: float = DEFAULT_MARGIN
+    spacing: float | Sequence[float],
+    speeds: tuple[float, float],
+    trust: Trust = "balises",
+    margin: float = DEFAULT_MARGIN,
 ) -> GainDesign:
     """Gains of `TakagiSugenoCdo` certified for every mixture of the gaps.
 
     Args:
         spacing, speeds: see `balise_gaps`.
-        trust: ``balises``: ``K_1 = (2 theta, theta^2)``, decay ``2 theta``, no odometer, so that slip does not touch the
-            estimate; theta is the largest certified one. ``odometer``: the speed is that of the odometer and a balise corrects
-            the position only, certified for any gap; slip biases the speed.
+        trust: ``balises``: ``K_1 = (2 theta, theta^2)``, decay ``2 theta``, no odometer, so that slip does not touch
+            the estimate; theta is the largest certified one. ``odometer``: the speed is that of the odometer and a
+            balise corrects the position only, certified for any gap; slip biases the speed.
         margin: the certified limit is this much longer than the longest gap [1].
 
     Raises:
@@ -158,13 +168,16 @@ def design_takagi_sugeno(
 
 
 def design_adaptive(
-    spacing: float | Sequence[float], speeds: tuple[float, float], acceleration: float = 0.7, speed_error: float = 0.05,
+    spacing: float | Sequence[float],
+    speeds: tuple[float, float],
+    acceleration: float = 0.7,
+    speed_error: float = 0.05,
     margin: float = DEFAULT_MARGIN,
-) -> GainDesign:  # fmt: skip
+) -> GainDesign:
     """Rule of `AdaptiveGainCdo` certified for the gaps and for every change of speed within `acceleration`.
 
-    The largest of a few ratios is taken that is certified with some theta_min, and for it the largest theta_min; theta_max is
-    what the fastest speed asks for, at most 8 1/s.
+    The largest of a few ratios is taken that is certified with some theta_min, and for it the largest theta_min;
+    theta_max is what the fastest speed asks for, at most 8 1/s.
 
     Args:
         spacing, speeds: see `balise_gaps`. Spacings that differ by more than about a third are hardly ever certified.
@@ -195,7 +208,8 @@ def design_adaptive(
     constant = design_high_gain(spacing, speeds, margin=margin).parameters["theta"]
     raise ValueError(
         f"Adaptive gain: no rule is certified for gaps up to {gaps.longest:.4g} s with spacings of {gaps.nearest:g} to "
-        f"{gaps.farthest:g} m and accelerations up to {acceleration:g} m/s2; a constant theta of {constant:.3g} is. Raise the "
+        f"{gaps.farthest:g} m and accelerations up to {acceleration:g} m/s2; a constant theta of {constant:.3g} is. "
+        f"Raise the "
         "slowest speed, or lower the acceleration."
     )
 
@@ -222,9 +236,12 @@ def _searched(observer: TrainObserver, family: Callable[[float], Gains], gap: fl
 
 
 def _design(
-    observer: TrainObserver, parameters: Gains, gaps: BaliseGaps, error: Callable[[float], SampledError],
+    observer: TrainObserver,
+    parameters: Gains,
+    gaps: BaliseGaps,
+    error: Callable[[float], SampledError],
     odometer_gain: tuple[float, float] = (0.0, 0.0),
-) -> GainDesign:  # fmt: skip
+) -> GainDesign:
     """The design with its certificate; `error` gives the error equations at a gap."""
     certificate = observer.certify(gaps.longest, parameters)
     if not certificate.holds:
@@ -242,13 +259,18 @@ def _with_margin(gaps: BaliseGaps, margin: float) -> float:
 
 def _distances(positions: Sequence[float]) -> list[float]:
     if len(positions) < 2:
-        raise ValueError(f"Balise gaps: expected a spacing or at least two positions, got {len(positions)} position(s).")
+        raise ValueError(
+            f"Balise gaps: expected a spacing or at least two positions, got {len(positions)} position(s)."
+        )
     for number, (place, following) in enumerate(pairwise(positions), start=1):
         if place == following:
-            raise ValueError(f"Balise gaps: balises {number} and {number + 1} both lie at {place:g} m; give each place once.")
+            raise ValueError(
+                f"Balise gaps: balises {number} and {number + 1} both lie at {place:g} m; give each place once."
+            )
         if following < place:
             raise ValueError(
-                f"Balise gaps: positions must increase; number {number + 1} at {following:g} m follows number {number} at "
+                f"Balise gaps: positions must increase; number {number + 1} at {following:g} m follows number {number} "
+                f"at "
                 f"{place:g} m."
             )
     return [following - place for place, following in pairwise(positions)]

@@ -1,4 +1,5 @@
-"""The printed bounds of the high-gain observer at samples: how large theta must be, how short the gaps. Plain NumPy and SciPy.
+"""The printed bounds of the high-gain observer at samples: how large theta must be, how short the gaps. Plain NumPy and
+SciPy.
 
 They are sufficient and very conservative: the exact limits are those of `fmu_observer.certificates`.
 """
@@ -37,7 +38,8 @@ def high_gain_bounds(
 
     Args:
         A: block shift matrix, shape (n, n). K: shape (n, q). C: shape (q, n).
-        theta: gain in use [1/s]. lipschitz: constant L of the nonlinear remainder [1/s]. mu: any positive number; it cancels.
+        theta: gain in use [1/s]. lipschitz: constant L of the nonlinear remainder [1/s]. mu: any positive number; it
+        cancels.
 
     Returns:
         The bounds; where ``A - K C`` is not Hurwitz no theta is large enough (inf) and no gap short enough (0).

@@ -19,7 +19,9 @@ def binomial_gain(order: int) -> np.ndarray:
 
 
 def lyapunov_size(K: np.ndarray) -> float:
-    """``lmax(P)`` of ``(A - K C)' P + P (A - K C) = -I`` for the chain of integrators [s]; inf when A - K C is not Hurwitz."""
+    """``lmax(P)`` of ``(A - K C)' P + P (A - K C) = -I`` for the chain of integrators [s]; inf when A - K C is not
+    Hurwitz.
+    """
     closed = chain_error(K)
     if np.linalg.eigvals(closed).real.max() >= 0.0:
         return inf
@@ -36,8 +38,8 @@ def chain_error(K: np.ndarray) -> np.ndarray:
 def theta_from_lipschitz(model: ObserverModel, K: np.ndarray) -> float:
     """Theta above which the error decays, ``max(1, 2 sqrt(n) lmax(P) lipschitz)`` [1/s].
 
-    In the coordinates ``e_i / theta^(i-1)`` the linear part grows with theta and a triangular phi does not: each of its n rows
-    stays below the Lipschitz constant times the norm of the scaled error.
+    In the coordinates ``e_i / theta^(i-1)`` the linear part grows with theta and a triangular phi does not: each of its
+    n rows stays below the Lipschitz constant times the norm of the scaled error.
 
     Args:
         model: in normal form, its `lipschitz` known. K: shape (n,).
@@ -46,11 +48,12 @@ def theta_from_lipschitz(model: ObserverModel, K: np.ndarray) -> float:
 
 
 def theta_from_slopes(model: ObserverModel, K: np.ndarray) -> float:
-    """The same with the slopes of phi instead of one constant: smaller, because damping and coupling shrink with theta [1/s].
+    """The same with the slopes of phi instead of one constant: smaller, because damping and coupling shrink with theta
+    [1/s].
 
     Returns:
-        The smallest theta of a fine grid from which on ``theta > 2 lmax(P) |inv(S) slope S|``; inf without slopes or when there
-        is none.
+        The smallest theta of a fine grid from which on ``theta > 2 lmax(P) |inv(S) slope S|``; inf without slopes or
+        when there is none.
     """
     size = lyapunov_size(K)
     if not model.slopes or size == inf:

@@ -29,7 +29,8 @@ class NoiseAmplification:
     def explain(self) -> str:
         """One sentence for the user."""
         return (
-            f"Noise of 1 m in the balise positions becomes {self.position:.3g} m in position and {self.speed:.3g} m/s in speed, "
+            f"Noise of 1 m in the balise positions becomes {self.position:.3g} m in position and {self.speed:.3g} m/s "
+            f"in speed, "
             f"1 m/s of odometer slip {self.slip:.3g} m/s."
         )
 
@@ -62,7 +63,8 @@ def _at(error: SampledError, gap: float, odometer_gain: np.ndarray) -> tuple[flo
     if error.spectral_radius(gap) >= 1.0:
         raise ValueError(f"Noise amplification: the error grows at a constant gap of {gap:.4g} s.")
     moved = [expm(generator * t)[:n] for t in np.linspace(0.0, gap, POINTS)]
-    closed = [m[:, :n] + np.outer(m[:, n], np.eye(n)[0]) for m in moved]  # the innovation starts as the first error component
+    # the innovation starts as the first error component
+    closed = [m[:, :n] + np.outer(m[:, n], np.eye(n)[0]) for m in moved]
     at_balises = solve_discrete_lyapunov(closed[-1], np.outer(moved[-1][:, n], moved[-1][:, n]))
     offset = np.linalg.solve(np.eye(n) - closed[-1], moved[-1][:, n + 1])
     variances = [np.diag(c @ at_balises @ c.T) + m[:, n] ** 2 for c, m in zip(closed, moved, strict=True)]

@@ -11,14 +11,20 @@ from fmu_observer.observability import MeasuredSystem, require_observable
 
 
 def observer_gain(
-    A: np.ndarray, C: np.ndarray, poles: Sequence[float] | np.ndarray, states: tuple[str, ...] = (), name: str = "pole placement"
+    A: np.ndarray,
+    C: np.ndarray,
+    poles: Sequence[float] | np.ndarray,
+    states: tuple[str, ...] = (),
+    name: str = "pole placement",
 ) -> np.ndarray:
     """Gain L such that ``A - L C`` has the given poles.
 
-    With one measurement by Ackermann's formula, which allows poles of any multiplicity; with several by SciPy's robust placement.
+    With one measurement by Ackermann's formula, which allows poles of any multiplicity; with several by SciPy's robust
+    placement.
 
     Args:
-        A: shape (n, n). C: shape (q, n), (A, C) observable. poles: n of them [1/s], real or in conjugate pairs; with several
+        A: shape (n, n). C: shape (q, n), (A, C) observable. poles: n of them [1/s], real or in conjugate pairs; with
+        several
             measurements none repeated more often than C has rank. For a discrete A the same, within the unit circle.
         states: their names, for the message. name: what asks, for the message.
 
@@ -31,7 +37,9 @@ def observer_gain(
     """
     wanted = np.asarray(poles)
     if wanted.shape != (len(A),):
-        raise ValueError(f"Pole placement: got poles of shape {wanted.shape}, expected {(len(A),)}, one for each state.")
+        raise ValueError(
+            f"Pole placement: got poles of shape {wanted.shape}, expected {(len(A),)}, one for each state."
+        )
     require_observable(MeasuredSystem(A, C, states=states, name=name))
     if len(C) > 1:
         return np.asarray(place_poles(A.T, C.T, wanted).gain_matrix.T)

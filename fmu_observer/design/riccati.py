@@ -28,12 +28,12 @@ def steady_filter(A: np.ndarray, C: np.ndarray, QN: np.ndarray, RN: np.ndarray) 
     """Solve the discrete Riccati equation of the filter.
 
     Args:
-        A: shape (n, n). C: shape (q, n). QN: process covariance of one period, shape (n, n). RN: measurement covariance, shape
-        (q, q).
+        A: shape (n, n). C: shape (q, n). QN: process covariance of one period, shape (n, n). RN: measurement
+        covariance, shape (q, q).
 
     Returns:
-        The steady state; None when there is no stabilising solution (a mode on or outside the unit circle that C does not see, or
-        a mode on the circle that the process noise does not drive).
+        The steady state; None when there is no stabilising solution (a mode on or outside the unit circle that C does
+        not see, or a mode on the circle that the process noise does not drive).
     """
     try:
         P = solve_discrete_are(A.T, C.T, QN, RN)

@@ -1,7 +1,7 @@
 """How steep a model's nonlinearity is in scaled coordinates ``z_i = x_i / s^(i-1)``. Plain NumPy.
 
-The printed conditions of Lipschitz observers hold in any coordinates; the ones in which the states are of one size are the
-sharpest.
+The printed conditions of Lipschitz observers hold in any coordinates; the ones in which the states are of one size are
+the sharpest.
 """
 
 from __future__ import annotations
@@ -17,7 +17,9 @@ def powers(scale: float, order: int) -> np.ndarray:
 
 
 def scaled(matrix: np.ndarray, scale: float) -> np.ndarray:
-    """``inv(S) M S`` with ``S = diag(1, s, ..., s^(n-1))``: a matrix of the flow in scaled coordinates, shape (n, n)."""
+    """``inv(S) M S`` with ``S = diag(1, s, ..., s^(n-1))``: a matrix of the flow in scaled coordinates, shape (n,
+    n).
+    """
     sizes = powers(scale, len(matrix))
     return np.asarray(matrix * sizes[None, :] / sizes[:, None])
 
@@ -25,8 +27,8 @@ def scaled(matrix: np.ndarray, scale: float) -> np.ndarray:
 def scaled_lipschitz(model: ObserverModel, scale: float, centre: np.ndarray | None = None) -> float:
     """Lipschitz constant of ``phi - centre x`` in scaled coordinates [1/s].
 
-    The largest norm over the vertices of its Jacobian where the model has them (a norm is convex), else `lipschitz` times the
-    condition number of the scaling.
+    The largest norm over the vertices of its Jacobian where the model has them (a norm is convex), else `lipschitz`
+    times the condition number of the scaling.
 
     Args:
         model: the model. scale: s. centre: linear part counted to A, shape (n, n); None for none. Needs vertices.

@@ -1,4 +1,5 @@
-"""Reduced-order observers by a Sylvester equation: the transformation that turns a part of the state into a stable filter.
+"""Reduced-order observers by a Sylvester equation: the transformation that turns a part of the state into a stable
+filter.
 
 Plain NumPy and SciPy; the observer itself needs none of this at run time, its matrices are parameters.
 """
@@ -19,7 +20,8 @@ class SylvesterDesign:
     """Matrices of ``dz = A z + B_c y_c + B_d w + T G u`` with z standing for ``T x``.
 
     Attributes:
-        A: Hurwitz, shape (r, r). B: ``[B_c B_d]``, shape (r, n - r). T: ``[T_R T_c T_d]``, shape (r, n), with T_R invertible.
+        A: Hurwitz, shape (r, r). B: ``[B_c B_d]``, shape (r, n - r). T: ``[T_R T_c T_d]``, shape (r, n), with T_R
+        invertible.
     """
 
     A: np.ndarray
@@ -42,12 +44,15 @@ def sylvester_transformation(F: np.ndarray, A: np.ndarray, B: np.ndarray) -> np.
     r, n = len(A), len(F)
     if np.shape(A) != (r, r) or np.shape(F) != (n, n) or np.shape(B) != (r, n - r):
         raise ValueError(
-            f"Sylvester equation: A {np.shape(A)}, F {np.shape(F)} and B {np.shape(B)} do not fit; expected (r, r), (n, n) and "
+            f"Sylvester equation: A {np.shape(A)}, F {np.shape(F)} and B {np.shape(B)} do not fit; expected (r, r), "
+            f"(n, n) and "
             f"(r, n - r), here {(r, n - r)}."
         )
     distance = np.abs(np.linalg.eigvals(A)[:, None] - np.linalg.eigvals(F)[None, :]).min()
     if distance < 1e-9 * max(1.0, float(np.abs(F).max())):
-        raise ValueError("Sylvester equation: A shares an eigenvalue with the plant, there is no unique T; move the poles of A.")
+        raise ValueError(
+            "Sylvester equation: A shares an eigenvalue with the plant, there is no unique T; move the poles of A."
+        )
     return np.asarray(solve_sylvester(-A, F, np.hstack([np.zeros((r, r)), B])))
 
 
@@ -64,15 +69,17 @@ def sylvester_design(
 ) -> SylvesterDesign:
     """A and B for given poles by the reduced-order observer, and T from the Sylvester equation [ours].
 
-    With L placing the poles of ``A = F_11 - L F_21`` the unmeasured part less L times the measured one is such a filter, with
-    ``B = F_12 - L F_22 + A L``; the equation then gives ``T = [I, -L]``, so that T_R is as well conditioned as can be.
+    With L placing the poles of ``A = F_11 - L F_21`` the unmeasured part less L times the measured one is such a
+    filter, with ``B = F_12 - L F_22 + A L``; the equation then gives ``T = [I, -L]``, so that T_R is as well
+    conditioned as can be.
 
     Args:
         F: plant, shape (n, n), its state in the order [unmeasured, measured]. unmeasured: r. poles: r of them [1/s].
         states: names of the unmeasured states, for the message. name: what asks, for the message.
 
     Raises:
-        UnobservableError: a mode of the unmeasured part cannot be observed from the measured one; the message says which.
+        UnobservableError: a mode of the unmeasured part cannot be observed from the measured one; the message says
+        which.
         ValueError: a pole is one of the plant.
     """
     r = unmeasured

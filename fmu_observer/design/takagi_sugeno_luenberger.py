@@ -1,4 +1,6 @@
-"""Gains of the continuous Takagi-Sugeno observer and the Lyapunov function behind them. Clarabel checks, cvxpy designs."""
+"""Gains of the continuous Takagi-Sugeno observer and the Lyapunov function behind them. Clarabel checks, cvxpy
+designs.
+"""
 
 from __future__ import annotations
 
@@ -25,9 +27,10 @@ class VertexDecrease:
     """Common quadratic Lyapunov function of the vertex errors ``A_i - K_i C``.
 
     Attributes:
-        margin: smallest decrease ``-lmax((A_i - K_i C)' P + P (A_i - K_i C))`` over the vertices, recomputed, at trace(P) = n in
-        the
-            model's scaled coordinates [1/s]; -inf when no P was found. abscissa: largest real part at the vertices [1/s].
+        margin: smallest decrease ``-lmax((A_i - K_i C)' P + P (A_i - K_i C))`` over the vertices, recomputed, at
+        trace(P) = n in the
+            model's scaled coordinates [1/s]; -inf when no P was found. abscissa: largest real part at the vertices
+            [1/s].
     """
 
     margin: float
@@ -37,7 +40,8 @@ class VertexDecrease:
 def placed_gains(model: TakagiSugenoModel, poles: np.ndarray) -> np.ndarray:
     """Gains K_i that give every vertex the same poles, shape (N, n, q).
 
-    All measurements of the model count as continuous. The same poles at every vertex are not yet a common Lyapunov function:
+    All measurements of the model count as continuous. The same poles at every vertex are not yet a common Lyapunov
+    function:
     `vertex_decrease` says whether there is one.
 
     Raises:
@@ -72,20 +76,23 @@ def vertex_decrease(model: TakagiSugenoModel, gains: np.ndarray) -> VertexDecrea
 
 
 def designed_gains(model: TakagiSugenoModel, decay: float = 1.0) -> np.ndarray:
-    """Gains from the linear matrix inequalities ``A_i' P + P A_i - L_i C - C' L_i' + 2 decay P < 0``, ``K_i = inv(P) L_i``.
+    """Gains from the linear matrix inequalities ``A_i' P + P A_i - L_i C - C' L_i' + 2 decay P < 0``,
+    ``K_i = inv(P) L_i``.
 
-    Bouchama 2024, (1.26) with the term ``C' L_i'`` in the order that fits, and a decay rate [ours]. Among the solutions with P >=
-    I one with small L_i is taken, so that the gains are not larger than the rate asks for.
+    Bouchama 2024, (1.26) with the term ``C' L_i'`` in the order that fits, and a decay rate [ours]. Among the solutions
+    with P >= I one with small L_i is taken, so that the gains are not larger than the rate asks for.
 
     Args:
-        model: N vertices; all its measurements count as continuous. decay: rate at which the error shall decay at least [1/s].
+        model: N vertices; all its measurements count as continuous. decay: rate at which the error shall decay at least
+        [1/s].
 
     Returns:
         Gains of shape (N, n, q) in SI units, their inequality recomputed.
 
     Raises:
         UnobservableError: a vertex has a mode that does not decay and is not measured; it is named.
-        ValueError: no gains were found for that rate; the message says what was tried and the nearest rate that can be had.
+        ValueError: no gains were found for that rate; the message says what was tried and the nearest rate that can be
+        had.
         ImportError: cvxpy (extra `lmi`) is not installed.
     """
     check_numbers("Takagi-Sugeno Luenberger design", {}, {"decay": decay})
@@ -96,8 +103,10 @@ def designed_gains(model: TakagiSugenoModel, decay: float = 1.0) -> np.ndarray:
     nearest = _nearest_decay(model, decay)
     found = "none" if nearest is None else f"{nearest:.3g} 1/s"
     raise ValueError(
-        f"Takagi-Sugeno Luenberger design for {model.name!r}: no common P at the {model.vertices} vertices for decay {decay:g} "
-        f"1/s. Nearest decay found feasible: {found}. Ask for a smaller one, measure more, or narrow the bounds of the premises."
+        f"Takagi-Sugeno Luenberger design for {model.name!r}: no common P at the {model.vertices} vertices for decay "
+        f"{decay:g} "
+        f"1/s. Nearest decay found feasible: {found}. Ask for a smaller one, measure more, or narrow the bounds of the "
+        f"premises."
     )
 
 
@@ -114,7 +123,9 @@ def _proven(model: TakagiSugenoModel, decay: float) -> np.ndarray | None:
 
 
 def _nearest_decay(model: TakagiSugenoModel, decay: float) -> float | None:
-    """Largest decay below the one asked for with proven gains, by bisection of its logarithm; None down to a billionth."""
+    """Largest decay below the one asked for with proven gains, by bisection of its logarithm; None down to a
+    billionth.
+    """
     low, high = SMALLEST * decay, decay
     if not decay or _proven(model, low) is None:
         return None
@@ -148,5 +159,7 @@ def _cvxpy() -> Any:
     try:
         import cvxpy  # noqa: PLC0415 - only who designs pays for it
     except ImportError as error:
-        raise ImportError("Design by linear matrix inequalities needs cvxpy: pip install 'fmu-observer[lmi]'.") from error
+        raise ImportError(
+            "Design by linear matrix inequalities needs cvxpy: pip install 'fmu-observer[lmi]'."
+        ) from error
     return cvxpy

@@ -19,7 +19,8 @@ class ThauBound:
 
     Attributes:
         valid: ``1 / (2 lmax(P))``: below it the error decays. printed: ``1 / lmin(P)`` as in (1.8), which is unsafe.
-        scale: s of the coordinates ``z_i = x_i / s^(i-1)`` they hold in. lipschitz: constant of phi in these coordinates.
+        scale: s of the coordinates ``z_i = x_i / s^(i-1)`` they hold in. lipschitz: constant of phi in these
+        coordinates.
     """
 
     valid: float
@@ -36,8 +37,8 @@ class ThauBound:
 def thau_bound(closed: np.ndarray) -> tuple[float, float]:
     """The valid and the printed bound of Bouchama 2024, (1.8), Theorem 1, at Q = I, which gives the best valid one.
 
-    The derivative of ``e' P e`` is at most ``(-lmin(Q) + 2 alpha lmax(P)) |e|^2``, so ``alpha < lmin(Q) / (2 lmax(P))`` is
-    enough. The print has ``alpha < lmax(Q) / lmin(P)``, which is not.
+    The derivative of ``e' P e`` is at most ``(-lmin(Q) + 2 alpha lmax(P)) |e|^2``, so ``alpha < lmin(Q) / (2 lmax(P))``
+    is enough. The print has ``alpha < lmax(Q) / lmin(P)``, which is not.
 
     Args:
         closed: ``A - L C``, shape (n, n) [1/s].
@@ -58,6 +59,8 @@ def scaled_thau_bound(model: ObserverModel, gain: np.ndarray, scale: float = 1.0
 
 
 def best_thau_bound(model: ObserverModel, gain: np.ndarray) -> ThauBound:
-    """The bound in the coordinates, of a geometric grid of scales, in which it leaves the largest factor over the constant."""
+    """The bound in the coordinates, of a geometric grid of scales, in which it leaves the largest factor over the
+    constant.
+    """
     bounds = [scaled_thau_bound(model, gain, float(s)) for s in SCALES]
     return max(bounds, key=lambda b: b.valid / max(b.lipschitz, 1e-12))

@@ -38,8 +38,9 @@ class UioCovariances:
 def uio_matrices(mass: float, drag_slope: float) -> tuple[np.ndarray, np.ndarray]:
     """Continuous model of (3.88)-(3.89) with the slip disturbance in the right column of the second row.
 
-    State ``[p, y, d1, d2, d1', d2']``: position, odometer speed, slip speed ``v - y``, acceleration disturbance, and their rates.
-    The print has the 1 of row 2 in column 3; with it in column 4 the printed A_d, B_d come out and the pair is observable.
+    State ``[p, y, d1, d2, d1', d2']``: position, odometer speed, slip speed ``v - y``, acceleration disturbance, and
+    their rates. The print has the 1 of row 2 in column 3; with it in column 4 the printed A_d, B_d come out and the
+    pair is observable.
 
     Args:
         mass: train mass [kg]. drag_slope: ``(b + c v) / M`` at the speed of linearisation [1/s].
@@ -67,9 +68,9 @@ def discretise(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.ndarray,
 def uio_gains(covariances: UioCovariances, drag_slope: float) -> tuple[np.ndarray, np.ndarray]:
     """Steady-state Kalman gains of the two channels, each at its own sampling interval.
 
-    The model splits: the odometer sees (y, d2, d2') whatever the balises do, and the balises add (p, d1, d1'). Each channel is a
-    filter for white noise on its second disturbance derivative; the odometer one every `odometer_period`, the balise one every
-    `balise_gap`. The joint error is then block triangular, stable when both channels are.
+    The model splits: the odometer sees (y, d2, d2') whatever the balises do, and the balises add (p, d1, d1'). Each
+    channel is a filter for white noise on its second disturbance derivative; the odometer one every `odometer_period`,
+    the balise one every `balise_gap`. The joint error is then block triangular, stable when both channels are.
 
     Args:
         covariances: what to design for. drag_slope: ``(b + c v) / M`` [1/s].
@@ -89,7 +90,9 @@ def uio_gains(covariances: UioCovariances, drag_slope: float) -> tuple[np.ndarra
 
 
 def _channel_gain(A: np.ndarray, density: float, variance: float, interval: float) -> np.ndarray:
-    """Filter gain ``P C' / (C P C' + R)`` of a chain of three, white noise into its last state, first state measured."""
+    """Filter gain ``P C' / (C P C' + R)`` of a chain of three, white noise into its last state, first state
+    measured.
+    """
     C = np.array([[1.0, 0.0, 0.0]])
     transition, process = expm(A * interval), process_covariance(A, np.diag([0.0, 0.0, density]), interval)
     P = solve_discrete_are(transition.T, C.T, process, np.array([[variance]]))

@@ -4,7 +4,13 @@ from fmu_observer.detection.adhesion_detector import AdhesionDetector, condition
 from fmu_observer.detection.adhesion_map import AdhesionMap, adhesion_map, degraded_map, nominal_map, published_map
 from fmu_observer.detection.coupler_risk import CouplerRisk
 from fmu_observer.detection.excessive_slip import ExcessiveSlip
-from fmu_observer.detection.slip_indicator import DEGRADED, NOMINAL, SlipIndicator, indicator_level, slip_filter_derivative
+from fmu_observer.detection.slip_indicator import (
+    DEGRADED,
+    NOMINAL,
+    SlipIndicator,
+    indicator_level,
+    slip_filter_derivative,
+)
 from fmu_observer.detection.slip_ratio import (
     odometer_slip,
     odometer_slip_from_speed_slip,

@@ -10,7 +10,16 @@ import numpy as np
 from fmu_observer.detection.adhesion_map import MAP_SPEEDS, AdhesionMap, degraded_map, nominal_map, published_map
 from fmu_observer.detection.slip_indicator import DEGRADED, NOMINAL
 from fmu_observer.detection.slip_ratio import speed_slip_from_odometer_slip
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, state, vector
+from plant_models.hybrid import (
+    HybridSystem,
+    PeriodicEvent,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+    state,
+    vector,
+)
 from plant_models.hybrid.system import Array
 from plant_models.railway.track.table import piecewise_linear
 
@@ -23,17 +32,17 @@ FILTERED, CONDITION, CONTRARY_TIME = range(3)  # indices of the state
 class AdhesionDetector(HybridSystem):
     """Nominal or degraded adhesion from slip and speed: Bouchama 2024, (4.16)-(4.17).
 
-    At the speed V the maps give the slip ``s_n(V)`` and ``s_d(V)`` at which the nominal and the degraded creep curve peak. With
-    the magnitude s of the slip the adhesion is nominal where ``|s_n - s| + alpha < |s_d - s|``, else degraded: the slip has to be
-    nearer to the nominal optimum by alpha. In effect that is a threshold on the slip, ``(s_n + s_d - alpha) / 2``, that falls
-    with the speed from 21 % at 5 km/h to 4.5 % at 50 km/h.
+    At the speed V the maps give the slip ``s_n(V)`` and ``s_d(V)`` at which the nominal and the degraded creep curve
+    peak. With the magnitude s of the slip the adhesion is nominal where ``|s_n - s| + alpha < |s_d - s|``, else
+    degraded: the slip has to be nearer to the nominal optimum by alpha. In effect that is a threshold on the slip,
+    ``(s_n + s_d - alpha) / 2``, that falls with the speed from 21 % at 5 km/h to 4.5 % at 50 km/h.
 
-    Slips of one definition only can be compared. The maps are relative to the train speed, like Polach's s; the observers' slip
-    (3.49) is relative to the odometer. It is converted, ``s / (1 - s)``, before the comparison. The thesis compares the
-    two as they are: ``slip_definition="speed"`` fed with (3.49) does that.
+    Slips of one definition only can be compared. The maps are relative to the train speed, like Polach's s; the
+    observers' slip (3.49) is relative to the odometer. It is converted, ``s / (1 - s)``, before the comparison. The
+    thesis compares the two as they are: ``slip_definition="speed"`` fed with (3.49) does that.
 
-    The slip is filtered, judged every `check_period`, and a new verdict counts when it has stood for `debounce_time` [ours].
-    Below `min_speed` the last verdict stays. `adhesion_limit` is the peak of the curve judged to be in force.
+    The slip is filtered, judged every `check_period`, and a new verdict counts when it has stood for `debounce_time`
+    [ours]. Below `min_speed` the last verdict stays. `adhesion_limit` is the peak of the curve judged to be in force.
 
     Args:
         slip_definition: denominator of the input `slip`: ``odometer``, (3.49) and (4.14), or ``speed``, (3.13).

@@ -11,7 +11,28 @@ from plant_models.railway.adhesion import POLACH_DRY, POLACH_WET, PolachCurve
 
 KMH = 3.6  # km/h in one m/s
 MAP_SPEEDS = tuple(
-    v / KMH for v in (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.5, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0, 80.0, 110.0, 160.0)
+    v / KMH
+    for v in (
+        1.0,
+        2.0,
+        3.0,
+        4.0,
+        5.0,
+        6.0,
+        8.0,
+        10.0,
+        12.5,
+        15.0,
+        20.0,
+        25.0,
+        30.0,
+        40.0,
+        50.0,
+        60.0,
+        80.0,
+        110.0,
+        160.0,
+    )
 )  # [m/s], from the lowest the thesis shows, and lower, to the speed limit of its line
 
 
@@ -39,7 +60,8 @@ def adhesion_map(curve: PolachCurve, speeds: tuple[float, ...] = MAP_SPEEDS) -> 
     Raises:
         ValueError: a speed is not positive, or the curve has no peak there.
 
-    Source: Bouchama 2024, (4.16) and Table 4.5, which the curves of its Table 3.1 give with the sliding speed in km/h and k = 25.
+    Source: Bouchama 2024, (4.16) and Table 4.5, which the curves of its Table 3.1 give with the sliding speed in km/h
+    and k = 25.
     """
     found = [curve.peak(float(speed)) for speed in speeds]
     return AdhesionMap(tuple(map(float, speeds)), tuple(slip for slip, _ in found), tuple(peak for _, peak in found))
@@ -56,9 +78,15 @@ def degraded_map() -> AdhesionMap:
 
 
 def published_map(degraded: bool) -> AdhesionMap:
-    """Table 4.5 as printed on the speeds of `MAP_SPEEDS`: linear between its six speeds, constant outside 5 to 50 km/h."""
+    """Table 4.5 as printed on the speeds of `MAP_SPEEDS`: linear between its six speeds, constant outside 5 to 50
+    km/h.
+    """
     speeds = np.array([5.0, 10.0, 20.0, 30.0, 40.0, 50.0]) / KMH
     slips = (0.304, 0.20, 0.144, 0.12, 0.096, 0.072) if degraded else (0.10, 0.08, 0.048, 0.04, 0.032, 0.032)
-    peaks = (0.2188, 0.1961, 0.1713, 0.1566, 0.1463, 0.1387) if degraded else (0.3894, 0.3474, 0.3027, 0.2769, 0.2594, 0.2449)
+    peaks = (
+        (0.2188, 0.1961, 0.1713, 0.1566, 0.1463, 0.1387)
+        if degraded
+        else (0.3894, 0.3474, 0.3027, 0.2769, 0.2594, 0.2449)
+    )
     slips_there, peaks_there = (np.interp(MAP_SPEEDS, speeds, values) for values in (slips, peaks))
     return AdhesionMap(MAP_SPEEDS, tuple(map(float, slips_there)), tuple(map(float, peaks_there)))

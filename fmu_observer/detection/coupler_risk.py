@@ -7,27 +7,38 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, state, vector
+from plant_models.hybrid import (
+    HybridSystem,
+    PeriodicEvent,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+    state,
+    vector,
+)
 from plant_models.hybrid.system import Array
 
 FILTERED, LEVEL, PEAK, PEAK_TIME, CHECKED = range(5)  # indices of the state
 
 
 class CouplerRisk(HybridSystem):
-    """Risk of a coupler to break, 0, 1 or 2, from its force, estimated or measured: Bouchama 2024, section 4.2 and figure 4.16.
+    """Risk of a coupler to break, 0, 1 or 2, from its force, estimated or measured: Bouchama 2024, section 4.2 and
+    figure 4.16.
 
     The thesis names the indicator as a block of its control and prints nothing of it; all of this is ours.
 
-    A screw coupling breaks in tension; buffers take compression, which counts as zero. Level 1 (warning) where the tension is
-    above `warning_share` of the breaking load, or rises faster than `warning_rate`; level 2 (alarm) with `alarm_share` and
-    `alarm_rate`. The level goes up at once, and down only when tension and rate are below `release_ratio` times its limits.
-    The rate is that of the tension behind a first-order filter of `rate_filter_time`, which also bounds what noise does to it.
-    `peak_tension` is the largest tension of the last `peak_hold_time`, at checks every `check_period`.
+    A screw coupling breaks in tension; buffers take compression, which counts as zero. Level 1 (warning) where the
+    tension is above `warning_share` of the breaking load, or rises faster than `warning_rate`; level 2 (alarm) with
+    `alarm_share` and `alarm_rate`. The level goes up at once, and down only when tension and rate are below
+    `release_ratio` times its limits. The rate is that of the tension behind a first-order filter of `rate_filter_time`,
+    which also bounds what noise does to it. `peak_tension` is the largest tension of the last `peak_hold_time`, at
+    checks every `check_period`.
 
-    **Limits.** EN 15566 (which follows UIC 520) has three categories of draw gear and screw coupling, 1, 1.2 and 1.5 MN; the
-    breaking load of the coupling is 850 kN in the first category and 1350 kN in the last. Shares: 40 % as a warning and 60 % as
-    an alarm, for couplings are rarely new and a force applied suddenly shows up to double. Rates: the full effort of 350 kN
-    applied in one second is a warning, twice that an alarm.
+    **Limits.** EN 15566 (which follows UIC 520) has three categories of draw gear and screw coupling, 1, 1.2 and 1.5
+    MN; the breaking load of the coupling is 850 kN in the first category and 1350 kN in the last. Shares: 40 % as a
+    warning and 60 % as an alarm, for couplings are rarely new and a force applied suddenly shows up to double. Rates:
+    the full effort of 350 kN applied in one second is a warning, twice that an alarm.
 
     Presets: `category_1_mn` (default, breaking load 850 kN), `category_1_5_mn` (1350 kN).
     """
@@ -77,7 +88,9 @@ class CouplerRisk(HybridSystem):
         tension = _tension(u)
         filtered = np.where(x[CHECKED] > 0.0, x[FILTERED], tension)  # a tension there from the start has not risen
         rate = (tension - filtered) / p.rate_filter_time
-        level = np.maximum(_level(tension, rate, 1.0, p), np.minimum(x[LEVEL], _level(tension, rate, p.release_ratio, p)))
+        level = np.maximum(
+            _level(tension, rate, 1.0, p), np.minimum(x[LEVEL], _level(tension, rate, p.release_ratio, p))
+        )
         forgotten = np.where(t - x[PEAK_TIME] > p.peak_hold_time + 1e-9, 1.0, 0.0)
         renewed = np.where(tension >= x[PEAK], 1.0, forgotten)
         peak, instant = np.where(renewed > 0.0, tension, x[PEAK]), np.where(renewed > 0.0, t, x[PEAK_TIME])

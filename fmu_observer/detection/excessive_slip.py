@@ -1,4 +1,6 @@
-"""The excessive-slip indicator: slip beyond a threshold, confirmed, held, and by how much. Uses only the slip ratios."""
+"""The excessive-slip indicator: slip beyond a threshold, confirmed, held, and by how much. Uses only the slip
+ratios.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.detection.slip_indicator import DEGRADED, FILTERED_SLIP, NOMINAL, indicator_level, slip_filter_derivative
+from fmu_observer.detection.slip_indicator import (
+    DEGRADED,
+    FILTERED_SLIP,
+    NOMINAL,
+    indicator_level,
+    slip_filter_derivative,
+)
 from fmu_observer.detection.slip_ratio import odometer_slip
 from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, vector
 from plant_models.hybrid.system import Array
@@ -16,16 +24,18 @@ FILTERED, EXCEEDING_TIME, QUIET_TIME, LEVEL, PEAK = range(5)  # indices of the s
 
 
 class ExcessiveSlip(HybridSystem):
-    """Slip beyond the threshold for a while, and the indicator held on afterwards: Bouchama 2024, sections 4.4 and Remark 16.
+    """Slip beyond the threshold for a while, and the indicator held on afterwards: Bouchama 2024, sections 4.4 and
+    Remark 16.
 
-    The filtered slip of (3.49) is checked every `check_period`. Where it has been beyond `slip_threshold` at all checks over
-    `confirm_time`, the indicator goes to 2, and stays there until `hold_time` has passed without an excess: spinning axles catch
-    for a moment again and again, and a controller that follows each catch would hunt.
+    The filtered slip of (3.49) is checked every `check_period`. Where it has been beyond `slip_threshold` at all checks
+    over `confirm_time`, the indicator goes to 2, and stays there until `hold_time` has passed without an excess:
+    spinning axles catch for a moment again and again, and a controller that follows each catch would hunt.
 
-    `exceedance` is how far the filtered slip is beyond the threshold now, in the thesis's words "exceeded by 25 points", and
-    `peak_exceedance` the largest of the episode, kept until the indicator goes off.
+    `exceedance` is how far the filtered slip is beyond the threshold now, in the thesis's words "exceeded by 25
+    points", and `peak_exceedance` the largest of the episode, kept until the indicator goes off.
 
-    The threshold of 15 % is printed. Confirmation, hold and filter times are not: ours, the last that of `SlipIndicator`.
+    The threshold of 15 % is printed. Confirmation, hold and filter times are not: ours, the last that of
+    `SlipIndicator`.
 
     Presets: `experiment` (15 %), `simulation` (2 %).
     """
@@ -55,18 +65,25 @@ class ExcessiveSlip(HybridSystem):
         parameter("slip_floor", "m/s", 0.5, "Smallest denominator of the slip ratio", min=1e-6),
         parameter("slip_filter_time", "s", 0.2, "Time constant of the slip filter", min=0.01),
         parameter("slip_threshold", "1", 0.15, "Filtered slip beyond which it counts as excessive", min=0.0),
-        parameter("slip_min_speed", "m/s", 0.5, "Slip is judged only when odometer or train speed exceed this", min=0.0),
+        parameter(
+            "slip_min_speed", "m/s", 0.5, "Slip is judged only when odometer or train speed exceed this", min=0.0
+        ),
         parameter("confirm_time", "s", 0.2, "Time beyond the threshold before the indicator goes on", min=0.0),
         parameter("hold_time", "s", 3.0, "Time the indicator stays on after the last excess", min=0.0),
         parameter("check_period", "s", 0.05, "Time between two checks", min=1e-4),
     )
     events = (PeriodicEvent("check", "check_period", description="The filtered slip is judged"),)
-    presets: Mapping[str, Mapping[str, Any]] = {"experiment": {"slip_threshold": 0.15}, "simulation": {"slip_threshold": 0.02}}
+    presets: Mapping[str, Mapping[str, Any]] = {
+        "experiment": {"slip_threshold": 0.15},
+        "simulation": {"slip_threshold": 0.02},
+    }
     default_preset = "experiment"
 
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Derivative of the filtered slip, shape (1,)."""
-        return vector(slip_filter_derivative(x[FILTERED], odometer_slip(u.odometer, u.speed, p.slip_floor), p.slip_filter_time))
+        return vector(
+            slip_filter_derivative(x[FILTERED], odometer_slip(u.odometer, u.speed, p.slip_floor), p.slip_filter_time)
+        )
 
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """A check: count the times beyond the threshold and since, judge, keep the largest exceedance."""

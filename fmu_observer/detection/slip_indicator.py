@@ -50,7 +50,8 @@ def indicator_level(filtered: Array, odometer: Array, speed: Array, threshold: A
 class SlipIndicator(HybridSystem):
     """Slip and its indicator from an odometer and any train speed, estimated or measured: Bouchama 2024, (3.49).
 
-    ``slip = (y - v) / max(|y|, floor)``, ``T d(filtered)/dt = slip - filtered``, ``indicator = 2 if |filtered| > threshold``.
+    ``slip = (y - v) / max(|y|, floor)``, ``T d(filtered)/dt = slip - filtered``,
+    ``indicator = 2 if |filtered| > threshold``.
     Presets: `simulation` (threshold 2 %) and `experiment` (15 %, Remark 16).
     """
 
@@ -64,12 +65,17 @@ class SlipIndicator(HybridSystem):
     )
     outputs = SLIP_OUTPUTS
     parameters = SLIP_PARAMETERS
-    presets: Mapping[str, Mapping[str, Any]] = {"simulation": {"slip_threshold": 0.02}, "experiment": {"slip_threshold": 0.15}}
+    presets: Mapping[str, Mapping[str, Any]] = {
+        "simulation": {"slip_threshold": 0.02},
+        "experiment": {"slip_threshold": 0.15},
+    }
     default_preset = "simulation"
 
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Derivative of the filtered slip, shape (1,)."""
-        return vector(slip_filter_derivative(x[0], odometer_slip(u.odometer, u.speed, p.slip_floor), p.slip_filter_time))
+        return vector(
+            slip_filter_derivative(x[0], odometer_slip(u.odometer, u.speed, p.slip_floor), p.slip_filter_time)
+        )
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """Slip and indicator."""

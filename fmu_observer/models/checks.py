@@ -1,4 +1,5 @@
-"""What every model must be before an observer is built on it: names, signals and matrices. Raises in words where it is not so.
+"""What every model must be before an observer is built on it: names, signals and matrices. Raises in words where it is
+not so.
 
 It knows signals and arrays, and no model.
 """
@@ -12,7 +13,11 @@ import numpy as np
 
 from plant_models.hybrid import Signal
 
-CAUSALITIES = {"states": ("local", "state"), "inputs": ("input", "input_signal"), "measurements": ("input", "input_signal")}
+CAUSALITIES = {
+    "states": ("local", "state"),
+    "inputs": ("input", "input_signal"),
+    "measurements": ("input", "input_signal"),
+}
 
 
 def check_identifiers(where: str, **names: object) -> None:
@@ -29,8 +34,8 @@ def check_identifiers(where: str, **names: object) -> None:
 def check_signals(where: str, **groups: Sequence[Signal]) -> None:
     """States, inputs and measurements are scalar signals of the right kind, no name twice where it would collide.
 
-    A measurement may have the name of the state it measures; a state and an input may not share one, for the observer's outputs
-    are called like the states.
+    A measurement may have the name of the state it measures; a state and an input may not share one, for the observer's
+    outputs are called like the states.
 
     Args:
         where: for the message. groups: `states`, `inputs` and `measurements`.
@@ -42,9 +47,13 @@ def check_signals(where: str, **groups: Sequence[Signal]) -> None:
         causality, maker = CAUSALITIES[kind]
         for signal in signals:
             if not isinstance(signal, Signal):
-                raise ValueError(f"{where}: {kind} holds {signal!r}, expected signals made by {maker}(name, unit, ...).")
+                raise ValueError(
+                    f"{where}: {kind} holds {signal!r}, expected signals made by {maker}(name, unit, ...)."
+                )
             if signal.size is not None or signal.causality != causality:
-                raise ValueError(f"{where}: {signal.name!r} in {kind} must be a scalar made by {maker}(name, unit, ...).")
+                raise ValueError(
+                    f"{where}: {signal.name!r} in {kind} must be a scalar made by {maker}(name, unit, ...)."
+                )
         _check_once(where, kind, [s.name for s in signals])
     _check_once(where, "states and inputs", [s.name for kind in ("states", "inputs") for s in groups[kind]])
     for kind in ("states", "measurements"):
@@ -56,7 +65,8 @@ def checked_matrix(where: str, name: str, value: object, shape: tuple[int, ...],
     """The matrix as an array of floats.
 
     Args:
-        where: for the message. name: of the matrix. value: what was given. shape: what is expected. reason: why that shape.
+        where: for the message. name: of the matrix. value: what was given. shape: what is expected. reason: why that
+        shape.
 
     Raises:
         ValueError: it holds something else than finite numbers, or has another shape.

@@ -60,7 +60,9 @@ def transition(model: ObserverModel, x: Array, u: Array, period: Array) -> Array
 
 
 def transition_jacobian(model: ObserverModel) -> Callable[[Array, Array, Array], Array]:
-    """Exact Jacobian of `transition` by x: a function of (x, u, period) that returns shape (n, n); also on traced symbols."""
+    """Exact Jacobian of `transition` by x: a function of (x, u, period) that returns shape (n, n); also on traced
+    symbols.
+    """
     m = len(model.inputs)
     jacobian = exact_jacobian(lambda x, known: transition(model, x, known[:m], known[m]), model.order, m + 1)
     return lambda x, u, period: jacobian(x, vector(*(u[i] for i in range(m)), period))

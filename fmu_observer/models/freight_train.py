@@ -15,10 +15,11 @@ REST = 0.1  # [m/s]; below it the constant resistance fades, so that it cannot p
 
 
 def freight_train() -> ObserverModel:
-    """``dp = v``, ``M dv = F - a - b v - c v |v|``, the position comes from balises: Bouchama 2024, (3.1)-(3.3), (3.24)-(3.25).
+    """``dp = v``, ``M dv = F - a - b v - c v |v|``, the position comes from balises: Bouchama 2024, (3.1)-(3.3),
+    (3.24)-(3.25).
 
-    For a generic observer the constant resistance is a smooth function of the speed near rest, and no dry friction; the observers
-    of `observers.train` hold a standing train exactly.
+    For a generic observer the constant resistance is a smooth function of the speed near rest, and no dry friction; the
+    observers of `observers.train` hold a standing train exactly.
     """
     slopes = tuple(np.array([[0.0, 0.0], [0.0, -(DAVIS_B + 2.0 * DAVIS_C * v) / MASS]]) for v in (0.0, TOP_SPEED))
     return ObserverModel(

@@ -1,4 +1,6 @@
-"""An inverted pendulum on a driven cart: the unstable linear plant on which the multirate observer is shown. Data only."""
+"""An inverted pendulum on a driven cart: the unstable linear plant on which the multirate observer is shown. Data
+only.
+"""
 
 from __future__ import annotations
 
@@ -14,12 +16,13 @@ RESISTANCE, INDUCTANCE, MOTOR, ROLLER = 1.0, 0.5, 0.5, 0.1  # [Ohm], [H], [N.m/A
 def inverted_pendulum_cart() -> ObserverModel:
     """Cart with an upright pendulum, driven by a direct-current motor, linear about the upright rest [ours].
 
-    The state is ordered as Bouchama 2024, (1.42) asks: ``x_R`` = speed v of the cart and angular rate q of the pendulum, not
-    measured; ``x_c`` = motor current i, measured always; ``x_d`` = position p of the cart, measured at marks on the track, and
-    angle a of the pendulum, measured by a camera, each at its own instants. With the motor force ``f = k i / r``:
+    The state is ordered as Bouchama 2024, (1.42) asks: ``x_R`` = speed v of the cart and angular rate q of the
+    pendulum, not measured; ``x_c`` = motor current i, measured always; ``x_d`` = position p of the cart, measured at
+    marks on the track, and angle a of the pendulum, measured by a camera, each at its own instants. With the motor
+    force ``f = k i / r``:
 
-    ``dv = -(m g / M) a + f / M``, ``dq = ((M + m) g / (M l)) a - f / (M l)``, ``di = (u - R i - (k / r) v) / L``, ``dp = v``,
-    ``da = q``. The pendulum falls with the time constant ``sqrt(M l / ((M + m) g))`` = 0.68 s.
+    ``dv = -(m g / M) a + f / M``, ``dq = ((M + m) g / (M l)) a - f / (M l)``, ``di = (u - R i - (k / r) v) / L``,
+    ``dp = v``, ``da = q``. The pendulum falls with the time constant ``sqrt(M l / ((M + m) g))`` = 0.68 s.
     """
     force = MOTOR / ROLLER
     fall = (CART + BOB) * GRAVITY / (CART * LENGTH)

@@ -13,7 +13,9 @@ def start_of(model: ObserverModel) -> np.ndarray:
 
 
 def linear_part(model: ObserverModel) -> np.ndarray:
-    """Jacobian of the flow at the start of the estimates with zero inputs, shape (n, n); A itself for a linear model."""
+    """Jacobian of the flow at the start of the estimates with zero inputs, shape (n, n); A itself for a linear
+    model.
+    """
     if model.phi is None:
         return model.A
     return np.asarray(model.jacobian(start_of(model), np.zeros(len(model.inputs))))

@@ -34,15 +34,16 @@ class ObserverModel:
             ``measured_angle``, at an event ``<event>_angle``.
         A: shape (n, n). B: shape (n, m). C: shape (q, n).
         phi: nonlinear remainder, plain NumPy that can be traced; None for a linear model.
-        lipschitz: Lipschitz constant of `phi` in x over the range the model is used in [1/s]. Where none is given it is the
-            largest norm of the slopes; without these inf, unless `phi` does not depend on x.
-        slopes: matrices of shape (n, n) whose convex hull holds the Jacobian of `phi` over that range. Certificates of a
-            nonlinear model need them.
+        lipschitz: Lipschitz constant of `phi` in x over the range the model is used in [1/s]. Where none is given it is
+            the largest norm of the slopes; without these inf, unless `phi` does not depend on x.
+        slopes: matrices of shape (n, n) whose convex hull holds the Jacobian of `phi` over that range. Certificates of
+            a nonlinear model need them.
         event: name of the event at which a sampled measurement arrives.
         sample_period: sampling period [s] that observers assume unless told otherwise.
 
     Raises:
-        ValueError: a shape does not fit the signals, a number is not finite, a name is no identifier or stands twice, or nothing
+        ValueError: a shape does not fit the signals, a number is not finite, a name is no identifier or stands twice,
+        or nothing
             is measured; the message names it.
     """
 
@@ -87,7 +88,8 @@ class ObserverModel:
             raise ValueError(f"{where}: phi(x, u) fails at the start values: {error}") from error
         if found != (self.order,):
             raise ValueError(
-                f"{where}: phi(x, u) returns shape {found}, expected {(self.order,)}, one value a state, as of vector(...)."
+                f"{where}: phi(x, u) returns shape {found}, expected {(self.order,)}, one value a state, as of "
+                f"vector(...)."
             )
 
     @property
@@ -111,7 +113,9 @@ class ObserverModel:
 
     @cached_property
     def jacobian(self) -> Callable[[Array, Array], Array]:
-        """Exact Jacobian of `flow` by x, a function of (x, u) that returns shape (n, n); works on traced symbols too."""
+        """Exact Jacobian of `flow` by x, a function of (x, u) that returns shape (n, n); works on traced symbols
+        too.
+        """
         return exact_jacobian(self.flow, self.order, len(self.inputs))
 
     @property
@@ -123,13 +127,16 @@ class ObserverModel:
         """
         if self.phi is not None and self.lipschitz > 0.0 and not self.slopes:
             raise ValueError(
-                f"Observer model {self.name!r}: nothing can be certified without the slopes of its nonlinear part phi; give "
+                f"Observer model {self.name!r}: nothing can be certified without the slopes of its nonlinear part phi; "
+                f"give "
                 "`slopes`, matrices whose convex hull holds the Jacobian of phi over the range of use."
             )
         return tuple(self.A + slope for slope in self.slopes) or (self.A,)
 
     def _lipschitz(self) -> float:
-        """What the slopes say; without slopes 0 if the Jacobian of phi vanishes at a few states, else inf, for unknown."""
+        """What the slopes say; without slopes 0 if the Jacobian of phi vanishes at a few states, else inf, for
+        unknown.
+        """
         if self.slopes:
             return max(float(np.linalg.norm(slope, 2)) for slope in self.slopes)
         at, u = np.random.default_rng(0).normal(size=(PROBES, self.order)), np.ones(len(self.inputs))
@@ -142,7 +149,9 @@ class ObserverModel:
 
 
 def shift_matrix(length: int, width: int = 1) -> np.ndarray:
-    """Block upper shift matrix of a chain of `length` blocks of `width` states, shape (length * width, length * width)."""
+    """Block upper shift matrix of a chain of `length` blocks of `width` states, shape (length * width, length *
+    width).
+    """
     return np.kron(np.diag(np.ones(length - 1), 1), np.eye(width))
 
 

@@ -13,8 +13,9 @@ from plant_models.hybrid.system import Array
 def non_triangularisable_example() -> TakagiSugenoModel:
     """Five states, premises ``a = 1/(1 + x4^2)`` in [0, 1] and x1 in [-1, 2]; x4 sampled, x1 continuous.
 
-    Bouchama 2024, (2.43)-(2.48). The input matrix is the five-vector of the vertices, ``[1 0 1 -0.3a -1]'``; (2.43) prints four
-    entries. G is kept on row 5 as printed, although the disturbance ``v x2`` enters row 4, so that its gains can be compared.
+    Bouchama 2024, (2.43)-(2.48). The input matrix is the five-vector of the vertices, ``[1 0 1 -0.3a -1]'``; (2.43)
+    prints four entries. G is kept on row 5 as printed, although the disturbance ``v x2`` enters row 4, so that its
+    gains can be compared.
     """
     return sector_nonlinearity(
         premises=(

@@ -1,4 +1,6 @@
-"""The damped pendulum driven by a torque: the small nonlinear example on which every generic observer is shown. Data only."""
+"""The damped pendulum driven by a torque: the small nonlinear example on which every generic observer is shown. Data
+only.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +17,9 @@ DAMPING = 0.2  # [1/s]
 def pendulum() -> ObserverModel:
     """``d angle = rate``, ``d rate = -a sin(angle) - d rate + torque``, the angle is measured [ours].
 
-    In the normal form of Bouchama 2024, (1.10): A the shift matrix, the rest in phi, triangular and globally Lipschitz with the
-    constant ``sqrt(a^2 + d^2)``. The thesis names a pendulum nowhere; it is the smallest system that has all the properties its
-    chapter 1 asks for.
+    In the normal form of Bouchama 2024, (1.10): A the shift matrix, the rest in phi, triangular and globally Lipschitz
+    with the constant ``sqrt(a^2 + d^2)``. The thesis names a pendulum nowhere; it is the smallest system that has all
+    the properties its chapter 1 asks for.
     """
     slopes = tuple(np.array([[0.0, 0.0], [a, -DAMPING]]) for a in (-STIFFNESS, STIFFNESS))
     return ObserverModel(

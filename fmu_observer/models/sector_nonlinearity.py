@@ -1,4 +1,6 @@
-"""Sector nonlinearity: from matrices that depend on premises to the vertices of an exact Takagi-Sugeno model. Plain NumPy."""
+"""Sector nonlinearity: from matrices that depend on premises to the vertices of an exact Takagi-Sugeno model. Plain
+NumPy.
+"""
 
 from __future__ import annotations
 
@@ -14,11 +16,13 @@ ROUNDING = 1e-9  # relative, of a matrix that is affine in a premise
 TRIALS = 12
 
 
-def sector_nonlinearity(premises: tuple[Premise, ...], A: PremiseMatrix, B: PremiseMatrix, **model: Any) -> TakagiSugenoModel:
+def sector_nonlinearity(
+    premises: tuple[Premise, ...], A: PremiseMatrix, B: PremiseMatrix, **model: Any
+) -> TakagiSugenoModel:
     """The model ``dx = A(f) x + B(f) u`` with premises ``f_j(x, u)``, as blended vertices: Bouchama 2024, (2.1)-(2.3).
 
-    The vertices are the matrices at the corners of the box of premises. Product memberships blend them exactly wherever A and B
-    are affine in each premise for fixed others; that is tried at points inside the box.
+    The vertices are the matrices at the corners of the box of premises. Product memberships blend them exactly wherever
+    A and B are affine in each premise for fixed others; that is tried at points inside the box.
 
     Args:
         premises: p premises with bounds.
@@ -33,7 +37,9 @@ def sector_nonlinearity(premises: tuple[Premise, ...], A: PremiseMatrix, B: Prem
     """
     if not premises:
         raise ValueError("Sector nonlinearity needs at least one premise; a linear model is an ObserverModel.")
-    corners = [np.array([p.high if i >> j & 1 else p.low for j, p in enumerate(premises)]) for i in range(2 ** len(premises))]
+    corners = [
+        np.array([p.high if i >> j & 1 else p.low for j, p in enumerate(premises)]) for i in range(2 ** len(premises))
+    ]
     for name, matrix in (("A", A), ("B", B)):
         _check_affine(name, matrix, premises)
     return TakagiSugenoModel(
@@ -57,6 +63,7 @@ def _check_affine(name: str, matrix: PremiseMatrix, premises: tuple[Premise, ...
             size = max(np.abs(ends[0]).max(initial=0.0), np.abs(ends[1]).max(initial=0.0), 1e-300)
             if error.max(initial=0.0) > ROUNDING * size:
                 raise ValueError(
-                    f"Sector nonlinearity: {name} is not affine in premise {premise.name!r} (off by {error.max():.3g} inside its "
+                    f"Sector nonlinearity: {name} is not affine in premise {premise.name!r} (off by {error.max():.3g} "
+                    f"inside its "
                     f"bounds). Make the nonlinear term itself a premise, so that {name} is affine in it."
                 )

@@ -1,4 +1,6 @@
-"""What an observer asks of its model: linear, one measurement, a chain of integrators. Raises in words where it is not so."""
+"""What an observer asks of its model: linear, one measurement, a chain of integrators. Raises in words where it is not
+so.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,8 @@ def require_linear(model: ObserverModel, observer: str, instead: str) -> None:
     """
     if model.phi is not None:
         raise ValueError(
-            f"{observer}: model {model.name!r} is nonlinear (it has a remainder phi), not dx = A x + B u. Use {instead!r}, or "
+            f"{observer}: model {model.name!r} is nonlinear (it has a remainder phi), not dx = A x + B u. Use "
+            f"{instead!r}, or "
             f"give a linearised ObserverModel."
         )
 
@@ -30,7 +33,8 @@ def require_single_output(model: ObserverModel, observer: str) -> None:
     """
     if len(model.measurements) != 1:
         raise ValueError(
-            f"{observer}: model {model.name!r} has {len(model.measurements)} measurements, expected one. Use 'luenberger' or "
+            f"{observer}: model {model.name!r} has {len(model.measurements)} measurements, expected one. Use "
+            f"'luenberger' or "
             "'thau', whose gains are of shape (n, q)."
         )
 
@@ -47,9 +51,13 @@ def require_triangular_chain(model: ObserverModel, observer: str) -> None:
     n = model.order
     where = f"{observer}: model {model.name!r} is not in the normal form (1.10): "
     if not np.array_equal(model.A, shift_matrix(n)):
-        raise ValueError(f"{where}A must be the upper shift matrix with everything else in phi, got {model.A.tolist()}.")
+        raise ValueError(
+            f"{where}A must be the upper shift matrix with everything else in phi, got {model.A.tolist()}."
+        )
     if not np.array_equal(model.C, np.eye(n)[:1]):
-        raise ValueError(f"{where}the first state must be measured, C = {np.eye(n)[:1].tolist()}, got {model.C.tolist()}.")
+        raise ValueError(
+            f"{where}the first state must be measured, C = {np.eye(n)[:1].tolist()}, got {model.C.tolist()}."
+        )
     generator = np.random.default_rng(0)
     at = generator.normal(size=(POINTS, n))
     remainders = [np.asarray(model.jacobian(x, np.ones(len(model.inputs)))) - model.A for x in at]

@@ -26,8 +26,8 @@ class Premise:
 
     Args:
         name: identifier. unit: its unit. low, high: bounds [unit]; beyond them the nearer bound is used.
-        of: plain NumPy that can be traced, (x of shape (n,), u of shape (m,)) to a number. A premise that is measured reads only
-            states that the measurements give.
+        of: plain NumPy that can be traced, (x of shape (n,), u of shape (m,)) to a number. A premise that is measured
+            reads only states that the measurements give.
         description: one line.
 
     Raises:
@@ -44,10 +44,14 @@ class Premise:
     def __post_init__(self) -> None:
         check_identifiers("Premise", name=self.name)
         if not (isfinite(self.low) and isfinite(self.high) and self.low < self.high):
-            raise ValueError(f"Premise {self.name!r}: bounds [{self.low}, {self.high}] must be finite, the lower one first.")
+            raise ValueError(
+                f"Premise {self.name!r}: bounds [{self.low}, {self.high}] must be finite, the lower one first."
+            )
 
     def share(self, value: Array) -> Array:
-        """Membership of the upper bound, ``(f - low) / (high - low)`` limited to [0, 1]; the lower bound has the rest."""
+        """Membership of the upper bound, ``(f - low) / (high - low)`` limited to [0, 1]; the lower bound has the
+        rest.
+        """
         return np.clip((value - self.low) / (self.high - self.low), 0.0, 1.0)
 
     def outside(self, value: Array) -> Array:
@@ -60,8 +64,8 @@ class Premise:
 class TakagiSugenoModel:
     """``dx = sum_i h_i (A_i x + B_i u) + G w``, ``y1(t_k) = C1 x`` at samples, ``y2 = C2 x + D v`` always.
 
-    Bouchama 2024, (2.1)-(2.5). Vertex i is the corner where premise j is at its upper bound if bit j of i is set, so the first
-    premise changes fastest; h_i is the product of the memberships, and the h_i add up to one.
+    Bouchama 2024, (2.1)-(2.5). Vertex i is the corner where premise j is at its upper bound if bit j of i is set, so
+    the first premise changes fastest; h_i is the product of the memberships, and the h_i add up to one.
 
     Args:
         name: identifier. description: one line. source: where the equations come from.
@@ -77,7 +81,8 @@ class TakagiSugenoModel:
         scaling: positive numbers T, one a state, for design and certificates: ``T x`` is of order one; () for ones.
 
     Raises:
-        ValueError: a shape does not fit the signals or the number of premises, a number is not finite, a name is no identifier or
+        ValueError: a shape does not fit the signals or the number of premises, a number is not finite, a name is no
+        identifier or
             stands twice, or nothing is measured; the message names it.
     """
 
@@ -188,7 +193,8 @@ class TakagiSugenoModel:
         """The state nearest to an estimate that agrees with measurements: what premises are read from.
 
         Args:
-            x: estimate, shape (n,). sampled: y1 of shape (q1,), or None to keep what the estimate says. continuous: y2, likewise.
+            x: estimate, shape (n,). sampled: y1 of shape (q1,), or None to keep what the estimate says. continuous: y2,
+            likewise.
 
         Returns:
             ``x + C^+ (y - C x)``, shape (n,); where rows of C pick states, these are replaced.

@@ -16,7 +16,8 @@ SMALL = 1e-4  # [rad]; below it the series 1 - x^2/6 is exact to rounding
 def takagi_sugeno_pendulum() -> TakagiSugenoModel:
     """``d angle = rate``, ``d rate = -a s angle - d rate + torque`` with the premise ``s = sin(angle)/angle`` [ours].
 
-    Exact at every angle, since s stays in [-0.2173, 1]. The angle is measured at samples; nothing is measured continuously.
+    Exact at every angle, since s stays in [-0.2173, 1]. The angle is measured at samples; nothing is measured
+    continuously.
     """
     plain = pendulum()
     return sector_nonlinearity(

@@ -1,4 +1,6 @@
-"""The single-mass train as a Takagi-Sugeno model: balises sampled, odometer continuous, drag blended by the speed. Data only."""
+"""The single-mass train as a Takagi-Sugeno model: balises sampled, odometer continuous, drag blended by the speed. Data
+only.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +20,8 @@ def takagi_sugeno_train(
 ) -> TakagiSugenoModel:
     """``dp = v``, ``M dv = F - b v - c v^2`` with the speed as premise: Bouchama 2024, (3.44)-(3.46).
 
-    The input is the effort less the constant resistance a. The wiring is that of section 3.4: the sampled output is the balise
-    position, the continuous one the odometer, and the disturbance enters the acceleration.
+    The input is the effort less the constant resistance a. The wiring is that of section 3.4: the sampled output is the
+    balise position, the continuous one the odometer, and the disturbance enters the acceleration.
 
     Args:
         mass: M [kg]. b: [N.s/m]. c: [N.s2/m2]. slowest, fastest: speeds of the vertices [m/s].

@@ -1,4 +1,6 @@
-"""First academic example of chapter 2: four states, its error equations can be brought to triangular form. Data only."""
+"""First academic example of chapter 2: four states, its error equations can be brought to triangular form. Data
+only.
+"""
 
 from __future__ import annotations
 
@@ -21,8 +23,8 @@ SOURCE = "Bouchama 2024, section 2.5.1"
 def triangularisable_example() -> TakagiSugenoModel:
     """``dx4 = -19.5 x2 - 19.5 x3 - 3.3 (sin x1 + x2^2) x4`` behind three linear rows, x1 sampled, x2 continuous.
 
-    Bouchama 2024, section 2.5.1. The premise ``sin(y1) + y2^2`` has the printed bounds -5 and 5; the print uses -4 and 4 for
-    y2^2, which cannot be negative, and its gains belong to these vertices.
+    Bouchama 2024, section 2.5.1. The premise ``sin(y1) + y2^2`` has the printed bounds -5 and 5; the print uses -4 and
+    4 for y2^2, which cannot be negative, and its gains belong to these vertices.
     """
     return sector_nonlinearity(
         premises=(Premise("damping", "1", -LARGEST_PREMISE, LARGEST_PREMISE, _damping, "sin(x1) + x2^2"),),

@@ -1,6 +1,7 @@
 """Can the measurements tell the states? Modes no sensor sees, and the Gramian over an actual pattern of balises.
 
-Linear algebra on matrices; they come from the user, from an observer model, or from a hybrid system at an operating point.
+Linear algebra on matrices; they come from the user, from an observer model, or from a hybrid system at an operating
+point.
 """
 
 from fmu_observer.observability.gramian import Observability, observability, observability_gramian

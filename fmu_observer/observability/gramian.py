@@ -1,7 +1,7 @@
 """The observability Gramian over a pattern: what the measurements of an actual run tell of the state at its start.
 
-``W = int exp(A't) Cc'Cc exp(A t) dt + sum exp(A'tk) Cs'Cs exp(A tk)``; x0' W x0 is the energy of all that is measured. [ours: the
-thesis treats observability by rank conditions only]
+``W = int exp(A't) Cc'Cc exp(A t) dt + sum exp(A'tk) Cs'Cs exp(A tk)``; x0' W x0 is the energy of all that is measured.
+[ours: the thesis treats observability by rank conditions only]
 """
 
 from __future__ import annotations
@@ -13,7 +13,13 @@ import numpy as np
 
 from fmu_observer.certificates.exponential import small_exponential
 from fmu_observer.observability.measured_system import MeasuredSystem
-from fmu_observer.observability.modes import Mode, UnobservableError, undetectable_modes, unobservable_basis, unobservable_modes
+from fmu_observer.observability.modes import (
+    Mode,
+    UnobservableError,
+    undetectable_modes,
+    unobservable_basis,
+    unobservable_modes,
+)
 from fmu_observer.observability.pattern import SamplePattern
 
 PATTERN_TOLERANCE = 1e-9
@@ -33,10 +39,11 @@ class Observability:
         system: the matrices asked about. pattern: the instants.
         gramian: W, shape (n, n).
         singular_values: of W, largest first, shape (n,).
-        rank: number of independent directions that are measured; judged on the measurements, not on W, whose singular values
-            are their squares.
+        rank: number of independent directions that are measured; judged on the measurements, not on W, whose singular
+            values are their squares.
         unseen: orthonormal basis of the directions that are not measured, shape (n, n - rank).
-        remaining: largest factor by which an unseen direction has grown or shrunk at the end of the pattern; 0 without any.
+        remaining: largest factor by which an unseen direction has grown or shrunk at the end of the pattern; 0 without
+        any.
         unobservable: modes that no pattern would show. undetectable: those of them that do not decay.
     """
 
@@ -64,11 +71,16 @@ class Observability:
         """One to three sentences for the user."""
         count, n = len(self.pattern.instants), self.system.order
         plural = "" if count == 1 else "s"
-        head = f"{self.system.name}: {count} sample{plural} in {self.pattern.duration:.4g} s tell {self.rank} of {n} states"
+        head = (
+            f"{self.system.name}: {count} sample{plural} in {self.pattern.duration:.4g} s tell {self.rank} of {n} "
+            f"states"
+        )
         if self.observable:
             return f"{head}; smallest singular value of the Gramian {self.smallest_singular_value:.4g}."
         parts = [self._direction(column) for column in self.unseen.T]
-        text = f"{head}; not measured: {'; '.join(parts)}. At the end of the pattern {self.remaining:.2g} of it is left."
+        text = (
+            f"{head}; not measured: {'; '.join(parts)}. At the end of the pattern {self.remaining:.2g} of it is left."
+        )
         if self.unobservable:
             return f"{text} No pattern would show: {'; '.join(mode.explain() for mode in self.unobservable)}."
         if self.remaining < PATTERN_TOLERANCE:
@@ -90,11 +102,13 @@ class Observability:
         return " ".join(f"{value / largest:+.3g} {name}" for name, value in named if abs(value) > 1e-6 * largest)
 
 
-def observability(system: MeasuredSystem, pattern: SamplePattern, tolerance: float = PATTERN_TOLERANCE) -> Observability:
+def observability(
+    system: MeasuredSystem, pattern: SamplePattern, tolerance: float = PATTERN_TOLERANCE
+) -> Observability:
     """Gramian, rank and unseen directions of a measured system over a pattern.
 
-    Rank and directions are those of the state at the start of the pattern. A mode that dies out before the first sample is not
-    measured, and need not be: `remaining` says how much of it is left.
+    Rank and directions are those of the state at the start of the pattern. A mode that dies out before the first sample
+    is not measured, and need not be: `remaining` says how much of it is left.
 
     Args:
         system: the matrices. pattern: instants of its sampled measurements, and how long the continuous ones last.
@@ -107,9 +121,16 @@ def observability(system: MeasuredSystem, pattern: SamplePattern, tolerance: flo
     if unseen.shape[1]:
         remaining = float(np.linalg.norm(_transition(scaled.A, pattern.duration) @ unseen, 2))
     return Observability(
-        system, pattern, gramian, np.linalg.svd(gramian, compute_uv=False), system.order - unseen.shape[1], unseen, remaining,
-        tuple(unobservable_modes(system)), tuple(undetectable_modes(system)),
-    )  # fmt: skip
+        system,
+        pattern,
+        gramian,
+        np.linalg.svd(gramian, compute_uv=False),
+        system.order - unseen.shape[1],
+        unseen,
+        remaining,
+        tuple(unobservable_modes(system)),
+        tuple(undetectable_modes(system)),
+    )
 
 
 def observability_gramian(system: MeasuredSystem, pattern: SamplePattern) -> np.ndarray:
@@ -130,8 +151,8 @@ def observability_gramian(system: MeasuredSystem, pattern: SamplePattern) -> np.
 def _stretch(A: np.ndarray, weight: np.ndarray, gap: float) -> tuple[np.ndarray, np.ndarray]:
     """``exp(A gap)`` and ``int_0^gap exp(A't) weight exp(A t) dt`` by Van Loan's block, then doubling.
 
-    The block exponential of Van Loan (1978) holds exp(-A' h) too, which leaves the range of numbers over a long gap where A is
-    stiff. So it is taken over a short step only.
+    The block exponential of Van Loan (1978) holds exp(-A' h) too, which leaves the range of numbers over a long gap
+    where A is stiff. So it is taken over a short step only.
     """
     n, size = len(A), float(np.abs(A).sum(axis=0).max()) * gap
     doublings = max(0, ceil(log2(size / BASE_NORM))) if size > 0.0 else 0

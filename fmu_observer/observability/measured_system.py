@@ -1,4 +1,6 @@
-"""A linear system and how it is measured: ``dx = A x``, continuously ``C_continuous x``, at instants ``C_sampled x``. A value."""
+"""A linear system and how it is measured: ``dx = A x``, continuously ``C_continuous x``, at instants ``C_sampled x``. A
+value.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,8 @@ class MeasuredSystem:
         C_continuous: what is measured at all times, shape (q1, n), or None.
         C_sampled: what is measured at the instants of a pattern, shape (q2, n), or None.
         states: names of the states; ``x1`` ... ``xn`` where none are given.
-        scales: a typical size of each state, so that states of different units can be compared, shape (n,); 1 where not given.
+        scales: a typical size of each state, so that states of different units can be compared, shape (n,); 1 where not
+        given.
         name: for messages.
 
     Raises:
@@ -45,10 +48,14 @@ class MeasuredSystem:
             found[key] = C
         object.__setattr__(self, "states", tuple(self.states) or tuple(f"x{i + 1}" for i in range(n)))
         if len(self.states) != n or found["scales"].shape != (n,):
-            raise ValueError(f"{self.name}: {len(self.states)} state names, {found['scales'].size} scales; expected {n} of each.")
+            raise ValueError(
+                f"{self.name}: {len(self.states)} state names, {found['scales'].size} scales; expected {n} of each."
+            )
         wrong = [key for key, value in found.items() if not np.isfinite(value).all()]
         if wrong or (found["scales"] <= 0.0).any():
-            raise ValueError(f"{self.name}: {wrong[0] if wrong else 'scales'} must hold finite numbers, scales positive ones.")
+            raise ValueError(
+                f"{self.name}: {wrong[0] if wrong else 'scales'} must hold finite numbers, scales positive ones."
+            )
         if not len(found["C_continuous"]) and not len(found["C_sampled"]):
             raise ValueError(f"{self.name}: nothing is measured; give C_continuous, C_sampled, or both.")
         for key, value in found.items():
@@ -69,4 +76,4 @@ class MeasuredSystem:
         S, inverse = np.diag(self.scales), np.diag(1.0 / np.asarray(self.scales))
         return MeasuredSystem(
             inverse @ self.A @ S, self.C_continuous @ S, self.C_sampled @ S, self.states, name=self.name
-        )  # fmt: skip
+        )

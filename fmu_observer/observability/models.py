@@ -1,4 +1,6 @@
-"""Detectability of the models that observers are built on: at every vertex, or somewhere of a nonlinear one. Raises in words."""
+"""Detectability of the models that observers are built on: at every vertex, or somewhere of a nonlinear one. Raises in
+words.
+"""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
-"""Modes that no measurement sees, by the staircase of the pair (A, C), which is the Popov-Belevitch-Hautus test made safe.
+"""Modes that no measurement sees, by the staircase of the pair (A, C), which is the Popov-Belevitch-Hautus test made
+safe.
 
-A mode is unobservable when an eigenvector of A lies in the kernel of C: ``rank [lambda I - A; C] < n`` (Hautus 1969). With
-computed eigenvalues this fails where they are repeated, as in every chain of integrators; the staircase finds the unobservable
-subspace by orthogonal steps first (Paige 1981) and needs the eigenvalues in it only.
+A mode is unobservable when an eigenvector of A lies in the kernel of C: ``rank [lambda I - A; C] < n`` (Hautus 1969).
+With computed eigenvalues this fails where they are repeated, as in every chain of integrators; the staircase finds the
+unobservable subspace by orthogonal steps first (Paige 1981) and needs the eigenvalues in it only.
 """
 
 from __future__ import annotations
@@ -39,11 +40,12 @@ class Mode:
 
     Attributes:
         eigenvalue: [1/s]; of a conjugate pair the one with positive imaginary part.
-        vector: its eigenvector in the units of the states, largest entry (relative to the scales) real and positive, shape (n,).
+        vector: its eigenvector in the units of the states, largest entry (relative to the scales) real and positive,
+        shape (n,).
         states: names of the states, in the order of `vector`.
         shares: sizes of the entries relative to the scales, the largest 1, shape (n,).
-        chain: 1 for an eigenvector; 2 or more for a direction that moves into the one before it in a chain of integrators, and
-            so grows as t.
+        chain: 1 for an eigenvector; 2 or more for a direction that moves into the one before it in a chain of
+            integrators, and so grows as t.
     """
 
     eigenvalue: complex
@@ -143,7 +145,9 @@ def _refuse(system: MeasuredSystem, modes: Sequence[Mode], what: str) -> None:
     if modes:
         count = f"{len(modes)} modes that" if len(modes) > 1 else "a mode that"
         listed = "; ".join(mode.explain() for mode in modes)
-        raise UnobservableError(f"{system.name}: it has {count} {what}: {listed}. Measure one of these states as well.", modes)
+        raise UnobservableError(
+            f"{system.name}: it has {count} {what}: {listed}. Measure one of these states as well.", modes
+        )
 
 
 def _mode(system: MeasuredSystem, value: complex, scaled_vector: np.ndarray, chain: int = 1) -> Mode:
@@ -157,7 +161,9 @@ def _mode(system: MeasuredSystem, value: complex, scaled_vector: np.ndarray, cha
 
 
 def _zero_cluster(values: np.ndarray, norm: float) -> list[int]:
-    """Indices of eigenvalues that are zero but for rounding, which splits m equal ones by its m-th root around their mean."""
+    """Indices of eigenvalues that are zero but for rounding, which splits m equal ones by its m-th root around their
+    mean.
+    """
     order, rounding = np.argsort(np.abs(values)), np.finfo(float).eps
     for count in range(len(values), 0, -1):
         cluster = values[order[:count]]
@@ -168,7 +174,9 @@ def _zero_cluster(values: np.ndarray, norm: float) -> list[int]:
 
 
 def _integrators(inner: np.ndarray, count: int, tolerance: float) -> list[tuple[np.ndarray, int]]:
-    """Directions of the eigenvalue zero, each with its place in a chain of integrators; those of the first place are constant."""
+    """Directions of the eigenvalue zero, each with its place in a chain of integrators; those of the first place are
+    constant.
+    """
     found: list[tuple[np.ndarray, int]] = []
     power = np.eye(len(inner))
     for place in range(1, count + 1):

@@ -27,16 +27,21 @@ class SamplePattern:
         times = np.array(instants, dtype=float).ravel()
         end = duration if duration is not None else (float(times[-1]) if times.size else 0.0)
         if not np.isfinite(times).all() or not 0.0 <= end < np.inf:
-            raise ValueError("Sample pattern: the instants and the duration must be finite, and the duration not negative [s].")
+            raise ValueError(
+                "Sample pattern: the instants and the duration must be finite, and the duration not negative [s]."
+            )
         late = np.flatnonzero(np.diff(times) <= 0.0)
         if late.size:
             i = int(late[0])
             raise ValueError(
-                f"Sample pattern: instants must increase, one sample at a time: number {i + 2} at {times[i + 1]:g} s follows "
+                f"Sample pattern: instants must increase, one sample at a time: number {i + 2} at {times[i + 1]:g} s "
+                f"follows "
                 f"number {i + 1} at {times[i]:g} s."
             )
         if times.size and not (times[0] >= 0.0 and times[-1] <= end):
-            raise ValueError(f"Sample pattern: {times[0]:g} s to {times[-1]:g} s is not within the window 0 s to {end:g} s.")
+            raise ValueError(
+                f"Sample pattern: {times[0]:g} s to {times[-1]:g} s is not within the window 0 s to {end:g} s."
+            )
         object.__setattr__(self, "instants", times)
         object.__setattr__(self, "duration", float(end))
 
@@ -51,7 +56,8 @@ class SamplePattern:
             start: its position at time zero [m]. duration: length of the window [s]; None up to the last balise.
 
         Raises:
-            ValueError: two balises lie at one place, a position is not finite, the speed is zero, or no balise is passed.
+            ValueError: two balises lie at one place, a position is not finite, the speed is zero, or no balise is
+            passed.
         """
         places = np.array(positions, dtype=float).ravel()
         if not np.isfinite(places).all() or not np.isfinite(start):
@@ -63,13 +69,16 @@ class SamplePattern:
         if same.size:
             first, second = order[same[0]] + 1, order[same[0] + 1] + 1
             raise ValueError(
-                f"Balise pattern: two balises at one place: numbers {first} and {second} at {places[order[same[0]]]:g} m. "
+                f"Balise pattern: two balises at one place: numbers {first} and {second} at {places[order[same[0]]]:g} "
+                f"m. "
                 f"They are one measurement; list the place once."
             )
         times = np.sort((places - start) / speed)
         passed = times[(times >= 0.0) & (times <= (np.inf if duration is None else duration))]
         if not passed.size:
-            raise ValueError(f"Balise pattern: from {start:g} m at {speed:g} m/s no balise is passed within the window.")
+            raise ValueError(
+                f"Balise pattern: from {start:g} m at {speed:g} m/s no balise is passed within the window."
+            )
         return cls(passed, duration)
 
     @property

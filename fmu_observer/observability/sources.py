@@ -1,4 +1,6 @@
-"""Where the matrices come from: an observer model, or any hybrid system at an operating point by its exact traced Jacobians."""
+"""Where the matrices come from: an observer model, or any hybrid system at an operating point by its exact traced
+Jacobians.
+"""
 
 from __future__ import annotations
 
@@ -32,8 +34,8 @@ def measured_plant(
 
     Args:
         system: a traceable hybrid system, a plant or an observer; events do not enter.
-        x0, u0: states and inputs of the point. continuous, sampled: names of outputs measured at all times, or at instants.
-        preset, parameters, memory: of the system. scales: typical sizes of states by name. t: time [s].
+        x0, u0: states and inputs of the point. continuous, sampled: names of outputs measured at all times, or at
+        instants. preset, parameters, memory: of the system. scales: typical sizes of states by name. t: time [s].
 
     Raises:
         ValueError: a name is unknown, nothing is measured, or nothing in the system is continuous.
@@ -45,7 +47,9 @@ def measured_plant(
     A, _, C, _ = jacobians(part, x, u, t)
 
     def rows(names: Sequence[str]) -> np.ndarray:
-        return np.asarray(C[[part.outputs.index(known(name, part.outputs, f"{system.name}: output")) for name in names]])
+        return np.asarray(
+            C[[part.outputs.index(known(name, part.outputs, f"{system.name}: output")) for name in names]]
+        )
 
     sizes = filled(dict.fromkeys(part.states, 1.0), scales, f"{system.name}: scale of")
     return MeasuredSystem(A, rows(continuous), rows(sampled), part.states, sizes, system.name)
@@ -62,7 +66,8 @@ def measured_model(
 
     Args:
         model: the model. sampled: names of the measurements taken at instants, the others last; None for all of them.
-        x0: states of the point, by default the model's starts. u0: inputs, likewise. scales: typical sizes of states by name.
+        x0: states of the point, by default the model's starts. u0: inputs, likewise. scales: typical sizes of states by
+        name.
 
     Raises:
         ValueError: a name is unknown, or a number of values is wrong.

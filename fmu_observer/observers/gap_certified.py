@@ -26,12 +26,15 @@ class GapCertified(HybridSystem):
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate of the estimation error for gaps up to `max_gap` [s], gains from the named tuple `p`."""
 
-    def certify(self, max_gap: float, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Certificate:
+    def certify(
+        self, max_gap: float, parameters: Mapping[str, Value] | None = None, preset: str | None = None
+    ) -> Certificate:
         """Exact stability check of the gains in use for sampling gaps up to `max_gap`.
 
         Args:
             max_gap: longest expected time between two samples [s].
-            parameters: values by name that replace those of the preset, scalars or whole vectors (``theta``, ``high_gain[1]``,
+            parameters: values by name that replace those of the preset, scalars or whole vectors (``theta``,
+            ``high_gain[1]``,
                 ``high_gain``).
             preset: preset to start from; by default the observer's own default.
 
@@ -39,7 +42,8 @@ class GapCertified(HybridSystem):
             The certificate; ask its `holds` and `explain()`.
 
         Raises:
-            ValueError: the gap is not positive and finite, a parameter is unknown, not finite or of another size, or the preset
+            ValueError: the gap is not positive and finite, a parameter is unknown, not finite or of another size, or
+            the preset
                 is unknown.
         """
         if not (isfinite(max_gap) and max_gap > 0.0):
@@ -52,7 +56,9 @@ class GapCertified(HybridSystem):
         return replace(certificate, observer=self.name, preset=chosen, parameters=deciding, event=event)
 
     def deciding_parameters(self) -> tuple[Signal, ...]:
-        """What the certificate names as the values it judged: all parameters but the timing, unless a subclass knows better."""
+        """What the certificate names as the values it judged: all parameters but the timing, unless a subclass knows
+        better.
+        """
         return tuple(s for s in self.parameters if s.name != "sample_period" and not is_gate_parameter(s))
 
     def _deciding_values(self, values: Any) -> tuple[tuple[str, float], ...]:

@@ -32,11 +32,14 @@ class GatedObserver(HybridSystem):
 
     The contract:
 
-    1. A subclass declares the event `balise` with the payload `balise_position`, and the position it believes is the state
+    1. A subclass declares the event `balise` with the payload `balise_position`, and the position it believes is the
+      state
        `position_state`. It writes `update` in place of `jump`, and sees there its own states only.
-    2. The gate's memory stands behind all states, its parameters behind all parameters, and the payload of the event gets
+    2. The gate's memory stands behind all states, its parameters behind all parameters, and the payload of the event
+      gets
        `balise_location_accuracy`. What became of a telegram is the event's `verdict`.
-    3. `odometer_of`, `own_bound` and `listens` say what the gate may know more of the observer, `gate_start` what `gate` is where
+    3. `odometer_of`, `own_bound` and `listens` say what the gate may know more of the observer, `gate_start` what
+      `gate` is where
        nobody sets it: `REJECT`, unless true telegrams are doubted in the shipped scenarios.
     """
 
@@ -58,7 +61,9 @@ class GatedObserver(HybridSystem):
     # -- what a subclass writes -------------------------------------------------------------------------------------
 
     def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Own states after an event, shape (own_count,), of the own states before it; a telegram here is one to be used."""
+        """Own states after an event, shape (own_count,), of the own states before it; a telegram here is one to be
+        used.
+        """
         raise NotImplementedError(f"{type(self).__name__} declares event {event!r} but has no update for it.")
 
     def odometer_of(self, u: Any) -> Array | None:
@@ -86,7 +91,9 @@ class GatedObserver(HybridSystem):
             after = self.update(event, t, vector(*own), u, p)
             return vector(*(after[i] for i in range(self.own_count)), *gate)
         estimate = own[self.position_state]
-        told = Told(u.balise_position, u.balise_location_accuracy, estimate, self.own_bound(x, p), self.odometer_of(u), t)
+        told = Told(
+            u.balise_position, u.balise_location_accuracy, estimate, self.own_bound(x, p), self.odometer_of(u), t
+        )
         judged = judge(GateMemory(*gate), told, p)
         listens = self.listens(p)
         used = np.where(listens > 0.0, judged.used, 1.0)
@@ -100,7 +107,11 @@ class GatedObserver(HybridSystem):
 
 
 def _is_gated(event: Event) -> TypeGuard[TriggeredEvent]:
-    return event.name == GATED_EVENT and isinstance(event, TriggeredEvent) and TOLD_POSITION in (s.name for s in event.payload)
+    return (
+        event.name == GATED_EVENT
+        and isinstance(event, TriggeredEvent)
+        and TOLD_POSITION in (s.name for s in event.payload)
+    )
 
 
 def _judged(event: TriggeredEvent) -> TriggeredEvent:

@@ -1,17 +1,18 @@
-"""The innovation gate: whether a position that is told can be true, beside what the observer believes. Pure functions, ours.
+"""The innovation gate: whether a position that is told can be true, beside what the observer believes. Pure functions,
+ours.
 
 The limit of the innovation ``|estimate - told|`` is
 
     ``gate_floor + location accuracy + own bound + gate_drift * way + gate_spread * recent``
 
-with the way since the last position that was used, as the observer believes it, and `recent` the largest innovation of late,
-halved at every telegram: the bound of its own error that an observer without a covariance has. While an observer converges the
-gate is therefore open; and nothing is doubted before `gate_recover` telegrams in a row were within the limit, for an observer may
-start anywhere. It is touched at telegrams only, so it costs nothing between them.
+with the way since the last position that was used, as the observer believes it, and `recent` the largest innovation of
+late, halved at every telegram: the bound of its own error that an observer without a covariance has. While an observer
+converges the gate is therefore open; and nothing is doubted before `gate_recover` telegrams in a row were within the
+limit, for an observer may start anywhere. It is touched at telegrams only, so it costs nothing between them.
 
-Positions that were doubted may be right and the estimate wrong. So each is compared with the one doubted before it: they agree
-where the way between them is the way of the odometer, or that of the estimate. After `gate_recover` that agree, the position
-is taken, the estimate restarts there, and the gate is open again until it has settled.
+Positions that were doubted may be right and the estimate wrong. So each is compared with the one doubted before it:
+they agree where the way between them is the way of the odometer, or that of the estimate. After `gate_recover` that
+agree, the position is taken, the estimate restarts there, and the gate is open again until it has settled.
 """
 
 from __future__ import annotations
@@ -25,14 +26,21 @@ from plant_models.hybrid.event import DOUBTED, IGNORED, USED
 from plant_models.hybrid.system import Array
 
 OFF, WARN, REJECT = 0.0, 1.0, 2.0
-"""Values of the parameter `gate`: every telegram is used; doubted ones are used and counted; they are ignored and counted."""
+"""Values of the parameter `gate`: every telegram is used; doubted ones are used and counted; they are ignored and
+counted.
+"""
 
 FORGETTING = 0.5  # of the recent innovation, at each telegram
 VERDICT = "gate_verdict"
 
 GATE_PARAMETERS = (
     parameter(
-        "gate", "1", REJECT, "Balises that cannot be true: 0 not looked for, 1 used and counted, 2 ignored", min=0.0, max=2.0
+        "gate",
+        "1",
+        REJECT,
+        "Balises that cannot be true: 0 not looked for, 1 used and counted, 2 ignored",
+        min=0.0,
+        max=2.0,
     ),
     parameter("gate_floor", "m", 0.5, "Innovation that is never doubted", min=1e-3),
     parameter("gate_drift", "1", 0.05, "Error granted for the way since the last balise, a share of it", min=0.0),
@@ -77,7 +85,8 @@ class Told(NamedTuple):
 
     Args:
         position: told [m]. accuracy: of the place of the balise, either way [m]. estimate: believed position [m].
-        bound: of the estimate's own error, where the observer has one [m]. odometer: reading [m/s]; None where there is none.
+        bound: of the estimate's own error, where the observer has one [m]. odometer: reading [m/s]; None where there is
+        none.
         t: stamp [s].
     """
 
@@ -90,7 +99,9 @@ class Told(NamedTuple):
 
 
 class Judgement(NamedTuple):
-    """Args: used: 1 where the position is used, else 0. restart: 1 where the estimate restarts there. memory: afterwards."""
+    """Args: used: 1 where the position is used, else 0. restart: 1 where the estimate restarts there. memory:
+    afterwards.
+    """
 
     used: Array
     restart: Array
@@ -128,7 +139,9 @@ def judge(before: GateMemory, told: Told, p: Any) -> Judgement:
         np.where(doubted > 0.0, told.position, before.doubted_position),
         np.where(doubted > 0.0, innovation, before.doubted_innovation),
         np.where(doubted > 0.0, told.t, before.doubted_time),
-        before.doubted_odometer if told.odometer is None else np.where(doubted > 0.0, told.odometer, before.doubted_odometer),
+        before.doubted_odometer
+        if told.odometer is None
+        else np.where(doubted > 0.0, told.odometer, before.doubted_odometer),
     )
     return Judgement(used, restart, after)
 
@@ -138,7 +151,8 @@ def _agreeing(before: GateMemory, told: Told, innovation: Array, p: Any) -> Arra
     spacing = told.position - before.doubted_position
     tolerance = _granted(np.abs(spacing), told.accuracy, p)
     agrees = is_same = _is(np.abs(spacing) <= tolerance)
-    agrees = np.maximum(agrees, _is(np.abs(innovation - before.doubted_innovation) <= tolerance))  # the way of the estimate
+    # the way of the estimate
+    agrees = np.maximum(agrees, _is(np.abs(innovation - before.doubted_innovation) <= tolerance))
     if told.odometer is not None:
         way = 0.5 * (told.odometer + before.doubted_odometer) * (told.t - before.doubted_time)
         agrees = np.maximum(agrees, _is(np.abs(spacing - way) <= tolerance))

@@ -37,13 +37,17 @@ class ModelObserver(HybridSystem):
 
     The contract:
 
-    1. A subclass sets `timing`: measurements are ``continuous`` inputs ``measured_<y>``; or such inputs read at a ``periodic``
+    1. A subclass sets `timing`: measurements are ``continuous`` inputs ``measured_<y>``; or such inputs read at a
+      ``periodic``
        event `sampling`; or the payload ``<event>_<y>`` of a triggered ``event``, the model's own.
-    2. The state begins with the estimates ``estimated_<x>``, n of them, which flow; behind them stand `extra_states`, continuous
-       too, then `extra_memory`. Where `discrete` is set the estimates are memory and stand behind `extra_states`. A subclass sets
-       both before ``super().__init__``.
-    3. It writes `flow` or `jump` or both, and `condition_of`, the existence or stability condition for the gains in use.
-    4. Gains are parameters (`gain_parameter`), so they can be changed in an FMU; their starts come from a design rule that the
+    2. The state begins with the estimates ``estimated_<x>``, n of them, which flow; behind them stand `extra_states`,
+      continuous
+       too, then `extra_memory`. Where `discrete` is set the estimates are memory and stand behind `extra_states`. A
+       subclass sets both before ``super().__init__``.
+    3. It writes `flow` or `jump` or both, and `condition_of`, the existence or stability condition for the gains in
+      use.
+    4. Gains are parameters (`gain_parameter`), so they can be changed in an FMU; their starts come from a design rule
+      that the
        subclass names. Matrices are flat, row by row; `as_matrix` restores them.
     5. Outputs are the estimates under the names of the model's states.
 
@@ -72,10 +76,15 @@ class ModelObserver(HybridSystem):
         self.inputs = (*self.model.inputs, *measured)
         moves: Variability = "discrete" if self.discrete else "continuous"
         self.outputs = (
-            *(output_signal(s.name, s.unit, f"Estimate: {s.description}", variability=moves) for s in self.model.states),
+            *(
+                output_signal(s.name, s.unit, f"Estimate: {s.description}", variability=moves)
+                for s in self.model.states
+            ),
             *self.extra_outputs,
         )
-        period = parameter("sample_period", "s", self.model.sample_period, "Sampling period of the measurements", min=1e-6)
+        period = parameter(
+            "sample_period", "s", self.model.sample_period, "Sampling period of the measurements", min=1e-6
+        )
         self.parameters = (*self.gain_parameters, *((period,) if self.timing == "periodic" else ()))
         self.events = self._events()
         super().__init__(model=self.model.name, **options)
@@ -132,7 +141,9 @@ class ModelObserver(HybridSystem):
 
     def _estimates(self) -> tuple[Signal, ...]:
         kind = memory if self.discrete else state
-        return tuple(kind(f"estimated_{s.name}", s.unit, s.start, f"Estimate: {s.description}") for s in self.model.states)
+        return tuple(
+            kind(f"estimated_{s.name}", s.unit, s.start, f"Estimate: {s.description}") for s in self.model.states
+        )
 
     def _events(self) -> tuple[Any, ...]:
         if self.timing == "periodic":
@@ -149,4 +160,6 @@ def as_matrix(flat: Array, rows: int, columns: int) -> Array:
 
 
 def _renamed(signal: Signal, prefix: str, variability: Literal["continuous", "discrete"] = "continuous") -> Signal:
-    return input_signal(f"{prefix}{signal.name}", signal.unit, signal.start, signal.description, variability=variability)
+    return input_signal(
+        f"{prefix}{signal.name}", signal.unit, signal.start, signal.description, variability=variability
+    )

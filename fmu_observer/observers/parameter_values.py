@@ -12,12 +12,16 @@ Value = float | Sequence[float] | np.ndarray
 
 
 def parameter_values(
-    system: HybridSystem, overrides: Mapping[str, Value] | None = None, preset: str | None = None, purpose: str = "to certify"
+    system: HybridSystem,
+    overrides: Mapping[str, Value] | None = None,
+    preset: str | None = None,
+    purpose: str = "to certify",
 ) -> np.ndarray:
     """Parameters of a preset with some replaced, flat, shape (k,).
 
     Args:
-        system: whose parameters. overrides: values by name, scalars or whole vectors (``theta``, ``gain[1]``, ``gain``).
+        system: whose parameters. overrides: values by name, scalars or whole vectors (``theta``, ``gain[1]``,
+        ``gain``).
         preset: preset to start from; None for the system's default.
         purpose: for the message, as in "unknown parameter x to certify".
 
@@ -34,7 +38,9 @@ def parameter_values(
             raise ValueError(f"{system.name}: unknown parameter {name!r} {purpose}; it has: {', '.join(vectors)}.")
         elements = _numbers(value)
         if elements.size not in (1, len(targets)) or not np.all(np.isfinite(elements)):
-            raise ValueError(f"{system.name}: parameter {name!r} {purpose} needs {len(targets)} finite number(s), got {value!r}.")
+            raise ValueError(
+                f"{system.name}: parameter {name!r} {purpose} needs {len(targets)} finite number(s), got {value!r}."
+            )
         _check_bounds(f"{system.name}: parameter {name!r} {purpose}", signals[name], elements)
         values[[names.index(target) for target in targets]] = elements
     return values
@@ -42,7 +48,9 @@ def parameter_values(
 
 def _check_bounds(where: str, signal: Signal, elements: np.ndarray) -> None:
     limits = {"least": signal.min, "most": signal.max}
-    low, high = (np.inf * sign if limit is None else limit for sign, limit in zip((-1, 1), limits.values(), strict=True))
+    low, high = (
+        np.inf * sign if limit is None else limit for sign, limit in zip((-1, 1), limits.values(), strict=True)
+    )
     if elements.min() < low or elements.max() > high:
         within = " and ".join(f"at {word} {limit:g}" for word, limit in limits.items() if limit is not None)
         unit = "" if signal.unit == "1" else f" {signal.unit}"

@@ -23,12 +23,13 @@ LARGEST = len(LEVANT_GAINS) - 1
 class SignalDifferentiator(HybridSystem):
     """Base of the differentiators of one scalar signal f with ``|f^(n+1)| <= L``.
 
-    The contract: a subclass sets `discrete` where the estimates are memory, gives the filter states and further signals to
-    ``super().__init__``, and writes `flow` or `jump`, and `accuracy`. The state begins with the filter states, then the estimates
-    of f and its n derivatives.
+    The contract: a subclass sets `discrete` where the estimates are memory, gives the filter states and further signals
+    to ``super().__init__``, and writes `flow` or `jump`, and `accuracy`. The state begins with the filter states, then
+    the estimates of f and its n derivatives.
 
-    Between communication points the signal is held. Evaluations more frequent than the signal is renewed see a staircase: keep
-    the interval between evaluations (internal step or sampling period) equal to the interval at which the signal comes.
+    Between communication points the signal is held. Evaluations more frequent than the signal is renewed see a
+    staircase: keep the interval between evaluations (internal step or sampling period) equal to the interval at which
+    the signal comes.
 
     Args:
         order: number n of derivatives.
@@ -43,13 +44,19 @@ class SignalDifferentiator(HybridSystem):
     discrete: ClassVar[bool] = False
 
     def __init__(
-        self, order: int, filtering_order: int, unit: str, *, extra_parameters: tuple[Signal, ...] = (),
+        self,
+        order: int,
+        filtering_order: int,
+        unit: str,
+        *,
+        extra_parameters: tuple[Signal, ...] = (),
         extra_memory: tuple[Signal, ...] = (),
-    ) -> None:  # fmt: skip
+    ) -> None:
         require_whole(self.name, 0, order=order, filtering_order=filtering_order)
         if order + filtering_order > LARGEST:
             raise ValueError(
-                f"{self.name}: order {order} with filtering order {filtering_order}: expected whole numbers from 0 on with a sum "
+                f"{self.name}: order {order} with filtering order {filtering_order}: expected whole numbers from 0 on "
+                f"with a sum "
                 f"of at most {LARGEST}, for which gains are tabulated."
             )
         self.order, self.filtering_order = order, filtering_order
@@ -63,8 +70,12 @@ class SignalDifferentiator(HybridSystem):
         self.states = (*filters, *estimates, *extra_memory)
         self.inputs = (input_signal("signal", unit, 0.0, "Signal to differentiate"),)
         moves: Variability = "discrete" if self.discrete else "continuous"
-        self.outputs = tuple(output_signal(name, u, f"Estimate of {text}", variability=moves) for name, u, text in described)
-        bound = parameter("bound", rate_unit(unit, order + 1), 1.0, f"Bound L of derivative {order + 1} of the signal", min=1e-12)
+        self.outputs = tuple(
+            output_signal(name, u, f"Estimate of {text}", variability=moves) for name, u, text in described
+        )
+        bound = parameter(
+            "bound", rate_unit(unit, order + 1), 1.0, f"Bound L of derivative {order + 1} of the signal", min=1e-12
+        )
         self.parameters = (bound, *extra_parameters)
         filters_too = {"filtering_order": filtering_order} if filtering_order else {}
         super().__init__(order=order, unit=unit, **filters_too)
@@ -80,20 +91,28 @@ class SignalDifferentiator(HybridSystem):
     def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
         """What the differentiator asks of its signal, and how well it can do, for the parameters in use.
 
-        The gains are tabulated ones, whose convergence in finite time is Levant's theorem; so the condition is one on the signal:
-        L bounds its derivative n + 1. `unit_sine_rate` is the largest rate [rad/s] of a sine of amplitude 1 that is within L, and
-        ``chatter_i = L h^(n+1-i)`` the size of the error of derivative i that a time h between evaluations leaves.
+        The gains are tabulated ones, whose convergence in finite time is Levant's theorem; so the condition is one on
+        the signal:
+        L bounds its derivative n + 1. `unit_sine_rate` is the largest rate [rad/s] of a sine of amplitude 1 that is
+        within L, and ``chatter_i = L h^(n+1-i)`` the size of the error of derivative i that a time h between
+        evaluations leaves.
         """
         p = self.unpack_parameters(parameter_values(self, parameters, preset, "to judge"))
         bound, h, n = float(p.bound), self.interval(p), self.order
         chatter = {f"chatter_{i}": bound * h ** (n + 1 - i) for i in range(n + 1)}
         return Condition(
             holds=bound > 0.0,
-            values={"order": n, "filtering_order": self.filtering_order, "bound": bound, "interval": h,
-                    "unit_sine_rate": max(bound, 0.0) ** (1.0 / (n + 1)), **chatter},
+            values={
+                "order": n,
+                "filtering_order": self.filtering_order,
+                "bound": bound,
+                "interval": h,
+                "unit_sine_rate": max(bound, 0.0) ** (1.0 / (n + 1)),
+                **chatter,
+            },
             statement="bound > 0, and the signal's derivative of order n + 1 stays within it",
             source=self.source,
-        )  # fmt: skip
+        )
 
 
 def rate_unit(unit: str, order: int) -> str:

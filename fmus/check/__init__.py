@@ -1,7 +1,7 @@
 """What an FMU really does, whatever it says about itself: ``fmus check``, and the probe of the master in `probe.py`.
 
-Importing it costs nothing; what does the work is loaded when it is first used. It may use `plant_models`, `fmu_observer` and
-the rest of `fmus`, never `cosim`.
+Importing it costs nothing; what does the work is loaded when it is first used. It may use `plant_models`,
+`fmu_observer` and the rest of `fmus`, never `cosim`.
 """
 
 from __future__ import annotations

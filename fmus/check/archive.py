@@ -1,4 +1,6 @@
-"""Archives: an FMU file is looked at before anything of it is unpacked, and refused where it is broken, dangerous or foreign."""
+"""Archives: an FMU file is looked at before anything of it is unpacked, and refused where it is broken, dangerous or
+foreign.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,11 @@ MAX_UNPACKED_BYTES = 2 * 1024**3
 MAX_FILES = 100_000
 MAX_DESCRIPTION_BYTES = 256 * 1024**2
 ENCRYPTED = 1
-INTERFACES = {"coSimulation": "co-simulation", "modelExchange": "model exchange", "scheduledExecution": "scheduled execution"}
+INTERFACES = {
+    "coSimulation": "co-simulation",
+    "modelExchange": "model exchange",
+    "scheduledExecution": "scheduled execution",
+}
 
 
 class NotAnFmuError(ValueError):
@@ -125,7 +131,9 @@ def demand_harmless(path: Path, entries: list[zipfile.ZipInfo], max_bytes: int =
     size = sum(entry.file_size for entry in entries)
     if size > max_bytes or len(entries) > MAX_FILES:
         limit = f"{max_bytes / 1e9:.1f} GB and {MAX_FILES} files"
-        raise NotAnFmuError(f"{path} would unpack to {size / 1e9:.1f} GB; refused: {len(entries)} files, the limit is {limit}.")
+        raise NotAnFmuError(
+            f"{path} would unpack to {size / 1e9:.1f} GB; refused: {len(entries)} files, the limit is {limit}."
+        )
     for entry in entries:
         name = entry.orig_filename
         if name.startswith("/") or ":" in name or "\\" in name or ".." in PurePosixPath(name).parts or "\0" in name:
@@ -143,7 +151,9 @@ def _description(path: Path, names: list[str], versions: Sequence[str]) -> Model
         description = read_description(path)
     except Exception as error:  # whatever a broken file makes the parser throw
         reason = why_unreadable(path, error)
-        raise NotAnFmuError(f"{path} is not a readable FMU: modelDescription.xml cannot be parsed ({reason}).") from error
+        raise NotAnFmuError(
+            f"{path} is not a readable FMU: modelDescription.xml cannot be parsed ({reason})."
+        ) from error
     version = str(description.fmiVersion)
     if not version.startswith(tuple(known[:2] for known in versions)):
         supported = f"{', '.join(versions[:-1])} and {versions[-1]}"

@@ -12,7 +12,9 @@ import numpy as np
 from fmus.check.bench import WARM_UP_STEPS, Bench, elsewhere
 
 STEP_TOLERANCE = 0.01
-"""A divided step may differ from a whole one by this share of the change: far above any integration error, far below a lie."""
+"""A divided step may differ from a whole one by this share of the change: far above any integration error, far below a
+lie.
+"""
 
 UNEVEN = 0.3137
 """Where the whole step is divided: no simple fraction, so that it is no multiple of an internal step."""
@@ -21,7 +23,9 @@ MICRO = 1e-4
 """A step of this share of the whole one must move the outputs, and by about that share of the change."""
 
 MICRO_EXCESS = 20.0
-"""By how much more a tiny step may move an output than its share: an output may start to move faster than on average."""
+"""By how much more a tiny step may move an output than its share: an output may start to move faster than on
+average.
+"""
 
 ENOUGH = 0.5
 """Share of the moving outputs that must behave; a sampled one among them need not move in a tiny step."""

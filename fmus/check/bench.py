@@ -36,9 +36,14 @@ class Bench:
     """
 
     def __init__(
-        self, make: Callable[[], Steppable], starts: Mapping[str, Any], start_time: float, h: float,
-        component: Steppable | None = None, until: float | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        make: Callable[[], Steppable],
+        starts: Mapping[str, Any],
+        start_time: float,
+        h: float,
+        component: Steppable | None = None,
+        until: float | None = None,
+    ) -> None:
         self._make, self.starts, self.t0, self.h = make, starts, start_time, h
         self.component = make() if component is None else component
         self.end = max(end_of_experiment(self.component.description, start_time), until or start_time)
@@ -73,7 +78,9 @@ class Bench:
     def output_names(self) -> list[str]:
         """Names of the outputs, elements of arrays included; where there are none, of the first local variables."""
         locals_ = self.component.names("local")[:LOOKED_AT]
-        return self.component.names("output") or [n for n in locals_ if self.component.variables[n].variability in MOVING]
+        return self.component.names("output") or [
+            n for n in locals_ if self.component.variables[n].variability in MOVING
+        ]
 
     @property
     def discrete(self) -> np.ndarray:
@@ -83,9 +90,9 @@ class Bench:
     def excite(self, limit: float = np.inf) -> bool:
         """Find inputs under which the outputs move; an amplitude that breaks the FMU is none.
 
-        First the start values of the inputs, then the same value added to all, then a different one for each (a difference of
-        inputs is zero under equal ones), then a change of the inputs (what has no memory moves with them only), then more steps
-        (a sensor may be sampled slowly).
+        First the start values of the inputs, then the same value added to all, then a different one for each (a
+        difference of inputs is zero under equal ones), then a change of the inputs (what has no memory moves with them
+        only), then more steps (a sensor may be sampled slowly).
 
         Args:
             limit: time after which no more is tried [s].
@@ -192,7 +199,8 @@ class Bench:
 def end_of_experiment(description: ModelDescription, start_time: float) -> float:
     """Where the default experiment ends [s]; long after the start where there is none.
 
-    Some FMUs divide the time up to the announced end into steps of their own: a far end is a coarse step, or a run without end.
+    Some FMUs divide the time up to the announced end into steps of their own: a far end is a coarse step, or a run
+    without end.
     """
     experiment = description.defaultExperiment
     stop = _number(experiment.stopTime if experiment else None, start_time)

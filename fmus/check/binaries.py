@@ -1,4 +1,6 @@
-"""Binaries: which libraries an FMU file holds, and whether the one needed on this machine is among them; by names alone."""
+"""Binaries: which libraries an FMU file holds, and whether the one needed on this machine is among them; by names
+alone.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,8 @@ def why_not_here(description: ModelDescription, identifiers: Collection[str], na
     if others:
         wanted = " or ".join(f"binaries/{here}/{identifier}{own}" for identifier in sorted(identifiers))
         return (
-            f"has its library under another name than its model identifier: it holds binaries/{here}/{', '.join(sorted(others))} "
+            f"has its library under another name than its model identifier: it holds "
+            f"binaries/{here}/{', '.join(sorted(others))} "
             f"where {wanted} is wanted. Rename the file in the archive, or ask the FMU's maker for a right export."
         )
     has = ", ".join(sorted({folder for folder, file in map(_folder_and_file, names) if file})) or "none"

@@ -1,8 +1,8 @@
 """The catalogue: all checks that run an FMU, in order, by interface type, and what it means where one fails.
 
-What a failure means is judged by what becomes of a run of this package's master: NOTE, where no master of this package does such
-a thing; LIMIT, where a run is right as long as the advice is followed; DISTRUST, where a plain run may be wrong or may not come
-to its end. A crash is never less than a limit.
+What a failure means is judged by what becomes of a run of this package's master: NOTE, where no master of this package
+does such a thing; LIMIT, where a run is right as long as the advice is followed; DISTRUST, where a plain run may be
+wrong or may not come to its end. A crash is never less than a limit.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ ONE_INSTANCE = "have one instance of it in a process, a fresh process for each r
 NO_PROBE = "with balises on it, choose the method early-return or interpolate: the probe for the others would crash too"
 SLOW = "it hangs or is slow there: a longer --timeout tells which"
 MISSING = "do not use the capabilities whose functions are missing"
-NO_REDOING = "do not redo steps: the master finds passings by shorter steps or interpolation, and iterates nothing"
+NO_REDOING = "do not redo steps: the master finds crossings by shorter steps or interpolation, and iterates nothing"
 FIXED_STEP = "keep to one communication step; an event inside it can only be interpolated"
 NO_BYTES = "do not store its states or take them to another instance"
 
@@ -64,7 +64,12 @@ SLAVE_CHECKS = (
     Check("loading", life.loading, DISTRUST, basis=True),
     Check("exported symbols", life.slave_symbols, LIMIT, MISSING),
     Check("initialise", life.initialise, DISTRUST, "give start values, if it needs some", basis=True),
-    Check("values at start", life.values_at_start, LIMIT, "give start values, so that what it feeds does not begin with these"),
+    Check(
+        "values at start",
+        life.values_at_start,
+        LIMIT,
+        "give start values, so that what it feeds does not begin with these",
+    ),
     Check("getters", life.getters, LIMIT, "leave these variables out of connections and recordings"),
     Check("stepping", life.stepping, DISTRUST, basis=True),
     Check(REPEATED, life.repeated, LIMIT, "give each run a fresh process, and compare no two runs digit by digit"),
@@ -81,7 +86,9 @@ SLAVE_CHECKS = (
     Check("serialised state", state.serialised, LIMIT, NO_BYTES, compares=True),
     Check("state in another instance", state.other_instance, LIMIT, NO_BYTES, compares=True),
     Check("two instances", instances.two_instances, LIMIT, ONE_INSTANCE, compares=True),
-    Check("repeated instantiation", instances.repeated_instantiation, LIMIT, "do not make many instances in one process"),
+    Check(
+        "repeated instantiation", instances.repeated_instantiation, LIMIT, "do not make many instances in one process"
+    ),
     Check("logging", life.logging, LIMIT, "leave its logging off", compares=True),
     Check("events", events.events, DISTRUST),
     Check("directional derivatives", derivatives.slave_derivatives, LIMIT, "do not use its derivatives"),

@@ -1,7 +1,7 @@
 """Command line: ``fmus check FILE.fmu``.
 
-Exit codes: 0 use it as it is, or with the limits that are told; 1 do not trust it, with ``--strict`` also where there are limits;
-2 the file cannot be checked, the check itself failed, or a mistake of the user.
+Exit codes: 0 use it as it is, or with the limits that are told; 1 do not trust it, with ``--strict`` also where there
+are limits; 2 the file cannot be checked, the check itself failed, or a mistake of the user.
 """
 
 from __future__ import annotations
@@ -20,13 +20,19 @@ TRUTH = {"true": 1.0, "false": 0.0}
 
 def add_parser(commands: Any) -> None:
     """Add the subcommand to what `argparse.ArgumentParser.add_subparsers` returned."""
-    parser: argparse.ArgumentParser = commands.add_parser("check", help="how far an FMU can be trusted: validity and behaviour")
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "check", help="how far an FMU can be trusted: validity and behaviour"
+    )
     parser.add_argument("file", type=Path, metavar="FILE", help="an FMU, FMI 2.0 or 3.0")
     parser.add_argument("--step", type=float, metavar="H", help="communication step in s (default: the FMU's own)")
     parser.add_argument("--start", action="append", default=[], metavar="K=V", help="start value; may be repeated")
-    parser.add_argument("--timeout", type=float, default=30.0, metavar="S", help="time limit of each check in s (default 30)")
+    parser.add_argument(
+        "--timeout", type=float, default=30.0, metavar="S", help="time limit of each check in s (default 30)"
+    )
     length = parser.add_mutually_exclusive_group()
-    length.add_argument("--steps", type=int, metavar="N", help="steps of the longest run (default 50, within its experiment)")
+    length.add_argument(
+        "--steps", type=int, metavar="N", help="steps of the longest run (default 50, within its experiment)"
+    )
     length.add_argument("--until", type=float, metavar="T", help="end of the longest run in s, in place of --steps")
     parser.add_argument("--strict", action="store_true", help="limits end with exit code 1 too")
     parser.add_argument("--json", metavar="FILE", help="write the report as JSON; '-' prints it in place of the table")
@@ -75,9 +81,14 @@ def _checked(options: argparse.Namespace) -> Any:
             bar.update()
 
         return running.check_fmu(
-            options.file, step=options.step, starts=starts, timeout=options.timeout, steps=options.steps, until=options.until,
+            options.file,
+            step=options.step,
+            starts=starts,
+            timeout=options.timeout,
+            steps=options.steps,
+            until=options.until,
             progress=progress,
-        )  # fmt: skip
+        )
 
 
 def _starts(words: Sequence[str]) -> dict[str, float]:

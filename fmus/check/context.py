@@ -1,4 +1,6 @@
-"""Context: all that a check function needs: the unpacked FMU, how to run it, and a bench that the checks of one process share."""
+"""Context: all that a check function needs: the unpacked FMU, how to run it, and a bench that the checks of one process
+share.
+"""
 
 from __future__ import annotations
 
@@ -30,9 +32,15 @@ class Context:
     """
 
     def __init__(
-        self, folder: Path, description: ModelDescription, step: float, start_time: float,
-        starts: Mapping[str, float], budget: float, steps: int,
-    ) -> None:  # fmt: skip
+        self,
+        folder: Path,
+        description: ModelDescription,
+        step: float,
+        start_time: float,
+        starts: Mapping[str, float],
+        budget: float,
+        steps: int,
+    ) -> None:
         self.folder, self.description = folder, description
         self.step, self.start_time, self.starts, self.budget, self.steps = step, start_time, dict(starts), budget, steps
         self._made = 0
@@ -49,7 +57,9 @@ class Context:
 
     def quiet_bench(self) -> Bench:
         """A bench that has not been stepped to find an excitation; the caller puts it away."""
-        return Bench(self.slave, self.starts, self.start_time, self.step, until=self.start_time + self.steps * self.step)
+        return Bench(
+            self.slave, self.starts, self.start_time, self.step, until=self.start_time + self.steps * self.step
+        )
 
     @cached_property
     def bench(self) -> Bench:

@@ -12,19 +12,26 @@ RELATIVE_STEP = 1e-6
 """Of a finite difference: near the cube root of the rounding unit, where central differences are best."""
 
 TOLERANCE = 1e-3
-"""Between a derivative and its finite difference, as a share of either: far above what differences lose, far below a mistake."""
+"""Between a derivative and its finite difference, as a share of either: far above what differences lose, far below a
+mistake.
+"""
 
 ROUNDING = 1e3 * np.finfo(float).eps
 """What evaluation loses, as a share of the values; internal sums and functions cost some digits."""
 
 NOTHING = 1e-9
-"""A change of an unknown over the nominal range of a known that counts as none: at a flat point both sides are rounding."""
+"""A change of an unknown over the nominal range of a known that counts as none: at a flat point both sides are
+rounding.
+"""
 
 
 def compare(
-    evaluate: Callable[[str, float], np.ndarray], directional: Callable[[str], np.ndarray],
-    knowns: Mapping[str, float], unknowns: Sequence[str], nominal: Mapping[str, float],
-) -> Outcome:  # fmt: skip
+    evaluate: Callable[[str, float], np.ndarray],
+    directional: Callable[[str], np.ndarray],
+    knowns: Mapping[str, float],
+    unknowns: Sequence[str],
+    nominal: Mapping[str, float],
+) -> Outcome:
     """Compare column by column.
 
     Args:
@@ -49,5 +56,7 @@ def compare(
         if bad.any():
             k = int(np.argmax(bad))
             found = 0.5 * (right[k] + left[k])
-            return failed(f"the derivative of {unknowns[k]} along {name} is said to be {said[k]:g}, differences give {found:g}")
+            return failed(
+                f"the derivative of {unknowns[k]} along {name} is said to be {said[k]:g}, differences give {found:g}"
+            )
     return passed(f"{pairs} derivatives agree with finite differences")

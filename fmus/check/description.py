@@ -21,14 +21,23 @@ LEFT_OUT = {
 ELEMENTS = {"CoSimulation": "coSimulation", "ModelExchange": "modelExchange"}
 TRUE = {"true", "1"}
 CLOCK_ATTRIBUTES: dict[str, Any] = {
-    "priority": int, "intervalDecimal": float, "shiftDecimal": float, "resolution": int, "intervalCounter": int,
-    "shiftCounter": int, "supportsFraction": TRUE.__contains__, "canBeDeactivated": TRUE.__contains__,
-}  # fmt: skip
+    "priority": int,
+    "intervalDecimal": float,
+    "shiftDecimal": float,
+    "resolution": int,
+    "intervalCounter": int,
+    "shiftCounter": int,
+    "supportsFraction": TRUE.__contains__,
+    "canBeDeactivated": TRUE.__contains__,
+}
 
 FLAGS_OF_FMI_1 = (
-    "canHandleVariableCommunicationStepSize", "canInterpolateInputs", "canRunAsynchronuously",
-    "canBeInstantiatedOnlyOncePerProcess", "canNotUseMemoryManagementFunctions",
-)  # fmt: skip
+    "canHandleVariableCommunicationStepSize",
+    "canInterpolateInputs",
+    "canRunAsynchronuously",
+    "canBeInstantiatedOnlyOncePerProcess",
+    "canNotUseMemoryManagementFunctions",
+)
 
 
 def read_description(source: Path) -> ModelDescription:
@@ -57,7 +66,9 @@ def read_description(source: Path) -> ModelDescription:
 
 
 def why_unreadable(source: Path, error: Exception) -> str:
-    """Why a model description could not be read: what the schema of the standard says first, else what the parser threw."""
+    """Why a model description could not be read: what the schema of the standard says first, else what the parser
+    threw.
+    """
     try:
         read_model_description(str(source), validate=True)
     except ValidationError as found:
@@ -89,7 +100,9 @@ def declared_tolerance(description: ModelDescription) -> float | None:
 
 
 def negated_aliases(source: Path) -> frozenset[str]:
-    """Names of the variables of an FMI 1.0 FMU whose slave holds the value with the other sign; fmpy does not read it."""
+    """Names of the variables of an FMI 1.0 FMU whose slave holds the value with the other sign; fmpy does not read
+    it.
+    """
     root = ElementTree.fromstring(_text(source))
     entries = root.iterfind("ModelVariables/ScalarVariable")
     return frozenset(entry.get("name", "") for entry in entries if entry.get("alias") == "negatedAlias")

@@ -1,4 +1,6 @@
-"""Drift: how fast an FMU leaves what the same FMU computes to a finer tolerance. It is what its solver's own errors add up to."""
+"""Drift: how fast an FMU leaves what the same FMU computes to a finer tolerance. It is what its solver's own errors add
+up to.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Findings: what one check saw, and what it means for a co-simulation run. Standard library only; they travel as plain data."""
+"""Findings: what one check saw, and what it means for a co-simulation run. Standard library only; they travel as plain
+data.
+"""
 
 from __future__ import annotations
 

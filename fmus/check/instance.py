@@ -1,4 +1,5 @@
-"""Instances: what co-simulation and model exchange have in common when an FMU is driven under test, for FMI 2.0 and 3.0.
+"""Instances: what co-simulation and model exchange have in common when an FMU is driven under test, for FMI 2.0 and
+3.0.
 
 Every call is guarded: whatever the FMU or fmpy throws comes out as a `SlaveError` with what the FMU logged last.
 """
@@ -28,7 +29,15 @@ LOADING = "loading the library"
 INSTANTIATING = "instantiate"
 FATAL = 4  # FMI status: the instance must not be called again
 MESSAGES_KEPT = 20
-OWN_MISTAKES = (TypeError, AttributeError, LookupError, NameError, AssertionError, ArithmeticError, ctypes.ArgumentError)
+OWN_MISTAKES = (
+    TypeError,
+    AttributeError,
+    LookupError,
+    NameError,
+    AssertionError,
+    ArithmeticError,
+    ctypes.ArgumentError,
+)
 """What wrong calls end with, whatever FMU is called."""
 
 NUMERIC_TYPES = frozenset(
@@ -42,7 +51,9 @@ def element_names(variable: ModelVariable) -> list[str]:
     """The names of the elements of an array, ``y[1,2]``, row by row; of a scalar its own."""
     if not variable.shape:
         return [variable.name]
-    return [f"{variable.name}[{','.join(map(str, place))}]" for place in product(*(range(1, n + 1) for n in variable.shape))]
+    return [
+        f"{variable.name}[{','.join(map(str, place))}]" for place in product(*(range(1, n + 1) for n in variable.shape))
+    ]
 
 
 class SlaveError(RuntimeError):
@@ -64,11 +75,15 @@ class FmuInstance:
 
     interface: str
 
-    def __init__(self, folder: Path, description: ModelDescription, name: str = "checked", *, logging: bool = False) -> None:
+    def __init__(
+        self, folder: Path, description: ModelDescription, name: str = "checked", *, logging: bool = False
+    ) -> None:
         self.name, self.description, self.logging = name, description, logging
         self.version = fmi_version(description)
         self.tolerance = declared_tolerance(description)
-        self.variables: dict[str, ModelVariable] = {n: v for v in description.modelVariables for n in (v.name, *element_names(v))}
+        self.variables: dict[str, ModelVariable] = {
+            n: v for v in description.modelVariables for n in (v.name, *element_names(v))
+        }
         self.messages: deque[str] = deque(maxlen=MESSAGES_KEPT)
         self.terminated = False
         self._alive = self._running = False
@@ -92,7 +107,9 @@ class FmuInstance:
         return list(self.slave.dll.missing)
 
     def names(self, causality: str) -> list[str]:
-        """Names of the numeric scalars and elements of one causality, each once; no clocks, nothing clocked, no aliases."""
+        """Names of the numeric scalars and elements of one causality, each once; no clocks, nothing clocked, no
+        aliases.
+        """
         own = [v for v in self.description.modelVariables if v.alias is None and v.causality == causality]
         return [n for v in own if v.type in NUMERIC_TYPES and not v.clocks for n in element_names(v)]
 
@@ -162,7 +179,9 @@ class FmuInstance:
         return call, buffer
 
     def _whole(self, names: Sequence[str]) -> tuple[list[ModelVariable], np.ndarray, np.ndarray]:
-        """The whole variables of scalars and elements, the places of these among all their values, and room for the values."""
+        """The whole variables of scalars and elements, the places of these among all their values, and room for the
+        values.
+        """
         whole = {self.variables[n].name: self.variables[n] for n in names}
         place = {n: k for k, n in enumerate(n for v in whole.values() for n in element_names(v))}
         return list(whole.values()), np.array([place[n] for n in names], dtype=np.intp), np.zeros(len(place))
@@ -184,7 +203,9 @@ class FmuInstance:
             kind = "Integer" if self.version == 2 else "Int64"
         call = getattr(self.slave, f"get{kind}")
         size = {"nValues": prod(variable.shape)} if variable.shape else {}
-        values: list[Any] = self.guarded(f"get{kind} of {variable.name}", lambda: call([variable.valueReference], **size))
+        values: list[Any] = self.guarded(
+            f"get{kind} of {variable.name}", lambda: call([variable.valueReference], **size)
+        )
         return values
 
     def derivative(self, unknowns: Sequence[str], known: str) -> np.ndarray:
@@ -192,7 +213,9 @@ class FmuInstance:
         references = [self.variables[n].valueReference for n in unknowns]
         along = [self.variables[known].valueReference]
         return np.array(
-            self.guarded("getDirectionalDerivative", lambda: self.slave.getDirectionalDerivative(references, along, [1.0]))
+            self.guarded(
+                "getDirectionalDerivative", lambda: self.slave.getDirectionalDerivative(references, along, [1.0])
+            )
         )
 
     # -- state ------------------------------------------------------------------------------------------------------
@@ -226,7 +249,9 @@ class FmuInstance:
         return SlaveError(reason + place + (f"; the FMU says: {self.messages[-1]}" if self.messages else ""))
 
     def guarded(self, what: str, call: Callable[[], Any]) -> Any:
-        """Run a call; whatever the FMU or fmpy throws for it becomes a `SlaveError`, a mistake of ours stays what it is."""
+        """Run a call; whatever the FMU or fmpy throws for it becomes a `SlaveError`, a mistake of ours stays what it
+        is.
+        """
         try:
             return call()
         except (SlaveError, *OWN_MISTAKES):
@@ -251,11 +276,15 @@ class FmuInstance:
         slave, tolerance = self.slave, self.tolerance
         if self.version == 2:
             setup = slave.setupExperiment
-            self.guarded("setupExperiment", lambda: setup(tolerance=tolerance, startTime=start_time, stopTime=stop_time))
+            self.guarded(
+                "setupExperiment", lambda: setup(tolerance=tolerance, startTime=start_time, stopTime=stop_time)
+            )
             self.guarded("enterInitializationMode", slave.enterInitializationMode)
         else:
             enter = slave.enterInitializationMode
-            self.guarded("enterInitializationMode", lambda: enter(tolerance=tolerance, startTime=start_time, stopTime=stop_time))
+            self.guarded(
+                "enterInitializationMode", lambda: enter(tolerance=tolerance, startTime=start_time, stopTime=stop_time)
+            )
 
     def _callbacks(self) -> Any:
         """fmpy's callbacks with our logger in place of the one that prints."""

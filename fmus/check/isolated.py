@@ -1,6 +1,8 @@
-"""Isolation: checks run in a child process with a time limit, so that an FMU that crashes, hangs or prints takes nothing down.
+"""Isolation: checks run in a child process with a time limit, so that an FMU that crashes, hangs or prints takes
+nothing down.
 
-A child costs about half a second to start. One that dies or stays silent costs the check it was in; another child does the rest.
+A child costs about half a second to start. One that dies or stays silent costs the check it was in; another child does
+the rest.
 """
 
 from __future__ import annotations
@@ -47,7 +49,8 @@ class _Child:
     """What came of one child process.
 
     Args:
-        findings: what it told. current: the check it was in when it ended, empty where it did all. end: how it ended, in words.
+        findings: what it told. current: the check it was in when it ended, empty where it did all. end: how it ended,
+        in words.
         crashed: whether it ended by itself or had to be stopped for what it took; not where it was silent.
         left: processes that it left running.
     """
@@ -126,9 +129,13 @@ def _process(console: IO[bytes]) -> Iterator[subprocess.Popen[bytes]]:
         paths = [str(PACKAGE_ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
         process = subprocess.Popen(
             [sys.executable, "-P", "-m", "fmus.check.keeper", str(PROCESSES), str(MEMORY)],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=console, cwd=folder, start_new_session=True,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=console,
+            cwd=folder,
+            start_new_session=True,
             env=os.environ | {"PYTHONPATH": os.pathsep.join(paths), "PYTHONWARNINGS": "ignore"},
-        )  # fmt: skip
+        )
         try:
             yield process
         finally:
@@ -199,7 +206,9 @@ def _left(running: int) -> Finding:
 
 
 def _console(console: IO[bytes]) -> Finding:
-    """What the FMU printed past its logger; everything a child prints comes from the FMU or from Python dying under it."""
+    """What the FMU printed past its logger; everything a child prints comes from the FMU or from Python dying under
+    it.
+    """
     size = console.seek(0, os.SEEK_END)
     console.seek(0)
     first = console.readline().decode("utf-8", "replace").strip()[:SHOWN]

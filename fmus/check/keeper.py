@@ -1,8 +1,10 @@
-"""The keeper: the process between a check and its worker; it counts what the FMU starts, and leaves nothing of it running.
+"""The keeper: the process between a check and its worker; it counts what the FMU starts, and leaves nothing of it
+running.
 
-Started by `fmus.check.isolated` as ``python -m fmus.check.keeper PROCESSES BYTES``. It forks: the child becomes the worker, in a
-session of its own; what any descendant leaves behind becomes a child of the keeper (on Linux), so that nothing escapes by forking
-twice. Its last line says how the worker ended. Where there is no fork, the worker runs here, unwatched.
+Started by `fmus.check.isolated` as ``python -m fmus.check.keeper PROCESSES BYTES``. It forks: the child becomes the
+worker, in a session of its own; what any descendant leaves behind becomes a child of the keeper (on Linux), so that
+nothing escapes by forking twice. Its last line says how the worker ended. Where there is no fork, the worker runs here,
+unwatched.
 """
 
 from __future__ import annotations

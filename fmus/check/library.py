@@ -1,6 +1,7 @@
 """Libraries: fmpy's slave and model classes over a shared library that may lack functions, and which ones it must have.
 
-fmpy refuses a library that lacks any function of the standard. Here a missing one is noted, and fails when it is called.
+fmpy refuses a library that lacks any function of the standard. Here a missing one is noted, and fails when it is
+called.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The probe: what an FMU really does with steps of any length, saved states and resets, whatever it says about itself.
 
-It works on instances of its own, made and thrown away here, with inputs that make something happen. The master chooses its
-localisation method by it.
+It works on instances of its own, made and thrown away here, with inputs that make something happen. The master chooses
+its localisation method by it.
 """
 
 from __future__ import annotations
@@ -33,9 +33,10 @@ class ProbeReport:
         repeatable: after a reset the same steps gave the identical outputs.
         excited: some input made the outputs move, so that the findings mean something.
         remarks: what failed, in words.
-        spread: by output, in its own unit: how far results lay apart that differ by the solver's steps alone, after restoring
-            and between a step and its parts. Empty where that was not measured.
-        drift: by output, in its own unit for each second: how fast it leaves what a finer tolerance gives. Empty likewise.
+        spread: by output, in its own unit: how far results lay apart that differ by the solver's steps alone, after
+            restoring and between a step and its parts. Empty where that was not measured.
+        drift: by output, in its own unit for each second: how fast it leaves what a finer tolerance gives. Empty
+        likewise.
     """
 
     component: str
@@ -75,8 +76,12 @@ def probe(make: Callable[[], Steppable], starts: Mapping[str, Any], start_time: 
     component = make()
     declares: dict[str, Any] = {"declares_variable_step": component.can_vary_step, "declares_state": component.can_save}
     nothing_seen: dict[str, Any] = {
-        "honest_step": False, "restores": "no", "restore_mismatch": None, "repeatable": False, "excited": False,
-    }  # fmt: skip
+        "honest_step": False,
+        "restores": "no",
+        "restore_mismatch": None,
+        "repeatable": False,
+        "excited": False,
+    }
     if component.description.coSimulation.canBeInstantiatedOnlyOncePerProcess:
         component.free()
         remark = "not probed: the FMU allows one instance per process only"
@@ -94,7 +99,9 @@ def probe(make: Callable[[], Steppable], starts: Mapping[str, Any], start_time: 
 
 
 def _seen(bench: Bench, declares: Mapping[str, bool], remarks: list[str]) -> dict[str, Any]:
-    """Find an excitation, then check what is declared. Resets come first: the other checks rely on them where they work."""
+    """Find an excitation, then check what is declared. Resets come first: the other checks rely on them where they
+    work.
+    """
     excited = bench.excite()
     if not excited:
         remarks.append("no input made the outputs move; findings are weak")
@@ -103,10 +110,14 @@ def _seen(bench: Bench, declares: Mapping[str, bool], remarks: list[str]) -> dic
     found = _restoring(bench, remarks) if declares["declares_state"] else None
     spread = _spread(bench, found) if honest else {}
     return {
-        "honest_step": honest, "repeatable": repeats, "excited": excited,
-        "restores": found.restores if found else "no", "restore_mismatch": found.mismatch if found else None,
-        "spread": spread, "drift": _drift(bench) if any(spread.values()) else {},
-    }  # fmt: skip
+        "honest_step": honest,
+        "repeatable": repeats,
+        "excited": excited,
+        "restores": found.restores if found else "no",
+        "restore_mismatch": found.mismatch if found else None,
+        "spread": spread,
+        "drift": _drift(bench) if any(spread.values()) else {},
+    }
 
 
 def _restoring(bench: Bench, remarks: list[str]) -> Restoring | None:

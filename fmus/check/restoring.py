@@ -1,7 +1,8 @@
 """Restoring: what follows a restored state, against what followed when it was saved.
 
-The state of a solver with a variable step is rarely all that a saved state holds: order, step size and history are chosen anew,
-and what follows lies within the solver's tolerance of what it was. That is another finding than a state that was not restored.
+The state of a solver with a variable step is rarely all that a saved state holds: order, step size and history are
+chosen anew, and what follows lies within the solver's tolerance of what it was. That is another finding than a state
+that was not restored.
 """
 
 from __future__ import annotations
@@ -42,7 +43,8 @@ class Restoring:
 
     Args:
         restores: ``exact`` bit for bit; ``within_tolerance`` of the solver; ``no``.
-        mismatch: largest difference of an output after restoring, relative to its size, or its movement where that is more.
+        mismatch: largest difference of an output after restoring, relative to its size, or its movement where that is
+        more.
         apart: largest difference of each output in its own unit, shape (q,).
         problem: what differed, in words; empty where nothing did.
     """
@@ -56,9 +58,9 @@ class Restoring:
 def restoring(bench: Bench) -> Restoring:
     """Save, go on, go elsewhere under other inputs, restore twice: the same steps must give the same outputs.
 
-    Several steps are compared, because a part of the state that was not restored may take time to show, and one of them is
-    short where the FMU takes such steps. Where they differ, the instance is sent further away once more: what was not restored
-    then differs by more, what a solver makes of its restart does not.
+    Several steps are compared, because a part of the state that was not restored may take time to show, and one of them
+    is short where the FMU takes such steps. Where they differ, the instance is sent further away once more: what was
+    not restored then differs by more, what a solver makes of its restart does not.
     """
     path = continuation(bench)
     bench.begin()
@@ -92,7 +94,9 @@ def solver_tolerance(bench: Bench) -> float:
 
 
 def _judged(first: np.ndarray, trips: Sequence[Trip], tolerance: float, problem: str) -> Restoring:
-    """Compare the rows after saving, shape (k, q), with those after each excursion; `tolerance` is the solver's, relative."""
+    """Compare the rows after saving, shape (k, q), with those after each excursion; `tolerance` is the solver's,
+    relative.
+    """
     verdict: Restores = "within_tolerance"
     mismatch, furthest = 0.0, np.zeros(first.shape[1])
     size = np.max(np.abs(first), axis=0)
@@ -118,7 +122,9 @@ def near(bench: Bench, first: Sequence[np.ndarray], redone: Sequence[np.ndarray]
 
 
 def largest(first: np.ndarray | Sequence[np.ndarray], redone: np.ndarray) -> np.ndarray:
-    """Largest differences of each output, shape (q,), between rows that should agree; infinite where only one is a number."""
+    """Largest differences of each output, shape (q,), between rows that should agree; infinite where only one is a
+    number.
+    """
     a, b = np.broadcast_arrays(np.asarray(first), redone)
     with np.errstate(invalid="ignore"):  # infinite values of one sign do not differ
         apart = np.where((a == b) | (np.isnan(a) & np.isnan(b)), 0.0, np.abs(a - b))

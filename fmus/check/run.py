@@ -83,9 +83,15 @@ class CheckReport:
 
 
 def check_fmu(
-    path: Path | str, *, step: float | None = None, starts: Mapping[str, float] | None = None, timeout: float = TIMEOUT,
-    steps: int | None = None, until: float | None = None, progress: Callable[[str], None] = lambda _: None,
-) -> CheckReport:  # fmt: skip
+    path: Path | str,
+    *,
+    step: float | None = None,
+    starts: Mapping[str, float] | None = None,
+    timeout: float = TIMEOUT,
+    steps: int | None = None,
+    until: float | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> CheckReport:
     """Check what an FMU really does. Its code runs in child processes; a crash there is a finding.
 
     Args:
@@ -107,7 +113,9 @@ def check_fmu(
     description = archive.description
     size = default_step(description) if step is None else step
     if not 0.0 < size < math.inf or not 0.0 < timeout < math.inf:
-        raise ValueError(f"The communication step ({size:g} s) and the time limit ({timeout:g} s) must be positive and finite.")
+        raise ValueError(
+            f"The communication step ({size:g} s) and the time limit ({timeout:g} s) must be positive and finite."
+        )
     chosen = dict(starts or {})
     _demand_settable(description, chosen)
     start_time = _start_time(description)
@@ -160,7 +168,9 @@ def _steps(description: ModelDescription, step: float, steps: int | None, until:
     if steps is None and until is None:
         return max(1, min(STEPS, math.floor((end_of_experiment(description, start) - start) / step + WHOLE)))
     if until is not None and not start < until < math.inf:
-        raise ValueError(f"The end of the longest run ({until:g} s) must lie after the start ({start:g} s) and be finite.")
+        raise ValueError(
+            f"The end of the longest run ({until:g} s) must lie after the start ({start:g} s) and be finite."
+        )
     count = steps if until is None else math.ceil((until - start) / step - WHOLE)
     if count is None or count < 1:
         raise ValueError(f"The longest run must have a step at least, not {count}.")
@@ -173,14 +183,17 @@ def _meant(archive: Archive, interface: str, findings: list[Finding]) -> list[Fi
         return findings
     own = {check.name for check in CATALOGUE[interface]}
     meant = {Verdict.LIMIT, Verdict.DISTRUST}
-    return [replace(f, verdict=Verdict.NOTE, advice="") if f.check in own and f.verdict in meant else f for f in findings]
+    return [
+        replace(f, verdict=Verdict.NOTE, advice="") if f.check in own and f.verdict in meant else f for f in findings
+    ]
 
 
 def _demand_runnable(archive: Archive, findings: list[Finding]) -> None:
     """Refuse an FMU that cannot be loaded or makes no instance on this machine: nothing can be said of it, good or bad.
 
     Raises:
-        NotAnFmuError: it is so for co-simulation, or for model exchange where there is nothing else; the message says why.
+        NotAnFmuError: it is so for co-simulation, or for model exchange where there is nothing else; the message says
+        why.
     """
     prefix = "" if CO_SIMULATION in archive.interfaces else "model exchange: "
     for finding in findings:
@@ -200,7 +213,9 @@ def _demand_settable(description: ModelDescription, starts: Mapping[str, float])
         if found.causality in UNSETTABLE or found.variability == "constant":
             raise ValueError(f"{name} cannot be set: it is '{found.causality}' and '{found.variability}'.")
         if found.type not in NUMERIC_TYPES or found.shape:
-            raise ValueError(f"{name} cannot be set: it is a {found.type}{list(found.shape or ())}; only scalar numbers can.")
+            raise ValueError(
+                f"{name} cannot be set: it is a {found.type}{list(found.shape or ())}; only scalar numbers can."
+            )
 
 
 def _merged(findings: list[Finding]) -> tuple[Finding, ...]:

@@ -20,8 +20,8 @@ CLOCKS = ("calculated", "constant", "fixed", "tunable", "changing", "countdown",
 def tell_apart(description: ModelDescription) -> None:
     """Give internal variables that share one name a name each: nobody can mean one of them by it, and nobody needs to.
 
-    Public FMUs have such pairs. Inputs, outputs and parameters are left as they are: they are set and connected by name, so that
-    two of one name are refused.
+    Public FMUs have such pairs. Inputs, outputs and parameters are left as they are: they are set and connected by
+    name, so that two of one name are refused.
     """
     named: dict[str, list[ModelVariable]] = {}
     for variable in description.modelVariables:

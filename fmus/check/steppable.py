@@ -1,6 +1,7 @@
 """What can be probed: the face of a co-simulation component that the behaviour checks need. Types only.
 
-`fmus.check.slave.FmuSlave` has it, and so have the components of the master: its probe and ``fmus check`` run the same code.
+`fmus.check.slave.FmuSlave` has it, and so have the components of the master: its probe and ``fmus check`` run the same
+code.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ FAILURES = (RuntimeError, ValueError, OSError)
 class Steppable(Protocol):
     """A co-simulation component, from instantiation to the end.
 
-    1. `instantiate`, `set_start`, `enter_initialization`, readers and writers, `exit_initialization`, then `advance` in turn,
+    1. `instantiate`, `set_start`, `enter_initialization`, readers and writers, `exit_initialization`, then `advance` in
+      turn,
        `terminate`, `free`. `reset` leads back to the state after `instantiate`.
     2. `save`, `restore` and `release` exist where `can_save` says so.
     3. Each call raises one of `FAILURES` where the slave refuses or throws.

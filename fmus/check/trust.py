@@ -1,4 +1,6 @@
-"""Trust: what a master can rely on, in sentences, from the findings. Knows the names of the checks and nothing of FMUs."""
+"""Trust: what a master can rely on, in sentences, from the findings. Knows the names of the checks and nothing of
+FMUs.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +24,13 @@ def what_to_trust(findings: Iterable[Finding]) -> list[str]:
     if by_name["stepping"].verdict in (Verdict.DISTRUST, Verdict.ERROR, Verdict.SKIPPED):
         return ["Nothing: it could not be stepped."]
     sentences = [
-        _variable_step(by_name), _rollback(by_name), _reset(by_name), _instances(by_name), _events(by_name), _process(by_name)
-    ]  # fmt: skip
+        _variable_step(by_name),
+        _rollback(by_name),
+        _reset(by_name),
+        _instances(by_name),
+        _events(by_name),
+        _process(by_name),
+    ]
     return [sentence for sentence in sentences if sentence]
 
 
@@ -61,8 +68,13 @@ def _rollback(findings: Mapping[str, Finding]) -> str:
     if _good(findings, "state round trip"):
         return "Rollback: yes. A restored state gives the identical continuation, so steps may be redone."
     if "within the tolerance" in findings["state round trip"].detail:
-        return "Rollback: to within the tolerance of its solver. Steps may be redone, and what is redone differs by as much."
-    reason = "states are not restored" if _failed(findings, "state round trip") else _why_not(findings, "state round trip")
+        return (
+            "Rollback: to within the tolerance of its solver. Steps may be redone, and what is redone differs by as "
+            "much."
+        )
+    reason = (
+        "states are not restored" if _failed(findings, "state round trip") else _why_not(findings, "state round trip")
+    )
     return f"Rollback: no ({reason}). Do not redo steps."
 
 

@@ -63,7 +63,9 @@ def run(job: Job, tell: Callable[[dict[str, Any]], None]) -> None:
     context.close()
 
 
-def findings(checks: list[Check], context: Context, starting: Callable[[str], None] = lambda _: None) -> Iterator[Finding]:
+def findings(
+    checks: list[Check], context: Context, starting: Callable[[str], None] = lambda _: None
+) -> Iterator[Finding]:
     """Run checks one after the other; where one that is the basis of the others fails, these are skipped.
 
     Args:

@@ -1,7 +1,7 @@
 """Command line ``fmus``: list, build, check, info.
 
-Exit codes: 0 done, 1 the FMU has problems, 2 a mistake of the user or a build that failed or was interrupted, 141 nobody reads
-the output any more.
+Exit codes: 0 done, 1 the FMU has problems, 2 a mistake of the user or a build that failed or was interrupted, 141
+nobody reads the output any more.
 """
 
 from __future__ import annotations
@@ -48,7 +48,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="fmus", description="Export train models and observers as FMUs, and check FMUs.")
+    parser = argparse.ArgumentParser(
+        prog="fmus", description="Export train models and observers as FMUs, and check FMUs."
+    )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     listing = commands.add_parser("list", help="models that can be exported, with their presets and options")
     listing.set_defaults(run=_list)
@@ -60,7 +62,8 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-# -- list ---------------------------------------------------------------------------------------------------------------
+# -- list
+# ---------------------------------------------------------------------------------------------------------------
 
 
 def _list(_options: argparse.Namespace) -> int:
@@ -96,7 +99,8 @@ def _first_line(text: str) -> str:
     return lines[0] if lines else ""
 
 
-# -- info ---------------------------------------------------------------------------------------------------------------
+# -- info
+# ---------------------------------------------------------------------------------------------------------------
 
 
 def _info(options: argparse.Namespace) -> int:

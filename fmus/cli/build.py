@@ -37,23 +37,47 @@ class Job:
 def add_parser(commands: Any) -> None:
     """Add the subcommand to what `argparse.ArgumentParser.add_subparsers` returned."""
     parser: argparse.ArgumentParser = commands.add_parser(
-        "build", help="export models as native FMUs", epilog=EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter
+        "build",
+        help="export models as native FMUs",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("names", nargs="*", metavar="NAME", help="model name, see 'fmus list', or path/to/file.py:ClassName")
+    parser.add_argument(
+        "names", nargs="*", metavar="NAME", help="model name, see 'fmus list', or path/to/file.py:ClassName"
+    )
     parser.add_argument("--all", action="store_true", help="all models that 'fmus list' shows")
     parser.add_argument(
         "--fmi", choices=tuple(VERSIONS), default="3", help="FMI version (default 3); both: folders fmi2 and fmi3"
     )
-    parser.add_argument("--platform", default="host", metavar="P", help="host (default), all, or names separated by commas, "
-                        "e.g. x86_64-linux,win64; named ones need the extra 'cross'")  # fmt: skip
-    parser.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="folder or .fmu file (default: here)")
+    parser.add_argument(
+        "--platform",
+        default="host",
+        metavar="P",
+        help="host (default), all, or names separated by commas, "
+        "e.g. x86_64-linux,win64; named ones need the extra 'cross'",
+    )
+    parser.add_argument(
+        "-o", "--output", type=Path, default=Path(), metavar="DIR", help="folder or .fmu file (default: here)"
+    )
     parser.add_argument("--preset", metavar="P", help="preset whose values become the start values")
-    parser.add_argument("--option", action="append", default=[], metavar="K=V", help="option of the model; may be repeated")
-    parser.add_argument("--events", choices=("clocks", "counts"), help="how an FMI 3 FMU is told of events: by clocks, in event "
-                        "mode (default), or by counts, for tools without event mode")  # fmt: skip
-    parser.add_argument("--late-policy", choices=LATE_POLICIES, default=LATE_POLICIES[0], help="what to do with late events; "
-                        "start value of the parameter late_policy (default replay)")  # fmt: skip
-    parser.add_argument("--hosted", action="store_true", help="FMI 2.0 with Python inside, for a model that cannot be traced")
+    parser.add_argument(
+        "--option", action="append", default=[], metavar="K=V", help="option of the model; may be repeated"
+    )
+    parser.add_argument(
+        "--events",
+        choices=("clocks", "counts"),
+        help="how an FMI 3 FMU is told of events: by clocks, in event "
+        "mode (default), or by counts, for tools without event mode",
+    )
+    parser.add_argument(
+        "--late-policy",
+        choices=LATE_POLICIES,
+        default=LATE_POLICIES[0],
+        help="what to do with late events; start value of the parameter late_policy (default replay)",
+    )
+    parser.add_argument(
+        "--hosted", action="store_true", help="FMI 2.0 with Python inside, for a model that cannot be traced"
+    )
     parser.set_defaults(run=run)
 
 
@@ -106,7 +130,9 @@ def _run_hosted(options: argparse.Namespace) -> int:
             path = hosted.build_hosted_fmu(place, options.output, options=chosen, preset=options.preset)
         else:
             path = hosted.build_hosted_fmu(model, options.output, preset=options.preset)
-        print(f"{model.name}: FMI 2.0, {path.stat().st_size / 1000:.0f} kB, runs in Python", file=sys.stderr, flush=True)
+        print(
+            f"{model.name}: FMI 2.0, {path.stat().st_size / 1000:.0f} kB, runs in Python", file=sys.stderr, flush=True
+        )
         print(path, flush=True)
     return 0
 
@@ -125,7 +151,8 @@ def _summary(job: Job, path: Path) -> str:
     return f"{job.system.name}: FMI {job.fmi_version}.0, {path.stat().st_size / 1000:.0f} kB, {', '.join(platforms)}"
 
 
-# -- what to build ------------------------------------------------------------------------------------------------------
+# -- what to build
+# ------------------------------------------------------------------------------------------------------
 
 
 def _jobs(options: argparse.Namespace) -> list[Job]:
@@ -139,7 +166,9 @@ def _jobs(options: argparse.Namespace) -> list[Job]:
     repeated = sorted({s.name for s in systems if [t.name for t in systems].count(s.name) > 1})
     if repeated:
         raise ValueError(f"Several models have the name {', '.join(repeated)} and would overwrite each other.")
-    folders = {version: options.output / f"fmi{version}" if len(versions) > 1 else options.output for version in versions}
+    folders = {
+        version: options.output / f"fmi{version}" if len(versions) > 1 else options.output for version in versions
+    }
     return [Job(system, version, folders[version]) for version in versions for system in systems]
 
 

@@ -29,7 +29,11 @@ def _unexpected(error: BaseException, options: argparse.Namespace) -> str:
 
 
 def _task(options: argparse.Namespace) -> str:
-    names, file, target = getattr(options, "names", None), getattr(options, "file", None), getattr(options, "output", None)
+    names, file, target = (
+        getattr(options, "names", None),
+        getattr(options, "file", None),
+        getattr(options, "output", None),
+    )
     if names:
         return f"building {', '.join(names)} into {target}"
     return f"reading {file}" if file else "working"

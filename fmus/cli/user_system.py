@@ -23,7 +23,8 @@ def names_a_file(name: str) -> bool:
 
 
 def load_class(name: str) -> type[HybridSystem]:
-    """The class that ``path/to/file.py:ClassName`` names; ``:ClassName`` may be left out where the file has only one system.
+    """The class that ``path/to/file.py:ClassName`` names; ``:ClassName`` may be left out where the file has only one
+    system.
 
     Raises:
         UserSystemError: there is no such file or class, the file fails, or the class is no hybrid system.
@@ -33,14 +34,18 @@ def load_class(name: str) -> type[HybridSystem]:
     if not path.is_file():
         raise UserSystemError(f"{path} does not exist; write path/to/file.py:ClassName.")
     module = _run(path)
-    found: dict[str, type[HybridSystem]] = {key: value for key, value in vars(module).items() if _is_system_of(value, module)}
+    found: dict[str, type[HybridSystem]] = {
+        key: value for key, value in vars(module).items() if _is_system_of(value, module)
+    }
     if not wanted and len(found) == 1:
         return next(iter(found.values()))
     wanted_class = getattr(module, wanted, None) if wanted else None
     if isinstance(wanted_class, type) and issubclass(wanted_class, HybridSystem):
         return wanted_class
     has = ", ".join(found) or "none"
-    raise UserSystemError(f"{path} has no subclass of HybridSystem named {wanted!r}; it has: {has}. Write {path}:ClassName.")
+    raise UserSystemError(
+        f"{path} has no subclass of HybridSystem named {wanted!r}; it has: {has}. Write {path}:ClassName."
+    )
 
 
 def make_system(cls: type[HybridSystem], options: dict[str, Any]) -> HybridSystem:

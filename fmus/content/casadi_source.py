@@ -1,4 +1,6 @@
-"""The C that CasADi generates, stripped to what an FMU calls and made private, so that two FMUs never meet in one program."""
+"""The C that CasADi generates, stripped to what an FMU calls and made private, so that two FMUs never meet in one
+program.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,9 @@ FUNCTION = re.compile(
     r"\{(?:.*\}|[\s\S]*?^\})\n\n?",
     re.MULTILINE,
 )
-SPARSITY = re.compile(r"^(?:#define (?P<macro>casadi_s\d+) |static const casadi_int (?P<array>casadi_s\d+)\[).*\n", re.MULTILINE)
+SPARSITY = re.compile(
+    r"^(?:#define (?P<macro>casadi_s\d+) |static const casadi_int (?P<array>casadi_s\d+)\[).*\n", re.MULTILINE
+)
 
 INLINE = {
     "return fmax(x, y);": "return y != y ? x : x > y ? x : y;",
@@ -22,7 +26,8 @@ INLINE = {
 def private_source(source: str, called: Collection[str]) -> str:
     """Generated C with nothing visible outside its file.
 
-    CasADi writes a dozen functions of information beside each function (names, sizes, sparsity); nobody calls them here.
+    CasADi writes a dozen functions of information beside each function (names, sizes, sparsity); nobody calls them
+    here.
 
     Args:
         source: what ``CodeGenerator.dump()`` returned.

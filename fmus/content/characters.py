@@ -32,9 +32,11 @@ def check_text(text: str, whose: str) -> None:
 
 
 def number_text(value: float) -> str:
-    """A number as text: the decimal of few digits that is next to it where there is one (3.6, not 3.5999999999999996), else all.
+    """A number as text: the decimal of few digits that is next to it where there is one (3.6, not 3.5999999999999996),
+    else all.
 
-    A quotient such as ``1 / (1 / 3.6)`` is one rounding away from the number that is meant; so is what is written here at most.
+    A quotient such as ``1 / (1 / 3.6)`` is one rounding away from the number that is meant; so is what is written here
+    at most.
     """
     neat = float(f"{value:.{DIGITS}g}")
     return repr(neat if abs(neat - value) <= math.ulp(value) else float(value))

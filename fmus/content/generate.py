@@ -1,7 +1,7 @@
 """Generation: the equations of a hybrid system become the C file ``model.c``.
 
-CasADi writes the straight-line functions; this file adds the constant table (`runtime/model.h`) by which the runtime knows
-them. It touches no files.
+CasADi writes the straight-line functions; this file adds the constant table (`runtime/model.h`) by which the runtime
+knows them. It touches no files.
 """
 
 from __future__ import annotations
@@ -74,13 +74,15 @@ def trace_equations(system: HybridSystem) -> Equations:
     """
     if not system.traceable:
         raise GenerationError(
-            f"{system.name}: it uses Python that cannot be traced (traceable = False), so no C can be generated from it. "
+            f"{system.name}: it uses Python that cannot be traced (traceable = False), so no C can be generated from "
+            f"it. "
             "Step it as a block in Python, or export it with Python inside: fmus build ... --hosted."
         )
     traced = TracedSystem(system)
     if traced.digest() != TracedSystem(system).digest():
         raise GenerationError(
-            f"{system.name}: its functions give other equations each time they are traced. They must depend on t, x, u and p "
+            f"{system.name}: its functions give other equations each time they are traced. They must depend on t, x, u "
+            f"and p "
             "only: no random numbers, no clock, nothing kept on self; declare noise at a periodic event."
         )
     jumps = {f"jump_{event.name}": traced.jump(event.name) for event in system.events}
@@ -90,7 +92,9 @@ def trace_equations(system: HybridSystem) -> Equations:
     return Equations(
         step=_dense(traced.step, f"{prefix}_step", system.continuous_count) if flows else None,
         output=_dense(traced.output, f"{prefix}_output") if outputs else None,
-        jumps={event.name: _dense(jumps[f"jump_{event.name}"], f"{prefix}_jump_{event.name}") for event in system.events},
+        jumps={
+            event.name: _dense(jumps[f"jump_{event.name}"], f"{prefix}_jump_{event.name}") for event in system.events
+        },
         derivative=_dense(traced.derivative, f"{prefix}_derivative") if flows else None,
         balance=_dense(traced.balance, f"{prefix}_balance") if events else None,
         tangent=_dense(traced.tangent, f"{prefix}_tangent") if flows or outputs else None,
@@ -99,7 +103,9 @@ def trace_equations(system: HybridSystem) -> Equations:
     )
 
 
-def generate_model(system: HybridSystem, equations: Equations, description: ModelDescription, preset: str | None) -> str:
+def generate_model(
+    system: HybridSystem, equations: Equations, description: ModelDescription, preset: str | None
+) -> str:
     """The text of ``model.c``.
 
     Args:
@@ -122,7 +128,8 @@ def generate_model(system: HybridSystem, equations: Equations, description: Mode
     return "\n".join(parts)
 
 
-# -- equations ----------------------------------------------------------------------------------------------------------
+# -- equations
+# ----------------------------------------------------------------------------------------------------------
 
 
 def _dense(function: ca.Function, name: str, rows: int | None = None) -> ca.Function:
@@ -144,7 +151,8 @@ def _equations_source(name: str, equations: Equations) -> str:
     return source.strip() + "\n"
 
 
-# -- tables -------------------------------------------------------------------------------------------------------------
+# -- tables
+# -------------------------------------------------------------------------------------------------------------
 
 
 def _start_arrays(system: HybridSystem, preset: str | None) -> str:
@@ -168,7 +176,8 @@ def _event_tables(system: HybridSystem, equations: Equations) -> str:
     for event in system.triggered_events:
         count = width(event.payload)
         triggered.append(
-            f"{_text(event.name)}, {equations.jumps[event.name].name()}, {payload}, {count}, {system.verdict_index(event)}"
+            f"{_text(event.name)}, {equations.jumps[event.name].name()}, {payload}, {count}, "
+            f"{system.verdict_index(event)}"
         )
         payload += count
     communications = [equations.jumps[event.name].name() for event in system.communication_events]

@@ -16,11 +16,42 @@ LONGEST = 63
 
 C_KEYWORDS = frozenset(
     {
-        "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum", "extern", "float", "for",
-        "goto", "if", "inline", "int", "long", "register", "restrict", "return", "short", "signed", "sizeof", "static", "struct",
-        "switch", "typedef", "union", "unsigned", "void", "volatile", "while",
+        "auto",
+        "break",
+        "case",
+        "char",
+        "const",
+        "continue",
+        "default",
+        "do",
+        "double",
+        "else",
+        "enum",
+        "extern",
+        "float",
+        "for",
+        "goto",
+        "if",
+        "inline",
+        "int",
+        "long",
+        "register",
+        "restrict",
+        "return",
+        "short",
+        "signed",
+        "sizeof",
+        "static",
+        "struct",
+        "switch",
+        "typedef",
+        "union",
+        "unsigned",
+        "void",
+        "volatile",
+        "while",
     }
-)  # fmt: skip
+)
 
 
 class NameRefusedError(ValueError):
@@ -36,11 +67,15 @@ def check_names(system: HybridSystem) -> None:
     where = f"{type(system).__name__} ({system.name!r})"
     for what, name in _names(system):
         if not LEGAL.fullmatch(name):
-            raise NameRefusedError(f"{where}: the name {name!r} of {what} is not legal in C and FMI; use a-z, A-Z, 0-9, '_'.")
+            raise NameRefusedError(
+                f"{where}: the name {name!r} of {what} is not legal in C and FMI; use a-z, A-Z, 0-9, '_'."
+            )
         if len(name) > LONGEST:
             raise NameRefusedError(f"{where}: the name {name!r} of {what} is too long; {LONGEST} characters are legal.")
     if system.name in C_KEYWORDS | _runtime_words():
-        raise NameRefusedError(f"{where}: the name {system.name!r} is a word of C or of the runtime; choose another one.")
+        raise NameRefusedError(
+            f"{where}: the name {system.name!r} is a word of C or of the runtime; choose another one."
+        )
 
 
 @cache

@@ -1,6 +1,7 @@
 """XML: an fmpy `ModelDescription` is written as modelDescription.xml for FMI 2.0 and 3.0.
 
-A transcription: every name, value reference, start and dependency comes from `fmu_observer.description`. Touches no files.
+A transcription: every name, value reference, start and dependency comes from `fmu_observer.description`. Touches no
+files.
 """
 
 from __future__ import annotations
@@ -27,8 +28,11 @@ _CAPABILITIES_3 = {
     "mightReturnEarlyFromDoStep": "mightReturnEarlyFromDoStep",
 }
 _EXCHANGE_2 = (
-    "canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative", "completedIntegratorStepNotNeeded",
-)  # fmt: skip
+    "canGetAndSetFMUstate",
+    "canSerializeFMUstate",
+    "providesDirectionalDerivative",
+    "completedIntegratorStepNotNeeded",
+)
 
 
 def model_description_xml(description: ModelDescription, sources: Sequence[str] = ()) -> str:
@@ -75,7 +79,8 @@ def build_description_xml(identifier: str, sources: Sequence[str]) -> str:
     return _document(root)
 
 
-# -- head ---------------------------------------------------------------------------------------------------------------
+# -- head
+# ---------------------------------------------------------------------------------------------------------------
 
 
 def _is_2(description: ModelDescription) -> bool:
@@ -85,7 +90,11 @@ def _is_2(description: ModelDescription) -> bool:
 def _head(description: ModelDescription) -> Element:
     token = "guid" if _is_2(description) else "instantiationToken"
     names = ("description", "author", "version", "copyright", "license", "generationTool", "variableNamingConvention")
-    attributes = {"fmiVersion": description.fmiVersion, "modelName": description.modelName, token: description.instantiationToken}
+    attributes = {
+        "fmiVersion": description.fmiVersion,
+        "modelName": description.modelName,
+        token: description.instantiationToken,
+    }
     attributes |= {name: getattr(description, name) for name in names}
     if _is_2(description) and description.modelExchange is not None:
         attributes["numberOfEventIndicators"] = description.numberOfEventIndicators
@@ -98,8 +107,10 @@ def _interfaces(root: Element, description: ModelDescription, sources: Sequence[
     """Model exchange, then co-simulation: FMI 3 wants this order."""
     cosimulation, exchange, is_2 = description.coSimulation, description.modelExchange, _is_2(description)
     renamed = _CAPABILITIES_2 if is_2 else _CAPABILITIES_3
-    groups = ((exchange, "ModelExchange", {name: renamed.get(name, name) for name in _EXCHANGE_2 if is_2 or name in renamed}),
-              (cosimulation, "CoSimulation", renamed))  # fmt: skip
+    groups = (
+        (exchange, "ModelExchange", {name: renamed.get(name, name) for name in _EXCHANGE_2 if is_2 or name in renamed}),
+        (cosimulation, "CoSimulation", renamed),
+    )
     for interface, tag, names in groups:
         if interface is None:
             continue
@@ -138,7 +149,11 @@ def _units(root: Element, units: Sequence[Unit]) -> None:
         if unit.baseUnit is not None:
             _element(element, "BaseUnit", _base_unit(unit.baseUnit))
         for display in unit.displayUnits:
-            attributes = {"name": display.name, "factor": number_text(display.factor), "offset": number_text(display.offset)}
+            attributes = {
+                "name": display.name,
+                "factor": number_text(display.factor),
+                "offset": number_text(display.offset),
+            }
             _element(element, "DisplayUnit", attributes)
 
 
@@ -152,13 +167,15 @@ def _base_unit(unit: BaseUnit) -> dict[str, str | None]:
     return attributes
 
 
-# -- variables ----------------------------------------------------------------------------------------------------------
+# -- variables
+# ----------------------------------------------------------------------------------------------------------
 
 
 def _variable_2(parent: Element, variable: ModelVariable, exchanged: bool) -> None:
     names = ("name", "valueReference", "description", "causality", "variability", "initial")
     element = _element(parent, "ScalarVariable", {name: getattr(variable, name) for name in names})
-    derivative = None if variable.derivative is None else variable.derivative.valueReference  # its index, see FIRST_REFERENCE
+    # its index, see FIRST_REFERENCE
+    derivative = None if variable.derivative is None else variable.derivative.valueReference
     _element(element, variable.type, _values(variable, exchanged) | {"derivative": derivative})
 
 
@@ -187,7 +204,8 @@ def _values(variable: ModelVariable, exchanged: bool) -> dict[str, object]:
     return values
 
 
-# -- structure ----------------------------------------------------------------------------------------------------------
+# -- structure
+# ----------------------------------------------------------------------------------------------------------
 
 
 def _structure_2(root: Element, description: ModelDescription) -> None:
@@ -228,7 +246,8 @@ def _unknown(parent: Element, tag: str, key: dict[str, int], unknown: Unknown, k
     _element(parent, tag, attributes)
 
 
-# -- elements -----------------------------------------------------------------------------------------------------------
+# -- elements
+# -----------------------------------------------------------------------------------------------------------
 
 
 def _element(parent: Element, tag: str, attributes: Mapping[str, object]) -> Element:

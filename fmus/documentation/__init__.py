@@ -1,4 +1,6 @@
-"""Documentation inside an FMU: a page that says what it is, how it is built again, and the licences. Text in, bytes out."""
+"""Documentation inside an FMU: a page that says what it is, how it is built again, and the licences. Text in, bytes
+out.
+"""
 
 from __future__ import annotations
 

@@ -34,22 +34,30 @@ def _triggered(event: TriggeredEvent, by_name: dict[str, ModelVariable]) -> str:
     inputs = ", ".join(f"<code>{escape(name)}</code>" for name in [*payload, stamp])
     title = f"<h3>{escape(event.name)}</h3>" + (f"<p>{escape(event.description)}.</p>" if event.description else "")
     if count in by_name:
-        return f"{title}<p>Set {inputs}, raise <code>{escape(count)}</code> by one and step; raised by more, it is one event.</p>"
+        return (
+            f"{title}<p>Set {inputs}, raise <code>{escape(count)}</code> by one and step; raised by more, it is one "
+            f"event.</p>"
+        )
     return (
-        f"{title}<p>The triggered input clock <code>{escape(event.name)}</code>: enter event mode, set the clock and {inputs}, "
+        f"{title}<p>The triggered input clock <code>{escape(event.name)}</code>: enter event mode, set the clock and "
+        f"{inputs}, "
         "call <code>fmi3UpdateDiscreteStates</code>, enter step mode.</p>"
     )
 
 
 def _exactness(by_name: dict[str, ModelVariable]) -> str:
     text = (
-        "<p>A stamp within the coming step is hit exactly: the FMU integrates to it, jumps, and integrates on. A stamp that is "
+        "<p>A stamp within the coming step is hit exactly: the FMU integrates to it, jumps, and integrates on. A stamp "
+        "that is "
         "not set means now."
     )
     policy = by_name.get("late_policy")
     if policy is not None:
         name = LATE_POLICIES[int(policy.start) - 1]
-        text += f" A stamp before the current time goes by <code>late_policy</code>, here <code>{name}</code>: {LATE[name]}."
+        text += (
+            f" A stamp before the current time goes by <code>late_policy</code>, here <code>{name}</code>: "
+            f"{LATE[name]}."
+        )
     counts = ", ".join(f"<code>{count}</code>" for count in OUTCOME_VARIABLES if count in by_name)
     return text + (f" What became of the events is counted in {counts}." if counts else "") + "</p>"
 
@@ -59,7 +67,10 @@ def _periodic(system: HybridSystem) -> str:
     for event in system.periodic_events:
         offset = f", first after <code>{escape(event.offset)}</code>" if event.offset else ""
         what = f" {escape(event.description)}" if event.description else ""
-        items.append(f"<li><code>{escape(event.name)}</code>: every <code>{escape(event.period)}</code>{offset}.{what}</li>")
-    return "<h3>Periodic events</h3><p>They happen inside, at their own instants, between communication points too.</p>" + (
-        f"<ul>{''.join(items)}</ul>"
+        items.append(
+            f"<li><code>{escape(event.name)}</code>: every <code>{escape(event.period)}</code>{offset}.{what}</li>"
+        )
+    return (
+        "<h3>Periodic events</h3><p>They happen inside, at their own instants, between communication points too.</p>"
+        + (f"<ul>{''.join(items)}</ul>")
     )

@@ -39,7 +39,8 @@ def _entry(system: HybridSystem) -> str:
     return "\n".join(
         [
             model_terms(system),
-            "The runtime (all other C files in sources/ and what is compiled from them): BSD-3-Clause, see fmu-observer.txt.",
+            "The runtime (all other C files in sources/ and what is compiled from them): BSD-3-Clause, see "
+            "fmu-observer.txt.",
             "The headers fmi*.h in sources/: BSD-2-Clause, see fmi-headers.txt.",
             "The code that CasADi generated in sources/model.c: free of claims, see casadi-generated-code.txt.",
             "",

@@ -17,7 +17,8 @@ from fmus.toolchain.targets import Target
 from plant_models.hybrid import HybridSystem
 
 STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; color: #222; background: #fff; max-width: 60rem; margin: 0 auto; padding: 1rem; }
+body { font: 16px/1.5 system-ui, sans-serif; color: #222; background: #fff;
+       max-width: 60rem; margin: 0 auto; padding: 1rem; }
 h1, h2, h3 { line-height: 1.2; } h2 { margin-top: 2rem; border-bottom: 1px solid #ccc; }
 code { font-size: 0.95em; background: #f3f3f3; padding: 0 0.2em; overflow-wrap: anywhere; }
 code.formula { background: #eef4fb; }
@@ -76,7 +77,9 @@ def _head(description: ModelDescription, preset: str | None) -> str:
 
 def _equations(system: HybridSystem) -> str:
     classes = type(system).__mro__[: type(system).__mro__.index(HybridSystem)]
-    texts = [prose(cls.__doc__) if cls is type(system) else first_paragraph(cls.__doc__) for cls in classes if cls.__doc__]
+    texts = [
+        prose(cls.__doc__) if cls is type(system) else first_paragraph(cls.__doc__) for cls in classes if cls.__doc__
+    ]
     options = ", ".join(f"<code>{escape(name)} = {escape(str(value))}</code>" for name, value in system.options.items())
     texts += [f"<p>This FMU was built with {options}.</p>"] if options else []
     return "\n".join(texts) or "<p>The author of the model gave no description of its equations.</p>"
@@ -89,13 +92,16 @@ def _limits(system: HybridSystem, targets: Sequence[Target]) -> list[str]:
     ]
     if system.noises:
         limits.append(
-            "Its noise is a function of <code>seed</code>, signal and index: the same numbers in every run, whatever was saved, "
+            "Its noise is a function of <code>seed</code>, signal and index: the same numbers in every run, whatever "
+            "was saved, "
             "restored or repeated. Two instances with the same seed have the same noise."
         )
     if len(targets) > 1:
         limits.append("Results on different platforms may differ in the last digits: their mathematical libraries do.")
     if hasattr(system, "certify"):
-        limits.append("The certificates are those of the presets; other values of the parameters are not covered by them.")
+        limits.append(
+            "The certificates are those of the presets; other values of the parameters are not covered by them."
+        )
     return limits
 
 
@@ -103,14 +109,19 @@ def _platforms(targets: Sequence[Target]) -> str:
     items = []
     for target in targets:
         needs = f"; needs {escape(target.platform.needs)}" if target.platform.needs and target.compiler.zig else ""
-        items.append(f"<code>{escape(target.platform.name)}</code>, compiled by {escape(target.compiler.version)}{needs}")
+        items.append(
+            f"<code>{escape(target.platform.name)}</code>, compiled by {escape(target.compiler.version)}{needs}"
+        )
     return _list(items)
 
 
 def _rebuild(system: HybridSystem) -> str:
-    commands = "".join(f"{escape(f'# {name}')}\n{escape(line)}\n" for name, line in rebuild_commands(system.name).items())
+    commands = "".join(
+        f"{escape(f'# {name}')}\n{escape(line)}\n" for name, line in rebuild_commands(system.name).items()
+    )
     return (
-        "<p>On any other platform one command in the folder <code>sources</code> builds it again; how to link it statically says "
+        "<p>On any other platform one command in the folder <code>sources</code> builds it again; how to link it "
+        "statically says "
         f"<code>staticLinking.txt</code>.</p>\n<pre>{commands}</pre>"
     )
 
@@ -118,7 +129,8 @@ def _rebuild(system: HybridSystem) -> str:
 def _origin(system: HybridSystem) -> str:
     source = f"<p>Source: {escape(system.source)}.</p>" if system.source else ""
     return (
-        f"{source}\n<p>Built by {escape(_tool())}.</p>\n<p>{escape(model_terms(system))} All licences are in the folder "
+        f"{source}\n<p>Built by {escape(_tool())}.</p>\n<p>{escape(model_terms(system))} All licences are in the "
+        f"folder "
         "<code>licenses</code>.</p>"
     )
 

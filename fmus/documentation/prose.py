@@ -73,4 +73,8 @@ def _items(lines: list[str], marker: str) -> list[str]:
 def _definitions(lines: list[str]) -> str:
     items = _items(dedent("\n".join(lines)).splitlines(), r"(?=\w+: )")
     pairs = (item.partition(": ") for item in items)
-    return "<dl>" + "".join(f"<dt><code>{escape(name)}</code></dt><dd>{inline(text)}</dd>" for name, _, text in pairs) + "</dl>"
+    return (
+        "<dl>"
+        + "".join(f"<dt><code>{escape(name)}</code></dt><dd>{inline(text)}</dd>" for name, _, text in pairs)
+        + "</dl>"
+    )

@@ -33,12 +33,12 @@ A shared library, in sources/:
 
 {shared}
 
-A part of a larger program: every function of FMI gets a prefix, and nothing else is visible outside, so that several FMUs can be
-linked into one program:
+A part of a larger program: every function of FMI gets a prefix, and nothing else is visible outside, so that several FMUs can
+be linked into one program:
 
     cc -std=c11 -O2 -ffp-contract=off -DFMI{version}_FUNCTION_PREFIX={name}_ -c all.c -o {name}.o
 
     {name}_fmi{version}{"Instantiate" if version == "2" else "InstantiateCoSimulation"}(...);
 
 It needs the C library and its mathematical functions, and nothing else.
-"""
+"""  # noqa: E501

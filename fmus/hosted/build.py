@@ -1,6 +1,7 @@
 """Building a hosted FMU: the user's Python, the Python end, pythonfmu and the front are put into one file.
 
-Everything is assembled in a folder first and tried there in a process of its own, so that what is packed is what was tried.
+Everything is assembled in a folder first and tried there in a process of its own, so that what is packed is what was
+tried.
 """
 
 from __future__ import annotations
@@ -51,14 +52,19 @@ CHECK_SECONDS = 120.0
 
 
 def build_hosted_fmu(
-    model: Model, target: Path | str, *, options: Mapping[str, Any] | None = None, preset: str | None = None,
-    extra_files: Iterable[Path | str] = (), **block_arguments: Any,
-) -> Path:  # fmt: skip
+    model: Model,
+    target: Path | str,
+    *,
+    options: Mapping[str, Any] | None = None,
+    preset: str | None = None,
+    extra_files: Iterable[Path | str] = (),
+    **block_arguments: Any,
+) -> Path:
     """Export a block that cannot be traced as an FMI 2.0 co-simulation FMU that runs it in Python.
 
     Args:
-        model: ``path/to/file.py:Class`` or ``package.module:Class``, a class or function, or a hybrid system. It makes a hybrid
-            system, or an object with the calls of `fmu_observer.block.FMI2Block` and a `model_description`.
+        model: ``path/to/file.py:Class`` or ``package.module:Class``, a class or function, or a hybrid system. It makes
+            a hybrid system, or an object with the calls of `fmu_observer.block.FMI2Block` and a `model_description`.
         target: path of the FMU file (ending in ``.fmu``), or a folder that gets ``<name>.fmu``.
         options: arguments of the class; numbers, text and lists of them. None for those that a hybrid system has.
         preset: preset whose values become the start values; None for the system's default.
@@ -69,7 +75,8 @@ def build_hosted_fmu(
         Path of the FMU. The same model gives the same bytes; a failed build leaves nothing behind.
 
     Raises:
-        HostedExportError: pythonfmu is missing or has no library for this platform, or the model does not run by itself.
+        HostedExportError: pythonfmu is missing or has no library for this platform, or the model does not run by
+        itself.
         CompilerMissing: no C compiler was found. CompilationError: the compiler refused the front.
         OSError: the target cannot be written.
     """
@@ -92,22 +99,33 @@ def build_hosted_fmu(
     return pack_fmu(content | _front(description), path)
 
 
-# -- parts of the file --------------------------------------------------------------------------------------------------
+# -- parts of the file
+# --------------------------------------------------------------------------------------------------
 
 
 def _pythonfmu_library(platform: Platform) -> bytes:
     if find_spec("pythonfmu") is None:
-        raise HostedExportError("Python-hosted export needs the package pythonfmu; run: pip install 'fmu-observer[hosted]'.")
+        raise HostedExportError(
+            "Python-hosted export needs the package pythonfmu; run: pip install 'fmu-observer[hosted]'."
+        )
     if platform.name not in LIBRARIES:
-        raise HostedExportError(f"Python-hosted export is for {', '.join(LIBRARIES)} only; this machine is {platform.name}.")
+        raise HostedExportError(
+            f"Python-hosted export is for {', '.join(LIBRARIES)} only; this machine is {platform.name}."
+        )
     return (files("pythonfmu") / "resources" / "binaries" / LIBRARIES[platform.name]).read_bytes()
 
 
 def _recipe(source: Source, preset: str | None, block_arguments: Mapping[str, Any]) -> dict[str, Any]:
     recipe = {
-        "module": source.module, "class": source.name, "file": source.file, "options": dict(source.options), "preset": preset,
-        "arguments": dict(block_arguments), "python": list(OLDEST_PYTHON), "package": package_version(),
-    }  # fmt: skip
+        "module": source.module,
+        "class": source.name,
+        "file": source.file,
+        "options": dict(source.options),
+        "preset": preset,
+        "arguments": dict(block_arguments),
+        "python": list(OLDEST_PYTHON),
+        "package": package_version(),
+    }
     try:
         json.dumps(recipe)
     except TypeError as error:
@@ -155,7 +173,11 @@ def front_sources() -> dict[str, bytes]:
 
 
 def _papers(description: ModelDescription, source: Source) -> dict[str, bytes]:
-    text = f"the file resources/model/{source.file}" if source.file else f"imported from the installed module {source.module}"
+    text = (
+        f"the file resources/model/{source.file}"
+        if source.file
+        else f"imported from the installed module {source.module}"
+    )
     html = page(description, f"{source.name}, {text}", package_version(), OLDEST_PYTHON, sys.version_info[1])
     return {
         "modelDescription.xml": _xml(description).encode(),
@@ -183,7 +205,8 @@ def _digest(source: Source, recipe: Mapping[str, Any]) -> str:
     return digest.hexdigest()
 
 
-# -- description --------------------------------------------------------------------------------------------------------
+# -- description
+# --------------------------------------------------------------------------------------------------------
 
 
 def _describe(recipe: Mapping[str, Any], resources: Path, digest: str) -> ModelDescription:
@@ -202,7 +225,9 @@ def _describe(recipe: Mapping[str, Any], resources: Path, digest: str) -> ModelD
     description = copy.copy(block.model_description)
     own = hashlib.sha256(f"{description.instantiationToken}{digest}".encode()).hexdigest()
     description.instantiationToken = f"{{{own[:8]}-{own[8:12]}-{own[12:16]}-{own[16:20]}-{own[20:32]}}}"
-    text = description_text(description.description or "", package_version(), OLDEST_PYTHON, host_platform().fmi2_folder)
+    text = description_text(
+        description.description or "", package_version(), OLDEST_PYTHON, host_platform().fmi2_folder
+    )
     description.description, description.modelExchange = text, None
     description.coSimulation = _interface(description.coSimulation)
     description.logCategories = [Category(name=name, description=text) for name, text in LOG_CATEGORIES.items()]
@@ -224,20 +249,26 @@ def _xml(description: ModelDescription) -> str:
     return model_description_xml(description).replace("<CoSimulation ", '<CoSimulation needsExecutionTool="true" ', 1)
 
 
-# -- trial --------------------------------------------------------------------------------------------------------------
+# -- trial
+# --------------------------------------------------------------------------------------------------------------
 
 
 def _try_alone(resources: Path, slave: str) -> None:
-    """Make one instance in a fresh process, as an importer will: a file that was forgotten shows here and not at the user's.
+    """Make one instance in a fresh process, as an importer will: a file that was forgotten shows here and not at the
+    user's.
 
     Raises:
         HostedExportError: it cannot be made there; with what it said.
     """
     command = [sys.executable, "-c", CHECK, str(resources), slave]
     try:
-        done = subprocess.run(command, cwd=resources, capture_output=True, text=True, check=False, timeout=CHECK_SECONDS)
+        done = subprocess.run(
+            command, cwd=resources, capture_output=True, text=True, check=False, timeout=CHECK_SECONDS
+        )
     except subprocess.TimeoutExpired as error:
-        raise HostedExportError(f"making the model in a process of its own took more than {CHECK_SECONDS:g} s.") from error
+        raise HostedExportError(
+            f"making the model in a process of its own took more than {CHECK_SECONDS:g} s."
+        ) from error
     if done.returncode != 0:
         raise HostedExportError(f"the model does not run in a process of its own: {done.stderr.strip()[-2000:]}")
     messages = json.loads(done.stdout.splitlines()[-1])

@@ -28,9 +28,16 @@ MODEL_FOLDER = "model"
 BLOCK_FOLDER = Path(fmu_observer.__file__).parent
 
 CALLS = (
-    "instantiate", "setupExperiment", "enterInitializationMode", "exitInitializationMode", "doStep", "terminate", "reset",
-    "getReal", "setReal",
-)  # fmt: skip
+    "instantiate",
+    "setupExperiment",
+    "enterInitializationMode",
+    "exitInitializationMode",
+    "doStep",
+    "terminate",
+    "reset",
+    "getReal",
+    "setReal",
+)
 STATE_CALLS = ("getFMUstate", "setFMUstate", "serializeFMUstate", "deSerializeFMUstate")
 
 
@@ -89,7 +96,8 @@ def check_package(built_with: str) -> None:
     here = package_version()
     if _numbers(here) < _numbers(built_with):
         raise HostError(
-            f"this FMU was built with fmu-observer {built_with}, here is {here}; update it: pip install -U fmu-observer."
+            f"this FMU was built with fmu-observer {built_with}, here is {here}; update it: pip install -U "
+            f"fmu-observer."
         )
 
 
@@ -118,7 +126,9 @@ def make_hosted_block(recipe: Mapping[str, Any], resources: Path, instance_name:
         raise HostError(f"{what}; its model_description is for FMI {description.fmiVersion}, expected 2.0.")
     unable = [name for name in STATE_CALLS if not callable(getattr(made, name, None))]
     if description.coSimulation is None or (description.coSimulation.canGetAndSetFMUstate and unable):
-        raise HostError(f"{what}; its model_description promises canGetAndSetFMUstate, but it lacks {', '.join(unable)}.")
+        raise HostError(
+            f"{what}; its model_description promises canGetAndSetFMUstate, but it lacks {', '.join(unable)}."
+        )
     return made
 
 
@@ -142,7 +152,9 @@ def load_factory(recipe: Mapping[str, Any], resources: Path) -> Any:
 
 
 def _load_module(recipe: Mapping[str, Any], resources: Path) -> ModuleType:
-    """An installed module by its name; a loose file under a name of its own, so that two FMUs may both bring a model.py."""
+    """An installed module by its name; a loose file under a name of its own, so that two FMUs may both bring a
+    model.py.
+    """
     if recipe["file"] is None:
         return importlib.import_module(recipe["module"])
     name = recipe["module"]

@@ -21,7 +21,8 @@ def _entry(source: Source) -> str:
     return "\n".join(
         [
             _model_terms(source),
-            "The library in binaries/, and hosted_*.py and hosted.json in resources/: BSD-3-Clause, see fmu-observer.txt.",
+            "The library in binaries/, and hosted_*.py and hosted.json in resources/: BSD-3-Clause, see "
+            "fmu-observer.txt.",
             "The headers of FMI that the library was compiled with: BSD-2-Clause, see fmi-headers.txt.",
             "The folder pythonfmu and the library pythonfmu-export in resources/: MIT, see pythonfmu.txt.",
             "",

@@ -1,8 +1,9 @@
-"""The Python end of a hosted FMU. This file is copied into the FMU under a name of its own and run by pythonfmu's library there.
+"""The Python end of a hosted FMU. This file is copied into the FMU under a name of its own and run by pythonfmu's
+library there.
 
-It may import pythonfmu, which lies beside it, and the standard library; `fmu-observer` only after the check that it is there.
-Nothing here may raise: pythonfmu would be left with broken references. A failure is a message with status error in the log
-queue, which the front (the C files in front/) turns into fmi2Error.
+It may import pythonfmu, which lies beside it, and the standard library; `fmu-observer` only after the check that it is
+there. Nothing here may raise: pythonfmu would be left with broken references. A failure is a message with status error
+in the log queue, which the front (the C files in front/) turns into fmi2Error.
 """
 
 from __future__ import annotations
@@ -61,7 +62,9 @@ class Hosted(Fmi2Slave):
 
     # -- life -------------------------------------------------------------------------------------------------------
 
-    def setup_experiment(self, start_time: float, stop_time: float | None = None, tolerance: float | None = None) -> None:
+    def setup_experiment(
+        self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
+    ) -> None:
         """fmi2SetupExperiment."""
         self._hand_on("setupExperiment", None, tolerance, start_time, stop_time)
 
@@ -129,7 +132,9 @@ class Hosted(Fmi2Slave):
 
     @staticmethod
     def _fmu_state_to_bytes(state: Any) -> bytes:
-        content: bytes = _without_instance("fmi2SerializeFMUstate", b"", lambda host: host.block.serializeFMUstate(state))
+        content: bytes = _without_instance(
+            "fmi2SerializeFMUstate", b"", lambda host: host.block.serializeFMUstate(state)
+        )
         return content
 
     @staticmethod
@@ -182,7 +187,8 @@ def describe_failure(host: Any, function: str, error: BaseException, t: float | 
     return text
 
 
-# -- what must be installed -----------------------------------------------------------------------------------------------
+# -- what must be installed
+# -----------------------------------------------------------------------------------------------
 
 
 class Missing(RuntimeError):  # noqa: N818 - says what is the matter better than with a suffix
@@ -200,7 +206,9 @@ def check_python(recipe: dict[str, Any]) -> None:
     """
     needed, here = recipe["python"], ".".join(map(str, sys.version_info[:3]))
     if sys.version_info[:2] < tuple(needed):
-        raise Missing(f"this FMU needs Python {'.'.join(map(str, needed))} or later; the Python in this process is {here}.")
+        raise Missing(
+            f"this FMU needs Python {'.'.join(map(str, needed))} or later; the Python in this process is {here}."
+        )
     _enter_virtual_environment()
     missing = _missing()
     if missing:

@@ -1,4 +1,5 @@
-"""The source of a hosted model: which class it is, and which of the user's files go into the FMU. Reads files, writes none.
+"""The source of a hosted model: which class it is, and which of the user's files go into the FMU. Reads files, writes
+none.
 
 An installed package is imported by name in the importing process; a loose file is copied into ``resources/model/``.
 """
@@ -48,8 +49,8 @@ def find_source(model: Model, options: Mapping[str, Any] | None, extra_files: It
     """The source of a model.
 
     Args:
-        model: ``path/to/file.py:Class``, ``package.module:Class``, a class, a function that makes a system or a block, or a
-            hybrid system (its class and options are taken).
+        model: ``path/to/file.py:Class``, ``package.module:Class``, a class, a function that makes a system or a block,
+            or a hybrid system (its class and options are taken).
         options: arguments of the class or function; None for those that the hybrid system has.
         extra_files: files and folders that the loose file imports or reads.
 
@@ -70,7 +71,9 @@ def _named(text: str, options: dict[str, Any], extra: dict[str, bytes]) -> Sourc
         raise HostedExportError(f"{text!r} names no class; write path/to/file.py:Class or package.module:Class.")
     if not place.endswith(".py"):
         if extra:
-            raise HostedExportError(f"{text!r} is imported where the FMU runs, so extra_files have no place; name a file.py.")
+            raise HostedExportError(
+                f"{text!r} is imported where the FMU runs, so extra_files have no place; name a file.py."
+            )
         return Source(place, name, None, options)
     return _loose(Path(place), name, options, extra)
 

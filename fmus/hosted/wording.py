@@ -9,7 +9,8 @@ from fmpy.model_description import ModelDescription
 from fmus.documentation.tables import variable_table
 
 OVERHEAD = (
-    "a step costs about 10 us more than the block's own Python, which takes 10 us to more than 100 us where native C takes 1 us"
+    "a step costs about 10 us more than the block's own Python, which takes 10 us to more than 100 us where "
+    "native C takes 1 us"
 )
 """Measured, see docs/hosted_export.md."""
 
@@ -31,7 +32,8 @@ def description_text(own: str, package: str, oldest: tuple[int, int], platform: 
     """
     return (
         f"NEEDS PYTHON: this FMU runs Python code and needs {needs(package, oldest)} on the machine that runs it. "
-        f"Slow ({OVERHEAD}); not for real-time targets. Only for {platform}; loads into Python processes such as fmpy, and into "
+        f"Slow ({OVERHEAD}); not for real-time targets. Only for {platform}; loads into Python processes such as fmpy, "
+        f"and into "
         f"other programs if they find Python's library (see documentation/index.html). {own}"
     ).strip()
 
@@ -62,8 +64,10 @@ Set PYTHONPATH to the folder in which fmu-observer is installed, or VIRTUAL_ENV 
 </ul>
 <h2>Limits</h2>
 <ul>
-<li>FMI 2.0 co-simulation only; no model exchange, no directional derivatives. Events come by count, time stamp and payload.</li>
-<li>Slow: {escape(OVERHEAD)}. Instances share one Python: two threads do not run at the same time. Not for real-time targets.</li>
+<li>FMI 2.0 co-simulation only; no model exchange, no directional derivatives. Events come
+by count, time stamp and payload.</li>
+<li>Slow: {escape(OVERHEAD)}. Instances share one Python: two threads do not run at the same time.
+Not for real-time targets.</li>
 <li>An FMU state is complete. Serialised states can be read by the same FMU with the same version of fmu-observer.</li>
 <li>What the model prints, reads and imports happens in the process that loads the FMU.</li>
 <li>In a program that is not Python, make the first instance before others are made in parallel threads.</li>

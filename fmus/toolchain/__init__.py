@@ -1,1 +1,3 @@
-"""The toolchain: C files become the libraries of one or many platforms. Knows compilers and platforms, nothing of models."""
+"""The toolchain: C files become the libraries of one or many platforms. Knows compilers and platforms, nothing of
+models.
+"""

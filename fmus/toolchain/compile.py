@@ -15,7 +15,15 @@ from pathlib import Path
 
 import fmpy
 
-from fmus.toolchain.cross import EXTRA, LINK_FLAGS, ZIG_FLAGS, zig_command, zig_environment, zig_is_installed, zig_version
+from fmus.toolchain.cross import (
+    EXTRA,
+    LINK_FLAGS,
+    ZIG_FLAGS,
+    zig_command,
+    zig_environment,
+    zig_is_installed,
+    zig_version,
+)
 from fmus.toolchain.platforms import Platform, host_platform
 
 CANDIDATES = ("cc", "gcc", "clang")
@@ -73,7 +81,9 @@ def find_compiler() -> Compiler:
     if wanted:
         command = tuple(shlex.split(wanted))
         if shutil.which(command[0]) is None:
-            raise CompilerMissing(f"The environment variable CC names the compiler {wanted!r}, which does not exist. {_advice()}")
+            raise CompilerMissing(
+                f"The environment variable CC names the compiler {wanted!r}, which does not exist. {_advice()}"
+            )
         return _identified(command)
     for candidate in CANDIDATES:
         found = shutil.which(candidate)
@@ -119,7 +129,9 @@ def compile_library(compiler: Compiler, folder: Path, sources: Sequence[str], li
     command = [*compiler.command, *FLAGS, *compiler.flags, f"-I{header_folder()}", *sources, "-o", library, "-lm"]
     with tempfile.TemporaryDirectory(prefix="fmus-scratch-") as scratch:
         environment = zig_environment(Path(scratch)) if compiler.zig else None
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace", check=False, env=environment)
+        done = subprocess.run(
+            command, cwd=folder, capture_output=True, text=True, errors="replace", check=False, env=environment
+        )
     if done.returncode != 0:
         raise CompilationError(
             f"{shlex.join(command)} failed with code {done.returncode}:\n{done.stderr.strip() or done.stdout.strip()}"

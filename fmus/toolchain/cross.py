@@ -28,7 +28,9 @@ LINK_FLAGS = {
     "windows": ("-shared", "-s"),
     "darwin": ("-shared", "-fPIC", "-Wl,-dead_strip", "-Wl,-x"),
 }
-"""By system. The time stamp of a DLL is a digest of its content, and aarch64 libraries for macOS are signed: zig does both."""
+"""By system. The time stamp of a DLL is a digest of its content, and aarch64 libraries for macOS are signed: zig does
+both.
+"""
 
 
 def zig_is_installed() -> bool:

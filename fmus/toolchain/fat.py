@@ -14,8 +14,8 @@ ALIGNMENT = 14
 def fat_binary(slices: Sequence[bytes]) -> bytes:
     """One file of several 64-bit Mach-O libraries.
 
-    The header is big-endian: a magic number, the number of slices, and for each its processor, subtype, offset, size and
-    alignment; see ``mach-o/fat.h`` of Apple's SDK.
+    The header is big-endian: a magic number, the number of slices, and for each its processor, subtype, offset, size
+    and alignment; see ``mach-o/fat.h`` of Apple's SDK.
 
     Args:
         slices: thin libraries, each for another processor.

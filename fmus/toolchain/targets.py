@@ -27,8 +27,8 @@ class Target:
 def choose_targets(platforms: str | Sequence[str] = HOST) -> tuple[Target, ...]:
     """Targets by name: ``host`` is built by the system's compiler, everything named by the cross compiler.
 
-    So a named platform has the same bytes whatever machine it is built on. Where ``host`` and this machine's own name are
-    both given, the one named first counts.
+    So a named platform has the same bytes whatever machine it is built on. Where ``host`` and this machine's own name
+    are both given, the one named first counts.
 
     Args:
         platforms: see `fmus.toolchain.platforms.platform_names`.
@@ -73,7 +73,9 @@ def compile_targets(
             folder = Path(name)
             for source, text in files.items():
                 (folder / source).write_bytes(text)
-            library = compile_library(target.compiler, folder, sources, f"{identifier}{target.platform.extension}").read_bytes()
+            library = compile_library(
+                target.compiler, folder, sources, f"{identifier}{target.platform.extension}"
+            ).read_bytes()
         if progress is not None:
             progress(target.platform.name)
         return library

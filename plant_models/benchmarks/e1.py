@@ -14,8 +14,8 @@ class TriangularisablePlant(HybridSystem):
     """Four states whose last is damped by ``3.3 (sin x1 + x2^2)``: Bouchama 2024, (2.40)-(2.41).
 
     Its error equations can be brought to triangular form, so high-gain observers apply as well. Driven by the printed
-    ``u = sin t - sin 7t`` times `drive_gain`, plus the input `drive`; the drive that acts is an output, for the observer. It
-    starts at ones.
+    ``u = sin t - sin 7t`` times `drive_gain`, plus the input `drive`; the drive that acts is an output, for the
+    observer. It starts at ones.
     """
 
     name = "triangularisable_plant"

@@ -14,8 +14,8 @@ class NonTriangularisablePlant(HybridSystem):
     """Five states with ``a = 1/(1 + x4^2)`` in row 3 and the product ``x1 x2`` in row 4: Bouchama 2024, (2.43)-(2.48).
 
     The input matrix is the five-vector of the printed vertices, ``[1 0 1 -0.3a -1]'``. Driven by the printed
-    ``u = 5 sin(2 pi t)`` times `drive_gain`, plus the input `drive`; the drive that acts is an output, for the observer. Starts
-    in zero.
+    ``u = 5 sin(2 pi t)`` times `drive_gain`, plus the input `drive`; the drive that acts is an output, for the
+    observer. Starts in zero.
     """
 
     name = "non_triangularisable_plant"

@@ -1,4 +1,6 @@
-"""The damped pendulum driven by a torque, the small nonlinear plant of the generic observers. Knows only the foundation."""
+"""The damped pendulum driven by a torque, the small nonlinear plant of the generic observers. Knows only the
+foundation.
+"""
 
 from __future__ import annotations
 
@@ -14,9 +16,9 @@ from plant_models.hybrid.system import Array
 class Pendulum(HybridSystem):
     """Damped pendulum: ``d angle = rate``, ``d rate = -a sin(angle) - d rate + torque`` [ours].
 
-    In the normal form of Bouchama 2024, (1.10): a chain of integrators with the rest in the last equation, globally Lipschitz.
-    The thesis prints no plant for its chapter 1; this is the smallest one with all the properties that chapter asks for. It
-    starts at 1 rad at rest, while its observers start at 0.
+    In the normal form of Bouchama 2024, (1.10): a chain of integrators with the rest in the last equation, globally
+    Lipschitz. The thesis prints no plant for its chapter 1; this is the smallest one with all the properties that
+    chapter asks for. It starts at 1 rad at rest, while its observers start at 0.
 
     Presets: `swinging` (default), `small` (0.05 rad, where the linear observers are right), `rest`.
     """

@@ -12,7 +12,9 @@ from dataclasses import dataclass
 from plant_models.hybrid.signal import Signal
 
 USED, DOUBTED, IGNORED = 0, 1, 2
-"""Verdicts of a system on a triggered event: it took effect; so it did, although it was doubted; it was doubted and did not."""
+"""Verdicts of a system on a triggered event: it took effect; so it did, although it was doubted; it was doubted and did
+not.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,12 +22,13 @@ class TriggeredEvent:
     """An event that arrives from outside, at any time.
 
     Args:
-        name: identifier; in FMI 3 the name of a triggered input clock, in FMI 2 the stem of ``<name>_count`` and ``<name>_time``.
-        payload: discrete inputs that arrive with the event; each name starts with ``<name>_``. Only the jump at this event
-            may read them: before it they are not known. What is needed later belongs into memory.
+        name: identifier; in FMI 3 the name of a triggered input clock, in FMI 2 the stem of ``<name>_count`` and
+        ``<name>_time``.
+        payload: discrete inputs that arrive with the event; each name starts with ``<name>_``. Only the jump at this
+            event may read them: before it they are not known. What is needed later belongs into memory.
         description: one line for the user.
-        verdict: name of the memory that holds, after the jump, what the system made of the event (`USED`, `DOUBTED`, `IGNORED`);
-            empty where it uses every one.
+        verdict: name of the memory that holds, after the jump, what the system made of the event (`USED`, `DOUBTED`,
+            `IGNORED`); empty where it uses every one.
 
     Raises:
         ValueError: a payload has another prefix, is not a discrete input, or takes the name of the count or the stamp.
@@ -43,7 +46,9 @@ class TriggeredEvent:
             if signal.causality != "input" or signal.variability != "discrete":
                 raise ValueError(f"Payload {signal.name!r} of event {self.name!r} must be a discrete input.")
             if signal.name in self.implied_names:
-                raise ValueError(f"Payload {signal.name!r} of event {self.name!r} takes a name that every event has itself.")
+                raise ValueError(
+                    f"Payload {signal.name!r} of event {self.name!r} takes a name that every event has itself."
+                )
 
     @property
     def implied_names(self) -> tuple[str, str]:
@@ -74,8 +79,8 @@ class PeriodicEvent:
 class CommunicationEvent:
     """An event at the start, and at the end of every communication step, after all others due there.
 
-    For a system that works on what a master hands over from step to step and on nothing in between (the balise reader). How
-    such a system moves depends on the communication steps; it has no place in model exchange.
+    For a system that works on what a master hands over from step to step and on nothing in between (the balise reader).
+    How such a system moves depends on the communication steps; it has no place in model exchange.
 
     Args:
         name: identifier.

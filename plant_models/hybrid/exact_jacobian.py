@@ -1,7 +1,7 @@
 """Exact Jacobians of functions written in plain NumPy, usable inside a system's own flow and jump.
 
-The function is traced once by CasADi and differentiated; the result is again a function of numbers or of traced symbols. It knows
-nothing of systems.
+The function is traced once by CasADi and differentiated; the result is again a function of numbers or of traced
+symbols. It knows nothing of systems.
 """
 
 from __future__ import annotations
@@ -16,11 +16,14 @@ from plant_models.hybrid.system import Array
 SYMBOLIC = ca.ArrayInterface.SX
 
 
-def exact_jacobian(function: Callable[[Array, Array], Array], states: int, inputs: int) -> Callable[[Array, Array], Array]:
+def exact_jacobian(
+    function: Callable[[Array, Array], Array], states: int, inputs: int
+) -> Callable[[Array, Array], Array]:
     """The Jacobian ``d function(x, u) / d x`` as a function of (x, u).
 
     Args:
-        function: plain NumPy without branching on values; x of shape (states,), u of shape (inputs,), returns shape (rows,).
+        function: plain NumPy without branching on values; x of shape (states,), u of shape (inputs,), returns shape
+        (rows,).
         states: number of states. inputs: number of inputs.
 
     Returns:

@@ -1,9 +1,9 @@
 """Integration: one internal step of a hybrid system, written in the same plain NumPy as the system.
 
-`rk4` for smooth equations, `rosenbrock` (linearly implicit, L-stable) for stiff ones, `euler` for discontinuous ones of sampled
-signals (a sliding-mode differentiator), which ask for one evaluation a step; dry friction is set-valued and
-resolved inside the step, and all stages of a step see the switches as they are at its start. The functions trace like the
-system does; they know nothing of events or of who calls them.
+`rk4` for smooth equations, `rosenbrock` (linearly implicit, L-stable) for stiff ones, `euler` for discontinuous ones of
+sampled signals (a sliding-mode differentiator), which ask for one evaluation a step; dry friction is set-valued and
+resolved inside the step, and all stages of a step see the switches as they are at its start. The functions trace like
+the system does; they know nothing of events or of who calls them.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ Jacobian = Callable[[Array, Array], tuple[Array, Array]]  # (t, x) -> (d/dx of s
 ROSENBROCK_GAMMA = 1.0 - 1.0 / sqrt(2.0)
 
 BEND_STEEPNESS = 3.0
-"""How much steeper than the secant over it a bend is taken to be. With 1 a wheel may jump to and fro across the creep curve's
-rise; with 2 and with 3 no start was found from which it does (`test_sliding_wheel`)."""
+"""How much steeper than the secant over it a bend is taken to be. With 1 a wheel may jump to and fro across the creep
+curve's rise; with 2 and with 3 no start was found from which it does (`test_sliding_wheel`)."""
 
 HOLD_TOLERANCE = 1e-12
 """Share of a dry friction by which a push may exceed it and not move what is at rest: such an excess is rounding."""
@@ -56,11 +56,14 @@ def effective_flow(
     return _stack(parts)
 
 
-def step(system: HybridSystem, t: Array, h: Array, x: Array, u: Array, p: Array, jacobian: Jacobian | None = None) -> Array:
+def step(
+    system: HybridSystem, t: Array, h: Array, x: Array, u: Array, p: Array, jacobian: Jacobian | None = None
+) -> Array:
     """State after one internal step by the system's own method.
 
     Args:
-        t: time at the start [s]. h: step [s]. x: state, shape (n,). u: inputs held over the step, shape (m,). p: shape (k,).
+        t: time at the start [s]. h: step [s]. x: state, shape (n,). u: inputs held over the step, shape (m,). p: shape
+        (k,).
         jacobian: exact derivatives of `effective_flow`, needed by ``rosenbrock``; see `tracing`.
 
     Returns:
@@ -87,7 +90,9 @@ def step(system: HybridSystem, t: Array, h: Array, x: Array, u: Array, p: Array,
     elif system.method == "rosenbrock":
         if jacobian is None:
             raise ValueError(f"{system.name}: the rosenbrock step needs the Jacobian of the flow.")
-        moved = rosenbrock_step(derivative, jacobian, t, h, x[:count], _at_rest(system, t, x, u, p, sign), system.stiff_mask())
+        moved = rosenbrock_step(
+            derivative, jacobian, t, h, x[:count], _at_rest(system, t, x, u, p, sign), system.stiff_mask()
+        )
     else:
         raise ValueError(f"{system.name}: unknown method {system.method!r}; use 'rk4', 'rosenbrock' or 'euler'.")
     parts = [moved[i] for i in range(count)]
@@ -107,29 +112,36 @@ def rk4_step(derivative: Derivative, t: Array, h: Array, x: Array) -> Array:
 
 
 def rosenbrock_step(
-    derivative: Derivative, jacobian: Jacobian, t: Array, h: Array, x: Array, at_rest: Array | None = None,
+    derivative: Derivative,
+    jacobian: Jacobian,
+    t: Array,
+    h: Array,
+    x: Array,
+    at_rest: Array | None = None,
     stiff: np.ndarray | None = None,
-) -> Array:  # fmt: skip
+) -> Array:
     """The two-stage Rosenbrock step ROS2 of order 2, L-stable with gamma = 1 - 1/sqrt(2), guarded against steep bends.
 
     ``(I - g h J) k1 = f(t, x) + g h f_t``, ``(I - g h J) k2 = f(t+h, x + h k1) - 2 k1 - g h f_t``,
     ``x+ = x + h (3 k1 + k2) / 2`` (Verwer, Spee, Blom, Hundsdorfer, SIAM J. Sci. Comput. 20 (1999) 1456-1480). Linear
     systems, no iteration: the cost is fixed and the step can be generated as straight-line C.
 
-    The Jacobian knows the slope here and nothing of a steep part that the stage leaps over, such as the rise of a creep curve
-    between two flat branches. There the two stages may cancel, and a sliding wheel would slide for ever. Where the stage has
-    turned a derivative round, by more than the Jacobian explains, `damped_step` takes its place.
+    The Jacobian knows the slope here and nothing of a steep part that the stage leaps over, such as the rise of a creep
+    curve between two flat branches. There the two stages may cancel, and a sliding wheel would slide for ever. Where
+    the stage has turned a derivative round, by more than the Jacobian explains, `damped_step` takes its place.
 
-    The stages also shoot past the value a stiff state settles at, by 2.4 times the way there and, at the end of the step, by up
-    to a sixth of it. Where such a state pushes another one that dry friction holds, the excess would set it in motion although
-    the push itself can not. So where a stage lets go a state that is held at the start of the step, `damped_step`, which does
-    not shoot past, decides: where the state is still held at its end, it takes the place of the stages.
+    The stages also shoot past the value a stiff state settles at, by 2.4 times the way there and, at the end of the
+    step, by up to a sixth of it. Where such a state pushes another one that dry friction holds, the excess would set it
+    in motion although the push itself can not. So where a stage lets go a state that is held at the start of the step,
+    `damped_step`, which does not shoot past, decides: where the state is still held at its end, it takes the place of
+    the stages.
 
     The order is 2 with any matrix in place of the Jacobian, so that it may be kept to the states that are stiff.
 
     Args:
         derivative, jacobian: of the flow with dry friction resolved. t: time at the start [s]. h: step [s].
-        x: continuous states, shape (nc,). at_rest: 1 for states at rest under dry friction, else 0, shape (nc,); None without.
+        x: continuous states, shape (nc,). at_rest: 1 for states at rest under dry friction, else 0, shape (nc,); None
+        without.
         stiff: 1 for states treated implicitly, else 0, shape (nc,); None for all.
     """
     implicit = 1.0 if stiff is None else stiff
@@ -139,7 +151,8 @@ def rosenbrock_step(
     matrix = np.eye(x.shape[0]) - gamma_h * by_state
     flow = derivative(t, x)
     held = 0.0 * flow if at_rest is None else np.where(flow == 0.0, at_rest, 0.0)
-    # A held state whose row of the Jacobian is zero does not move at all; the solution of a larger system would add its rounding.
+    # A held state whose row of the Jacobian is zero does not move at all; the solution of a larger system would add its
+    # rounding.
     fixed = np.where(np.abs(by_all) @ np.ones(x.shape[0]) == 0.0, held, 0.0)
     k1 = np.where(fixed > 0.0, 0.0, np.linalg.solve(matrix, flow + gamma_h * by_time))
     ahead = derivative(t + h, x + h * k1)
@@ -147,7 +160,8 @@ def rosenbrock_step(
     k2 = np.where(ahead == 0.0, np.where(fixed > 0.0, 0.0, k2), k2)
     smooth = x + 0.5 * h * (3.0 * k1 + k2)
     change, predicted = ahead - flow, h * (by_all @ k1 + by_time)
-    turned = implicit * np.where(change * k1 < 0.0, np.minimum(flow * ahead, 0.0), 0.0)  # negative where it came back over zero
+    # negative where it came back over zero
+    turned = implicit * np.where(change * k1 < 0.0, np.minimum(flow * ahead, 0.0), 0.0)
     bent = np.where(np.abs(change - predicted) > np.abs(flow), turned, 0.0)
     known = predicted if stiff is None else h * (by_state @ k1 + by_time)
     missing = implicit * np.where(np.sum(bent) < 0.0, BEND_STEEPNESS * change - known, 0.0)
@@ -161,10 +175,11 @@ def rosenbrock_step(
 
 
 def damped_step(by_state: Array, move: Array, missing: Array, h: Array, x: Array, flow: Array) -> Array:
-    """The linearly implicit Euler step with a Jacobian that explains `missing` more change over `move`, by Broyden's update;
-    the plain one where nothing is missing.
+    """The linearly implicit Euler step with a Jacobian that explains `missing` more change over `move`, by Broyden's
+    update; the plain one where nothing is missing.
 
-    The update adds a multiple of `missing` in every column, so that what the flow conserves, momentum above all, stays conserved.
+    The update adds a multiple of `missing` in every column, so that what the flow conserves, momentum above all, stays
+    conserved.
     """
     length = move @ move
     steeper = by_state + np.outer(missing, move) / np.where(length == 0.0, 1.0, length)

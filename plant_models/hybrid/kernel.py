@@ -1,8 +1,8 @@
 """Kernels: how the functions of a hybrid system are evaluated at run time.
 
 A kernel works in place on three arrays (state, inputs, parameters). `TracedKernel` calls CasADi functions through
-preset buffers, `NumpyKernel` calls the Python functions themselves; both have the same face and `runtime` cannot tell them
-apart.
+preset buffers, `NumpyKernel` calls the Python functions themselves; both have the same face and `runtime` cannot tell
+them apart.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ class Kernel(Protocol):
     """In-place evaluation of one system.
 
     Attributes:
-        x: state, shape (n,). u: inputs, payloads and noises, shape (m,). p: parameters, shape (k,). y: outputs, shape (q,).
+        x: state, shape (n,). u: inputs, payloads and noises, shape (m,). p: parameters, shape (k,). y: outputs, shape
+        (q,).
         memory: x, u and p in one contiguous array of shape (n + m + k,), of which they are views.
     """
 
@@ -116,7 +117,8 @@ class TracedKernel(_Arrays):
         self._steps = _buffered(functions["steps"], [self._t0, self._k, self._h, x, u, p], *stepped)
         self._output = _buffered(functions["output"], [self._t, x, u, p], self.y)
         self._jumps = {
-            event.name: _buffered(functions[f"jump_{event.name}"], [self._t, x, u, p], self._x_next) for event in system.events
+            event.name: _buffered(functions[f"jump_{event.name}"], [self._t, x, u, p], self._x_next)
+            for event in system.events
         }
         self._flows = system.continuous_count > 0
 
@@ -190,7 +192,8 @@ def _traced_functions(system: HybridSystem) -> dict[str, ca.Function]:
 
 
 def check_payloads(system: HybridSystem, functions: dict[str, ca.Function]) -> None:
-    """Refuse a system that reads the payload of an event before or without that event: it would depend on when it was told.
+    """Refuse a system that reads the payload of an event before or without that event: it would depend on when it was
+    told.
 
     Args:
         system: the hybrid system.
@@ -208,11 +211,14 @@ def check_payloads(system: HybridSystem, functions: dict[str, ca.Function]) -> N
             early = {names[column] for column in columns} & payloads - own.get(function_name, set())
             if early:
                 raise ValueError(
-                    f"{system.name}: {function_name} reads {', '.join(sorted(early))}, which is known only at the event; "
+                    f"{system.name}: {function_name} reads {', '.join(sorted(early))}, which is known only at the "
+                    f"event; "
                     "keep it in memory in the jump at that event."
                 )
 
 
 def _dense(function: ca.Function) -> ca.Function:
-    arguments = [ca.SX.sym(function.name_in(i), function.size1_in(i), function.size2_in(i)) for i in range(function.n_in())]
+    arguments = [
+        ca.SX.sym(function.name_in(i), function.size1_in(i), function.size2_in(i)) for i in range(function.n_in())
+    ]
     return ca.Function(function.name(), arguments, [ca.densify(result) for result in function.call(arguments)])

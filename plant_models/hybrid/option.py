@@ -9,7 +9,8 @@ def require_whole(where: str, low: int = 1, high: int | None = None, **options: 
     """Refuse an option that is not a whole number, or not within bounds.
 
     Args:
-        where: what asks, for the message. low, high: bounds, both legal; None for no upper one. options: values by name.
+        where: what asks, for the message. low, high: bounds, both legal; None for no upper one. options: values by
+        name.
 
     Raises:
         ValueError: one is not; the message says which, and what is expected.

@@ -1,7 +1,7 @@
 """Requirements: what parameters must fulfil before time runs, and what is said where they do not.
 
-A system declares them by `HybridSystem.requirements`, each as a text and a condition. Mirrored by `runtime_unfulfilled` of the
-C runtime. Knows systems, and nothing of time.
+A system declares them by `HybridSystem.requirements`, each as a text and a condition. Mirrored by `runtime_unfulfilled`
+of the C runtime. Knows systems, and nothing of time.
 """
 
 from __future__ import annotations
@@ -50,7 +50,8 @@ def named_parameters(system: HybridSystem, text: str) -> list[int]:
 
 
 def unfulfilled(system: HybridSystem, p: np.ndarray) -> str | None:
-    """The first requirement that parameters do not fulfil, with the values of those it names; None where they fulfil all.
+    """The first requirement that parameters do not fulfil, with the values of those it names; None where they fulfil
+    all.
 
     Args:
         system: the hybrid system.

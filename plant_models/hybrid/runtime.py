@@ -39,7 +39,8 @@ class Runtime:
     1. `x`, `u`, `p`, `y` are flat arrays in the declared order; write inputs into `u` before `advance`.
     2. `advance(t_end)` integrates on the absolute grid ``t0 + k * internal_step``, so that splitting a step changes
        nothing, and hits every periodic instant in ``(t, t_end]`` exactly, in the declared order.
-    3. `start(t0)` fires the periodic events that are due at ``t0``, then the communication events; `communicate()` fires these
+    3. `start(t0)` fires the periodic events that are due at ``t0``, then the communication events; `communicate()`
+      fires these
        at the end of a communication step.
     4. `trigger(event)` jumps now, with the payload that stands in `u`.
     5. `snapshot` / `restore` are exact: what follows a restore is bit-identical to what followed the snapshot.
@@ -74,7 +75,8 @@ class Runtime:
         """Begin at `t0` [s] with the values that stand in `x`, `u`, `p`, and fire the events due there.
 
         Raises:
-            ValueError: time cannot run with a parameter: the internal step, a period, an offset or the seed; or the parameters do
+            ValueError: time cannot run with a parameter: the internal step, a period, an offset or the seed; or the
+            parameters do
                 not fulfil what the system requires.
         """
         self._check_timing()
@@ -103,7 +105,9 @@ class Runtime:
             self._kernel.jump(event.name, self.t)
 
     def trigger(self, event: str) -> int:
-        """Jump at a triggered event now, with the payload in `u`; returns what the system made of it (`hybrid.event`)."""
+        """Jump at a triggered event now, with the payload in `u`; returns what the system made of it
+        (`hybrid.event`).
+        """
         self._kernel.jump(event, self.t)
         place = self._verdicts.get(event, -1)
         return USED if place < 0 else round(float(self.x[place]))
@@ -119,8 +123,8 @@ class Runtime:
         return np.asarray(effective_flow(self.system, self.t, self.x, self.u, self.p, signs), dtype=float)
 
     def indicators(self) -> np.ndarray:
-        """Event indicators, shape (len(frictions) + len(switchings),): how far each state with dry friction is from a change (its
-        magnitude while it moves, the friction it has left at rest), then the switching functions."""
+        """Event indicators, shape (len(frictions) + len(switchings),): how far each state with dry friction is from a
+        change (its magnitude while it moves, the friction it has left at rest), then the switching functions."""
         system = self.system
         values = self.x[system.friction_indices()]
         now = (self.t, self.x, self.u, self.p)
@@ -161,7 +165,9 @@ class Runtime:
             raise ValueError(f"{self.system.name}: time cannot run with these parameters: {broken}.")
 
     def _illegal(self, name: str, expected: str) -> str:
-        return f"{self.system.name}: time cannot run with parameter {name} = {self._timing(name)!r}; expected {expected}."
+        return (
+            f"{self.system.name}: time cannot run with parameter {name} = {self._timing(name)!r}; expected {expected}."
+        )
 
     def _read_timing(self) -> None:
         """Fetch what stays fixed between events; parameters may have been set or restored."""

@@ -34,7 +34,8 @@ class Signal:
         integer: a whole number to the outside; only a discrete output can be one.
 
     Raises:
-        ValueError: the name is not an identifier or is a keyword, the start does not fit the size, or an integer is no discrete
+        ValueError: the name is not an identifier or is a keyword, the start does not fit the size, or an integer is no
+        discrete
             output.
     """
 
@@ -102,25 +103,45 @@ def memory(name: str, unit: str, start: Start = 0.0, description: str = "", *, s
 
 
 def input_signal(
-    name: str, unit: str, start: Start = 0.0, description: str = "", *, size: int | None = None,
-    variability: Variability = "continuous", display_unit: str | None = None,
-) -> Signal:  # fmt: skip
+    name: str,
+    unit: str,
+    start: Start = 0.0,
+    description: str = "",
+    *,
+    size: int | None = None,
+    variability: Variability = "continuous",
+    display_unit: str | None = None,
+) -> Signal:
     """An input; `start` is used while nothing is connected to it."""
     return Signal(name, unit, "input", variability, start, None, None, description, size, display_unit)
 
 
 def output_signal(
-    name: str, unit: str, description: str = "", *, variability: Variability = "continuous",
-    display_unit: str | None = None, size: int | None = None, integer: bool = False,
-) -> Signal:  # fmt: skip
+    name: str,
+    unit: str,
+    description: str = "",
+    *,
+    variability: Variability = "continuous",
+    display_unit: str | None = None,
+    size: int | None = None,
+    integer: bool = False,
+) -> Signal:
     """An output, computed from time, state, input and parameters."""
     return Signal(name, unit, "output", variability, 0.0, None, None, description, size, display_unit, integer)
 
 
 def parameter(
-    name: str, unit: str, start: Start, description: str = "", *, min: float | None = None, max: float | None = None,
-    variability: Variability = "fixed", size: int | None = None, display_unit: str | None = None,
-) -> Signal:  # fmt: skip
+    name: str,
+    unit: str,
+    start: Start,
+    description: str = "",
+    *,
+    min: float | None = None,
+    max: float | None = None,
+    variability: Variability = "fixed",
+    size: int | None = None,
+    display_unit: str | None = None,
+) -> Signal:
     """A parameter: fixed after initialisation, or tunable between steps."""
     return Signal(name, unit, "parameter", variability, start, min, max, description, size, display_unit)
 

@@ -1,4 +1,5 @@
-"""Steps divided at switches: an internal step ends where a switching function changes its sign, and the next begins there.
+"""Steps divided at switches: an internal step ends where a switching function changes its sign, and the next begins
+there.
 
 Mirrored by `switching.c` of the C runtime; change the two together. Knows kernels, and nothing of grids and events.
 """
@@ -15,7 +16,9 @@ class Trial(Protocol):
     """A kernel that can try an internal step."""
 
     def attempt(self, t: float, h: float) -> bool:
-        """Compute the state after an internal step of length `h` [s] from `t` [s]; whether a switch changes on the way."""
+        """Compute the state after an internal step of length `h` [s] from `t` [s]; whether a switch changes on the
+        way.
+        """
 
     def accept(self) -> None:
         """Take the state computed last."""
@@ -37,7 +40,9 @@ def divided_step(kernel: Trial, t: float, h: float) -> None:
 
 
 def _until_switch(kernel: Trial, t: float, h: float) -> float:
-    """The shortest step [s] after which a switch has changed, to the resolution of time, where one has after `h` [s]."""
+    """The shortest step [s] after which a switch has changed, to the resolution of time, where one has after `h`
+    [s].
+    """
     before, after, resolution = 0.0, h, 4.0 * ulp(t + h)
     while after - before > resolution:
         middle = 0.5 * (before + after)

@@ -39,7 +39,8 @@ def vector(*components: Array) -> Array:
 
 
 class HybridSystem:
-    """Base of all hybrid systems: ``dx/dt = flow(t, x, u, p)`` between events, ``x+ = jump(event, t, x, u, p)`` at them.
+    """Base of all hybrid systems: ``dx/dt = flow(t, x, u, p)`` between events, ``x+ = jump(event, t, x, u, p)`` at
+    them.
 
     The contract:
 
@@ -49,19 +50,24 @@ class HybridSystem:
        (``np.where``, not ``if``); nothing is kept on ``self`` between calls.
     3. ``x`` is an array of shape (n,) (or (n, members) in a batch): the continuous states first, then the memory.
        ``u`` and ``p`` are named tuples of the inputs (with event payloads and noises) and of the parameters.
-    4. `flow` returns the derivatives of the continuous states, shape (nc,); `jump` returns the whole new ``x``, shape (n,);
+    4. `flow` returns the derivatives of the continuous states, shape (nc,); `jump` returns the whole new ``x``, shape
+      (n,);
        `output` returns a dictionary with every declared output.
     5. Dry friction is declared, not regularised: a state named in `frictions` feels a resistance of magnitude
        `friction(...)` against its sign. The integrator lets it stop exactly at zero and stay there while the flow is
        smaller than the friction.
-    6. Equations that change at a place or an instant are declared too: `switchings` names switching functions, `switching(...)`
-       computes them, and `flow`, `friction` and `output` ask `switches(...)` on which side of each they are. The integrator
-       holds the sides during a step and ends it where one changes its sign: the edge is an exact event, seen by no stage early.
+    6. Equations that change at a place or an instant are declared too: `switchings` names switching functions,
+      `switching(...)`
+       computes them, and `flow`, `friction` and `output` ask `switches(...)` on which side of each they are. The
+       integrator holds the sides during a step and ends it where one changes its sign: the edge is an exact event, seen
+       by no stage early.
     7. Numbers that shape the equations themselves (an order, a mode) are constructor arguments, listed in `options`.
     8. A vector parameter that an exported model reads from a file of its own is listed in `resources`.
-    9. Where only some states are stiff, `stiff` names all of these and `rosenbrock` treats them alone implicitly. The step
+    9. Where only some states are stiff, `stiff` names all of these and `rosenbrock` treats them alone implicitly. The
+      step
        keeps its order; with all states that carry a conserved sum among them, momentum say, it stays conserved.
-    10. Time does not run with parameters that break one of the `requirements`: bounds to be kept (`within_bounds`), or what
+    10. Time does not run with parameters that break one of the `requirements`: bounds to be kept (`within_bounds`), or
+      what
         several must fulfil together. They are checked before time runs, so they are about fixed parameters.
     11. A system that cannot be traced says ``traceable = False`` and may then use any Python.
     """
@@ -108,18 +114,22 @@ class HybridSystem:
         return np.zeros(len(self.frictions))
 
     def switching(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Switching functions, continuous in `t` and `x`: a change of sign switches the equations; shape (len(switchings),)."""
+        """Switching functions, continuous in `t` and `x`: a change of sign switches the equations; shape
+        (len(switchings),).
+        """
         return np.zeros((len(self.switchings), *x.shape[1:]))
 
     def requirements(self, p: Any) -> dict[str, Array]:
-        """What the parameters must fulfil, by what is said where they do not (it names them): 1 where they do, else 0."""
+        """What the parameters must fulfil, by what is said where they do not (it names them): 1 where they do, else
+        0.
+        """
         return {}
 
     # -- for those who write these functions ------------------------------------------------------------------------
 
     def switches(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """1 where a switching function is not negative, else 0: as held over the integration step, if one is on its way,
-        otherwise now; shape (len(switchings),)."""
+        """1 where a switching function is not negative, else 0: as held over the integration step, if one is on its
+        way, otherwise now; shape (len(switchings),)."""
         if u.held_switches is not None:
             return u.held_switches
         return np.where(self.switching(t, x, u, p) >= 0.0, 1.0, 0.0)
@@ -165,12 +175,16 @@ class HybridSystem:
     @cached_property
     def parameter_signals(self) -> tuple[Signal, ...]:
         """Everything `p` holds, in order: declared parameters, the internal step, and the seed where there is noise."""
-        step = parameter("internal_step", "s", self.internal_step, f"Internal step of the {self.method} integrator", min=1e-9)
+        step = parameter(
+            "internal_step", "s", self.internal_step, f"Internal step of the {self.method} integrator", min=1e-9
+        )
         seed = parameter("seed", "1", 0.0, "Seed of the noise, a whole number", min=0.0)
         return (*self.parameters, step, *((seed,) if self.noises else ()))
 
     def unpack_inputs(self, values: Array, held_switches: Array | None = None) -> Any:
-        """Named tuple `u` from the flat array, shape (m,) or (m, members), with the switches that an integration step holds."""
+        """Named tuple `u` from the flat array, shape (m,) or (m, members), with the switches that an integration step
+        holds.
+        """
         return self._input_type(*_split(values, self.input_signals), held_switches)
 
     def unpack_parameters(self, values: Array) -> Any:
@@ -224,7 +238,9 @@ class HybridSystem:
         """`output` on flat arrays, stacked in the declared order, shape (q,)."""
         values = self.output(t, x, self.unpack_inputs(u), self.unpack_parameters(p))
         if not isinstance(values, Mapping):
-            raise TypeError(f"{self.name}: output() returns a {type(values).__name__}; expected a dictionary of values by name.")
+            raise TypeError(
+                f"{self.name}: output() returns a {type(values).__name__}; expected a dictionary of values by name."
+            )
         missing = [s.name for s in self.outputs if s.name not in values]
         if missing or len(values) != len(self.outputs):
             extra = sorted(set(values) - {s.name for s in self.outputs})
@@ -273,7 +289,9 @@ class HybridSystem:
         return scalar_names(self.states).index(event.verdict) if event.verdict else -1
 
     def stiff_mask(self) -> np.ndarray | None:
-        """1 for continuous states that `rosenbrock` treats implicitly, else 0, shape (nc,); None where it treats all so."""
+        """1 for continuous states that `rosenbrock` treats implicitly, else 0, shape (nc,); None where it treats all
+        so.
+        """
         if not self.stiff:
             return None
         continuous = [s for s in self.states if s.variability == "continuous"]
@@ -317,12 +335,15 @@ class HybridSystem:
             for reference in filter(None, (event.period, event.offset)):
                 if reference not in scalars:
                     raise ValueError(
-                        f"{where}: event {event.name!r} refers to unknown parameter {reference!r}; expected a scalar one."
+                        f"{where}: event {event.name!r} refers to unknown parameter {reference!r}; expected a scalar "
+                        f"one."
                     )
         vectors = {s.name for s in self.parameters if s.size is not None}
         for resource in self.resources:
             if resource.parameter not in vectors:
-                raise ValueError(f"{where}: {resource.file} is to set {resource.parameter!r}; expected a vector parameter.")
+                raise ValueError(
+                    f"{where}: {resource.file} is to set {resource.parameter!r}; expected a vector parameter."
+                )
         known = {s.name for s in (*self.parameter_signals, *self.states)}
         for preset, values in self.presets.items():
             unknown = sorted(set(values) - known)
@@ -347,12 +368,16 @@ class HybridSystem:
             others += [s.name for e in self.triggered_events for s in e.payload if s.name not in payload]
             confusing = [name for name in others if name.startswith(f"{event.name}_")]
             if confusing:
-                raise ValueError(f"{where}: {', '.join(confusing)} would be taken for payload of event {event.name!r}; rename.")
+                raise ValueError(
+                    f"{where}: {', '.join(confusing)} would be taken for payload of event {event.name!r}; rename."
+                )
 
     def _checked(self, function: str, values: Array, count: int) -> Array:
         if not getattr(values, "shape", ()):
             kind = type(values).__name__
-            raise TypeError(f"{self.name}: {function} returns a {kind}; expected an array of {count} values, as of vector(...).")
+            raise TypeError(
+                f"{self.name}: {function} returns a {kind}; expected an array of {count} values, as of vector(...)."
+            )
         if values.shape[0] != count:  # a vector of one element would be broadcast in silence
             raise ValueError(f"{self.name}: {function} returns {values.shape[0]} values, expected {count}.")
         return values

@@ -1,7 +1,7 @@
 """Tracing: a hybrid system becomes CasADi functions, with exact Jacobians and sparsity.
 
-The same NumPy code is handed symbolic arrays once; what comes back is a graph that runs without Python (`kernel`), that is
-differentiated exactly (EKF, observability, directional derivatives) and from which C is generated (package `fmus`).
+The same NumPy code is handed symbolic arrays once; what comes back is a graph that runs without Python (`kernel`), that
+is differentiated exactly (EKF, observability, directional derivatives) and from which C is generated (package `fmus`).
 """
 
 from __future__ import annotations
@@ -23,11 +23,17 @@ from plant_models.hybrid.system import HybridSystem
 
 SYMBOLIC = ca.ArrayInterface.SX
 FOUNDATION = Path(__file__).parent
-WRITTEN_AS = {"state_derivative": "flow", "output_vector": "output", "jump_vector": "jump", "friction_vector": "friction"}
+WRITTEN_AS = {
+    "state_derivative": "flow",
+    "output_vector": "output",
+    "jump_vector": "jump",
+    "friction_vector": "friction",
+}
 """What the user wrote, by what is traced."""
 
 ADVICE = (
-    "Write it in plain NumPy without branching on values: np.where instead of 'if', vector(...) instead of np.array([...]), "
+    "Write it in plain NumPy without branching on values: np.where instead of 'if', vector(...) instead of "
+    "np.array([...]), "
     "np.sin instead of math.sin."
 )
 
@@ -71,11 +77,15 @@ class TracedSystem:
 
     @cached_property
     def step(self) -> ca.Function:
-        """One internal step: ``(t, h, x, u, p) -> x, switched``; `switched` counts the switches that change on the way."""
+        """One internal step: ``(t, h, x, u, p) -> x, switched``; `switched` counts the switches that change on the
+        way.
+        """
         s = self._symbols
         x_next = self._step_expression()
         results = [x_next, self._switched_expression(x_next)]
-        return ca.Function("step", [s.t, s.h, s.x, s.u, s.p], results, ["t", "h", "x", "u", "p"], ["x_next", "switched"])
+        return ca.Function(
+            "step", [s.t, s.h, s.x, s.u, s.p], results, ["t", "h", "x", "u", "p"], ["x_next", "switched"]
+        )
 
     def steps(self, count: int) -> ca.Function:
         """`count` full internal steps on the grid ``t0 + k*h`` in one call: ``(t0, k, h, x, u, p) -> x, switched``."""
@@ -97,22 +107,24 @@ class TracedSystem:
     def flow(self) -> ca.Function:
         """Derivatives of the continuous states without dry friction: ``(t, x, u, p) -> dx``."""
         s = self._symbols
-        return ca.Function("flow", [s.t, s.x, s.u, s.p], [self._trace("state_derivative")], ["t", "x", "u", "p"], ["dx"])
+        return ca.Function(
+            "flow", [s.t, s.x, s.u, s.p], [self._trace("state_derivative")], ["t", "x", "u", "p"], ["dx"]
+        )
 
     @cached_property
     def derivative(self) -> ca.Function:
         """Derivatives of the continuous states, dry friction resolved: ``(t, x, u, p, s) -> dx``.
 
-        `s` is what a solver holds between events: signs (-1, 0, 1) of the states with dry friction, then the switches (0, 1),
-        shape (len(frictions) + len(switchings),).
+        `s` is what a solver holds between events: signs (-1, 0, 1) of the states with dry friction, then the switches
+        (0, 1), shape (len(frictions) + len(switchings),).
         """
         s = self._symbols
         return ca.Function("derivative", [s.t, s.x, s.u, s.p, s.held], [self._derivative_expression()])
 
     @cached_property
     def balance(self) -> ca.Function:
-        """What decides on state events: ``(t, x, u, p, s) -> (flows, frictions, switching functions)``, stacked: what drives and
-        what holds each state with dry friction, then the switching functions; `s` as in `derivative`."""
+        """What decides on state events: ``(t, x, u, p, s) -> (flows, frictions, switching functions)``, stacked: what
+        drives and what holds each state with dry friction, then the switching functions; `s` as in `derivative`."""
         s = self._symbols
         _, switches = self._held()
         t, _, x, u, p = self._arrays()
@@ -134,7 +146,9 @@ class TracedSystem:
 
     @cached_property
     def tangent(self) -> ca.Function:
-        """Exact directional derivative: ``(t, x, u, p, s, dt, dx, du, dp) -> (dy, d derivative)``, stacked, with `s` held."""
+        """Exact directional derivative: ``(t, x, u, p, s, dt, dx, du, dp) -> (dy, d derivative)``, stacked, with `s`
+        held.
+        """
         s = self._symbols
         knowns = [s.t, s.x, s.u, s.p]
         seeds = [ca.SX.sym(name, *k.shape) for name, k in zip(("dt", "dx", "du", "dp"), knowns, strict=True)]
@@ -258,7 +272,11 @@ class TracedSystem:
         return ca.SX(value) if getattr(value, "size", 1) else ca.SX(0, 1)
 
     def _explain(self, function: str, error: Exception) -> str:
-        own = [f for f in traceback.extract_tb(error.__traceback__) if "casadi" not in f.filename and "numpy" not in f.filename]
+        own = [
+            f
+            for f in traceback.extract_tb(error.__traceback__)
+            if "casadi" not in f.filename and "numpy" not in f.filename
+        ]
         users = [f for f in own if Path(f.filename).parent != FOUNDATION]
         if users:
             place = f"{users[-1].filename}:{users[-1].lineno}: {users[-1].line}"
@@ -273,7 +291,9 @@ class TracedSystem:
 
 @contextmanager
 def _symbols_are_no_numbers() -> Iterator[None]:
-    """While a function is traced, ``float(x[0])`` and ``math.sin(x[0])`` are refused: CasADi would make NaN of them silently."""
+    """While a function is traced, ``float(x[0])`` and ``math.sin(x[0])`` are refused: CasADi would make NaN of them
+    silently.
+    """
     symbolic: Any = ca.ArrayInterface
     usual = symbolic.__float__
 

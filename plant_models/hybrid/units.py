@@ -75,15 +75,18 @@ def parse_unit(name: str) -> Unit:
     """The meaning of a unit name: products with ``.`` or ``*``, quotients with ``/``, integer powers behind a symbol.
 
     Args:
-        name: e.g. ``m/s``, ``kg.m2``, ``N.s2/m2``, ``J/(kg.K)``, ``s-1``, ``km/h``, ``1``; empty for a pure number. After a
-            ``/`` everything up to the next ``/`` is divided by, with or without parentheses; no ``/`` within them.
+        name: e.g. ``m/s``, ``kg.m2``, ``N.s2/m2``, ``J/(kg.K)``, ``s-1``, ``km/h``, ``1``; empty for a pure number.
+            After a ``/`` everything up to the next ``/`` is divided by, with or without parentheses; no ``/`` within
+            them.
 
     Raises:
         UnitError: a symbol is unknown, or the name is not such an expression.
     """
     plain = name.replace(" ", "") or "1"
     if _NAME.fullmatch(plain) is None:
-        raise UnitError(f"cannot read unit {name!r}: expected products and quotients of symbols, like 'kg.m2/s' or 'J/(kg.K)'")
+        raise UnitError(
+            f"cannot read unit {name!r}: expected products and quotients of symbols, like 'kg.m2/s' or 'J/(kg.K)'"
+        )
     if plain in _SYMBOLS:
         return _SYMBOLS[plain]
     exponents = [0] * len(BASE_SYMBOLS)
@@ -95,7 +98,8 @@ def parse_unit(name: str) -> Unit:
             power *= sign
             exponents = [e + power * s for e, s in zip(exponents, symbol.exponents, strict=True)]
             factor *= symbol.factor**power
-    return Unit(tuple(exponents), factor)  # a shifted unit within a product or quotient is a difference, without the shift
+    # a shifted unit within a product or quotient is a difference, without the shift
+    return Unit(tuple(exponents), factor)
 
 
 def conversion(source: Unit, target: Unit) -> tuple[float, float]:

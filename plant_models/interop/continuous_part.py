@@ -24,7 +24,8 @@ class ContinuousPart:
     """``dx = f(t, x, u, params)``, ``y = g(t, x, u, params)`` of a hybrid system between its events.
 
     Args:
-        system: the hybrid system. preset: its preset; None for the default one. parameters: values that replace the preset's.
+        system: the hybrid system. preset: its preset; None for the default one. parameters: values that replace the
+        preset's.
         memory: values at which discrete states are held; by default their starts.
 
     Raises:
@@ -40,7 +41,8 @@ class ContinuousPart:
     ) -> None:
         if not system.continuous_count and (system.states or system.events):
             raise ValueError(
-                f"{system.name}: nothing in it is continuous, so it has no continuous part to convert. {left_out(system)} "
+                f"{system.name}: nothing in it is continuous, so it has no continuous part to convert. "
+                f"{left_out(system)} "
                 f"Run it with plant_models.hybrid.Runtime, or export it as an FMU."
             )
         self.system = system
@@ -48,15 +50,21 @@ class ContinuousPart:
         names = scalar_names(system.states)
         starts = system.start_state(preset)
         self.states, self.start_state = names[:count], starts[:count]
-        self.inputs, self.start_inputs = scalar_names(system.inputs), system.start_inputs()[: len(scalar_names(system.inputs))]
+        self.inputs, self.start_inputs = (
+            scalar_names(system.inputs),
+            system.start_inputs()[: len(scalar_names(system.inputs))],
+        )
         self.outputs = scalar_names(system.outputs)
         held = dict(zip(names[count:], map(float, starts[count:]), strict=True))
         self._memory = filled(held, memory, f"{system.name}: memory")
         self._held_inputs = system.start_inputs()[len(self.inputs) :]
-        every = dict(zip(scalar_names(system.parameter_signals), map(float, system.start_parameters(preset)), strict=True))
+        every = dict(
+            zip(scalar_names(system.parameter_signals), map(float, system.start_parameters(preset)), strict=True)
+        )
         declared = {name: every[name] for name in scalar_names(system.parameters)}
         self.parameters = dict(zip(declared, filled(declared, parameters, f"{system.name}: parameter"), strict=True))
-        self._runtime_parameters = [value for name, value in every.items() if name not in declared]  # internal step, seed
+        # internal step, seed
+        self._runtime_parameters = [value for name, value in every.items() if name not in declared]
 
     @cached_property
     def traced(self) -> TracedSystem:

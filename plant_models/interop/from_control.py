@@ -29,17 +29,21 @@ from plant_models.interop.continuous_part import Values, filled, known
 if TYPE_CHECKING:
     import control
 
-Function = Callable[[Array, Array, Array, Mapping[str, Any]], Any]  # (t, x, u, params) -> values, as python-control calls it
+# (t, x, u, params) -> values, as python-control calls it
+Function = Callable[[Array, Array, Array, Mapping[str, Any]], Any]
 
-SAMPLING = PeriodicEvent("sampling", "sample_period", "sample_offset", description="The discrete-time system takes one step")
+SAMPLING = PeriodicEvent(
+    "sampling", "sample_period", "sample_offset", description="The discrete-time system takes one step"
+)
 _TIMING = ("sample_period", "sample_offset", "sampling")
 
 
 class ControlSystem(HybridSystem):
     """A python-control system as a hybrid system; made by `from_state_space` and `from_nonlinear_io`.
 
-    A continuous one flows. A discrete one steps at ``start + sample_offset + k * sample_period``: there it reads its inputs, puts
-    out ``y[k]``, which is held until the next instant, and moves on to ``x[k+1]``, which is what its states then hold.
+    A continuous one flows. A discrete one steps at ``start + sample_offset + k * sample_period``: there it reads its
+    inputs, puts out ``y[k]``, which is held until the next instant, and moves on to ``x[k+1]``, which is what its
+    states then hold.
     """
 
     def __init__(
@@ -89,7 +93,11 @@ class ControlSystem(HybridSystem):
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """Outputs, of a discrete system those of the last instant."""
         count = len(self.outputs)
-        values = x[len(self.states) - count :] if self._sampled else _flat(self._read(t, x, self._inputs(u), self._params(p)))
+        values = (
+            x[len(self.states) - count :]
+            if self._sampled
+            else _flat(self._read(t, x, self._inputs(u), self._params(p)))
+        )
         return {signal.name: values[i] for i, signal in enumerate(self.outputs)}
 
     def _inputs(self, u: Any) -> Array:
@@ -112,8 +120,8 @@ def from_state_space(
 ) -> HybridSystem:
     """A linear system ``dx = A x + B u`` or ``x[k+1] = A x[k] + B u[k]``, ``y = C x + D u``, as a hybrid system.
 
-    Names are kept where they are legal and unique: ``x[0]`` becomes ``x_0``; a state, output or parameter whose name is taken
-    gets the ending ``_state``, ``_output`` or ``_parameter``.
+    Names are kept where they are legal and unique: ``x[0]`` becomes ``x_0``; a state, output or parameter whose name is
+    taken gets the ending ``_state``, ``_output`` or ``_parameter``.
 
     Args:
         sys: a ``control.StateSpace``, or what ``control.ss`` can turn into one.
@@ -148,14 +156,14 @@ def from_nonlinear_io(
     """A nonlinear input/output system of python-control as a hybrid system.
 
     Its functions are traced where they can be: plain NumPy without branching on values, results as a tuple, a list or
-    ``plant_models.hybrid.vector``. Where they cannot (``np.array([...])`` of several values, ``if``, ``math``, an interconnected
-    system), the hybrid system says ``traceable = False`` and runs as Python. Numbers and vectors in ``params`` become parameters;
-    anything else there stays as it is.
+    ``plant_models.hybrid.vector``. Where they cannot (``np.array([...])`` of several values, ``if``, ``math``, an
+    interconnected system), the hybrid system says ``traceable = False`` and runs as Python. Numbers and vectors in
+    ``params`` become parameters; anything else there stays as it is.
 
     Args:
         sys: the system; its numbers of states, inputs and outputs must be known.
-        x0, name, description, units, sample_period, method, internal_step: see `from_state_space`; ``rosenbrock`` needs a
-            system that can be traced.
+        x0, name, description, units, sample_period, method, internal_step: see `from_state_space`; ``rosenbrock`` needs
+            a system that can be traced.
 
     Raises:
         ValueError: a number of signals or the sample period is missing, a name is unknown, or the method needs tracing.
@@ -164,9 +172,15 @@ def from_nonlinear_io(
 
     if isinstance(sys, control.StateSpace):
         return from_state_space(
-            sys, x0, name=name, description=description, units=units, sample_period=sample_period, method=method,
+            sys,
+            x0,
+            name=name,
+            description=description,
+            units=units,
+            sample_period=sample_period,
+            method=method,
             internal_step=internal_step,
-        )  # fmt: skip
+        )
     for what in ("nstates", "ninputs", "noutputs"):
         if getattr(sys, what) is None:
             raise ValueError(f"{sys.name}: its {what} is not known; give states, inputs and outputs when you make it.")
@@ -176,14 +190,23 @@ def from_nonlinear_io(
     system = _made(sys, update, read, x0, name, description, units, sample_period, how)
     system.traceable = _can_be_traced(system)
     if not system.traceable and method == "rosenbrock":
-        raise ValueError(f"{system.name}: method 'rosenbrock' needs functions that can be traced, and these cannot; use 'rk4'.")
+        raise ValueError(
+            f"{system.name}: method 'rosenbrock' needs functions that can be traced, and these cannot; use 'rk4'."
+        )
     return system
 
 
 def _made(
-    sys: Any, update: Function, read: Function, x0: Values | None, name: str | None, description: str,
-    units: Mapping[str, str] | None, sample_period: float | None, how: Mapping[str, Any],
-) -> ControlSystem:  # fmt: skip
+    sys: Any,
+    update: Function,
+    read: Function,
+    x0: Values | None,
+    name: str | None,
+    description: str,
+    units: Mapping[str, str] | None,
+    sample_period: float | None,
+    how: Mapping[str, Any],
+) -> ControlSystem:
     labels = {"input": sys.input_labels, "output": sys.output_labels, "state": sys.state_labels}
     period = _period(sys, sample_period)
     numbers = {key: value for key, value in getattr(sys, "params", {}).items() if _is_number(value)}
@@ -205,9 +228,12 @@ def _made(
         states=[make_state(fields["state"][n], unit.get(n, "1"), starts[n], f"State {n}") for n in labels["state"]],
         inputs=[input_signal(fields["input"][n], unit.get(n, "1"), 0.0, f"Input {n}") for n in labels["input"]],
         outputs=[
-            output_signal(fields["output"][n], unit.get(n, "1"), f"Output {n}", variability=variability) for n in labels["output"]
+            output_signal(fields["output"][n], unit.get(n, "1"), f"Output {n}", variability=variability)
+            for n in labels["output"]
         ],
-        parameters={key: _parameter(fields["parameter"][key], unit.get(key, "1"), key, value) for key, value in numbers.items()},
+        parameters={
+            key: _parameter(fields["parameter"][key], unit.get(key, "1"), key, value) for key, value in numbers.items()
+        },
         constants={key: value for key, value in getattr(sys, "params", {}).items() if key not in numbers},
         sample_period=period,
         **how,

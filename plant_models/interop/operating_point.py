@@ -53,9 +53,10 @@ def operating_point(
     A train that runs steadily: ``hold=("train_position", "train_speed"), drift=("train_position",), find=("effort",)``.
 
     Args:
-        system: a traceable hybrid system. x0, u0: first guess of states and inputs, and the values of what is not sought.
-        hold: states that keep their value of `x0`. drift: states that may change with time. find: inputs that are sought; the
-            others keep their value of `u0`. outputs: wanted values.
+        system: a traceable hybrid system. x0, u0: first guess of states and inputs, and the values of what is not
+        sought.
+        hold: states that keep their value of `x0`. drift: states that may change with time. find: inputs that are
+            sought; the others keep their value of `u0`. outputs: wanted values.
         preset, parameters, memory: see `to_nonlinear_io`. t: time [s].
 
     Raises:
@@ -68,15 +69,20 @@ def operating_point(
     wanted = dict(outputs or {})
     held, drifting = (_indices(names, part.states, f"{system.name}: state") for names in (hold, drift))
     problem = _Problem(
-        part, x, u, t,
+        part,
+        x,
+        u,
+        t,
         unknown_x=[i for i in range(len(x)) if i not in held],
         unknown_u=_indices(find, part.inputs, f"{system.name}: input"),
         still=[i for i in range(len(x)) if i not in drifting],
         rows=_indices(list(wanted), part.outputs, f"{system.name}: output"),
         targets=np.array(list(wanted.values()), dtype=float),
-    )  # fmt: skip
+    )
     _check_count(problem)
-    found = root(problem.residual, problem.guess, jac=problem.slope, tol=1e-13).x if problem.guess.size else problem.guess
+    found = (
+        root(problem.residual, problem.guess, jac=problem.slope, tol=1e-13).x if problem.guess.size else problem.guess
+    )
     _check_found(problem, found)
     return _point(part, *problem.place(found), t)
 
@@ -125,7 +131,8 @@ def _check_count(problem: _Problem) -> None:
     unknowns, equations = len(problem.guess), len(problem.labels)
     if unknowns != equations:
         raise ValueError(
-            f"{problem.part.system.name}: {unknowns} unknowns (states not in hold, inputs in find) but {equations} equations "
+            f"{problem.part.system.name}: {unknowns} unknowns (states not in hold, inputs in find) but {equations} "
+            f"equations "
             f"(states not in drift, outputs); expected as many of one as of the other."
         )
 
@@ -139,7 +146,8 @@ def _check_found(problem: _Problem, found: np.ndarray) -> None:
     if missed:
         text = ", ".join(f"{problem.labels[i]} is off by {residual[i]:.4g}" for i in missed)
         raise OperatingPointError(
-            f"{problem.part.system.name}: no operating point found from this guess: {text}. Give a nearer guess in x0 and u0, or "
+            f"{problem.part.system.name}: no operating point found from this guess: {text}. Give a nearer guess in x0 "
+            f"and u0, or "
             f"let a state drift; dry friction holds what stands at exactly zero."
         )
 
@@ -154,5 +162,8 @@ def _point(part: ContinuousPart, x: np.ndarray, u: np.ndarray, t: float) -> Oper
 
     y, flow = part.output(t, x, u, part.parameters), part.derivative(t, x, u, part.parameters)
     return OperatingPoint(
-        named(part.states, x), named(part.inputs, u), named(part.outputs, np.asarray(y)), named(part.states, np.asarray(flow))
+        named(part.states, x),
+        named(part.inputs, u),
+        named(part.outputs, np.asarray(y)),
+        named(part.states, np.asarray(flow)),
     )

@@ -22,12 +22,13 @@ def to_nonlinear_io(
 ) -> control.NonlinearIOSystem:
     """The continuous part of a hybrid system, names kept, parameters adjustable through python-control's ``params``.
 
-    Events do not occur (`left_out` names them): discrete states keep the values in `memory`, payloads and noises their starts.
-    Dry friction is resolved: a state at exactly zero is held while the flow is smaller than the friction. Solvers with step-size
-    control seldom meet zero exactly, so they chatter at a standstill, where `Runtime` stops.
+    Events do not occur (`left_out` names them): discrete states keep the values in `memory`, payloads and noises their
+    starts. Dry friction is resolved: a state at exactly zero is held while the flow is smaller than the friction.
+    Solvers with step-size control seldom meet zero exactly, so they chatter at a standstill, where `Runtime` stops.
 
     Args:
-        system: the hybrid system. preset: its preset; None for the default one. parameters: values that replace the preset's.
+        system: the hybrid system. preset: its preset; None for the default one. parameters: values that replace the
+        preset's.
         memory: values at which discrete states are held; by default their starts.
 
     Returns:
@@ -63,19 +64,22 @@ def to_state_space(
 ) -> control.StateSpace:
     """Linearisation ``d dx = A dx + B du``, ``dy = C dx + D du`` about a point, by the exact traced Jacobians.
 
-    The point need not be an equilibrium; `operating_point` finds one. A state with dry friction keeps the direction it has in
+    The point need not be an equilibrium; `operating_point` finds one. A state with dry friction keeps the direction it
+    has in
     `x0`: one at rest that the friction holds stays at rest, so its row of A and B is zero. Events are left out, as in
     `to_nonlinear_io`.
 
     Args:
-        system: a traceable hybrid system. x0: continuous states. u0: inputs. preset, parameters, memory: see `to_nonlinear_io`.
+        system: a traceable hybrid system. x0: continuous states. u0: inputs. preset, parameters, memory: see
+        `to_nonlinear_io`.
         t: time of the linearisation [s].
 
     Returns:
         A continuous-time system in deviations from the point, names kept.
 
     Raises:
-        ValueError: nothing in the system is continuous, it has no inputs or outputs, or a name or a number of values is wrong.
+        ValueError: nothing in the system is continuous, it has no inputs or outputs, or a name or a number of values is
+        wrong.
         TracingError: the system cannot be traced; ``control.linearize`` of `to_nonlinear_io` works on differences.
     """
     import control  # noqa: PLC0415
@@ -83,7 +87,9 @@ def to_state_space(
     part = ContinuousPart(system, preset, parameters, memory)
     for what, present in (("states", part.states), ("inputs", part.inputs), ("outputs", part.outputs)):
         if not present:
-            raise ValueError(f"{system.name}: it has no {what}, and a StateSpace needs some; convert it with to_nonlinear_io.")
+            raise ValueError(
+                f"{system.name}: it has no {what}, and a StateSpace needs some; convert it with to_nonlinear_io."
+            )
     x = filled(dict(zip(part.states, part.start_state, strict=True)), x0, f"{system.name}: state")
     u = filled(dict(zip(part.inputs, part.start_inputs, strict=True)), u0, f"{system.name}: input")
     names: dict[str, Any] = {"states": list(part.states), "inputs": list(part.inputs), "outputs": list(part.outputs)}

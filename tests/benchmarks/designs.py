@@ -1,7 +1,7 @@
 """Benchmark: what gain designs cost, from pole placement to linear matrix inequalities. Nothing is asserted.
 
-``python tests/benchmarks/designs.py``. Certificates remember their answers, so designs that certify are measured once, in a fresh
-process; the others are medians.
+``python tests/benchmarks/designs.py``. Certificates remember their answers, so designs that certify are measured once,
+in a fresh process; the others are medians.
 """
 
 from __future__ import annotations
@@ -31,7 +31,9 @@ REPEATED: dict[str, Callable[[], Any]] = {
     "unknown-input observer, two Riccati equations": lambda: uio_gains(UioCovariances(), 1e-3),
     "Takagi-Sugeno Luenberger (1.26), train": lambda: designed_gains(find_takagi_sugeno_model("takagi_sugeno_train")),
     "Theorem 7, train (0.1 s, 3 1/s)": lambda: design_theorem7("takagi_sugeno_train", 0.1, 3.0),
-    "Theorem 7, E1 core (0.2 s, 1 1/s)": lambda: design_theorem7("triangularisable_example", 0.2, 1.0, performance=False),
+    "Theorem 7, E1 core (0.2 s, 1 1/s)": lambda: design_theorem7(
+        "triangularisable_example", 0.2, 1.0, performance=False
+    ),
     "Theorem 7, E2 (0.4 s, 0.1 1/s)": lambda: design_theorem7("non_triangularisable_example", 0.4, 0.1),
     "largest eta, train, 0.5 s": lambda: largest_eta("takagi_sugeno_train", 0.5, 3.0),
 }

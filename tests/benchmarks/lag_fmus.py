@@ -1,4 +1,6 @@
-"""Chains of the trivial FMU of lag.c, for benchmarks of masters: the FMUs, their links, and the C loop that is the floor."""
+"""Chains of the trivial FMU of lag.c, for benchmarks of masters: the FMUs, their links, and the C loop that is the
+floor.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,7 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
   </ModelVariables>
   <ModelStructure><Outputs><Unknown index="2" dependencies=""/></Outputs></ModelStructure>
 </fmiModelDescription>
-"""
+"""  # noqa: E501
 
 
 @dataclass(frozen=True)
@@ -73,5 +75,7 @@ def make_chain(folder: Path, count: int, closed: bool = False) -> Chain:
 def compile_c(source: str, target: Path, *flags: str) -> Path:
     """Compile a C file of this folder."""
     options = ["-std=c11", "-O2", "-ffp-contract=off", f"-I{header_folder()}"]
-    subprocess.run([*find_compiler().command, *options, *flags, str(HERE / source), "-o", str(target), "-ldl"], check=True)
+    subprocess.run(
+        [*find_compiler().command, *options, *flags, str(HERE / source), "-o", str(target), "-ldl"], check=True
+    )
     return target

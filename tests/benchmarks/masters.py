@@ -1,8 +1,9 @@
-"""Benchmark: what a communication step costs in this master and in others; a pair in a loop and a chain of ten trivial FMUs.
+"""Benchmark: what a communication step costs in this master and in others; a pair in a loop and a chain of ten trivial
+FMUs.
 
-Run it with ``python tests/benchmarks/masters.py [REPETITIONS]``. All masters run in turn within one process, on the same FMUs
-(`lag.c`), with all outputs of all steps recorded in memory; loading is not counted. What each one calculates is checked, to the
-rounding of its communication step: ``h`` or ``t_(k+1) - t_k``.
+Run it with ``python tests/benchmarks/masters.py [REPETITIONS]``. All masters run in turn within one process, on the
+same FMUs (`lag.c`), with all outputs of all steps recorded in memory; loading is not counted. What each one calculates
+is checked, to the rounding of its communication step: ``h`` or ``t_(k+1) - t_k``.
 """
 
 from __future__ import annotations
@@ -106,8 +107,10 @@ def ctypes_loop(chain: Chain, steps: int, _: Path) -> Run:
         vr_u, vr_y = (ctypes.c_uint32 * 1)(U), (ctypes.c_uint32 * 1)(Y)
         place = [values[i:].ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for i in range(len(slaves))]
         inputs = [None if source is None else place[source] for source in sources]
-        parts = [(s.component, s.fmi2SetReal, u, s.fmi2DoStep, s.fmi2GetReal, y)
-                 for s, u, y in zip(slaves, inputs, place, strict=True)]  # fmt: skip
+        parts = [
+            (s.component, s.fmi2SetReal, u, s.fmi2DoStep, s.fmi2GetReal, y)
+            for s, u, y in zip(slaves, inputs, place, strict=True)
+        ]
         begin = perf_counter()
         for k in range(steps):
             t = k * H
@@ -124,7 +127,9 @@ def ctypes_loop(chain: Chain, steps: int, _: Path) -> Run:
 
 
 def container(chain: Chain, steps: int, folder: Path) -> Run:
-    """The FMU container of fmu-manipulation-toolbox, components in sequence, stepped by a loop with allocated arguments."""
+    """The FMU container of fmu-manipulation-toolbox, components in sequence, stepped by a loop with allocated
+    arguments.
+    """
     from fmu_manipulation_toolbox.container import FMUContainer
 
     logging.disable(logging.CRITICAL)  # it warns of inputs without a source, at every building
@@ -170,7 +175,9 @@ def _silent() -> Any:
 
 
 def libcosim(chain: Chain, steps: int, folder: Path) -> Run:
-    """libcosim's fixed-step algorithm, all steps in one call, its own observer recording in memory. All FMUs step at once."""
+    """libcosim's fixed-step algorithm, all steps in one call, its own observer recording in memory. All FMUs step at
+    once.
+    """
     from libcosimpy.CosimEnums import CosimVariableType
     from libcosimpy.CosimExecution import CosimExecution
     from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
@@ -196,9 +203,13 @@ def _last(samples: Any) -> float:
 
 def _system_structure(chain: Chain) -> str:
     simulators = "".join(
-        f'<Simulator name="{name}" source="{fmu}" stepSize="{H}"/>' for name, fmu in zip(chain.names, chain.fmus, strict=True)
+        f'<Simulator name="{name}" source="{fmu}" stepSize="{H}"/>'
+        for name, fmu in zip(chain.names, chain.fmus, strict=True)
     )
-    ends = '<VariableConnection><Variable simulator="{}" name="y"/><Variable simulator="{}" name="u"/></VariableConnection>'
+    ends = (
+        '<VariableConnection><Variable simulator="{}" name="y"/><Variable simulator="{}" '
+        'name="u"/></VariableConnection>'
+    )
     return (
         '<OspSystemStructure xmlns="http://opensimulationplatform.com/MSMI/OSPSystemStructure" version="0.1">'
         f"<StartTime>0.0</StartTime><BaseStepSize>{H}</BaseStepSize><Algorithm>fixedStep</Algorithm>"
@@ -225,7 +236,8 @@ class Master:
     """One line of the table.
 
     Args:
-        name: text of the line. run: runs it. steps: how many. package: what it needs. at_once: all FMUs step at once (Jacobi).
+        name: text of the line. run: runs it. steps: how many. package: what it needs. at_once: all FMUs step at once
+        (Jacobi).
     """
 
     name: str
@@ -270,7 +282,9 @@ def _is_here(package: str) -> bool:
 
 @lru_cache
 def expected(chain: Chain, steps: int, at_once: bool) -> np.ndarray:
-    """Outputs at the end, calculated here: FMUs in sequence, each with the newest values, or all at once with the former ones."""
+    """Outputs at the end, calculated here: FMUs in sequence, each with the newest values, or all at once with the
+    former ones.
+    """
     values, sources = [0.0] * len(chain.fmus), _sources(chain)
     for _ in range(steps):
         former = list(values)

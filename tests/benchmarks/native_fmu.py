@@ -1,9 +1,10 @@
 """Benchmark: what native FMUs cost and how exact they are in other masters.
 
-Sections: ``build`` (time to compile and size, by platform), ``step`` (see `native_step`), ``foreign`` (see `native_foreign`).
+Sections: ``build`` (time to compile and size, by platform), ``step`` (see `native_step`), ``foreign`` (see
+`native_foreign`).
 
-Run it with ``python tests/benchmarks/native_fmu.py [SECTION ...]``; without a section, all of them. Nothing is asserted.
-A further section is a function in `SECTIONS` that prints.
+Run it with ``python tests/benchmarks/native_fmu.py [SECTION ...]``; without a section, all of them. Nothing is
+asserted. A further section is a function in `SECTIONS` that prints.
 """
 
 from __future__ import annotations
@@ -28,7 +29,9 @@ REPETITIONS = 5
 
 
 def build() -> None:
-    """Time to compile one library and its size by platform; the C libraries of the targets are built before it is measured."""
+    """Time to compile one library and its size by platform; the C libraries of the targets are built before it is
+    measured.
+    """
     with tempfile.TemporaryDirectory(prefix="native-fmu-") as folder:
         build_everything(Path(folder))
     for model in MODELS:
@@ -50,12 +53,17 @@ def measure(plan: Plan, platform: str) -> str:
 
 
 def build_everything(folder: Path) -> None:
-    """The whole FMU for all platforms: the first time compiles the C libraries of the targets, unless they are in the cache."""
+    """The whole FMU for all platforms: the first time compiles the C libraries of the targets, unless they are in the
+    cache.
+    """
     for attempt in ("first", "second"):
         start = time.perf_counter()
         fmu = build_fmu(recipe(MODELS[0]), folder / f"{attempt}.fmu", platforms="all")
         seconds = time.perf_counter() - start
-        print(f"{MODELS[0]}, FMI 3, all platforms, {attempt} time: {seconds:.1f} s, FMU of {fmu.stat().st_size / 1000:.0f} kB")
+        print(
+            f"{MODELS[0]}, FMI 3, all platforms, {attempt} time: {seconds:.1f} s, FMU of "
+            f"{fmu.stat().st_size / 1000:.0f} kB"
+        )
 
 
 SECTIONS: dict[str, Callable[[], None]] = {"build": build, "step": step, "foreign": foreign}

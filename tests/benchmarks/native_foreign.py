@@ -1,4 +1,6 @@
-"""Section ``foreign`` of `native_fmu`: how exact events are in masters of other people; the table of docs/foreign_masters.md."""
+"""Section ``foreign`` of `native_fmu`: how exact events are in masters of other people; the table of
+docs/foreign_masters.md.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,9 @@ HEAD = ("master", "`input_instant`", "stamps", "position", "speed")
 
 
 def foreign() -> None:
-    """Errors of stamps [s], observed position [m] and speed [m/s] by master, with the right and the wrong `input_instant`."""
+    """Errors of stamps [s], observed position [m] and speed [m/s] by master, with the right and the wrong
+    `input_instant`.
+    """
     print(f"| {' | '.join(HEAD)} |\n|{'---|' * len(HEAD)}")
     for name, master in MASTERS.items():
         if find_spec(master.package) is None:

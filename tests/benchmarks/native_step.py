@@ -1,4 +1,6 @@
-"""Section ``step`` of `native_fmu`: what calls of the Takagi-Sugeno observer cost, raw from C and through fmpy, and its block."""
+"""Section ``step`` of `native_fmu`: what calls of the Takagi-Sugeno observer cost, raw from C and through fmpy, and its
+block.
+"""
 
 from __future__ import annotations
 
@@ -52,7 +54,9 @@ def _raw(folder: Path, unpacked: Path, description: ModelDescription) -> None:
     subprocess.run(command, check=True)
     references = {v.name: str(v.valueReference) for v in description.modelVariables}
     (library,) = (unpacked / "binaries").glob(f"*/{MODEL}.*")
-    subprocess.run([str(program), str(library), description.guid, *(references[name] for name in ARGUMENTS)], check=True)
+    subprocess.run(
+        [str(program), str(library), description.guid, *(references[name] for name in ARGUMENTS)], check=True
+    )
 
 
 def _slave(version: int, unpacked: Path, description: ModelDescription) -> Any:

@@ -1,7 +1,8 @@
 """Benchmark: what each observer costs, to step, to certify and to construct with its designed gains.
 
-``python tests/benchmarks/observers.py [NAME ...]``; without names all registered systems. Nothing is asserted. A step is measured
-over one long ``doStep``, so the cost of the call does not count; `native_fmu.py step` and `stepper.py` measure calls.
+``python tests/benchmarks/observers.py [NAME ...]``; without names all registered systems. Nothing is asserted. A step
+is measured over one long ``doStep``, so the cost of the call does not count; `native_fmu.py step` and `stepper.py`
+measure calls.
 """
 
 from __future__ import annotations
@@ -34,7 +35,9 @@ def main(names: list[str]) -> None:
         system = cls()
         construct = median(cls)
         certify = (
-            "-" if name not in OBSERVERS or not hasattr(system, "certify") else f"{once(lambda s=system: s.certify(0.2)):.1f}"
+            "-"
+            if name not in OBSERVERS or not hasattr(system, "certify")
+            else f"{once(lambda s=system: s.certify(0.2)):.1f}"
         )
         columns = f"{native(system):>10.3f}{python(system):>10.2f}{1e3 * construct:>11.2f}{certify:>10}"
         print(f"{name:<28}{system.internal_step:>14g}{columns}", flush=True)
@@ -48,7 +51,7 @@ def native(system: HybridSystem) -> float:
         unpacked = Path(extract(fmu, folder))
         slave = FMU2Slave(
             guid=description.guid, unzipDirectory=str(unpacked), modelIdentifier=system.name, instanceName=system.name
-        )  # fmt: skip
+        )
         slave.instantiate()
         slave.setupExperiment()
         slave.enterInitializationMode()

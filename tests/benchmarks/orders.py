@@ -1,4 +1,5 @@
-"""Table: error, observed order and energy error of the algorithms and input methods, on two coupled masses with a closed form.
+"""Table: error, observed order and energy error of the algorithms and input methods, on two coupled masses with a
+closed form.
 
 Run it with ``python tests/benchmarks/orders.py``. The components are exact for the inputs they are told, so that the
 coupling is the only error. Lines as in docs/algorithms.md come out.
@@ -16,7 +17,7 @@ import numpy as np
 sys.path[:0] = [str(Path(__file__).parents[1]), str(Path(__file__).parents[1] / "cosim")]
 
 from linear_runs import LinearRun, run_cut  # noqa: E402 - the tests' own modules
-from zoo.masses import Chain, Cut, cuts  # noqa: E402
+from test_fmus.masses import Chain, Cut, cuts  # noqa: E402
 
 from cosim.coupling.plan import Plan  # noqa: E402
 from cosim.master.algorithms.gauss_seidel import GaussSeidel  # noqa: E402
@@ -42,7 +43,14 @@ def line(cut: Cut, folder: Path, algorithm: str, inputs: str, told: str) -> str:
     """One row of the table."""
     runs: list[LinearRun] = [
         run_cut(
-            cut, CHAIN, folder, DURATION / n, n, algorithm=ALGORITHMS[algorithm], inputs=inputs, capabilities=TOLD.get(told, {})
+            cut,
+            CHAIN,
+            folder,
+            DURATION / n,
+            n,
+            algorithm=ALGORITHMS[algorithm],
+            inputs=inputs,
+            capabilities=TOLD.get(told, {}),
         )
         for n in COUNTS
     ]
@@ -54,7 +62,9 @@ def line(cut: Cut, folder: Path, algorithm: str, inputs: str, told: str) -> str:
 def main() -> None:
     """Print the table."""
     steps = " | ".join(f"error at {1e3 * DURATION / n:g} ms" for n in COUNTS)
-    print(f"| cut | algorithm | inputs | told as | {steps} | order | energy error at {1e3 * DURATION / COUNTS[1]:g} ms |")
+    print(
+        f"| cut | algorithm | inputs | told as | {steps} | order | energy error at {1e3 * DURATION / COUNTS[1]:g} ms |"
+    )
     print("|---|---|---|---|---|---|---|---|")
     with TemporaryDirectory() as folder:
         for name in ("displacement-displacement", "force-displacement", "force-force"):

@@ -1,7 +1,8 @@
 """Benchmark: how many times faster than real time the default scenario runs, and where the time goes.
 
-Run it with ``python tests/benchmarks/real_time_factor.py [REPETITIONS]``. Variants are run in turn within one process, so
-that their ratios hold on a noisy machine; nothing is asserted. Set-up (building or loading FMUs, certificates) is not counted.
+Run it with ``python tests/benchmarks/real_time_factor.py [REPETITIONS]``. Variants are run in turn within one process,
+so that their ratios hold on a noisy machine; nothing is asserted. Set-up (building or loading FMUs, certificates) is
+not counted.
 """
 
 from __future__ import annotations
@@ -51,7 +52,9 @@ def main() -> None:
         print(name)
         for key in rows[0]:
             values = [row[key] for row in rows]
-            print(f"  {key:<22} median {statistics.median(values):8.1f}   min {min(values):8.1f}   max {max(values):8.1f}")
+            print(
+                f"  {key:<22} median {statistics.median(values):8.1f}   min {min(values):8.1f}   max {max(values):8.1f}"
+            )
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
 """Benchmark: how cost grows with components and with steps, and that memory does not grow with steps.
 
-Run it with ``python tests/benchmarks/scaling.py [SECTION ...]``; sections: ``components``, ``steps``. Without one, all of them.
-Trivial FMUs (`lag.c`) in a chain. Growth is the exponent p of a fit ``cost = c * n**p``: 1 is linear. Nothing is asserted.
+Run it with ``python tests/benchmarks/scaling.py [SECTION ...]``; sections: ``components``, ``steps``. Without one, all
+of them. Trivial FMUs (`lag.c`) in a chain. Growth is the exponent p of a fit ``cost = c * n**p``: 1 is linear. Nothing
+is asserted.
 """
 
 from __future__ import annotations
@@ -50,7 +51,9 @@ def run(chain: Chain, steps: int, stepper: str) -> Outcome:
 
 
 def exponent(sizes: Sequence[float], costs: Sequence[float]) -> float:
-    """Growth of the cost, by least squares on logarithms over the larger half of the sizes: small ones hold what is constant."""
+    """Growth of the cost, by least squares on logarithms over the larger half of the sizes: small ones hold what is
+    constant.
+    """
     half = len(sizes) // 2
     return float(np.polyfit(np.log(sizes[half:]), np.log(costs[half:]), 1)[0])
 
@@ -115,7 +118,9 @@ def _parts(chain: Chain) -> dict[str, float]:
 
 def steps() -> None:
     """Time and memory by number of steps, each run in a process of its own."""
-    print(f"{'steps of a pair':<22} {'us/step':>9} {'rows [MB]':>10} {'memory before':>14} {'most':>8} {'after [MB]':>11}")
+    print(
+        f"{'steps of a pair':<22} {'us/step':>9} {'rows [MB]':>10} {'memory before':>14} {'most':>8} {'after [MB]':>11}"
+    )
     with tempfile.TemporaryDirectory(prefix="scaling-") as folder:
         for stepper, numbers in STEPS.items():
             seconds = [_alone(folder, stepper, number) for number in numbers]

@@ -1,8 +1,9 @@
-"""Benchmark: what a communication step of small FMUs costs with the Python stepper, the compiled stepper, and in plain C.
+"""Benchmark: what a communication step of small FMUs costs with the Python stepper, the compiled stepper, and in plain
+C.
 
-Run it with ``python tests/benchmarks/stepper.py [REPETITIONS]`` from the root of the project. All three step the same libraries
-with exchange and recording in memory, in turn within one process, so that their ratios hold on a noisy machine; nothing is
-asserted. The plain C loop is written for this one ring, as fast as it can be.
+Run it with ``python tests/benchmarks/stepper.py [REPETITIONS]`` from the root of the project. All three step the same
+libraries with exchange and recording in memory, in turn within one process, so that their ratios hold on a noisy
+machine; nothing is asserted. The plain C loop is written for this one ring, as fast as it can be.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from zoo.build import linear_fmu
+from test_fmus.build import linear_fmu
 
 from cosim.components.loading import load_fmu
 from cosim.coupling.connection import connect
@@ -93,9 +94,13 @@ def by_plain_c(folder: Path, count: int, steps: int) -> float:
     rows[:] = 0.0  # no page is touched for the first time in the loop
     begin = perf_counter()
     run(
-        ctypes.c_long(steps), ctypes.c_int(count), *pointers, ctypes.c_double(STEP), ctypes.c_void_p(plan.values.ctypes.data),
+        ctypes.c_long(steps),
+        ctypes.c_int(count),
+        *pointers,
+        ctypes.c_double(STEP),
+        ctypes.c_void_p(plan.values.ctypes.data),
         ctypes.c_void_p(rows.ctypes.data),
-    )  # fmt: skip
+    )
     seconds = perf_counter() - begin
     close(plan)
     return seconds / steps
@@ -118,7 +123,9 @@ def main() -> None:
                 times["plain C"].append(by_plain_c(folder, count, 500_000))
             print(f"{count} FMUs, microseconds per communication step with recording in memory")
             for name, values in times.items():
-                print(f"  {name:<17} min {min(values) * 1e6:8.3f}   median {sorted(values)[len(values) // 2] * 1e6:8.3f}")
+                print(
+                    f"  {name:<17} min {min(values) * 1e6:8.3f}   median {sorted(values)[len(values) // 2] * 1e6:8.3f}"
+                )
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
 """Pages in a real browser: `check_page` says all that is wrong with a page, `open_page` opens one to look into it.
 
-One browser serves all tests of a process; `close_browser` ends it (see ``conftest.py``). A test that uses it bears the marker
-``browser``. Where no browser is installed it is skipped, but not where the environment variable CI is set: there it fails.
+One browser serves all tests of a process; `close_browser` ends it (see ``conftest.py``). A test that uses it bears the
+marker ``browser``. Where no browser is installed it is skipped, but not where the environment variable CI is set: there
+it fails.
 """
 
 from __future__ import annotations
@@ -21,9 +22,14 @@ from pypdfium2.raw import FPDF_PAGEOBJ_IMAGE
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 ARGUMENTS = [
-    "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking", "--disable-component-update",
-    "--disable-sync", "--disable-quic",
-]  # fmt: skip
+    "--no-sandbox",
+    "--disable-gpu",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-quic",
+]
 DESKTOP, PHONE = 1280, 390  # widths [px]
 PAPER = 703  # width of A4 between margins of 12 mm [px]
 EDGE = 1.0  # a page object may reach this far over the edge of the paper [pt]: half a line width, rounding
@@ -69,7 +75,9 @@ def _context(width: int) -> Iterator[BrowserContext]:
 
 
 @contextmanager
-def open_page(path: str | Path, *, width: int = DESKTOP, media: Literal["screen", "print"] = "screen") -> Iterator[Page]:
+def open_page(
+    path: str | Path, *, width: int = DESKTOP, media: Literal["screen", "print"] = "screen"
+) -> Iterator[Page]:
     """A page opened from its file, without a network.
 
     Args:
@@ -193,7 +201,7 @@ STRUCTURE = """() => {
     if ([...table.querySelectorAll("th")].some((th) => !th.scope)) problems.push("a header cell has no scope");
   }
   return problems;
-}"""
+}"""  # noqa: E501
 
 OVERFLOW = """(where) => {
   const room = document.documentElement.clientWidth, wide = document.documentElement.scrollWidth;
@@ -205,7 +213,7 @@ OVERFLOW = """(where) => {
     .filter((e) => e.getBoundingClientRect().right > room + 1 && !clipped(e)).slice(0, 3)
     .map((e) => `<${e.tagName.toLowerCase()}> ${e.textContent.trim().slice(0, 40)}`);
   return [`${where} the page is ${wide} px wide in ${room} px: ${over.join("; ")}`];
-}"""
+}"""  # noqa: E501
 
 CLIPPED = """() => [...document.body.querySelectorAll("*")]
   .filter((e) => getComputedStyle(e).overflowX !== "visible" && e.scrollWidth > e.clientWidth + 1)

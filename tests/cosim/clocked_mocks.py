@@ -1,4 +1,6 @@
-"""Slaves in plain Python with clocks of every kind, for what C examples cannot say: odd intervals, fractions, wrong answers."""
+"""Slaves in plain Python with clocks of every kind, for what C examples cannot say: odd intervals, fractions, wrong
+answers.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,9 @@ from mock_slaves import Mock, variable
 NOT_YET_KNOWN, UNCHANGED, CHANGED = 0, 1, 2
 
 
-def clock(name: str, reference: int, causality: str = "input", kind: str = "triggered", **attributes: Any) -> ModelVariable:
+def clock(
+    name: str, reference: int, causality: str = "input", kind: str = "triggered", **attributes: Any
+) -> ModelVariable:
     """A clock as `read_description` would make it."""
     made = variable(name, causality, reference, "Clock")
     made.intervalVariability = kind
@@ -32,7 +36,9 @@ class Clocked(Mock):
     memory = ("v", "x", "time", "asked")
     TICK = 90
 
-    def __init__(self, kind: str, answers: Sequence[tuple[float, int]] = (), shift: float = 0.0, **attributes: Any) -> None:
+    def __init__(
+        self, kind: str, answers: Sequence[tuple[float, int]] = (), shift: float = 0.0, **attributes: Any
+    ) -> None:
         self._clock = clock("tick", self.TICK, kind=kind, **attributes)
         self.answers, self.shift = list(answers), shift
         super().__init__()

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from zoo.build import linear_fmu
+from test_fmus.build import linear_fmu
 
 from cosim import Scenario
 from cosim.scenario.outcome import Outcome
@@ -46,7 +46,9 @@ def assert_same(python: Outcome, compiled: Outcome) -> None:
         assert mine["messages"] == reference["messages"]
 
 
-def random_linear(folder: Path, name: str, rng: np.random.Generator, version: Any, inputs: int = 1, outputs: int = 1) -> Path:
+def random_linear(
+    folder: Path, name: str, rng: np.random.Generator, version: Any, inputs: int = 1, outputs: int = 1
+) -> Path:
     """A stable linear FMU with random matrices and no direct feedthrough."""
     n = int(rng.integers(1, 4))
     a = rng.normal(size=(n, n)) - 2.0 * np.eye(n)

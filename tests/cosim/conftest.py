@@ -1,4 +1,6 @@
-"""Makes the helpers of this folder importable for the tests in its rooms; pytest puts the folder of a conftest on the path."""
+"""Makes the helpers of this folder importable for the tests in its rooms; pytest puts the folder of a conftest on the
+path.
+"""
 
 from __future__ import annotations
 

@@ -11,16 +11,16 @@ import numpy as np
 from cosim.balises.delivery import Receiver
 from cosim.balises.layout import Layout, by_positions
 from cosim.balises.localise import Method, make_localiser
+from cosim.balises.plant_monitor import PlantMonitor
 from cosim.balises.service import BaliseService
 from cosim.balises.telegram import Channel
-from cosim.balises.watch import Watch
 from cosim.components.component import Component
 from cosim.components.loading import load_block
 from cosim.coupling.connection import connect
 from cosim.coupling.graph import execution_order
 from cosim.coupling.plan import Plan, make_plan
 from cosim.master.axis import TimeAxis
-from cosim.master.lines.draw import draw_lines
+from cosim.master.interpolation.draw import draw_lines
 from cosim.master.master import Master, close
 from cosim.results.result import BaliseRecord
 from fmu_observer.observers.train.high_gain_observer import HighGainTrainObserver
@@ -42,9 +42,12 @@ class Motion(HybridSystem):
     name = "motion"
     outputs = (output_signal("position", "m"), output_signal("speed", "m/s"))
     parameters = (
-        parameter("p0", "m", 0.0), parameter("v0", "m/s", 13.9), parameter("a", "m/s2", 0.0),
-        parameter("A", "m/s", 0.0), parameter("w", "rad/s", 1.0),
-    )  # fmt: skip
+        parameter("p0", "m", 0.0),
+        parameter("v0", "m/s", 13.9),
+        parameter("a", "m/s2", 0.0),
+        parameter("A", "m/s", 0.0),
+        parameter("w", "rad/s", 1.0),
+    )
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         swing = p.A / p.w * (1.0 - np.cos(p.w * t))
@@ -71,8 +74,8 @@ class Pushed(HybridSystem):
 
 
 class Staircase(HybridSystem):
-    """Effort and odometer that are constant on every ``(0.1 k, 0.1 (k + 1)]``: the value at the end of a step is the one of the
-    whole step, so that holding it is exact for every communication step that divides 100 ms."""
+    """Effort and odometer that are constant on every ``(0.1 k, 0.1 (k + 1)]``: the value at the end of a step is the
+    one of the whole step, so that holding it is exact for every communication step that divides 100 ms."""
 
     name = "staircase"
     outputs = (output_signal("effort", "N"), output_signal("odometer", "m/s"), output_signal("push", "m/s2"))
@@ -102,9 +105,11 @@ class Listener(HybridSystem):
     states = (state("integral", "m"), memory("told", "m"), memory("told_at", "s", -1.0), memory("count", "1"))
     inputs = (input_signal("speed", "m/s"),)
     outputs = (
-        output_signal("integrated", "m"), output_signal("last", "m", variability="discrete"),
-        output_signal("at", "s", variability="discrete"), output_signal("heard", "1", variability="discrete"),
-    )  # fmt: skip
+        output_signal("integrated", "m"),
+        output_signal("last", "m", variability="discrete"),
+        output_signal("at", "s", variability="discrete"),
+        output_signal("heard", "1", variability="discrete"),
+    )
     events = (TriggeredEvent("balise", (input_signal("balise_position", "m", variability="discrete"),)),)
     internal_step = 1e-2
 
@@ -161,10 +166,19 @@ class Balises:
 
 
 def prepare(
-    components: Sequence[Component], connections: Sequence[tuple[str, str]], h: float, count: int, balises: Balises | None = None,
-    *, start: float = 0.0, starts: Mapping[str, Mapping[str, float]] | None = None,
-    extra: Mapping[str, Sequence[str]] | None = None, inputs: Any = "hold", order: Sequence[str] = (), **how: Any,
-) -> Master:  # fmt: skip
+    components: Sequence[Component],
+    connections: Sequence[tuple[str, str]],
+    h: float,
+    count: int,
+    balises: Balises | None = None,
+    *,
+    start: float = 0.0,
+    starts: Mapping[str, Mapping[str, float]] | None = None,
+    extra: Mapping[str, Sequence[str]] | None = None,
+    inputs: Any = "hold",
+    order: Sequence[str] = (),
+    **how: Any,
+) -> Master:
     """A master ready to run; `order` of execution where it is not left to the graph, `how` as for `Master`."""
     by_name = {c.name: c for c in components}
     pairs = connect(connections, by_name)
@@ -184,7 +198,7 @@ def prepare(
 def _service(plan: Plan, balises: Balises) -> BaliseService:
     planned = plan.find(balises.plant)
     names = planned.component.names("output")
-    watch = Watch(planned, names.index("position"), names.index("speed"), balises.scale, balises.scale)
+    watch = PlantMonitor(planned, names.index("position"), names.index("speed"), balises.scale, balises.scale)
     localiser = make_localiser(balises.method, watch, balises.layout, balises.clock)
     receivers = [Receiver(plan.find(name), timing=balises.timing) for name in balises.receivers]
     odometer = None if balises.odometer is None else plan.column(balises.odometer)

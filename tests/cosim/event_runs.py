@@ -45,10 +45,19 @@ class EventRun:
 
 
 def prepare(
-    components: Sequence[Component], connections: Sequence[str], h: float, count: int, *, start: float = 0.0,
-    algorithm: Callable[[Plan], Any] = GaussSeidel, control: Callable[[Any], Any] = FixedStep, events: Any = "propagate",
-    balises: Balises | None = None, starts: dict[str, dict[str, float]] | None = None, order: Sequence[str] = (),
-) -> Master:  # fmt: skip
+    components: Sequence[Component],
+    connections: Sequence[str],
+    h: float,
+    count: int,
+    *,
+    start: float = 0.0,
+    algorithm: Callable[[Plan], Any] = GaussSeidel,
+    control: Callable[[Any], Any] = FixedStep,
+    events: Any = "propagate",
+    balises: Balises | None = None,
+    starts: dict[str, dict[str, float]] | None = None,
+    order: Sequence[str] = (),
+) -> Master:
     by_name = {c.name: c for c in components}
     clocks, pairs = connect_clocks([tuple(c.split(" -> ")) for c in connections], by_name)  # type: ignore[misc]
     connected = connect(pairs, by_name)

@@ -9,9 +9,14 @@ from cosim.diagnostics.structure import Balises, Link, Part, Port, Structure
 
 
 def structure_of(
-    names: Sequence[str], links: Sequence[Link], *, feedthrough: Sequence[tuple[str, str, str]] = (),
-    loops: Sequence[tuple[tuple[str, str], ...]] = (), balises: Balises | None = None, title: str = "By hand",
-) -> Structure:  # fmt: skip
+    names: Sequence[str],
+    links: Sequence[Link],
+    *,
+    feedthrough: Sequence[tuple[str, str, str]] = (),
+    loops: Sequence[tuple[tuple[str, str], ...]] = (),
+    balises: Balises | None = None,
+    title: str = "By hand",
+) -> Structure:
     """A structure of components in the order given, with the ports that their links need and one output more."""
     edges = {(k.source[0], k.target[0]) for k in links}
     if balises is not None:
@@ -24,7 +29,10 @@ def structure_of(
         outputs = dict.fromkeys(k.source[1] for k in links if k.source[0] == name)
         direct = {o: tuple(u for c, u, y in feedthrough if (c, y) == (name, o)) for o in outputs}
         ports_in = tuple(Port(u, "m", "Float64", True) for u in inputs)
-        ports_out = (*(Port(y, None, "Float64", True, direct[y]) for y in outputs), Port("more", "N", "Float64", False, ()))
+        ports_out = (
+            *(Port(y, None, "Float64", True, direct[y]) for y in outputs),
+            Port("more", "N", "Float64", False, ()),
+        )
         kind = ("FMU", "block")[number % 2]
         parts.append(Part(name, kind, f"{number % 3 + 1}.0", "model", "file", ports_in, ports_out, (), (), index[name]))
     return Structure("hand", title, 0.0, 1.0, 0.1, tuple(parts), tuple(links), groups, tuple(loops), balises=balises)

@@ -1,4 +1,6 @@
-"""Runs of cut systems by an algorithm of choice: groups, choice and master as a scenario makes them, without a scenario."""
+"""Runs of cut systems by an algorithm of choice: groups, choice and master as a scenario makes them, without a
+scenario.
+"""
 
 from __future__ import annotations
 
@@ -13,14 +15,18 @@ from cosim.coupling.graph import execution_groups
 from cosim.coupling.plan import make_plan
 from cosim.master.algorithms.choose import choose_algorithm
 from cosim.master.axis import TimeAxis
-from cosim.master.lines.draw import draw_lines
+from cosim.master.interpolation.draw import draw_lines
 from cosim.master.master import Master, close
 from cosim.scenario.master import make_algorithm
 from cosim.scenario.tables import MasterTable
 
 
 def prepare(
-    components: Mapping[str, Component], connections: Sequence[str], h: float, count: int, table: Mapping[str, Any] | None = None
+    components: Mapping[str, Component],
+    connections: Sequence[str],
+    h: float,
+    count: int,
+    table: Mapping[str, Any] | None = None,
 ) -> Master:
     """A master ready to run; `table` as ``[master]`` of a scenario."""
     wanted = MasterTable.model_validate(table or {})

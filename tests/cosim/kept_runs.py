@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from zoo.build import linear_fmu
+from test_fmus.build import linear_fmu
 
 from cosim import Scenario
 from cosim.scenario import Outcome
@@ -18,7 +18,9 @@ def coast(folder: Path, rate: float = 1.0) -> Path:
 
 def coasting(folder: Path, **tables: Any) -> Scenario:
     """A scenario of ``coast.fmu`` in that folder."""
-    return Scenario(stop=1.0, step=0.1, folder=folder, master={"stepper": "python"}, **tables).add("train", fmu="coast.fmu")
+    return Scenario(stop=1.0, step=0.1, folder=folder, master={"stepper": "python"}, **tables).add(
+        "train", fmu="coast.fmu"
+    )
 
 
 def quietly(scenario: Scenario, **arguments: Any) -> Outcome:

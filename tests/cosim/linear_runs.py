@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from zoo.masses import Chain, Cut
+from test_fmus.masses import Chain, Cut
 
 from cosim.components.component import Component
 from cosim.components.fmi3 import FMI3Component
@@ -20,7 +20,7 @@ from cosim.master.algorithms.gauss_seidel import GaussSeidel
 from cosim.master.axis import TimeAxis
 from cosim.master.control.fixed import FixedStep
 from cosim.master.control.multirate import set_rates
-from cosim.master.lines.draw import draw_lines
+from cosim.master.interpolation.draw import draw_lines
 from cosim.master.master import Master, close
 
 
@@ -29,20 +29,22 @@ class LinearRun:
     """What a run left, beside the closed form of the whole.
 
     Args:
-        table: rows. carriers: by component, how it was told of its lines. master: after the run.
+        table: rows. interpolators: by component, how it was told of its lines. master: after the run.
     """
 
     cut: Cut
     chain: Chain
     table: np.ndarray
-    carriers: Mapping[str, str]
+    interpolators: Mapping[str, str]
     master: Master
 
     @property
     def error(self) -> float:
         """Largest error of any position or speed, at any row."""
         exact = self.chain.reference(self.table["time"])
-        return max(float(np.abs(self.table[signal] - exact[quantity]).max()) for quantity, signal in self.cut.signals.items())
+        return max(
+            float(np.abs(self.table[signal] - exact[quantity]).max()) for quantity, signal in self.cut.signals.items()
+        )
 
     @property
     def energy_error(self) -> float:
@@ -62,11 +64,19 @@ def load(cut: Cut, folder: Path, version: Any, **capabilities: Any) -> dict[str,
 
 
 def prepare(
-    components: Mapping[str, Component], connections: Sequence[str], h: float, count: int, *, inputs: Any = "hold",
-    algorithm: Callable[[Plan], Any] = GaussSeidel, control: Callable[[Any], Any] = FixedStep,
-    every: Mapping[str, int] | None = None, substeps: Mapping[str, int] | None = None, start: float = 0.0,
-) -> tuple[Master, Mapping[str, str]]:  # fmt: skip
-    """A master ready to run, and the carriers of its lines."""
+    components: Mapping[str, Component],
+    connections: Sequence[str],
+    h: float,
+    count: int,
+    *,
+    inputs: Any = "hold",
+    algorithm: Callable[[Plan], Any] = GaussSeidel,
+    control: Callable[[Any], Any] = FixedStep,
+    every: Mapping[str, int] | None = None,
+    substeps: Mapping[str, int] | None = None,
+    start: float = 0.0,
+) -> tuple[Master, Mapping[str, str]]:
+    """A master ready to run, and the interpolators of its lines."""
     pairs = connect([tuple(c.split(" -> ")) for c in connections], components)  # type: ignore[misc]
     order = execution_order(components, pairs)
     for name, component in components.items():
@@ -74,21 +84,29 @@ def prepare(
             component.request_intermediate_updates([c.target[1] for c in pairs if c.target[0] == name])
         component.instantiate()
     plan = make_plan(components, pairs, order)
-    carriers = {} if inputs == "hold" else draw_lines(plan, inputs)
+    interpolators = {} if inputs == "hold" else draw_lines(plan, inputs)
     axis = TimeAxis(start, h, count)
     master = Master(plan, axis, algorithm=algorithm, control=control)
     set_rates(plan, axis, every or {}, substeps or {}, {})
-    return master, carriers
+    return master, interpolators
 
 
 def run_cut(
-    cut: Cut, chain: Chain, folder: Path, h: float, count: int, version: Any = 2, *, capabilities: Any = None, **how: Any
+    cut: Cut,
+    chain: Chain,
+    folder: Path,
+    h: float,
+    count: int,
+    version: Any = 2,
+    *,
+    capabilities: Any = None,
+    **how: Any,
 ) -> LinearRun:
     """A whole run of a cut; `how` as for `prepare`."""
     components = load(cut, folder, version, **(capabilities or {}))
-    master, carriers = prepare(components, cut.connections, h, count, **how)
+    master, interpolators = prepare(components, cut.connections, h, count, **how)
     try:
         master.run()
     finally:
         close(master.plan)
-    return LinearRun(cut, chain, master.recorder.table(), carriers, master)
+    return LinearRun(cut, chain, master.recorder.table(), interpolators, master)

@@ -1,6 +1,7 @@
 """Slaves made of plain Python, with fmpy's call surface, for the tests of the co-simulation core.
 
-A mock is honest unless told otherwise; the tests subclass one and break one thing. `component` wraps it as the master would.
+A mock is honest unless told otherwise; the tests subclass one and break one thing. `component` wraps it as the master
+would.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ def variable(name: str, causality: str, reference: int, kind: str, **attributes:
 class Mock:
     """A slave with named real values in `v`, its own clock, and everything declared that it can do.
 
-    Subclasses set `inputs`, `outputs`, `parameters` (name -> start, or name -> (start, unit)) and `feedthrough`, and write
-    `compute` (outputs from the state) and `move(t, h)` (the step). Every mutable attribute in `memory` is state.
+    Subclasses set `inputs`, `outputs`, `parameters` (name -> start, or name -> (start, unit)) and `feedthrough`, and
+    write `compute` (outputs from the state) and `move(t, h)` (the step). Every mutable attribute in `memory` is state.
     """
 
     version = 3
@@ -81,14 +82,20 @@ class Mock:
             self._starts.setdefault(extra.name, 0.0)
         named = {v.name: v for v in variables}
         abilities = {
-            "canHandleVariableCommunicationStepSize": True, "canGetAndSetFMUstate": True, "modelIdentifier": "mock",
-        } | self.capabilities  # fmt: skip
+            "canHandleVariableCommunicationStepSize": True,
+            "canGetAndSetFMUstate": True,
+            "modelIdentifier": "mock",
+        } | self.capabilities
         description = ModelDescription(
-            fmiVersion=f"{self.version}.0", modelName=type(self).__name__, coSimulation=CoSimulation(**abilities),
-            modelVariables=variables, unitDefinitions=[Unit(name=n, baseUnit=b) for n, b in self.units.items()],
-        )  # fmt: skip
+            fmiVersion=f"{self.version}.0",
+            modelName=type(self).__name__,
+            coSimulation=CoSimulation(**abilities),
+            modelVariables=variables,
+            unitDefinitions=[Unit(name=n, baseUnit=b) for n, b in self.units.items()],
+        )
         description.outputs = [
-            Unknown(variable=named[n], dependencies=[named[i] for i in self.feedthrough.get(n, [])]) for n in self.outputs
+            Unknown(variable=named[n], dependencies=[named[i] for i in self.feedthrough.get(n, [])])
+            for n in self.outputs
         ]
         return description
 
@@ -105,7 +112,9 @@ class Mock:
     def instantiate(self, **_: Any) -> None:
         self._restart()
 
-    def setupExperiment(self, startTime: float = 0.0, stopTime: float | None = None, tolerance: float | None = None) -> None:
+    def setupExperiment(
+        self, startTime: float = 0.0, stopTime: float | None = None, tolerance: float | None = None
+    ) -> None:
         self.time = startTime
 
     def enterInitializationMode(self, startTime: float | None = None, stopTime: float | None = None) -> None:

@@ -1,4 +1,6 @@
-"""Results that are hard to keep: odd names, units in any script, odd numbers, events within a millisecond, few rows or none."""
+"""Results that are hard to keep: odd names, units in any script, odd numbers, events within a millisecond, few rows or
+none.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +14,31 @@ from cosim.results.result import BaliseRecord, Result, SignalInfo
 
 ODD = (0.1, -0.0, 5e-324, -2.2250738585072011e-308, 1.7976931348623157e308, math.inf, -math.inf, math.nan, 1 / 3)
 NAMES = (
-    "a[1,2]", "der(train.x)", "été.v", "x/y", "events", ".", "..", "a b", "time_", "units", "signals", 'q"uo;te', "#c", "a%b",
-    "x [m]", "data_2", "ß", "速度", "f(x)", "a\\b", "A", "a", "summary", "name",
-)  # fmt: skip
+    "a[1,2]",
+    "der(train.x)",
+    "été.v",
+    "x/y",
+    "events",
+    ".",
+    "..",
+    "a b",
+    "time_",
+    "units",
+    "signals",
+    'q"uo;te',
+    "#c",
+    "a%b",
+    "x [m]",
+    "data_2",
+    "ß",
+    "速度",
+    "f(x)",
+    "a\\b",
+    "A",
+    "a",
+    "summary",
+    "name",
+)
 TEXT = st.text(st.characters(exclude_categories=["Cs", "Cc"]), max_size=12)
 
 
@@ -30,7 +54,17 @@ def odd_table(rows: int, names: tuple[str, ...] = NAMES) -> np.ndarray:
 def odd_events() -> list[BaliseRecord]:
     return [
         BaliseRecord(
-            0.1, math.nan, 'B;1, "é"', 1 / 3, 5e-324, 2.0, math.nan, "missed", "rollback", math.inf, {"a;b": "c=d", "é": ""}
+            0.1,
+            math.nan,
+            'B;1, "é"',
+            1 / 3,
+            5e-324,
+            2.0,
+            math.nan,
+            "missed",
+            "rollback",
+            math.inf,
+            {"a;b": "c=d", "é": ""},
         ),
         BaliseRecord(0.2, 0.3, "", -0.0, 1e308),
     ]
@@ -47,7 +81,9 @@ def odd_result(rows: int = 9, names: tuple[str, ...] = NAMES, events: list[Balis
         "components": [{"name": "train", "parameters": {"mass": 80e3, "name": "text"}}],
         "largest": math.inf,
     }
-    return Result(odd_table(rows, names), signals, odd_events() if events is None else events, summary, "stopped at 0.3 s")
+    return Result(
+        odd_table(rows, names), signals, odd_events() if events is None else events, summary, "stopped at 0.3 s"
+    )
 
 
 @st.composite

@@ -6,8 +6,8 @@ import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
-from zoo.build import linear_fmu
-from zoo.description import Version
+from test_fmus.build import linear_fmu
+from test_fmus.description import Version
 
 HEADER = (
     '<ssd:SystemStructureDescription xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription" '
@@ -80,17 +80,33 @@ def package(path: Path, files: Mapping[str, str | bytes | Path]) -> Path:
 def ramp_fmu(folder: Path, version: Version = 2) -> Path:
     """``speed = 10 + 2 t`` [m/s]; parameter ``x0[1]`` is its start."""
     return linear_fmu(
-        folder, "ramp", [[0, 1], [0, 0]], [[], []], [[1, 0]], [[]], version=version, outputs=["speed"], x0=[10.0, 2.0],
+        folder,
+        "ramp",
+        [[0, 1], [0, 0]],
+        [[], []],
+        [[1, 0]],
+        [[]],
+        version=version,
+        outputs=["speed"],
+        x0=[10.0, 2.0],
         units={"speed": "m/s"},
-    )  # fmt: skip
+    )
 
 
 def sum_fmu(folder: Path, version: Version = 2) -> Path:
     """``y = 2 u + w``, all [m/s], without states."""
     return linear_fmu(
-        folder, "sum", [], [], [], [[2, 1]], version=version, inputs=["u", "w"], outputs=["y"],
+        folder,
+        "sum",
+        [],
+        [],
+        [],
+        [[2, 1]],
+        version=version,
+        inputs=["u", "w"],
+        outputs=["y"],
         units={"u": "m/s", "w": "m/s", "y": "m/s"},
-    )  # fmt: skip
+    )
 
 
 def described_fmu(folder: Path, name: str, variables: str, types: str = "") -> Path:

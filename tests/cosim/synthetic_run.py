@@ -13,7 +13,14 @@ from cosim.results.result import BaliseRecord, Result, SignalInfo
 ZONES = ((10.0, 20.0), (40.0, 50.0), (70.0, 80.0))
 OBSERVERS = ("differentiator_cdo", "takagi_sugeno_cdo", "multirate_cdo", "discrete_uio")
 SIZES = dict(zip(OBSERVERS, (0.001, 0.02, 0.06, 0.14), strict=True))  # of the speed errors [m/s]
-UNITS = {"position": "m", "speed": "m/s", "acceleration": "m/s2", "wheel_speed": "m/s", "adhesion_force": "N", "effort": "N"}
+UNITS = {
+    "position": "m",
+    "speed": "m/s",
+    "acceleration": "m/s2",
+    "wheel_speed": "m/s",
+    "adhesion_force": "N",
+    "effort": "N",
+}
 UNITS |= {"reading": "m/s", "speed_reference": "m/s", "innovation": "m"}
 
 
@@ -30,12 +37,19 @@ def _plant(t: np.ndarray) -> dict[str, np.ndarray]:
     slip = acceleration / rate * (0.005 + 0.0165 * degraded) + 0.0006 * degraded
     force = 90000 * acceleration + 900 + 32 * speed + 1.7 * speed**2
     return {
-        "locomotive.position": position, "locomotive.speed": speed, "locomotive.slip": slip, "locomotive.adhesion_force": force,
-        "locomotive.wheel_speed": speed / (1 - slip), "driver.speed_reference": speed, "driver.effort": force,
-    }  # fmt: skip
+        "locomotive.position": position,
+        "locomotive.speed": speed,
+        "locomotive.slip": slip,
+        "locomotive.adhesion_force": force,
+        "locomotive.wheel_speed": speed / (1 - slip),
+        "driver.speed_reference": speed,
+        "driver.effort": force,
+    }
 
 
-def _observer(t: np.ndarray, plant: dict[str, np.ndarray], size: float, rng: np.random.Generator) -> dict[str, np.ndarray]:
+def _observer(
+    t: np.ndarray, plant: dict[str, np.ndarray], size: float, rng: np.random.Generator
+) -> dict[str, np.ndarray]:
     start_up = np.exp(-t / 0.8) * np.cos(3 * t)
     wave = np.sin(2.1 * t + 40 * size) * (0.4 + 0.6 * (plant["locomotive.slip"] ** 2 > 0.0003))
     speed = plant["locomotive.speed"] + size * wave + start_up
@@ -63,7 +77,9 @@ def _events(stamps: np.ndarray, t: np.ndarray, position: np.ndarray) -> list[Bal
             told = dict.fromkeys(OBSERVERS, "rejected")
             events.append(BaliseRecord(stamp, stamp, f"B{i}", p + 80, p, kind="false", outcomes=told))
         else:
-            events.append(BaliseRecord(stamp, stamp + 0.02, f"B{i}", p, p, 1.0, 13.0, "true", "rollback", 1e-9, outcomes))
+            events.append(
+                BaliseRecord(stamp, stamp + 0.02, f"B{i}", p, p, 1.0, 13.0, "true", "rollback", 1e-9, outcomes)
+            )
     return events
 
 
@@ -71,22 +87,31 @@ def _summary() -> dict[str, Any]:
     limits = (0.5, 0.286, 0.5, math.inf)
     certificates = {
         o: {
-            "aperiodic_limit": limit, "constant_limit": 1.25 * limit, "holds": limit > 1, "max_gap": 1.1,
+            "aperiodic_limit": limit,
+            "constant_limit": 1.25 * limit,
+            "holds": limit > 1,
+            "max_gap": 1.1,
             "explanation": "Gaps up to 1.1 s occur; the certificate covers less." if limit < 1 else "No limit.",
         }
         for o, limit in zip(OBSERVERS, limits, strict=True)
-    }  # fmt: skip
+    }
     components = [
         {"name": "locomotive", "kind": "FMU", "fmi_version": "3.0", "model": "locomotive", "source": "locomotive.fmu"},
         {"name": "odometer", "kind": "Python", "fmi_version": None, "model": "odometer", "source": "plant_models"},
         *({"name": o, "kind": "FMU", "fmi_version": "2.0", "model": o, "source": f"{o}.fmu"} for o in OBSERVERS),
     ]
     return {
-        "scenario": "adhesion_zones", "step": 0.01, "start": 0.0, "reached": 90.0, "wall_seconds": 1.234,
+        "scenario": "adhesion_zones",
+        "step": 0.01,
+        "start": 0.0,
+        "reached": 90.0,
+        "wall_seconds": 1.234,
         "localisation": {"method": "rollback", "reason": "redone steps are bit-identical."},
-        "warnings": ["takagi_sugeno_cdo: gaps up to 1.1 s exceed the certified 0.286 s."], "certificates": certificates,
-        "components": components, "versions": {"fmu-observer": "0.1.0", "fmpy": "0.3.32", "numpy": np.__version__},
-    }  # fmt: skip
+        "warnings": ["takagi_sugeno_cdo: gaps up to 1.1 s exceed the certified 0.286 s."],
+        "certificates": certificates,
+        "components": components,
+        "versions": {"fmu-observer": "0.1.0", "fmpy": "0.3.32", "numpy": np.__version__},
+    }
 
 
 def synthetic_result(step: float = 0.05, diverged: str | None = None, seed: int = 0) -> Result:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from zoo.events import DEEDS, hostile_fmu
+from test_fmus.events import DEEDS, hostile_fmu
 
 from cosim import CosimError, Scenario, load_result
 from cosim.cli import main
@@ -105,8 +105,12 @@ def test_what_was_streamed_is_whole(fmu: Path, tmp_path: Path) -> None:
     assert len(result.table) == 25
     assert "SIGSEGV" in str(result.failure)
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
-        "events.csv", "made_from", "messages.csv", "summary.json", "table.npy",
-    ]  # fmt: skip
+        "events.csv",
+        "made_from",
+        "messages.csv",
+        "summary.json",
+        "table.npy",
+    ]
 
 
 def test_results_are_written_before_anything_is_closed(fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -140,7 +144,7 @@ def test_a_limit_is_for_one_call_and_not_for_many(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(watch, "LAST_CALL", page)
     page.limit(0.5)
     ended: list[str] = []
-    looking = watch._Watch(0)
+    looking = watch._PlantMonitor(0)
     monkeypatch.setattr(looking, "_end", ended.append)
     for now in [(1, 0.0)] * 3 + [(2, 0.0), (2, 0.1), (2, 0.2)] + [(0, 0.2)] * 4:
         page.call[0], page.time[0] = now
@@ -277,11 +281,15 @@ def test_flushing_small_numbers_to_zero_is_put_back() -> None:
 def test_it_is_put_back_while_the_run_goes_on(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     seen: list[Path] = []
-    hostile(fmu, "moves", stepper="python").set("stop", 1.0).run(progress=lambda *_: seen.append(Path.cwd()), warn=lambda _: None)
+    hostile(fmu, "moves", stepper="python").set("stop", 1.0).run(
+        progress=lambda *_: seen.append(Path.cwd()), warn=lambda _: None
+    )
     assert seen[-1] == tmp_path  # told before the run is over
 
 
-def test_escape_sequences_never_reach_the_terminal(fmu: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_escape_sequences_never_reach_the_terminal(
+    fmu: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["run", saved(fmu, tmp_path, "paints"), "--out", str(tmp_path / "out"), "--no-report", "--quiet"]) == 0
     shown = "".join(capsys.readouterr())
     result = load_result(tmp_path / "out")
@@ -316,7 +324,9 @@ def test_parts_of_steps_below_the_resolution_of_time_are_refused() -> None:
 
 
 @pytest.mark.parametrize("damage", [b"", b"PK\x03\x04", None])
-def test_a_damaged_fmu_in_the_cache_is_built_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damage: bytes | None) -> None:
+def test_a_damaged_fmu_in_the_cache_is_built_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damage: bytes | None
+) -> None:
     monkeypatch.setattr(cache, "Draft", FakeDraft)
     monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path)
     system, first_byte = PLANTS["odometer"](), 30 + len("modelDescription.xml")  # that of the compressed content

@@ -1,4 +1,6 @@
-"""Small hybrid systems for the tests of the block, and a handle that drives either FMI face, or the runtime, by names."""
+"""Small hybrid systems for the tests of the block, and a handle that drives either FMI face, or the runtime, by
+names.
+"""
 
 from __future__ import annotations
 
@@ -203,7 +205,9 @@ class Driven:
         return self.get(*real)
 
     def what_matters(self) -> np.ndarray:
-        """All real variables but the payloads: those stand as they were set last and are read only at their own events."""
+        """All real variables but the payloads: those stand as they were set last and are read only at their own
+        events.
+        """
         payloads = {name for event in self.block.system.triggered_events for name in scalar_names(event.payload)}
         variables = self.block.model_description.modelVariables
         return self.get(*(v.name for v in variables if v.type in ("Real", "Float64") and v.name not in payloads))

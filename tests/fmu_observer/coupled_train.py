@@ -1,6 +1,7 @@
 """A train of one locomotive and four wagons, Table 4.2, solved by SciPy: the truth for the augmented observers.
 
-Wheels roll without slip and without inertia, so that the force at the rail is given; positions are relative to neutral couplers.
+Wheels roll without slip and without inertia, so that the force at the rail is given; positions are relative to neutral
+couplers.
 """
 
 from __future__ import annotations
@@ -19,7 +20,9 @@ ROWS = 0.01  # [s], inputs of the observers are renewed so often
 
 @dataclass(frozen=True)
 class Journey:
-    """Rows every `ROWS` seconds: time [s], force at the rail [N], position and speed of the locomotive, first coupler's force."""
+    """Rows every `ROWS` seconds: time [s], force at the rail [N], position and speed of the locomotive, first coupler's
+    force.
+    """
 
     time: np.ndarray
     force: np.ndarray
@@ -63,7 +66,9 @@ def journey(force: Callable[[float], float], edges: list[float], gradient: float
     return Journey(time, np.array([force(t) for t in time]), rows[0], rows[5], pull, gradient)
 
 
-def trip(cruise: float = 35.0 / 3.6, acceleration: float = 0.5, gradient: float = 0.008, length: float = 80.0) -> Journey:
+def trip(
+    cruise: float = 35.0 / 3.6, acceleration: float = 0.5, gradient: float = 0.008, length: float = 80.0
+) -> Journey:
     """Accelerate, then hold the speed [m/s] uphill: what the whole train needs, in two steps."""
     reached = (cruise - 0.5) / acceleration
 

@@ -1,4 +1,6 @@
-"""A plant and an observer of it as one differential equation, and an observer fed sample by sample: references for the tests."""
+"""A plant and an observer of it as one differential equation, and an observer fed sample by sample: references for the
+tests.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +15,15 @@ from plant_models.hybrid import Runtime, scalar_names
 
 
 def joint_errors(
-    observer: ModelObserver, start: np.ndarray, times: list[float], torque: Callable[[float], float] = np.sin, **gains: object
+    observer: ModelObserver,
+    start: np.ndarray,
+    times: list[float],
+    torque: Callable[[float], float] = np.sin,
+    **gains: object,
 ) -> np.ndarray:
-    """Estimate minus state of the observer's own model at the times, shape (len(times), n); measurements are continuous."""
+    """Estimate minus state of the observer's own model at the times, shape (len(times), n); measurements are
+    continuous.
+    """
     model, n = observer.model, observer.model.order
     p = observer.unpack_parameters(observer.start_parameters())._replace(**gains)
 
@@ -30,7 +38,9 @@ def joint_errors(
 
 
 def exact_states(model: ObserverModel, start: np.ndarray, torques: np.ndarray, period: float) -> np.ndarray:
-    """States of the model at the samples, inputs held in between, by an adaptive solver, shape (len(torques) + 1, n)."""
+    """States of the model at the samples, inputs held in between, by an adaptive solver, shape (len(torques) + 1,
+    n).
+    """
     states = [np.asarray(start, dtype=float)]
     for torque in torques:
         known = np.array([torque])

@@ -51,7 +51,9 @@ class SteadyMotion:
 class Bench:
     """A runtime whose signals, states and parameters are reached by name."""
 
-    def __init__(self, system: HybridSystem, *, python: bool = False, preset: str | None = None, **parameters: float) -> None:
+    def __init__(
+        self, system: HybridSystem, *, python: bool = False, preset: str | None = None, **parameters: float
+    ) -> None:
         self.system = system
         self.runtime = Runtime(system, NumpyKernel(system) if python else None)
         self._names = {

@@ -1,4 +1,6 @@
-"""A test bench for observers corrected by samples: the true motion by an independent integrator, and errors along a run."""
+"""A test bench for observers corrected by samples: the true motion by an independent integrator, and errors along a
+run.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,13 @@ class SampledBench:
     """An observer that follows a true motion, sampled at given instants; periodic observers sample by themselves."""
 
     def __init__(
-        self, observer: HybridSystem, motion: Motion, inputs: Sequence[float], *, python: bool = False, **parameters: float
+        self,
+        observer: HybridSystem,
+        motion: Motion,
+        inputs: Sequence[float],
+        *,
+        python: bool = False,
+        **parameters: float,
     ) -> None:
         self.observer, self.motion = observer, motion
         self.runtime = Runtime(observer, NumpyKernel(observer) if python else None)

@@ -1,7 +1,8 @@
-"""Situations: for any registered observer a plant that it believes in, and what it measures there. No noise, no model error.
+"""Situations: for any registered observer a plant that it believes in, and what it measures there. No noise, no model
+error.
 
-A situation knows the true outputs at any time, the inputs at any time and the payload of any event, all by name. It is made from
-the observer's own declarations, so that a new observer needs no entry here unless it is of a new kind.
+A situation knows the true outputs at any time, the inputs at any time and the payload of any event, all by name. It is
+made from the observer's own declarations, so that a new observer needs no entry here unless it is of a new kind.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ class Situation:
     """A motion as an observer sees it.
 
     Args:
-        system: the observer. truth: true outputs by name at a time, those that are known. inputs: continuous inputs at a time.
+        system: the observer. truth: true outputs by name at a time, those that are known. inputs: continuous inputs at
+        a time.
         payload: payload of an event at a time, by name. gap: time between two events that suits it [s].
         left: part of the first error that may stay: what its discretisation costs.
     """
@@ -113,7 +115,12 @@ def _known(model: Any) -> np.ndarray:
 def _motion(model: Any, start: np.ndarray) -> Callable[[float], np.ndarray]:
     u = _known(model)
     solution = solve_ivp(
-        lambda _t, x: np.asarray(model.flow(x, u), dtype=float), (0.0, HORIZON), start, rtol=1e-10, atol=1e-12, dense_output=True
+        lambda _t, x: np.asarray(model.flow(x, u), dtype=float),
+        (0.0, HORIZON),
+        start,
+        rtol=1e-10,
+        atol=1e-12,
+        dense_output=True,
     )
     return lambda t: np.asarray(solution.sol(t))
 
@@ -165,7 +172,9 @@ def _of_train(system: Any) -> Situation:
 
 
 def _of_differentiator(system: Any) -> Situation:
-    """A sine. A sliding mode stays within a power of L times its step; the coarsest of them, sampled at 10 ms, within 0.1."""
+    """A sine. A sliding mode stays within a power of L times its step; the coarsest of them, sampled at 10 ms, within
+    0.1.
+    """
 
     def truth(t: float) -> Values:
         return _named(system.outputs, [np.sin(t + 0.5 * np.pi * i) for i in range(len(system.outputs))])

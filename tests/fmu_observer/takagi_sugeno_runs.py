@@ -1,4 +1,6 @@
-"""Academic plant and observer as one hybrid system, so that the continuous output reaches the observer without any delay."""
+"""Academic plant and observer as one hybrid system, so that the continuous output reaches the observer without any
+delay.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +40,9 @@ class Together(HybridSystem):
         plant, behind = x[: self.order], x[self.order :]
         moved = self.plant.flow(t, plant, self._nothing, self._plant_parameters)
         followed = self.observer.flow(t, behind, self._seen(t, plant, u.noise), self._parameters)
-        return vector(*(moved[i] for i in range(self.order)), *(followed[i] for i in range(self.observer.continuous_count)))
+        return vector(
+            *(moved[i] for i in range(self.order)), *(followed[i] for i in range(self.observer.continuous_count))
+        )
 
     def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
         plant, behind = x[: self.order], x[self.order :]
@@ -81,10 +85,18 @@ def sampling(tau: float, stop: float, seed: int, loss: float = np.inf) -> np.nda
 
 
 def errors(
-    plant: HybridSystem, observer: HybridSystem, instants: np.ndarray, stop: float, noise: float = 0.0, hold: float = STEP,
-    seed: int = 0, overrides: dict[str, Any] | None = None,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """Times of shape (K,) and errors of shape (K, n), every 10 ms or every `hold`, noise uniform within +-noise and held."""
+    plant: HybridSystem,
+    observer: HybridSystem,
+    instants: np.ndarray,
+    stop: float,
+    noise: float = 0.0,
+    hold: float = STEP,
+    seed: int = 0,
+    overrides: dict[str, Any] | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Times of shape (K,) and errors of shape (K, n), every 10 ms or every `hold`, noise uniform within +-noise and
+    held.
+    """
     runtime = Runtime(Together(plant, observer, overrides))
     generator = np.random.default_rng(1000 + seed)
     step = hold if noise else 0.01

@@ -47,7 +47,8 @@ def test_limits_of_the_binomial_gains() -> None:
 def test_position_gains_place_the_poles(poles: list[float], slope: float) -> None:
     gains = position_gains(poles, slope)
     closed = augmented_matrix(slope) - np.outer(gains, [1.0, 0.0, 0.0, 0.0])
-    np.testing.assert_allclose(np.poly(closed), np.poly(poles), rtol=1e-8, atol=1e-10)  # coefficients; roots are ill-conditioned
+    # coefficients; roots are ill-conditioned
+    np.testing.assert_allclose(np.poly(closed), np.poly(poles), rtol=1e-8, atol=1e-10)
 
 
 @pytest.mark.parametrize("poles", [(-1.0, -1.0, -1.0), (-1.0, -1.0, 0.0, -1.0), (-1.0, np.nan, -1.0, -1.0)])
@@ -132,7 +133,9 @@ def test_gains_that_are_too_high_are_not_certified() -> None:
 @both
 @pytest.mark.parametrize("seed", range(3))
 def test_certified_mixtures_do_converge(make: type[AugmentedTrainObserver], seed: int) -> None:
-    """Random orders of fixes and balises with random gaps up to fix_period, by scratch transitions of the gains in use."""
+    """Random orders of fixes and balises with random gaps up to fix_period, by scratch transitions of the gains in
+    use.
+    """
     observer = make()
     p = observer.unpack_parameters(observer.start_parameters())
     generator, product = np.random.default_rng(seed), np.eye(4)

@@ -27,7 +27,9 @@ def binomial(theta: float) -> dict[str, float]:
     return {f"gps_gain[{i + 1}]": gain for i, gain in enumerate(gains)} | {"gps_decay": gains[0]}
 
 
-def pulling(make: Callable[[], AugmentedTrainObserver], preset: str, motion: SteadyMotion, **parameters: float) -> Bench:
+def pulling(
+    make: Callable[[], AugmentedTrainObserver], preset: str, motion: SteadyMotion, **parameters: float
+) -> Bench:
     """A bench at time zero whose locomotive holds its speed against `PULL`, wheels without slip."""
     bench = Bench(make(), preset=preset, **parameters)
     bench.set("u", {"effort": motion.effort(0.0) + PULL, "odometer": motion.odometer(0.0)})
@@ -41,7 +43,11 @@ def sample(bench: Bench, kind: str, position: float) -> None:
 
 
 def observe(
-    observer: AugmentedTrainObserver, journey: Journey, noise: float = 0.0, rotating_mass: float = 0.0, **parameters: float
+    observer: AugmentedTrainObserver,
+    journey: Journey,
+    noise: float = 0.0,
+    rotating_mass: float = 0.0,
+    **parameters: float,
 ) -> np.ndarray:
     """Speed and coupler force of the observer at the rows of a journey, fixes at 10 Hz, shape (rows, 2)."""
     bench, generator = Bench(observer, **parameters), np.random.default_rng(0)
@@ -65,7 +71,8 @@ def uphill() -> Journey:
     return trip()
 
 
-# -- laws -----------------------------------------------------------------------------------------------------------------
+# -- laws
+# -----------------------------------------------------------------------------------------------------------------
 
 
 @every
@@ -73,13 +80,20 @@ def test_signals_and_events(make: Callable[[], AugmentedTrainObserver]) -> None:
     observer = make()
     assert [s.name for s in observer.inputs] == ["effort", "odometer", "gradient"]
     assert {e.name: [s.name for s in e.payload] for e in observer.triggered_events} == {
-        "balise": ["balise_position", "balise_location_accuracy"], "gps": ["gps_position"]
-    }  # fmt: skip
+        "balise": ["balise_position", "balise_location_accuracy"],
+        "gps": ["gps_position"],
+    }
     units = {s.name: s.unit for s in observer.outputs}
     assert units == {
-        "position": "m", "speed": "m/s", "slip": "1", "slip_indicator": "1", "adhesion_force": "N", "innovation": "m",
-        "coupler_force": "N", "disturbance": "m/s2",
-    }  # fmt: skip
+        "position": "m",
+        "speed": "m/s",
+        "slip": "1",
+        "slip_indicator": "1",
+        "adhesion_force": "N",
+        "innovation": "m",
+        "coupler_force": "N",
+        "disturbance": "m/s2",
+    }
 
 
 @every
@@ -120,7 +134,9 @@ def test_a_batch_flows_and_jumps_like_its_members(make: Callable[[], AugmentedTr
         np.testing.assert_allclose(flows[:, k], observer.state_derivative(0.0, x[:, k], u[:, k], p[:, k]), rtol=1e-12)
         for event in ("balise", "gps"):
             together = observer.jump_vector(event, 0.0, x, u, p)[:, k]
-            np.testing.assert_allclose(together, observer.jump_vector(event, 0.0, x[:, k], u[:, k], p[:, k]), rtol=1e-12)
+            np.testing.assert_allclose(
+                together, observer.jump_vector(event, 0.0, x[:, k], u[:, k], p[:, k]), rtol=1e-12
+            )
 
 
 @both
@@ -145,7 +161,8 @@ def test_sampled_fixes_are_events_at_their_period(make: type[AugmentedHighGainCd
         make(fixes="both")  # type: ignore[arg-type]
 
 
-# -- convergence ------------------------------------------------------------------------------------------------------------
+# -- convergence
+# ------------------------------------------------------------------------------------------------------------
 
 
 @both
@@ -170,11 +187,14 @@ def test_the_unknown_force_is_found_at_random_gaps(make: Callable[[], AugmentedT
 
 @pytest.mark.parametrize(("make", "lag"), [(AugmentedHighGainCdo, 2.0 / 8.0), (AugmentedTakagiSugenoCdo, 0.0)])
 def test_a_force_that_grows_steadily_is_followed(make: Callable[[], AugmentedTrainObserver], lag: float) -> None:
-    """Without lag by the augmented observer; a wheel observer with a double pole at theta_1 = 8 lags by 2 / theta_1 itself."""
+    """Without lag by the augmented observer; a wheel observer with a double pole at theta_1 = 8 lags by 2 / theta_1
+    itself.
+    """
     motion = SteadyMotion(speed=10.0)
     bench = pulling(make, "gps", motion)
     for k in range(1, 4001):
-        bench.set("u", {"effort": motion.effort(0.0) + PULL + 500.0 * (0.01 * k - 0.005)})  # 500 N/s, by its mean in the step
+        # 500 N/s, by its mean in the step
+        bench.set("u", {"effort": motion.effort(0.0) + PULL + 500.0 * (0.01 * k - 0.005)})
         bench.runtime.advance(0.01 * k)
         if k % 10 == 0:
             sample(bench, "gps", motion.position(0.01 * k))
@@ -191,7 +211,9 @@ def test_a_known_gradient_is_taken_out_of_the_coupler_force(make: Callable[[], A
 
 
 @every
-@pytest.mark.parametrize(("effort", "odometer"), [(0.0, 0.0), (-350e3, 0.0), (350e3, 60.0)], ids=["rest", "lock", "spin"])
+@pytest.mark.parametrize(
+    ("effort", "odometer"), [(0.0, 0.0), (-350e3, 0.0), (350e3, 60.0)], ids=["rest", "lock", "spin"]
+)
 def test_outputs_stay_finite_without_any_sample(
     make: Callable[[], AugmentedTrainObserver], effort: float, odometer: float
 ) -> None:
@@ -211,7 +233,8 @@ def test_a_braked_train_is_held_at_rest(make: Callable[[], AugmentedTrainObserve
     for k in range(1, 201):
         bench.runtime.advance(0.1 * k)
         sample(bench, "gps", 0.0)
-    bench.runtime.advance(80.0)  # a minute without samples: the brake holds against what is left of the unknown acceleration
+    # a minute without samples: the brake holds against what is left of the unknown acceleration
+    bench.runtime.advance(80.0)
     assert abs(bench.outputs()["speed"]) < 1e-3  # [m/s], against 40 m/s backwards if the brake pushed
     assert abs(bench.outputs()["position"]) < 0.1
 
@@ -265,7 +288,8 @@ def test_wheel_inertia_biases_the_force_of_the_family_on_the_applied_effort(uphi
         with_inertia, without = (observe(make(), uphill, rotating_mass=m, n_axles=4.0)[:, 1] for m in (rotating, 0.0))
         return float((with_inertia - without)[window].mean())
 
-    assert shift(AugmentedTakagiSugenoCdo) == pytest.approx(0.5 * rotating, rel=0.05)  # a slow tail of the step at the start
+    # a slow tail of the step at the start
+    assert shift(AugmentedTakagiSugenoCdo) == pytest.approx(0.5 * rotating, rel=0.05)
     right, biased = (
         observe(AugmentedHighGainCdo(), uphill, rotating_mass=m, n_axles=4.0)[window, 1].mean() for m in (rotating, 0.0)
     )
@@ -275,7 +299,8 @@ def test_wheel_inertia_biases_the_force_of_the_family_on_the_applied_effort(uphi
     assert biased - right == pytest.approx(-0.5 * rotating, rel=0.05)
 
 
-# -- the numbers of the spec, 5.7 ---------------------------------------------------------------------------------------------
+# -- the numbers of the spec, 5.7
+# ---------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("theta", "mean", "largest"), [(1.0, 0.082, 0.98), (3.0, 0.019, 0.41)])
@@ -284,7 +309,9 @@ def test_speed_error_without_noise(uphill: Journey, theta: float, mean: float, l
     error = 3.6 * np.abs(observe(AugmentedTakagiSugenoCdo(), uphill, **binomial(theta))[:, 0] - uphill.speed)
     settled = uphill.time > 5.0  # the start is from another speed
     assert (
-        error.mean() == pytest.approx(mean, rel=0.35) if theta == 1.0 else error[settled].mean() == pytest.approx(mean, rel=0.35)
+        error.mean() == pytest.approx(mean, rel=0.35)
+        if theta == 1.0
+        else error[settled].mean() == pytest.approx(mean, rel=0.35)
     )
     assert error[settled].max() == pytest.approx(largest, rel=0.35)
 
@@ -297,7 +324,8 @@ def test_coupler_and_grade_force(uphill: Journey) -> None:
     assert true[hold].mean() == pytest.approx(14.92e3, abs=20.0)
     assert force[hold].mean() == pytest.approx(true[hold].mean(), abs=20.0)
     moving = uphill.time > 10.0
-    # The coupler rings at 0.82 Hz, far above theta: the estimate follows its mean, and the ringing is the error, ~8 kN rms.
+    # The coupler rings at 0.82 Hz, far above theta: the estimate follows its mean, and the ringing is the error, ~8 kN
+    # rms.
     assert np.sqrt(np.mean((force - true)[moving] ** 2)) == pytest.approx(8e3, rel=0.25)
 
 
@@ -309,7 +337,9 @@ def test_speed_error_with_white_noise(uphill: Journey, noise: float, theta: floa
 
 
 def test_drift_costs_less_speed_than_white_noise_of_the_same_size(uphill: Journey) -> None:
-    """Half a metre that wanders over ten minutes gives a third of the speed error of half a metre of white noise, or less."""
+    """Half a metre that wanders over ten minutes gives a third of the speed error of half a metre of white noise, or
+    less.
+    """
     receiver, means = Bench(Gps()), {}
     for preset, drift_time in (("half_metre", 600.0), ("white", 60.0)):
         receiver.runtime.reset()

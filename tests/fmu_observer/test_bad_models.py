@@ -1,4 +1,6 @@
-"""Models that cannot be, and pairs that no observer can serve: refused where they are made, in words that name the fault."""
+"""Models that cannot be, and pairs that no observer can serve: refused where they are made, in words that name the
+fault.
+"""
 
 from __future__ import annotations
 
@@ -65,7 +67,8 @@ def test_a_takagi_sugeno_model_that_cannot_be(changes: dict[str, Any], message: 
         replace(find_takagi_sugeno_model("pendulum"), **changes)
 
 
-# -- what cannot be observed --------------------------------------------------------------------------------------------
+# -- what cannot be observed
+# --------------------------------------------------------------------------------------------
 
 DRIFTING = np.array([[0.0, 0.0], [0.0, 0.3]])  # the rate grows and the angle does not show it
 
@@ -75,15 +78,25 @@ def drifting() -> ObserverModel:
 
 
 @pytest.mark.parametrize(
-    "name", ["luenberger", "thau", "riccati_high_gain", "discrete_luenberger", "kalman_filter", "extended_luenberger",
-             "extended_kalman_filter"],
-)  # fmt: skip
+    "name",
+    [
+        "luenberger",
+        "thau",
+        "riccati_high_gain",
+        "discrete_luenberger",
+        "kalman_filter",
+        "extended_luenberger",
+        "extended_kalman_filter",
+    ],
+)
 def test_every_observer_of_a_model_names_the_mode_it_cannot_see(name: str) -> None:
     with pytest.raises(UnobservableError, match=r"linear_pendulum: .*eigenvalue 0.3 1/s \(grows .*rate \(1\)"):
         OBSERVERS[name](model=drifting())
 
 
-@pytest.mark.parametrize("name", ["high_gain", "exponential_gain", "output_predictor", "held_innovation", "hybrid_impulsive"])
+@pytest.mark.parametrize(
+    "name", ["high_gain", "exponential_gain", "output_predictor", "held_innovation", "hybrid_impulsive"]
+)
 def test_observers_of_a_chain_refuse_what_is_none(name: str) -> None:
     """A chain of integrators measured at its head is observable, so nothing else needs asking."""
     with pytest.raises(ValueError, match=r"shift matrix"):
@@ -139,11 +152,14 @@ def test_gains_that_cannot_be(gains: Any, message: str) -> None:
 
 @pytest.mark.parametrize("gains", [(GAIN,), (np.nan * GAIN, np.zeros((2, 2, 0)))])
 def test_gains_that_theorem_7_cannot_analyse(gains: Any) -> None:
-    with pytest.raises(ValueError, match=r"Theorem 7: (gains must be a pair|the sampled gain must hold finite numbers)"):
+    with pytest.raises(
+        ValueError, match=r"Theorem 7: (gains must be a pair|the sampled gain must hold finite numbers)"
+    ):
         design_theorem7("pendulum", 0.1, 0.5, gains=gains, performance=False)
 
 
-# -- options ------------------------------------------------------------------------------------------------------------
+# -- options
+# ------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -20,18 +20,26 @@ STATES = ["angle", "rate", "sample", "sampled_at", "marks[1]", "marks[2]"]
 
 def _simulate(block: Any, **arguments: Any) -> Any:
     return simulate_fmu(
-        block.unzipDirectory, fmu_instance=block, model_description=block.model_description, fmi_type="CoSimulation",
-        stop_time=STOP, output_interval=H, **arguments,
-    )  # fmt: skip
+        block.unzipDirectory,
+        fmu_instance=block,
+        model_description=block.model_description,
+        fmi_type="CoSimulation",
+        stop_time=STOP,
+        output_interval=H,
+        **arguments,
+    )
 
 
-def _expected(events: dict[int, tuple[float, str, Any]] | None = None, system: Any = SWING, **starts: float) -> np.ndarray:
+def _expected(
+    events: dict[int, tuple[float, str, Any]] | None = None, system: Any = SWING, **starts: float
+) -> np.ndarray:
     """Rows of fmpy's result: outputs and states of the runtime on the points that fmpy steps through."""
     bare = Reference(system).start(0.0, **starts)
     rows = [bare.values()]
     for k in range(20):
         here = (events or {}).get(k)
-        t, end = k * H, (k + 1) * H  # fmpy hands over differences of times; the last place of the end is lost in the comparison
+        # fmpy hands over differences of times; the last place of the end is lost in the comparison
+        t, end = k * H, (k + 1) * H
         bare.step(t, end - t, [here] if here else [])
         rows.append(bare.values())
     return np.array(rows)
@@ -87,13 +95,16 @@ def test_event_mode_of_simulate_fmu_with_inputs_that_jump() -> None:
 def test_event_mode_on_a_block_instantiated_without_it_is_refused_in_words() -> None:
     block = make_block(SWING, 3)
     block.instantiate(eventModeUsed=False)
-    with pytest.raises(BlockCallError, match=r"updateDiscreteStates: swing at t = .*not allowed in mode 'step', expected event"):
+    with pytest.raises(
+        BlockCallError, match=r"updateDiscreteStates: swing at t = .*not allowed in mode 'step', expected event"
+    ):
         _simulate(block, use_event_mode=True)
 
 
 def test_simulate_fmu_carries_events_through_fmi2_inputs() -> None:
     """fmpy sets its columns at its own communication points; the stamp says where inside the step the event belongs."""
-    told = {3: (3 * H + 0.011, kick(2.0)), 9: (9 * H + 0.03, kick(-1.0)), 10: (9 * H + 0.04, kick(0.5))}  # the last one is late
+    # the last one is late
+    told = {3: (3 * H + 0.011, kick(2.0)), 9: (9 * H + 0.03, kick(-1.0)), 10: (9 * H + 0.04, kick(0.5))}
     names = ["kick_count", "kick_time", "kick_impulse", "kick_share[1]", "kick_share[2]"]
     rows, values = [], dict.fromkeys(names, 0.0)
     for k in range(21):
@@ -140,7 +151,10 @@ def test_simulate_fmu_goes_on_from_a_saved_state(version: int, as_bytes: bool) -
     state = driven.block.getFMUState()
     other = make_block(SWING, version)  # type: ignore[arg-type]
     result = _simulate(
-        other, start_time=10 * H, fmu_state=other.serializeFMUState(state) if as_bytes else state, output=OUTPUTS + STATES
+        other,
+        start_time=10 * H,
+        fmu_state=other.serializeFMUState(state) if as_bytes else state,
+        output=OUTPUTS + STATES,
     )
     np.testing.assert_allclose(_columns(result), _expected()[10:], rtol=ROUNDING, atol=ROUNDING)
 

@@ -44,7 +44,8 @@ def test_a_misspelt_argument_is_refused(version: int) -> None:
         Driven(SWING, version).block.instantiate(eventModeUse=True)
 
 
-# -- refused calls ------------------------------------------------------------------------------------------------------
+# -- refused calls
+# ------------------------------------------------------------------------------------------------------
 
 
 def _in_mode(version: int, mode: str) -> Driven:
@@ -152,7 +153,9 @@ def test_variables_may_be_set_in_their_modes_only(version: int, name: str, mode:
 
 def test_the_refusal_of_a_fixed_parameter_says_so() -> None:
     driven = _in_mode(3, "step")
-    with pytest.raises(BlockCallError, match=r"stiffness\[1\] .* is a fixed parameter and cannot be set in mode 'step'"):
+    with pytest.raises(
+        BlockCallError, match=r"stiffness\[1\] .* is a fixed parameter and cannot be set in mode 'step'"
+    ):
         driven.set_all({"stiffness[1]": 1.0})
 
 
@@ -204,7 +207,9 @@ def test_outputs_follow_inputs_parameters_and_start_time_during_initialisation(v
         (H, float("inf"), "is not a positive number"),
     ],
 )
-def test_a_step_that_does_not_continue_is_refused_and_changes_nothing(version: int, t: float, h: float, message: str) -> None:
+def test_a_step_that_does_not_continue_is_refused_and_changes_nothing(
+    version: int, t: float, h: float, message: str
+) -> None:
     driven = _in_mode(version, "step")
     before = driven.everything()
     with pytest.raises(BlockCallError, match=f"^doStep: pendulum at t = 0.05 s: .*{message}"):
@@ -278,7 +283,9 @@ def test_unknown_and_foreign_value_references_are_refused_by_name(version: int) 
     get, put = getattr(block, f"get{block.real_type}"), getattr(block, f"set{block.real_type}")
     trigger = driven.vr("mark_count" if version == 2 else "mark")
     for call in (get, lambda vr: put(vr, [1.0])):
-        with pytest.raises(BlockCallError, match=f"no variable with value reference {last + 1}; the last one is {last}"):
+        with pytest.raises(
+            BlockCallError, match=f"no variable with value reference {last + 1}; the last one is {last}"
+        ):
             call([last + 1])
         with pytest.raises(BlockCallError, match="no variable with value reference 0"):  # they count from 1
             call([0])
@@ -327,7 +334,8 @@ def test_an_error_survives_a_trip_between_processes() -> None:
     assert (type(copy), copy.function, copy.status, str(copy)) == (BlockCallError, "doStep", 3, str(caught.value))
 
 
-# -- event mode -----------------------------------------------------------------------------------------------------------
+# -- event mode
+# -----------------------------------------------------------------------------------------------------------
 
 
 def test_without_event_mode_initialisation_ends_in_step_mode_and_event_mode_is_refused() -> None:
@@ -369,7 +377,8 @@ def test_leaving_event_mode_with_an_active_clock_is_refused() -> None:
     driven.block.enterStepMode()
 
 
-# -- files ----------------------------------------------------------------------------------------------------------------
+# -- files
+# ----------------------------------------------------------------------------------------------------------------
 
 
 def test_the_folder_for_fmpy_goes_away_with_the_block_without_a_warning() -> None:

@@ -29,11 +29,14 @@ class Happening:
 
     @property
     def step(self) -> int:
-        return int(np.searchsorted(np.arange(STEPS) * H, self.stamp + 1e-15, side="right")) - 1  # equal but for rounding
+        # equal but for rounding
+        return int(np.searchsorted(np.arange(STEPS) * H, self.stamp + 1e-15, side="right")) - 1
 
     @property
     def told(self) -> int:
-        """Number of the communication point at which it is told; a nanosecond later is not late but now, so one later then."""
+        """Number of the communication point at which it is told; a nanosecond later is not late but now, so one later
+        then.
+        """
         told = min(STEPS, self.step + self.delay)
         if self.delay > 0 and told * H - self.stamp < 1.1e-9:
             return told + 1 if told < STEPS else self.step
@@ -43,7 +46,11 @@ class Happening:
 TIMES = st.one_of(
     st.integers(0, round(STEPS * H * 1e10) - 1).map(lambda n: n * 1e-10),
     st.integers(0, STEPS - 1).map(lambda k: k * H),  # on a communication point
-    st.builds(lambda k, d: max(0.0, k * H + d), st.integers(1, STEPS - 1), st.sampled_from([-2e-9, -5e-10, -1e-14, 5e-10, 2e-9])),
+    st.builds(
+        lambda k, d: max(0.0, k * H + d),
+        st.integers(1, STEPS - 1),
+        st.sampled_from([-2e-9, -5e-10, -1e-14, 5e-10, 2e-9]),
+    ),
     st.integers(0, STEPS * 5 - 1).map(lambda k: k * 0.01),  # on the internal grid
     st.integers(0, 16).map(lambda k: 0.013 + k * 0.07),  # on a sampling instant
 )
@@ -164,7 +171,9 @@ def test_each_policy_does_what_it_says(policy: Any) -> None:
     }[policy]
     same_as_plain = bool((driven.get("angle", "rate", "sample") == plain.get("angle", "rate", "sample")).all())
     same_as_now = bool((driven.get("angle", "rate", "sample") == now.get("angle", "rate", "sample")).all())
-    assert (same_as_plain, same_as_now) == {"replay": (False, False), "reject": (True, False), "late": (False, True)}[policy]
+    assert (same_as_plain, same_as_now) == {"replay": (False, False), "reject": (True, False), "late": (False, True)}[
+        policy
+    ]
 
 
 @pytest.mark.parametrize("horizon", [0.0, 0.2, 5.0])

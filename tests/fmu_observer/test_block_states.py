@@ -1,4 +1,6 @@
-"""Saved states: what follows a restore is bit for bit what followed the save, in every mode, here or in another process."""
+"""Saved states: what follows a restore is bit for bit what followed the save, in every mode, here or in another
+process.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,7 @@ from fmu_observer import OBSERVERS
 from fmu_observer.block import BlockCallError
 from plant_models.hybrid import scalar_names
 
-Passing = Callable[[Driven, Any], Driven]
+Crossing = Callable[[Driven, Any], Driven]
 
 
 def _through_value(driven: Driven, state: Any) -> Driven:
@@ -40,7 +42,7 @@ def _through_bytes(driven: Driven, state: Any) -> Driven:
     return other
 
 
-PASSINGS = [pytest.param(_through_value, id="value"), pytest.param(_through_bytes, id="bytes")]
+CROSSINGS = [pytest.param(_through_value, id="value"), pytest.param(_through_bytes, id="bytes")]
 
 
 def _walk(driven: Driven, first: int, count: int, kicked: int | None = None) -> list[np.ndarray]:
@@ -139,23 +141,25 @@ MODES = [
 ]
 
 
-@pytest.mark.parametrize("passing", PASSINGS)
+@pytest.mark.parametrize("crossing", CROSSINGS)
 @pytest.mark.parametrize(("version", "to_mode", "go_on"), MODES)
 def test_in_every_mode_what_follows_a_restore_is_what_followed_the_save(
-    version: int, to_mode: Callable[[Driven], None], go_on: Callable[[Driven], list[np.ndarray]], passing: Passing
+    version: int, to_mode: Callable[[Driven], None], go_on: Callable[[Driven], list[np.ndarray]], crossing: Crossing
 ) -> None:
     driven = Driven(SWING, version)
     to_mode(driven)
     saved = driven.block.getFMUState()
     first = go_on(driven)
-    restored = passing(driven, saved)
+    restored = crossing(driven, saved)
     for found, expected in zip(go_on(restored), first, strict=True):
         np.testing.assert_array_equal(found, expected)
 
 
-@pytest.mark.parametrize("passing", PASSINGS)
-@pytest.mark.parametrize("name", ["differentiator_cdo", "takagi_sugeno_cdo", "multirate_cdo", "discrete_uio", "slip_indicator"])
-def test_shipped_observers_go_on_from_a_saved_state(name: str, passing: Passing) -> None:
+@pytest.mark.parametrize("crossing", CROSSINGS)
+@pytest.mark.parametrize(
+    "name", ["differentiator_cdo", "takagi_sugeno_cdo", "multirate_cdo", "discrete_uio", "slip_indicator"]
+)
+def test_shipped_observers_go_on_from_a_saved_state(name: str, crossing: Crossing) -> None:
     driven = Driven(OBSERVERS[name](), 3).start(odometer=12.0)
     telling = "balise" in driven.references
 
@@ -173,7 +177,7 @@ def test_shipped_observers_go_on_from_a_saved_state(name: str, passing: Passing)
         driven.step(k * H)
     saved = driven.block.getFMUState()
     first = go_on(driven)
-    np.testing.assert_array_equal(go_on(passing(driven, saved)), first)
+    np.testing.assert_array_equal(go_on(crossing(driven, saved)), first)
     assert np.ptp(first, axis=0).max() > 0.1
 
 
@@ -276,9 +280,13 @@ def test_another_process_goes_on_from_the_bytes() -> None:
     _to_step(driven)
     content = driven.block.serializeFMUState(driven.block.getFMUState())
     run = subprocess.run(
-        [sys.executable, "-c", CONTINUED], input=content, capture_output=True, check=True, cwd=Path(__file__).parent,
+        [sys.executable, "-c", CONTINUED],
+        input=content,
+        capture_output=True,
+        check=True,
+        cwd=Path(__file__).parent,
         env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
-    )  # fmt: skip
+    )
     found = [[float.fromhex(value) for value in row] for row in json.loads(run.stdout)]
     for row, expected in zip(found, _from_step(driven), strict=True):
         np.testing.assert_array_equal(row, expected)
@@ -376,7 +384,8 @@ def test_a_state_brings_its_policy_and_its_horizon_with_it(version: int) -> None
     assert (getter(taker.vr("late_policy")), taker.get("replay_horizon").tolist()) == ([1], [10.0])
     taker.event("mark", 5.0 * H)
     taker.step(8 * H)
-    assert taker.block.counters.replayed == source.block.counters.replayed + {2: 2, 3: 1}[version]  # FMI 2: one was announced
+    # FMI 2: one was announced
+    assert taker.block.counters.replayed == source.block.counters.replayed + {2: 2, 3: 1}[version]
 
 
 @pytest.mark.parametrize("version", [2, 3])
@@ -407,7 +416,8 @@ def test_reset_and_instantiate_return_to_the_preset_and_forget_active_clocks() -
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("internal_step", 0.0), ("internal_step", 1e300), ("period", -1.0), ("offset", -1e300), ("seed", -1.0)]
+    ("name", "value"),
+    [("internal_step", 0.0), ("internal_step", 1e300), ("period", -1.0), ("offset", -1e300), ("seed", -1.0)],
 )
 def test_a_state_with_which_time_cannot_run_is_refused(name: str, value: float) -> None:
     driven = _waiting()

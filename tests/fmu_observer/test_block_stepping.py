@@ -176,7 +176,8 @@ def test_a_stamp_is_used_up_by_its_event() -> None:
     assert driven.block.counters.replayed == 0
 
 
-# -- FMI 2: counts ------------------------------------------------------------------------------------------------------
+# -- FMI 2: counts
+# ------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -230,7 +231,8 @@ def test_the_payload_is_taken_when_the_event_is_announced() -> None:
     np.testing.assert_array_equal(driven.get("angle", "rate"), bare.runtime.x[:2])
 
 
-# -- prepared calls -------------------------------------------------------------------------------------------------------
+# -- prepared calls
+# -------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("version", [2, 3])
@@ -287,7 +289,9 @@ def test_a_prepared_payload_is_written_where_it_may_be() -> None:
 @pytest.mark.parametrize("call", ["prepared_get", "prepared_set"])
 def test_a_faulty_preparation_is_refused_at_once(call: str) -> None:
     block = Driven(SWING, 3).block
-    with pytest.raises(BlockCallError, match=rf"{call}: swing .* no variable with value reference 999; the last one is \d+"):
+    with pytest.raises(
+        BlockCallError, match=rf"{call}: swing .* no variable with value reference 999; the last one is \d+"
+    ):
         getattr(block, call)([999], np.zeros(1))
     with pytest.raises(BlockCallError, match=rf"{call}: .*shape \(2,\), expected \(1,\)"):
         getattr(block, call)([1], np.zeros(2))

@@ -103,7 +103,9 @@ class Awkward(Doorman):
 
 def test_failures_of_outputs_and_jumps_are_refused_calls_too() -> None:
     driven = Driven(Awkward(), 3).start(speed=13.0)
-    with pytest.raises(BlockCallError, match=r"^getFloat64: awkward at t = 0\.0 s: the model failed: ZeroDivisionError"):
+    with pytest.raises(
+        BlockCallError, match=r"^getFloat64: awkward at t = 0\.0 s: the model failed: ZeroDivisionError"
+    ):
         driven.get("doors_out")
     driven.set(speed=1.0)
     assert driven.get("doors_out") == [0.0]
@@ -117,7 +119,12 @@ def test_failures_of_outputs_and_jumps_are_refused_calls_too() -> None:
 def test_fmpy_simulates_ordinary_python() -> None:
     block = Driven(Doorman(), 3).block
     result = simulate_fmu(
-        block.unzipDirectory, fmu_instance=block, model_description=block.model_description, fmi_type="CoSimulation",
-        stop_time=1.0, output_interval=0.1, start_values={"speed": 1.5},
-    )  # fmt: skip
+        block.unzipDirectory,
+        fmu_instance=block,
+        model_description=block.model_description,
+        fmi_type="CoSimulation",
+        stop_time=1.0,
+        output_interval=0.1,
+        start_values={"speed": 1.5},
+    )
     np.testing.assert_allclose(result["travelled_out"], 1.5 * result["time"], rtol=1e-13)  # sums of 100 internal steps

@@ -29,7 +29,9 @@ def test_the_bounds_of_chapter_3(theta: float, gap: float) -> None:
     assert longest_gap_3_32(theta, BETA_50_KMH) == pytest.approx(gap, abs=DIGITS)
     assert longest_gap_3_87(theta, BETA_50_KMH) == longest_gap_3_32(theta, BETA_50_KMH)
     relative = BETA_50_KMH / theta  # (3.67) has theta + beta for one theta
-    assert longest_gap_3_67(theta, BETA_50_KMH) * (1.0 + relative) == pytest.approx(longest_gap_3_32(theta, BETA_50_KMH))
+    assert longest_gap_3_67(theta, BETA_50_KMH) * (1.0 + relative) == pytest.approx(
+        longest_gap_3_32(theta, BETA_50_KMH)
+    )
     assert longest_gap_3_67(theta) == pytest.approx(longest_gap_3_32(theta, 0.0))
 
 
@@ -59,7 +61,8 @@ def test_the_matrix_solves_its_equation() -> None:
 def test_the_table_stands_beside_the_exact_limits() -> None:
     rows = bound_table(lipschitz=BETA_50_KMH)
     for row in rows:
-        assert row.constant * row.theta == pytest.approx(5.0, abs=0.005)  # 4.9999 without drag; the drag takes 2e-3 at theta 1
+        # 4.9999 without drag; the drag takes 2e-3 at theta 1
+        assert row.constant * row.theta == pytest.approx(5.0, abs=0.005)
         assert row.aperiodic * row.theta == pytest.approx(4.0, abs=0.005)
         assert row.by_3_32 < 0.03 * row.aperiodic
     lines = bound_text(rows).splitlines()

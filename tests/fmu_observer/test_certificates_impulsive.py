@@ -12,7 +12,13 @@ from scipy.linalg import expm, solve_discrete_are
 from fmu_observer.certificates import ImpulsiveError, RiccatiError, SampledError, certify_sampled_error
 from fmu_observer.certificates.impulsive_error import row_echelon
 from fmu_observer.certificates.small_gain import independent_gap_limit
-from fmu_observer.observers.sampled import ExponentialGain, HeldInnovation, HybridImpulsive, MultirateSylvester, OutputPredictor
+from fmu_observer.observers.sampled import (
+    ExponentialGain,
+    HeldInnovation,
+    HybridImpulsive,
+    MultirateSylvester,
+    OutputPredictor,
+)
 from fmu_observer.observers.sampled.hybrid_impulsive import hybrid_gains
 
 BISECTION = 5e-4  # relative: twice the tolerance of the search for the aperiodic limit, and the grid of the check
@@ -34,7 +40,9 @@ def test_a_decaying_innovation_is_the_sampled_error() -> None:
 
 @settings(max_examples=60)
 @given(seed=st.integers(0, 10**6), size=st.integers(2, 5), rank=st.integers(1, 5), gap=st.floats(0.01, 1.0))
-def test_the_reduced_transition_has_the_eigenvalues_of_the_whole_one(seed: int, size: int, rank: int, gap: float) -> None:
+def test_the_reduced_transition_has_the_eigenvalues_of_the_whole_one(
+    seed: int, size: int, rank: int, gap: float
+) -> None:
     generator = np.random.default_rng(seed)
     rank = min(rank, size)
     G = generator.normal(size=(size, size))
@@ -78,7 +86,8 @@ def test_vertices_that_read_different_components_are_refused() -> None:
 @pytest.mark.parametrize("make", [ExponentialGain, OutputPredictor])
 def test_double_integrator_limits(make: type[ExponentialGain], theta: float) -> None:
     certificate = make(chain(2)).certify(0.1 / theta, {"theta": theta})
-    assert theta * certificate.constant_limit == pytest.approx(4.9999, abs=1e-3)  # independently measured; the last digit is read
+    # independently measured; the last digit is read
+    assert theta * certificate.constant_limit == pytest.approx(4.9999, abs=1e-3)
     assert theta * certificate.aperiodic_limit == pytest.approx(4.0, rel=1e-3)
 
 
@@ -89,14 +98,18 @@ def test_four_state_limit() -> None:
 
 @pytest.mark.parametrize("theta", [1.0, 5.0])
 def test_held_innovation_of_a_double_integrator_ends_at_one(theta: float) -> None:
-    """``tr = 2 - 2x - x^2/2``, ``det = 1 - 2x + x^2/2`` with x = theta gap: ``1 + tr + det = 4 - 4x`` vanishes at x = 1."""
+    """``tr = 2 - 2x - x^2/2``, ``det = 1 - 2x + x^2/2`` with x = theta gap: ``1 + tr + det = 4 - 4x`` vanishes at x =
+    1.
+    """
     observer = HeldInnovation(chain(2))
     certificate = observer.certify(0.5 / theta, {"theta": theta})
     assert theta * certificate.constant_limit == pytest.approx(1.0, abs=2e-4)  # an eigenvalue at -1: half of the digits
     assert certificate.holds
     x = 0.7
     Phi = np.array([[1.0 - 2.0 * x - 0.5 * x * x, x], [-x, 1.0]])
-    assert observer.certify(x, {"theta": 1.0}).spectral_radius == pytest.approx(np.abs(np.linalg.eigvals(Phi)).max(), rel=1e-9)
+    assert observer.certify(x, {"theta": 1.0}).spectral_radius == pytest.approx(
+        np.abs(np.linalg.eigvals(Phi)).max(), rel=1e-9
+    )
 
 
 @pytest.mark.parametrize("width", [2, 3])
@@ -125,7 +138,9 @@ def test_a_pure_jump_is_a_discrete_observer(gap: float) -> None:
     observer = HybridImpulsive(chain(2))
     gains = {"flow_gain": L, "flow_matrix": H, "jump_gain": F}
     whole = expm(SHIFT * gap) @ (np.eye(2) - F @ C)
-    assert observer.certify(gap, gains).spectral_radius == pytest.approx(np.abs(np.linalg.eigvals(whole)).max(), abs=1e-12)
+    assert observer.certify(gap, gains).spectral_radius == pytest.approx(
+        np.abs(np.linalg.eigvals(whole)).max(), abs=1e-12
+    )
 
 
 # -- Riccati ----------------------------------------------------------------------------------------------------------
@@ -152,7 +167,8 @@ def test_the_riccati_transition_at_short_gaps_is_the_continuous_one() -> None:
     assert np.linalg.eigvals(error.continuous_limit).real.max() < 0.0
 
 
-# -- never contradicted -------------------------------------------------------------------------------------------------
+# -- never contradicted
+# -------------------------------------------------------------------------------------------------
 
 MODEL = chain(3, slope=-0.3)
 LINEAR = {
@@ -169,7 +185,9 @@ LINEAR = {
     relative=st.lists(st.floats(0.001, 1.0), min_size=5, max_size=40),
     start=st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda e: max(map(abs, e)) > 0.1),
 )
-def test_the_certified_function_falls_at_every_admissible_gap(name: str, relative: list[float], start: tuple[float, ...]) -> None:
+def test_the_certified_function_falls_at_every_admissible_gap(
+    name: str, relative: list[float], start: tuple[float, ...]
+) -> None:
     """Exact error by SciPy's exponential of the observer's own equations, gaps on no grid."""
     observer = LINEAR[name]
     limit = 0.999 * observer.certify(0.1).aperiodic_limit

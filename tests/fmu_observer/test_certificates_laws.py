@@ -63,7 +63,9 @@ def test_beyond_the_constant_limit_the_error_grows(observer: TrainObserver) -> N
 
 
 def test_mixed_gaps_between_the_limits_grow_although_each_alone_is_stable() -> None:
-    """Why there are two limits: theta tau of 4.9 and 0.54, either of them stable alone, grow in turns by 15 % a balise."""
+    """Why there are two limits: theta tau of 4.9 and 0.54, either of them stable alone, grow in turns by 15 % a
+    balise.
+    """
     observer = DifferentiatorCdo()
     long, short = 4.9 / 8.0, 0.54 / 8.0
     start = (0.01, 0.01)

@@ -17,7 +17,14 @@ def double_integrator(theta: float) -> SampledError:
 
 @pytest.mark.parametrize(
     ("decay", "constant", "aperiodic"),
-    [(3.0, 0.286, 0.286), (6.0, 0.50, 0.496), (8.0, 0.73, 0.713), (9.9, 0.985, 0.779), (12.0, 1.28, 0.740), (15.0, None, 0.637)],
+    [
+        (3.0, 0.286, 0.286),
+        (6.0, 0.50, 0.496),
+        (8.0, 0.73, 0.713),
+        (9.9, 0.985, 0.779),
+        (12.0, 1.28, 0.740),
+        (15.0, None, 0.637),
+    ],
 )
 def test_printed_takagi_sugeno_gains_by_decay(decay: float, constant: float | None, aperiodic: float) -> None:
     certificate = TakagiSugenoCdo().certify(0.25, {"innovation_decay": decay})
@@ -43,7 +50,9 @@ def test_double_integrator_limits_scale_with_theta(theta: float) -> None:
 
 
 def test_constant_limit_is_the_root_of_the_closed_form() -> None:
-    """-1 is an eigenvalue of Phi where ``2 + 2 e^(-2x) - x + q + x q = 0``, ``q = (1 - e^(-2x))/2``, ``x = theta tau``."""
+    """-1 is an eigenvalue of Phi where ``2 + 2 e^(-2x) - x + q + x q = 0``, ``q = (1 - e^(-2x))/2``,
+    ``x = theta tau``.
+    """
     x = first_unstable_gap((double_integrator(1.0),), 20.0)
     q = 0.5 * (1.0 - np.exp(-2.0 * x))
     assert 2.0 + 2.0 * np.exp(-2.0 * x) - x + q + x * q == pytest.approx(0.0, abs=1e-6)

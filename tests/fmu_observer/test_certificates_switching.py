@@ -31,7 +31,9 @@ TURN, SPEEDS = 0.15, (51.0, 4.0)  # when in a gap the odometer changes, and betw
 def pair(theta: float, slopes: tuple[float, float], factors: tuple[float, float]) -> tuple[SampledError, SampledError]:
     """Two vertices of a second-order error with different slopes and gains."""
     gains = ((2.0 * theta, theta**2), (2.0 * theta * factors[0], theta**2 * factors[1]))
-    first, second = (SampledError.of([[0, 1], [0, -s]], gain, 2.0 * theta) for s, gain in zip(slopes, gains, strict=True))
+    first, second = (
+        SampledError.of([[0, 1], [0, -s]], gain, 2.0 * theta) for s, gain in zip(slopes, gains, strict=True)
+    )
     return first, second
 
 
@@ -67,7 +69,9 @@ def test_no_changes_within_a_certified_gap_raise_the_lyapunov_function(
 
 @pytest.mark.parametrize("rate", [0.1, 1.0, 2.0])
 def test_the_growth_of_a_scalar_error_is_what_can_really_happen(rate: float) -> None:
-    """``de/dt = d(t) e``, d within the rate, a sample leaves half: at most ``(exp(2 rate h) - 1) / 4`` of V comes on top."""
+    """``de/dt = d(t) e``, d within the rate, a sample leaves half: at most ``(exp(2 rate h) - 1) / 4`` of V comes on
+    top.
+    """
     vertices = [ImpulsiveError.of(np.array([[slope]]), np.array([[0.5]])) for slope in (rate, -rate)]
     gaps = np.linspace(0.05, 1.0, 20)
     found = SwitchingError.between(vertices).growth(np.eye(1), 1.0, gaps) * gaps
@@ -77,7 +81,9 @@ def test_the_growth_of_a_scalar_error_is_what_can_really_happen(rate: float) -> 
 
 
 def test_constant_equations_that_stand_up_alone_may_grow_where_they_take_turns() -> None:
-    """The case above, found by search: each vertex is stable at every gap up to the limit, their turns within a gap are not."""
+    """The case above, found by search: each vertex is stable at every gap up to the limit, their turns within a gap are
+    not.
+    """
     observer = TakagiSugenoCdo(premise="live")
     gains = observer.unpack_parameters(parameter_values(observer, UNEQUAL, None))
     vertices = tuple(observer._error_at(h, gains) for h in (1.0, 0.0))
@@ -101,7 +107,9 @@ def test_weights_that_change_within_a_gap_are_certified_as_such(premise: str, ho
 
 
 def test_two_copies_part_where_the_certificate_says_so() -> None:
-    """Two copies that differ in their start hear one odometer, which alternates within each gap, and the same balises."""
+    """Two copies that differ in their start hear one odometer, which alternates within each gap, and the same
+    balises.
+    """
     gap, distances = 1.85, []
     one, other = copies = [Runtime(TakagiSugenoCdo(premise="live")) for _ in range(2)]
     for runtime in copies:
@@ -140,14 +148,19 @@ def test_equal_vertices_change_nothing() -> None:
 
 
 def test_slopes_within_gaps_are_noted_for_observers_of_models() -> None:
-    assert "slopes that change within a gap are covered for no gap" in OBSERVERS["exponential_gain"]().certify(0.3).explain()
+    assert (
+        "slopes that change within a gap are covered for no gap"
+        in OBSERVERS["exponential_gain"]().certify(0.3).explain()
+    )
 
 
 def test_what_cannot_be_judged_is_refused() -> None:
     one, other = np.diag([1.0, 0.0]), np.diag([0.5, 0.0])
     flow = np.array([[0.0, -1.0], [0.0, -2.0]])
     with pytest.raises(ValueError, match="share one reset"):
-        certify_sampled_error((ImpulsiveError.of(flow, one), ImpulsiveError.of(flow, other)), 0.1, "resets", switching=True)
+        certify_sampled_error(
+            (ImpulsiveError.of(flow, one), ImpulsiveError.of(flow, other)), 0.1, "resets", switching=True
+        )
     riccati = RiccatiError.of(np.zeros((1, 1)), np.zeros((1, 1)), np.eye(1), np.eye(1), np.eye(1), (0,))
     with pytest.raises(ValueError, match="flow linearly"):
         certify_sampled_error((riccati,), 0.1, "riccati", switching=True)

@@ -47,7 +47,8 @@ def chain(n: int = 2, inputs: int = 0, **how: Any) -> ObserverModel:
     )
 
 
-# -- models -------------------------------------------------------------------------------------------------------------
+# -- models
+# -------------------------------------------------------------------------------------------------------------
 
 
 def test_a_model_without_a_word_on_its_nonlinear_part_is_not_taken_for_linear() -> None:
@@ -68,7 +69,8 @@ def test_nothing_is_certified_without_slopes(observer: Any, known: dict[str, Any
 def test_slopes_give_the_lipschitz_constant_where_none_is_given() -> None:
     model = chain(phi=steep, slopes=STEEP)
     assert model.lipschitz == pytest.approx(np.hypot(50.0, 30.0))
-    assert not HighGain(model).condition({"theta": 5.0}).holds  # Lyapunov size 1.707: 2 sqrt(2) 1.707 58.3 = 281, slopes less
+    # Lyapunov size 1.707: 2 sqrt(2) 1.707 58.3 = 281, slopes less
+    assert not HighGain(model).condition({"theta": 5.0}).holds
     assert 50.0 < HighGain(model).condition().values["smallest_theta"] < 281.6
     assert chain(phi=steep, slopes=STEEP, lipschitz=20.0).lipschitz == 20.0
 
@@ -96,7 +98,8 @@ def test_a_long_steep_chain_is_judged_though_its_bound_leaves_the_range_of_numbe
     assert condition.values["lipschitz"] > condition.values["bound"]
 
 
-# -- certificates -------------------------------------------------------------------------------------------------------
+# -- certificates
+# -------------------------------------------------------------------------------------------------------
 
 
 GROWING = ((0.0, 1.0), (50.0, 30.0))
@@ -105,7 +108,9 @@ GROWING = ((0.0, 1.0), (50.0, 30.0))
 @pytest.mark.parametrize("gap", [10.0, 30.0, 300.0])
 def test_an_error_that_leaves_the_range_of_numbers_is_unstable_in_words(gap: float) -> None:
     decaying = SampledError.of(GROWING, (20.0, 100.0), 20.0)
-    held = ImpulsiveError.with_innovation(np.array(GROWING), np.array([[20.0], [100.0]]), np.zeros((1, 1)), np.eye(2)[:1])
+    held = ImpulsiveError.with_innovation(
+        np.array(GROWING), np.array([[20.0], [100.0]]), np.zeros((1, 1)), np.eye(2)[:1]
+    )
     for error in (decaying, held):
         certificate = certify_sampled_error((error,), gap, "model")
         assert not certificate.holds
@@ -119,7 +124,9 @@ def test_riccati_gains_that_leave_the_range_of_numbers_are_unstable_in_words() -
 
 
 @settings(max_examples=15, deadline=None)
-@given(damping=st.floats(-6.0, -1.0), frequency=st.floats(0.1, 30.0), outputs=st.integers(1, 2), seed=st.integers(0, 1000))
+@given(
+    damping=st.floats(-6.0, -1.0), frequency=st.floats(0.1, 30.0), outputs=st.integers(1, 2), seed=st.integers(0, 1000)
+)
 def test_a_resonance_however_narrow_counts_in_the_small_gain_limit(
     damping: float, frequency: float, outputs: int, seed: int
 ) -> None:
@@ -132,22 +139,33 @@ def test_a_resonance_however_narrow_counts_in_the_small_gain_limit(
     assert independent_gap_limit(A, B, C, np.zeros((outputs, outputs))) <= np.pi / (2.0 * largest)
 
 
-# -- the adapting gain --------------------------------------------------------------------------------------------------
+# -- the adapting gain
+# --------------------------------------------------------------------------------------------------
 
 
 def rule(**changes: Any) -> GainAdaptation:
     values: dict[str, Any] = {
-        "ratio": 2.5, "theta_min": 0.1, "theta_max": 8.0, "spacing": 50.0, "high_gain": (2.0, 1.0), "drag_slopes": (4e-4, 2.2e-3),
-        "acceleration": 0.0, "spacing_tolerance": 0.2,
-    }  # fmt: skip
+        "ratio": 2.5,
+        "theta_min": 0.1,
+        "theta_max": 8.0,
+        "spacing": 50.0,
+        "high_gain": (2.0, 1.0),
+        "drag_slopes": (4e-4, 2.2e-3),
+        "acceleration": 0.0,
+        "spacing_tolerance": 0.2,
+    }
     return GainAdaptation(**(values | changes))
 
 
 def alternating_growth(adaptation: GainAdaptation, P: np.ndarray, speed: float) -> float:
-    """Largest growth of ``theta eps' P eps`` at a steady speed; spacings in turn short and long, each gain set by the last."""
+    """Largest growth of ``theta eps' P eps`` at a steady speed; spacings in turn short and long, each gain set by the
+    last.
+    """
     near, far = (adaptation.spacing * (1.0 + s * adaptation.spacing_tolerance) for s in (-1.0, 1.0))
-    steps = [(way / speed, float(np.clip(adaptation.ratio * speed / last, adaptation.theta_min, adaptation.theta_max)))
-             for way, last in ((far, near), (near, far), (far, near))]  # fmt: skip
+    steps = [
+        (way / speed, float(np.clip(adaptation.ratio * speed / last, adaptation.theta_min, adaptation.theta_max)))
+        for way, last in ((far, near), (near, far), (far, near))
+    ]
     found = []
     for (gap, theta), (_, following) in pairwise(steps):
         error = SampledError.of([[0.0, 1.0], [0.0, 0.0]], (2.0 * theta, theta**2), 2.0 * theta)
@@ -158,11 +176,14 @@ def alternating_growth(adaptation: GainAdaptation, P: np.ndarray, speed: float) 
 
 
 def test_a_learnt_spacing_may_be_off_twice() -> None:
-    """The longest spacing after the shortest: theta times gap is 2.5 * 1.2 / 0.8 = 3.75 and not 3.0, and the gain changes too."""
+    """The longest spacing after the shortest: theta times gap is 2.5 * 1.2 / 0.8 = 3.75 and not 3.0, and the gain
+    changes too.
+    """
     expected, learnt = (certify_adapting_gain(rule(learnt=told), 5.0, "model") for told in (False, True))
     assert expected.holds
     assert learnt.holds
-    assert alternating_growth(rule(), np.array(expected.lyapunov_matrix), 15.0) > 1.0  # it does not speak of learnt ones
+    # it does not speak of learnt ones
+    assert alternating_growth(rule(), np.array(expected.lyapunov_matrix), 15.0) > 1.0
     assert alternating_growth(rule(), np.array(learnt.lyapunov_matrix), 15.0) < 1.0
     assert not certify_adapting_gain(rule(learnt=True, acceleration=0.7), 5.0, "model").holds
 
@@ -181,13 +202,16 @@ def test_learning_spacings_of_any_size_is_certified_for_no_gap() -> None:
     assert not AdaptiveGainCdo().certify(5.0, {"ratio": 0.0, "theta_max": 0.2}).holds  # was NaN
 
 
-# -- observability ------------------------------------------------------------------------------------------------------
+# -- observability
+# ------------------------------------------------------------------------------------------------------
 
 
 @settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 10_000), count=st.integers(2, 12))
 def test_rounding_is_no_measurement(seed: int, count: int) -> None:
-    """A sensor at all times and one at samples see the same half of the state; turned axes leave 1e-17 in the place of zeros."""
+    """A sensor at all times and one at samples see the same half of the state; turned axes leave 1e-17 in the place of
+    zeros.
+    """
     rng = np.random.default_rng(seed)
     A, seen = np.zeros((4, 4)), np.zeros((2, 4))
     A[:2, :2], A[2:, 2:], A[2:, :2] = rng.normal(size=(3, 2, 2))

@@ -81,7 +81,12 @@ def test_the_event_protocol_follows_and_then_the_derivatives(version: Any) -> No
     late = EventProtocol(late_policy="late", replay_horizon=3.0)
     policy, horizon, *others = describe(SWING, version, protocol=late).modelVariables[len(TABLE) + 4 :]
     counts, rates = others[: len(OUTCOMES)], others[len(OUTCOMES) :]
-    assert (policy.name, policy.type, policy.causality, policy.start) == ("late_policy", "Enumeration", "parameter", "3")
+    assert (policy.name, policy.type, policy.causality, policy.start) == (
+        "late_policy",
+        "Enumeration",
+        "parameter",
+        "3",
+    )
     assert [item.name for item in policy.declaredType.items] == ["replay", "reject", "late"]
     assert (horizon.name, horizon.unit, horizon.start) == ("replay_horizon", "s", "3.0")
     whole = "Integer" if version == 2 else "Int32"
@@ -238,7 +243,9 @@ def test_dependencies_of_outputs_are_exact(version: Any) -> None:
 
 @BOTH
 @pytest.mark.parametrize("system", [SWING, Doorman(), *SHIPPED], ids=lambda s: s.name)
-def test_initial_unknowns_depend_on_what_running_ones_do_and_on_start_values(system: HybridSystem, version: Any) -> None:
+def test_initial_unknowns_depend_on_what_running_ones_do_and_on_start_values(
+    system: HybridSystem, version: Any
+) -> None:
     """Without dependencies OMSimulator takes every input for one, and finds algebraic loops."""
     description, table = describe(system, version), VariableTable.of(system)
     running = [*description.outputs, *description.derivatives]
@@ -308,7 +315,10 @@ def test_starts_are_plain_numbers_that_read_back_exactly(system: HybridSystem, v
 def test_numpy_scalars_as_starts_are_written_as_numbers() -> None:
     class Scalars(Swing):
         name = "scalars"
-        parameters = (*Swing.parameters, parameter("gain", "1", (np.float64(0.1), np.int64(2)), min=np.float64(0.0), size=2))  # type: ignore[arg-type]
+        parameters = (
+            *Swing.parameters,
+            parameter("gain", "1", (np.float64(0.1), np.int64(2)), min=np.float64(0.0), size=2),
+        )  # type: ignore[arg-type]
 
     variables = _by_name(describe(Scalars(), 3))
     assert (variables["gain[1]"].start, variables["gain[2]"].start, variables["gain[1]"].min) == ("0.1", "2.0", "0.0")
@@ -334,7 +344,8 @@ def test_an_unknown_version_is_refused() -> None:
         describe(SWING, 1)  # type: ignore[arg-type]
 
 
-# -- token --------------------------------------------------------------------------------------------------------------
+# -- token
+# --------------------------------------------------------------------------------------------------------------
 
 
 def _variant(**attributes: Any) -> HybridSystem:

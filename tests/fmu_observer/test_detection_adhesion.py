@@ -6,7 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from observer_bench import Bench
 
-from fmu_observer.detection import AdhesionDetector, adhesion_map, condition_of, degraded_map, nominal_map, published_map
+from fmu_observer.detection import (
+    AdhesionDetector,
+    adhesion_map,
+    condition_of,
+    degraded_map,
+    nominal_map,
+    published_map,
+)
 from plant_models.railway.adhesion import POLACH_DRY, POLACH_WET
 
 KMH = 1.0 / 3.6
@@ -22,7 +29,12 @@ PRINTED = {  # Table 4.5: speed [km/h]: largest coefficient and optimal slip [%]
 
 
 def detector(
-    speed: float, slip: float, seconds: float = 5.0, definition: str = "odometer", preset: str = "polach", **parameters: float
+    speed: float,
+    slip: float,
+    seconds: float = 5.0,
+    definition: str = "odometer",
+    preset: str = "polach",
+    **parameters: float,
 ) -> Bench:
     bench = Bench(AdhesionDetector(definition), preset=preset, **parameters)  # type: ignore[arg-type]
     bench.set("u", {"speed": speed, "slip": slip})
@@ -129,7 +141,8 @@ def test_at_rest_the_verdict_stays() -> None:
 
 
 def test_maps_are_of_any_curve_and_bad_ones_are_refused() -> None:
-    assert adhesion_map(POLACH_DRY, (5.0 * KMH,)).slips[0] == pytest.approx(0.112, abs=5e-4)  # spec 5.1, continuous maximum
+    # spec 5.1, continuous maximum
+    assert adhesion_map(POLACH_DRY, (5.0 * KMH,)).slips[0] == pytest.approx(0.112, abs=5e-4)
     assert published_map(False).slips[0] == 0.10
     with pytest.raises(ValueError, match="positive speed"):
         adhesion_map(POLACH_DRY, (0.0,))

@@ -34,7 +34,18 @@ def then(bench: Bench, force: float, seconds: float = 1.0) -> dict[str, float]:
 def test_levels_go_up_at_the_limits_and_down_below_them() -> None:
     bench = started(0.0)
     # warning 340 kN, alarm 510 kN; left below 80 % of them, 272 and 408 kN
-    story = [(335e3, 0), (345e3, 1), (300e3, 1), (270e3, 0), (505e3, 1), (515e3, 2), (420e3, 2), (400e3, 1), (280e3, 1), (0.0, 0)]
+    story = [
+        (335e3, 0),
+        (345e3, 1),
+        (300e3, 1),
+        (270e3, 0),
+        (505e3, 1),
+        (515e3, 2),
+        (420e3, 2),
+        (400e3, 1),
+        (280e3, 1),
+        (0.0, 0),
+    ]
     assert [then(bench, force)["risk"] for force, _ in story] == [level for _, level in story]
 
 
@@ -75,7 +86,9 @@ def test_the_peak_is_held_and_forgotten() -> None:
 @settings(max_examples=25, deadline=None)
 @given(forces=st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=30), hold=st.integers(0, 10))
 def test_level_and_peak_of_any_history(forces: list[float], hold: int) -> None:
-    """The level never lies below that of the tension now; the peak is at least the tension, at most the largest of the past."""
+    """The level never lies below that of the tension now; the peak is at least the tension, at most the largest of the
+    past.
+    """
     bench = started(forces[0], peak_hold_time=hold * 0.02)
     seen = []
     for k, force in enumerate(forces):

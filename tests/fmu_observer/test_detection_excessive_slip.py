@@ -86,7 +86,8 @@ def test_standstill_is_not_judged() -> None:
 def test_the_indicator_is_that_of_the_definition(pattern: list[bool], confirm: int, hold: int) -> None:
     """Against the definition by runs of the pattern, not by a state machine."""
     rows = drive([(0.5 if over else 0.0, 0.05) for over in pattern], confirm_time=confirm * 0.05, hold_time=hold * 0.05)
-    # A slip of 50 % set at check k - 1 is beyond 15 % at check k; back at 0 it is below: ln(0.5/0.15) < 5 time constants.
+    # A slip of 50 % set at check k - 1 is beyond 15 % at check k; back at 0 it is below: ln(0.5/0.15) < 5 time
+    # constants.
     expected, triggers = [], []
     for k, over in enumerate(pattern):
         run = all(pattern[max(k - confirm, 0) : k + 1]) and k >= confirm

@@ -29,7 +29,8 @@ def test_it_forgets_a_wrong_start(name: str) -> None:
     follower = Follower(ALL[name]).start()
     first = follower.error()
     follower.follow(gaps_of(ALL[name]))
-    # No noise and the right model: what is left is transient, and the feeding of inputs that are held for 2 ms (second order).
+    # No noise and the right model: what is left is transient, and the feeding of inputs that are held for 2 ms (second
+    # order).
     assert follower.error() < ALL[name].left * first, follower.errors()
 
 

@@ -1,4 +1,6 @@
-"""The observer whose gain follows the expected gap: spacings where constant gains fail, and its certificate against journeys."""
+"""The observer whose gain follows the expected gap: spacings where constant gains fail, and its certificate against
+journeys.
+"""
 
 from __future__ import annotations
 
@@ -24,22 +26,29 @@ class Journey:
     """A train at piecewise constant acceleration: 5 m/s, up to 14, hold, down to 5, hold; 160 s, 1.6 km."""
 
     def __init__(self) -> None:
-        self.starts = [(0.0, 0.0, 5.0, 0.5), (18.0, 171.0, 14.0, 0.0), (100.0, 1319.0, 14.0, -0.5), (118.0, 1490.0, 5.0, 0.0)]
+        self.starts = [
+            (0.0, 0.0, 5.0, 0.5),
+            (18.0, 171.0, 14.0, 0.0),
+            (100.0, 1319.0, 14.0, -0.5),
+            (118.0, 1490.0, 5.0, 0.0),
+        ]
 
     def at(self, t: float) -> tuple[float, float, float]:
         t0, p0, v0, a = [start for start in self.starts if start[0] <= t][-1]
         return p0 + v0 * (t - t0) + 0.5 * a * (t - t0) ** 2, v0 + a * (t - t0), a
 
-    def passing(self, place: float) -> float:
+    def crossing(self, place: float) -> float:
         t0, p0, v0, a = [start for start in self.starts if start[1] <= place][-1]
         way = place - p0
         return t0 + (way / v0 if a == 0.0 else (np.sqrt(v0 * v0 + 2.0 * a * way) - v0) / a)
 
 
 def ride(bench: Bench, spacing: float, until: float = 160.0, wheels: float = 0.0) -> np.ndarray:
-    """Speed errors every `STEP` with a balise every `spacing` metres; the effort accelerates `wheels` [kg] of inertia too."""
+    """Speed errors every `STEP` with a balise every `spacing` metres; the effort accelerates `wheels` [kg] of inertia
+    too.
+    """
     journey, errors = Journey(), []
-    stamps = iter([float(journey.passing(place)) for place in np.arange(spacing, journey.at(until)[0], spacing)])
+    stamps = iter([float(journey.crossing(place)) for place in np.arange(spacing, journey.at(until)[0], spacing)])
     following = next(stamps, np.inf)
     for k in range(round(until / STEP)):
         _, v, a = journey.at((k + 0.5) * STEP)
@@ -61,7 +70,9 @@ def ride(bench: Bench, spacing: float, until: float = 160.0, wheels: float = 0.0
 
 @pytest.mark.parametrize("spacing", [2.0, 8.7, 25.0, 100.0])
 def test_it_follows_where_a_constant_gain_of_8_diverges(spacing: float) -> None:
-    """Adhesion force exact, as in the independent measurement: end errors up to 3 mm/s for 2 to 100 m, a start 4 m/s wrong."""
+    """Adhesion force exact, as in the independent measurement: end errors up to 3 mm/s for 2 to 100 m, a start 4 m/s
+    wrong.
+    """
     adaptive = ride(Bench(AdaptiveGainCdo(), expected_spacing=spacing), spacing)
     assert abs(adaptive[-1]) <= 0.003
     assert np.abs(adaptive).max() < 4.5
@@ -86,7 +97,8 @@ def test_the_differentiator_takes_out_what_the_wheels_inertia_costs(first_stage:
     assert bool(abs(errors[-1]) > 0.2 * bias) is (first_stage == "effort")
 
 
-# -- the rule -----------------------------------------------------------------------------------------------------------
+# -- the rule
+# -----------------------------------------------------------------------------------------------------------
 
 
 def gains_at(observer: TrainObserver, places: list[float], speed: float, odometer: float | None = None) -> list[float]:
@@ -139,14 +151,22 @@ def test_an_unknown_option_is_refused_with_what_there_is(option: dict[str, str])
         AdaptiveGainCdo(**option)  # type: ignore[arg-type]
 
 
-# -- the certificate ----------------------------------------------------------------------------------------------------
+# -- the certificate
+# ----------------------------------------------------------------------------------------------------
 
 
 def adaptation(**changes: object) -> GainAdaptation:
     values = {
-        "ratio": 2.0, "theta_min": 0.12, "theta_max": 3.0, "spacing": 100.0, "high_gain": (2.0, 1.0), "drag_slopes": SLOPES,
-        "acceleration": 0.7, "speed_tolerance": 0.05, "spacing_tolerance": 0.05,
-    }  # fmt: skip
+        "ratio": 2.0,
+        "theta_min": 0.12,
+        "theta_max": 3.0,
+        "spacing": 100.0,
+        "high_gain": (2.0, 1.0),
+        "drag_slopes": SLOPES,
+        "acceleration": 0.7,
+        "speed_tolerance": 0.05,
+        "spacing_tolerance": 0.05,
+    }
     return GainAdaptation(**(values | changes))  # type: ignore[arg-type]
 
 
@@ -182,11 +202,15 @@ def test_every_assumption_costs_gap() -> None:
 def journey_of(
     rule: GainAdaptation, max_gap: float, choices: list[tuple[float, float, float, float]]
 ) -> Iterator[tuple[float, float]]:
-    """Gap and gain from its beginning on, of a train within the assumptions; choices: two accelerations, spacing, odometer."""
+    """Gap and gain from its beginning on, of a train within the assumptions; choices: two accelerations, spacing,
+    odometer.
+    """
     slowest, v, theta = rule.slowest_speed(max_gap), rule.slowest_speed(max_gap), rule.theta_min
     for early, late, place, odometer in choices:
         theta = float(
-            np.clip(rule.ratio * v * (1.0 + rule.speed_tolerance * odometer) / rule.spacing, rule.theta_min, rule.theta_max)
+            np.clip(
+                rule.ratio * v * (1.0 + rule.speed_tolerance * odometer) / rule.spacing, rule.theta_min, rule.theta_max
+            )
         )
         way, gap, half = rule.spacing * (1.0 + rule.spacing_tolerance * place), 0.0, 0.5 * rule.spacing
         step = max_gap / 2000.0
@@ -200,7 +224,9 @@ def journey_of(
 
 
 def growth(rule: GainAdaptation, P: np.ndarray, gap: float, theta: float, following: float, slope: float) -> float:
-    """Largest growth of ``theta eps' P eps`` over a gap, in any direction, by SciPy's exponential of the error equations."""
+    """Largest growth of ``theta eps' P eps`` over a gap, in any direction, by SciPy's exponential of the error
+    equations.
+    """
     K1, K2 = theta * rule.high_gain[0], theta**2 * rule.high_gain[1]
     moved = expm(np.array([[0.0, 1.0, -K1], [0.0, -slope, -K2], [0.0, 0.0, -K1]]) * gap)[:2]
     transition = moved[:, :2] + np.outer(moved[:, 2], [1.0, 0.0])
@@ -235,7 +261,9 @@ def test_no_journey_contradicts_the_certificate(
 
 
 def braking(rule: GainAdaptation, max_gap: float, way: float) -> list[tuple[float, float]]:
-    """Speed at the balise and gap of trains that brake from it to the slowest speed and keep that; backwards they speed up."""
+    """Speed at the balise and gap of trains that brake from it to the slowest speed and keep that; backwards they speed
+    up.
+    """
     slowest, a = rule.slowest_speed(max_gap), rule.acceleration
     speeds = np.linspace(slowest, np.sqrt(slowest**2 + 2.0 * a * way), 100)
     return [(float(v), float((v - slowest) / a + (way - (v * v - slowest**2) / (2.0 * a)) / slowest)) for v in speeds]

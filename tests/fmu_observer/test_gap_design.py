@@ -94,7 +94,8 @@ def _scalars(system: object, name: str, value: float) -> list[tuple[str, float]]
     return [(scalar, value) for scalar in signal.scalar_names]
 
 
-# -- the adapting gain --------------------------------------------------------------------------------------------------
+# -- the adapting gain
+# --------------------------------------------------------------------------------------------------
 
 
 def test_an_adapting_rule_is_certified_for_every_change_of_speed() -> None:
@@ -117,12 +118,15 @@ def test_where_no_rule_is_certified_the_constant_gain_is_named() -> None:
         design_adaptive(100.0, (2.0, 14.0), acceleration=0.7)
 
 
-# -- noise --------------------------------------------------------------------------------------------------------------
+# -- noise
+# --------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("gap", [0.5, 6.0, 11.0])
 def test_the_amplification_is_that_of_a_simulated_error(gap: float) -> None:
-    """Monte Carlo over 40000 balises: standard deviations to 0.5 % each, more where balises are close; 3 % are allowed."""
+    """Monte Carlo over 40000 balises: standard deviations to 0.5 % each, more where balises are close; 3 % are
+    allowed.
+    """
     theta = 0.4
     K1, K2 = 2.0 * theta, theta**2
     error = SampledError.of([[0.0, 1.0], [0.0, 0.0]], (K1, K2), K1)
@@ -142,7 +146,8 @@ def test_the_amplification_is_that_of_a_simulated_error(gap: float) -> None:
 def test_the_amplification_scales_with_the_gain() -> None:
     """In units of 1 / theta nothing changes: position alike, speed as theta."""
     found = [
-        noise_amplification([(SampledError.of([[0.0, 1.0], [0.0, 0.0]], (2.0 * k, k * k), 2.0 * k), 3.0 / k)]) for k in (1.0, 8.0)
+        noise_amplification([(SampledError.of([[0.0, 1.0], [0.0, 0.0]], (2.0 * k, k * k), 2.0 * k), 3.0 / k)])
+        for k in (1.0, 8.0)
     ]
     assert found[1].position == pytest.approx(found[0].position)
     assert found[1].speed == pytest.approx(8.0 * found[0].speed)
@@ -153,7 +158,8 @@ def test_an_unstable_gap_has_no_amplification() -> None:
         noise_amplification([(SampledError.of([[0.0, 1.0], [0.0, 0.0]], (16.0, 64.0), 16.0), 0.7)])
 
 
-# -- input --------------------------------------------------------------------------------------------------------------
+# -- input
+# --------------------------------------------------------------------------------------------------------------
 
 
 def test_gaps_come_from_the_extremes() -> None:

@@ -34,14 +34,18 @@ def sine_errors(rows: np.ndarray, step: float, last: float) -> np.ndarray:
 
 @pytest.mark.parametrize(("order", "measured"), [(2, (0.0, 5e-5, 4e-4)), (3, (0.0, 5e-5, 1e-4, 6e-4))])
 def test_errors_on_a_sine(order: int, measured: tuple[float, ...]) -> None:
-    """Independently measured with L = 1 at a step of 0.1 ms, one digit each; h / 2 of the first derivative is the Euler lag."""
+    """Independently measured with L = 1 at a step of 0.1 ms, one digit each; h / 2 of the first derivative is the Euler
+    lag.
+    """
     step = 1e-4
     errors = sine_errors(run(LevantDifferentiator(order), np.sin(step * np.arange(200_000)), step), step, 6.0)
     np.testing.assert_allclose(errors, measured, rtol=0.15, atol=1e-10)
 
 
 def test_the_printed_order_of_the_gains_fails() -> None:
-    """The same equations with gain i of the table in equation i: independently measured errors 0.2, 0.59 and 1.41 for n = 2."""
+    """The same equations with gain i of the table in equation i: independently measured errors 0.2, 0.59 and 1.41 for n
+    = 2.
+    """
     step, z, gains = 1e-3, np.zeros(3), LEVANT_GAINS[2]
     for k in range(20_000):
         s = z[0] - np.sin(step * k)
@@ -55,7 +59,9 @@ def test_the_printed_order_of_the_gains_fails() -> None:
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_the_error_with_noise_has_the_exponents_of_the_theorem(order: int) -> None:
-    """Noise eps cos(w t), w = eps^(-1/(n+1)), the slowest that the differentiator cannot tell from the signal's own limits."""
+    """Noise eps cos(w t), w = eps^(-1/(n+1)), the slowest that the differentiator cannot tell from the signal's own
+    limits.
+    """
     step, t = 2e-4, 2e-4 * np.arange(60_000)
     sizes = (1e-4, 1e-2)
     errors = []
@@ -103,7 +109,9 @@ def test_the_filter_rejects_what_ruins_the_plain_differentiator() -> None:
 @pytest.mark.parametrize(("order", "filters"), [(0, 2), (1, 1), (1, 3), (2, 2)])
 def test_filtering_differentiators_of_a_clean_sine(order: int, filters: int) -> None:
     step = 1e-3
-    errors = sine_errors(run(FilteringDifferentiator(order, filters), np.sin(step * np.arange(15_000)), step), step, 5.0)
+    errors = sine_errors(
+        run(FilteringDifferentiator(order, filters), np.sin(step * np.arange(15_000)), step), step, 5.0
+    )
     assert np.all(errors <= 10.0 * step * np.ones(order + 1))
 
 
@@ -118,7 +126,8 @@ def test_every_order_of_the_table_runs() -> None:
 def test_units_follow_the_signal() -> None:
     system = FilteringDifferentiator(2, 2, unit="m/s")
     units = [parse_unit(s.unit).exponents[1:3] for s in system.states]
-    assert units == [(1, 1), (1, 0), (1, -1), (1, -2), (1, -3)]  # powers of metre and second: filters, value, derivatives
+    # powers of metre and second: filters, value, derivatives
+    assert units == [(1, 1), (1, 0), (1, -1), (1, -2), (1, -3)]
     assert parse_unit(system.parameters[0].unit).exponents[1:3] == (1, -4)
     assert [s.name for s in system.outputs] == ["value", "derivative_1", "derivative_2"]
     assert [s.unit for s in LevantDifferentiator(2).outputs] == ["1", "1/s", "1/s2"]

@@ -58,7 +58,9 @@ def test_pole_placement_agrees_with_python_control(n: int, seed: int) -> None:
     condition = np.linalg.cond(np.vstack([C @ np.linalg.matrix_power(A, k) for k in range(n)]))
     L = observer_gain(A, C, poles)
     # Both invert the observability matrix; their difference is its condition number in roundings.
-    np.testing.assert_allclose(L[:, 0], np.ravel(place_acker(A.T, C.T, poles)), rtol=1e-12 * condition, atol=1e-12 * condition)
+    np.testing.assert_allclose(
+        L[:, 0], np.ravel(place_acker(A.T, C.T, poles)), rtol=1e-12 * condition, atol=1e-12 * condition
+    )
 
 
 def test_several_measurements_and_repeated_poles() -> None:
@@ -138,7 +140,9 @@ def test_the_smallest_theta_by_hand() -> None:
     """K = (2, 1): P = [[1/2, -1/2], [-1/2, 3/2]], largest eigenvalue 1 + sqrt(1/2)."""
     size = 1.0 + np.sqrt(0.5)
     assert lyapunov_size(binomial_gain(2)) == pytest.approx(size, rel=1e-12)
-    assert theta_from_lipschitz(pendulum(), binomial_gain(2)) == pytest.approx(2.0 * np.sqrt(2.0) * size * np.hypot(1.0, 0.2))
+    assert theta_from_lipschitz(pendulum(), binomial_gain(2)) == pytest.approx(
+        2.0 * np.sqrt(2.0) * size * np.hypot(1.0, 0.2)
+    )
     # With the slopes: theta > 2 lmax(P) hypot(1 / theta, 0.2), a quadratic equation in theta squared.
     c = (2.0 * size) ** 2
     exact = np.sqrt(0.5 * (0.04 * c + np.sqrt((0.04 * c) ** 2 + 4.0 * c)))
@@ -161,10 +165,15 @@ def test_above_the_smallest_theta_the_frozen_error_decays(factor: float, slope: 
     last = np.zeros((n, n))
     last[-1, 0], last[-1, -1] = slope, -0.2
     model = replace(
-        pendulum(), states=tuple(replace(pendulum().states[0], name=f"x{i}") for i in range(n)), A=np.diag(np.ones(n - 1), 1),
-        B=np.eye(n)[:, -1:], C=np.eye(n)[:1], phi=lambda x, _u: last @ x, slopes=(last,),
+        pendulum(),
+        states=tuple(replace(pendulum().states[0], name=f"x{i}") for i in range(n)),
+        A=np.diag(np.ones(n - 1), 1),
+        B=np.eye(n)[:, -1:],
+        C=np.eye(n)[:1],
+        phi=lambda x, _u: last @ x,
+        slopes=(last,),
         lipschitz=float(np.linalg.norm(last, 2)),
-    )  # fmt: skip
+    )
     for smallest in (theta_from_lipschitz(model, K), theta_from_slopes(model, K)):
         theta = factor * smallest
         closed = model.A + last - np.outer(theta ** np.arange(1, n + 1) * K, np.eye(n)[0])
@@ -172,7 +181,9 @@ def test_above_the_smallest_theta_the_frozen_error_decays(factor: float, slope: 
 
 
 def test_convergence_in_the_order_of_what_was_measured_elsewhere() -> None:
-    """On another pendulum, whose parameters are not printed: 6.0e-2, 7.9e-5, 4.7e-9 at 2, 5 and 10 s. Ours: a factor of ten."""
+    """On another pendulum, whose parameters are not printed: 6.0e-2, 7.9e-5, 4.7e-9 at 2, 5 and 10 s. Ours: a factor of
+    ten.
+    """
     errors = np.linalg.norm(joint_errors(HighGain(), np.array([1.0, 0.0]), [2.0, 5.0, 10.0], theta=2.0), axis=1)
     assert np.all(np.abs(np.log10(errors / [6.0e-2, 7.9e-5, 4.7e-9])) < 1.0)
     fast = np.linalg.norm(joint_errors(HighGain(), np.array([1.0, 0.0]), [2.0, 5.0]), axis=1)

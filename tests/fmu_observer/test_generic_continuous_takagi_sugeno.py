@@ -24,12 +24,16 @@ def joint(observer: TakagiSugenoLuenberger, start: np.ndarray, times: list[float
         u = observer.unpack_inputs(np.concatenate([known, model.C @ x[:n]]))
         return np.concatenate([model.flow(x[:n], known), observer.flow(t, x[n:], u, p)])
 
-    solution = solve_ivp(flow, (0.0, times[-1]), np.append(start, observer.start_state()), rtol=1e-11, atol=1e-13, t_eval=times)
+    solution = solve_ivp(
+        flow, (0.0, times[-1]), np.append(start, observer.start_state()), rtol=1e-11, atol=1e-13, t_eval=times
+    )
     return np.asarray(solution.y[n : 2 * n] - solution.y[:n]).T
 
 
 def test_the_error_is_that_of_the_blended_vertices() -> None:
-    """For the pendulum placed gains make all vertices one matrix, whatever the premise: its exponential is the error."""
+    """For the pendulum placed gains make all vertices one matrix, whatever the premise: its exponential is the
+    error.
+    """
     observer, start = TakagiSugenoLuenberger(), np.array([2.5, -1.0])
     errors = joint(observer, start, [0.5, 1.0, 3.0])
     closed = vertex_errors(observer.model, placed_gains(observer.model, POLES))
@@ -42,7 +46,9 @@ def test_the_error_is_that_of_the_blended_vertices() -> None:
 
 def test_estimated_premises_are_another_observer_that_converges_too() -> None:
     start = np.array([2.5, -1.0])
-    measured, estimated = (joint(TakagiSugenoLuenberger(premise=p), start, [0.5, 6.0]) for p in ("measured", "estimated"))
+    measured, estimated = (
+        joint(TakagiSugenoLuenberger(premise=p), start, [0.5, 6.0]) for p in ("measured", "estimated")
+    )
     assert np.abs(measured[0] - estimated[0]).max() > 1e-3
     assert np.abs(estimated[1]).max() < 1e-3
     condition = TakagiSugenoLuenberger(premise="estimated").condition()
@@ -95,8 +101,12 @@ def test_bad_input() -> None:
 
 
 def test_an_infeasible_decay_is_refused_with_the_nearest_one() -> None:
-    """The rate is not measured and decays with 0.2 1/s by itself: no gain makes it faster, every smaller decay can be had."""
-    blind = replace(find_takagi_sugeno_model("pendulum"), A=np.stack([np.array([[0.0, 0.0], [s, -0.2]]) for s in (-1.0, 0.2)]))
+    """The rate is not measured and decays with 0.2 1/s by itself: no gain makes it faster, every smaller decay can be
+    had.
+    """
+    blind = replace(
+        find_takagi_sugeno_model("pendulum"), A=np.stack([np.array([[0.0, 0.0], [s, -0.2]]) for s in (-1.0, 0.2)])
+    )
     with pytest.raises(ValueError, match=r"no common P at the 2 vertices for decay 1 1/s. Nearest decay") as refused:
         designed_gains(blind, 1.0)
     nearest = float(str(refused.value).split("found feasible: ")[1].split()[0])
@@ -115,7 +125,9 @@ def test_time_outside_the_bounds_is_counted() -> None:
 
 
 def test_the_margin_by_hand() -> None:
-    """``A = -I``: P = I is best and leaves -2. Two shears whose mean is unstable have no common P, stable as each is."""
+    """``A = -I``: P = I is best and leaves -2. Two shears whose mean is unstable have no common P, stable as each
+    is.
+    """
     model, none = find_takagi_sugeno_model("pendulum"), np.zeros((2, 2, 1))
     assert vertex_decrease(replace(model, A=np.stack([-np.eye(2)] * 2)), none).margin == pytest.approx(2.0, rel=1e-6)
     shear = np.array([[-1.0, 10.0], [0.0, -1.0]])

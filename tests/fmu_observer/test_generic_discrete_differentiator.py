@@ -12,7 +12,11 @@ from hypothesis import strategies as st
 from fmu_observer.observers.continuous.differentiator import filtering_differentiator_flow
 from fmu_observer.observers.discrete import ImplicitDifferentiator
 from fmu_observer.observers.discrete import implicit_step as module
-from fmu_observer.observers.discrete.implicit_step import equation_coefficients, implicit_step, solve_first_filter_equation
+from fmu_observer.observers.discrete.implicit_step import (
+    equation_coefficients,
+    implicit_step,
+    solve_first_filter_equation,
+)
 from plant_models.hybrid import Runtime
 
 Signal = Callable[[Any], Any]
@@ -55,14 +59,18 @@ def test_errors_at_a_coarse_period() -> None:
 
 
 def test_errors_at_a_fine_period() -> None:
-    """At 1 ms: (1e-5, 5.6e-3) measured, against (2e-5, 8.6e-3); over which stretch is not said, chatter moves that by a third."""
+    """At 1 ms: (1e-5, 5.6e-3) measured, against (2e-5, 8.6e-3); over which stretch is not said, chatter moves that by a
+    third.
+    """
     implicit = worst(samples(1e-3, 20.0)[:, 3:5], 1e-3)
     np.testing.assert_allclose(implicit, [1e-5, 5.6e-3], rtol=0.35)
     assert np.all(implicit < worst(explicit(1e-3, 20.0), 1e-3))
 
 
 def test_the_first_filter_equation_is_solved_to_rounding() -> None:
-    """``w_1+`` from the sum of (1.36) against ``xi r^(m+1)``, at 1 ms. The terms are of 1e-5; their rounding is 1e-20 a term."""
+    """``w_1+`` from the sum of (1.36) against ``xi r^(m+1)``, at 1 ms. The terms are of 1e-5; their rounding is 1e-20 a
+    term.
+    """
     tau, n, nf, bound, rng = 1e-3, 1, 3, 2.0, np.random.default_rng(3)
     rows = samples(tau, 5.0, lambda t: np.sin(t) + 0.01 * rng.normal())
     largest = 0.0
@@ -105,7 +113,9 @@ def test_the_fixed_number_of_iterations_is_enough(exponents: list[float], excess
 @settings(max_examples=50, deadline=None)
 @given(ORDERS, st.integers(0, 10_000), st.sampled_from([1e-3, 0.1]))
 def test_the_step_is_odd(orders: tuple[int, int], seed: int, tau: float) -> None:
-    """Everything with the other sign gives the result with the other sign; the printed third case of Theorem 5 does not."""
+    """Everything with the other sign gives the result with the other sign; the printed third case of Theorem 5 does
+    not.
+    """
     n, nf = orders
     w, z, f = np.split(np.random.default_rng(seed).normal(size=nf + n + 2), [nf, nf + n + 1])
     plus, minus = implicit_step(list(w), list(z), f[0], 1.5, tau), implicit_step(list(-w), list(-z), -f[0], 1.5, tau)
@@ -120,7 +130,9 @@ def test_within_the_sliding_band_the_state_is_zero() -> None:
 
 
 def test_what_is_left_on_a_line_shrinks_with_the_powers_of_the_period() -> None:
-    """f'' = 0. The error of derivative i is a limit cycle of the size ``tau^(n+1-i)``, smaller than that of the explicit step."""
+    """f'' = 0. The error of derivative i is a limit cycle of the size ``tau^(n+1-i)``, smaller than that of the
+    explicit step.
+    """
 
     def line(t: float) -> float:
         return 0.5 + 0.3 * t

@@ -43,7 +43,8 @@ def test_the_error_follows_the_powers_of_the_closed_matrix(period: float) -> Non
 def test_estimates_belong_to_the_sample_they_are_published_at() -> None:
     """Started right, the observer agrees with the plant at every sample, the first one included."""
     model = replace(
-        linear_pendulum(), states=tuple(replace(s, start=v) for s, v in zip(linear_pendulum().states, (0.4, -0.3), strict=True))
+        linear_pendulum(),
+        states=tuple(replace(s, start=v) for s, v in zip(linear_pendulum().states, (0.4, -0.3), strict=True)),
     )
     states = exact_states(model, np.array([0.4, -0.3]), TORQUES, T)
     for observer in (DiscreteLuenberger(model), KalmanFilter(model)):
@@ -52,7 +53,8 @@ def test_estimates_belong_to_the_sample_they_are_published_at() -> None:
 
 def test_conditions_of_the_discrete_luenberger_observer() -> None:
     values = DiscreteLuenberger().condition().values
-    assert values["spectral_radius"] == pytest.approx(np.exp(-2.0 * T), rel=1e-6)  # a double pole: the root of a rounding
+    # a double pole: the root of a rounding
+    assert values["spectral_radius"] == pytest.approx(np.exp(-2.0 * T), rel=1e-6)
     assert DiscreteLuenberger().condition().holds
     assert not DiscreteLuenberger().condition({"gain": [0.0, -2.0]}).holds
 
@@ -99,7 +101,9 @@ def test_the_distance_to_the_circle_by_hand() -> None:
 # -- Kalman -----------------------------------------------------------------------------------------------------------
 
 
-def textbook_filter(observer: ExtendedKalmanFilter, torques: np.ndarray, measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def textbook_filter(
+    observer: ExtendedKalmanFilter, torques: np.ndarray, measured: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Estimates and covariances after each sample: P = (I - K C) P, Jacobians by central differences."""
     model, p = observer.model, observer.start_parameters()
     QN, RN, x, P, C = p[:4].reshape(2, 2), p[4:5].reshape(1, 1), np.zeros(2), np.eye(2), observer.model.C
@@ -140,7 +144,9 @@ def test_the_linear_filter_settles_at_the_riccati_solution() -> None:
     last = sampled_run(observer, np.zeros(300), np.zeros(301), T)[-1]
     np.testing.assert_allclose(last[2:6].reshape(2, 2), updated, rtol=1e-8)
     closed = Ad @ (np.eye(2) - P @ model.C.T @ np.linalg.inv(model.C @ P @ model.C.T + RN) @ model.C)
-    assert observer.condition().values["spectral_radius"] == pytest.approx(np.abs(np.linalg.eigvals(closed)).max(), rel=1e-9)
+    assert observer.condition().values["spectral_radius"] == pytest.approx(
+        np.abs(np.linalg.eigvals(closed)).max(), rel=1e-9
+    )
 
 
 def test_the_covariance_is_that_of_the_errors() -> None:
@@ -183,7 +189,9 @@ def test_a_filter_without_a_steady_state_says_so() -> None:
 
 @pytest.mark.parametrize("kind", [KalmanFilter, ExtendedKalmanFilter])
 def test_a_mode_that_is_not_measured_is_refused_unless_it_decays(kind: type[ExtendedKalmanFilter]) -> None:
-    with pytest.raises(UnobservableError, match=r"filter of linear_pendulum: .*eigenvalue 0.1 1/s \(grows .*rate \(1\)"):
+    with pytest.raises(
+        UnobservableError, match=r"filter of linear_pendulum: .*eigenvalue 0.1 1/s \(grows .*rate \(1\)"
+    ):
         kind(replace(linear_pendulum(), A=np.array([[0.1, 0.0], [0.0, 0.1]])))
     decaying = kind(replace(linear_pendulum(), A=np.array([[0.1, 0.0], [0.0, -0.1]]))).condition()
     assert decaying.holds
@@ -199,7 +207,8 @@ def test_a_nonlinear_model_that_is_blind_at_its_start_only_is_accepted() -> None
         ExtendedKalmanFilter(replace(model, phi=lambda x, _u: vector(0.0 * x[0], 0.1 * x[1])))
 
 
-# -- what they refuse ---------------------------------------------------------------------------------------------------
+# -- what they refuse
+# ---------------------------------------------------------------------------------------------------
 
 
 def test_models_that_do_not_suit() -> None:

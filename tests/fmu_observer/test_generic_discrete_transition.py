@@ -1,4 +1,6 @@
-"""Models over one sampling period: the zero-order hold, the nonlinear transition, its Jacobian, Van Loan's covariance."""
+"""Models over one sampling period: the zero-order hold, the nonlinear transition, its Jacobian, Van Loan's
+covariance.
+"""
 
 import casadi as ca
 import numpy as np

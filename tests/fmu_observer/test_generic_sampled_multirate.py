@@ -61,7 +61,8 @@ def test_the_sylvester_equation_is_solved_to_rounding() -> None:
     design = sylvester_design(MODEL.A, 2, [-2.0, -2.5])
     r = len(design.A)
     error = design.T @ MODEL.A - design.A @ design.T - np.hstack([np.zeros((r, r)), design.B])
-    assert np.abs(error).max() < 2e-14  # independently measured 4e-16 on another plant; here entries of 10 are subtracted
+    # independently measured 4e-16 on another plant; here entries of 10 are subtracted
+    assert np.abs(error).max() < 2e-14
     np.testing.assert_allclose(design.T[:, :r], np.eye(r), atol=1e-12)
     np.testing.assert_allclose(sorted(np.linalg.eigvals(design.A).real), [-2.5, -2.0], atol=1e-9)
     assert MultirateSylvester().condition().values["residual"] < 2e-14
@@ -85,7 +86,9 @@ def test_a_filter_that_shares_an_eigenvalue_with_the_plant_is_refused() -> None:
 
 
 def test_the_error_dies_on_an_unstable_plant() -> None:
-    """Independently measured 1.4e-4, 4.5e-9, 2.8e-13 at 2, 5, 12 s on a plant that is not printed: rates like ours or faster."""
+    """Independently measured 1.4e-4, 4.5e-9, 2.8e-13 at 2, 5, 12 s on a plant that is not printed: rates like ours or
+    faster.
+    """
     assert np.linalg.eigvals(MODEL.A).real.max() > 1.4
     errors = joint_errors((2.0, 5.0, 12.0), 0.1, 0.15)
     assert errors[0] < 1e-2

@@ -14,7 +14,9 @@ START = (1.0, 0.5)
 
 
 def covariance_filter(end: float) -> tuple[np.ndarray, np.ndarray]:
-    """Estimate and inv(S) from ``dP = F P + P F' + Q_theta`` and the gain form of the update, F by central differences."""
+    """Estimate and inv(S) from ``dP = F P + P F' + Q_theta`` and the gain form of the update, F by central
+    differences.
+    """
     model = pendulum()
     truth = true_motion(model, START, (TORQUE,), end)
     u, Q = np.array([TORQUE]), np.diag([THETA**2, THETA**4])
@@ -97,6 +99,8 @@ def test_the_period_is_judged_by_the_condition() -> None:
 @pytest.mark.parametrize("name", ["theta", "state_weight", "output_weight", "sample_period"])
 @pytest.mark.parametrize("value", [0.0, -1.0])
 def test_weights_that_leave_no_riccati_equation_are_refused_by_name(name: str, value: float) -> None:
-    """A negative theta was certified, for only its square counts, and a weight of zero ended in the words of a solver."""
+    """A negative theta was certified, for only its square counts, and a weight of zero ended in the words of a
+    solver.
+    """
     with pytest.raises(ValueError, match=f"'{name}' to certify must be at least"):
         RiccatiHighGain().certify(0.3, {name: value})

@@ -1,4 +1,6 @@
-"""Takagi-Sugeno observers with the innovation held: convergence, frozen weights, and certificates against exact products."""
+"""Takagi-Sugeno observers with the innovation held: convergence, frozen weights, and certificates against exact
+products.
+"""
 
 from itertools import pairwise
 
@@ -67,7 +69,9 @@ def test_the_correction_pulls_towards_the_measurement() -> None:
     relative=st.lists(st.tuples(st.floats(0.001, 1.0), st.floats(0.0, 1.0)), min_size=5, max_size=40),
     angle=st.floats(0.0, np.pi),
 )
-def test_the_certified_function_falls_at_every_gap_and_weight(relative: list[tuple[float, float]], angle: float) -> None:
+def test_the_certified_function_falls_at_every_gap_and_weight(
+    relative: list[tuple[float, float]], angle: float
+) -> None:
     """Weights of the four mixtures' whole range, gaps on no grid, exact exponentials of the vertices' own equations."""
     observer, model = TakagiSugenoAperiodic(), find_takagi_sugeno_model("pendulum")
     limit = 0.999 * observer.certify(0.1).aperiodic_limit
@@ -92,14 +96,17 @@ def test_beyond_the_constant_limit_the_error_grows() -> None:
 
 def test_the_gains_place_the_same_poles_at_every_vertex() -> None:
     observer = TakagiSugenoPeriodic()
-    for A, L in zip(observer.model.A, observer.gains(observer.unpack_parameters(observer.start_parameters())), strict=True):
+    for A, L in zip(
+        observer.model.A, observer.gains(observer.unpack_parameters(observer.start_parameters())), strict=True
+    ):
         np.testing.assert_allclose(sorted(np.linalg.eigvals(A - L @ observer.model.C).real), [-2.5, -2.0], atol=1e-9)
 
 
 def test_the_condition_tells_the_slope_it_tolerates() -> None:
     condition = TakagiSugenoPeriodic().condition()
     assert condition.holds
-    assert 0.1 < condition.values["tolerated_slope"] < 2.0  # no less than the slowest pole can bear, no more than it could
+    # no less than the slowest pole can bear, no more than it could
+    assert 0.1 < condition.values["tolerated_slope"] < 2.0
     wrong = TakagiSugenoPeriodic().condition({"gain": [-1.0, 0.0, -1.0, 0.0]})
     assert not wrong.holds
     assert wrong.values["tolerated_slope"] == 0.0

@@ -1,4 +1,6 @@
-"""The innovation gate: what every observer of balises does with telegrams that cannot be true, and with its own mistakes."""
+"""The innovation gate: what every observer of balises does with telegrams that cannot be true, and with its own
+mistakes.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,8 @@ from plant_models.hybrid.event import DOUBTED, IGNORED, USED
 
 MOTION, GAP = SteadyMotion(speed=14.0), 0.3
 GENERIC = (ExponentialGain, HeldInnovation, HybridImpulsive, OutputPredictor)
-MAKERS: dict[str, Callable[[], GatedObserver]] = {system.name: cache(system) for system in SYSTEMS}  # one of each is traced once
+# one of each is traced once
+MAKERS: dict[str, Callable[[], GatedObserver]] = {system.name: cache(system) for system in SYSTEMS}
 MAKERS |= {f"{g.name} of freight_train": cache(partial(g, model="freight_train")) for g in GENERIC}
 MAKERS["general_takagi_sugeno_cdo"] = cache(OBSERVERS["general_takagi_sugeno_cdo"])  # type: ignore[arg-type]
 PRESETS = {"augmented_high_gain_cdo": "balises", "augmented_takagi_sugeno_cdo": "balises"}
@@ -40,7 +43,12 @@ def bench_of(make: Callable[[], GatedObserver], gate: float = REJECT, **paramete
     exact = {"estimated_speed": v, "wheel_rate": v / 0.575, "wheel_speed_estimate": v, "odometer_speed": v}
     exact |= {"adhesion_deceleration": -(0.575**2) / 225.0 * MOTION.effort(0.0)}
     bench.set("x", {name: value for name, value in exact.items() if name in names})
-    fed = {"effort": MOTION.effort(0.0), "odometer": v, "measured_odometer": v, "net_effort": MOTION.effort(0.0) - 900.0}
+    fed = {
+        "effort": MOTION.effort(0.0),
+        "odometer": v,
+        "measured_odometer": v,
+        "net_effort": MOTION.effort(0.0) - 900.0,
+    }
     bench.set("u", {name: value for name, value in fed.items() if name in inputs})
     bench.runtime.start(0.0)
     run(bench, 5)
@@ -61,12 +69,15 @@ def error(bench: Bench, off: float = 0.0) -> float:
     return abs(float(bench.runtime.x[0]) - MOTION.position(bench.runtime.t) - off)
 
 
-# -- the judgement alone ------------------------------------------------------------------------------------------------
+# -- the judgement alone
+# ------------------------------------------------------------------------------------------------
 
 GATE = SimpleNamespace(gate=REJECT, gate_floor=0.5, gate_drift=0.05, gate_spread=3.0, gate_recover=3.0)
 SETTLED = GateMemory(*np.zeros(9))._replace(settled=3.0, recent=0.4, reference=60.0)
 LIMIT = 0.5 + 0.2 + 0.3 + 0.05 * 40.0 + 3.0 * 0.4
-"""Of `SETTLED` and `judged`: floor, accuracy, own bound, a share of the way since 60 m, and of the recent innovation [m]."""
+"""Of `SETTLED` and `judged`: floor, accuracy, own bound, a share of the way since 60 m, and of the recent innovation
+[m].
+"""
 
 
 def judged(innovation: float, before: GateMemory = SETTLED, **told: Any) -> Judgement:
@@ -92,24 +103,31 @@ def test_what_is_remembered_of_a_telegram() -> None:
     assert [float(j.memory.verdict) for j in kept] == [USED, USED, IGNORED, USED]
 
 
-@pytest.mark.parametrize(("told", "count"), [
-    ({"estimate": 100.0, "position": 220.0, "odometer": 30.0}, 2.0),  # the way of the odometer, its mean of 10 and 30 m/s
-    ({"estimate": 100.0, "position": 220.0, "odometer": 10.0}, 1.0),
-    ({"estimate": 120.0, "position": 220.0, "odometer": 90.0}, 2.0),  # the way of the estimate
-    ({"estimate": 100.0, "position": 200.0, "odometer": 90.0}, 1.0),  # told twice
-    ({"estimate": 100.0, "position": 260.0, "odometer": 90.0}, 1.0),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("told", "count"),
+    [
+        # the way of the odometer, its mean of 10 and 30 m/s
+        ({"estimate": 100.0, "position": 220.0, "odometer": 30.0}, 2.0),
+        ({"estimate": 100.0, "position": 220.0, "odometer": 10.0}, 1.0),
+        ({"estimate": 120.0, "position": 220.0, "odometer": 90.0}, 2.0),  # the way of the estimate
+        ({"estimate": 100.0, "position": 200.0, "odometer": 90.0}, 1.0),  # told twice
+        ({"estimate": 100.0, "position": 260.0, "odometer": 90.0}, 1.0),
+    ],
+)
 def test_doubted_telegrams_agree_by_either_way(told: dict[str, float], count: float) -> None:
     first = judged(-100.0, odometer=10.0).memory
     second = judge(first, Told(told["position"], 0.2, told["estimate"], 0.3, told["odometer"], 2.0), GATE)
     assert float(second.memory.doubted) == count
-    third = judge(first._replace(doubted=2.0), Told(told["position"], 0.2, told["estimate"], 0.3, told["odometer"], 2.0), GATE)
+    third = judge(
+        first._replace(doubted=2.0), Told(told["position"], 0.2, told["estimate"], 0.3, told["odometer"], 2.0), GATE
+    )
     believed = count == 2.0
     assert (float(third.restart), float(third.used)) == (believed, believed)
     assert float(third.memory.doubted) == (0.0 if believed else count if told["position"] != 200.0 else 2.0)
 
 
-# -- in every observer --------------------------------------------------------------------------------------------------
+# -- in every observer
+# --------------------------------------------------------------------------------------------------
 
 
 def test_every_observer_of_balises_has_the_gate() -> None:
@@ -229,13 +247,23 @@ def _in_python(bench: Bench) -> Runtime:
     return other
 
 
-@pytest.mark.parametrize(("name", "value", "expected"), [
-    ("gate_floor", 0.0, "at least 0.001 m"), ("gate_floor", -1.0, "at least 0.001 m"), ("gate_floor", float("inf"), "finite"),
-    ("gate_drift", -0.1, "at least 0"), ("gate_spread", float("nan"), "finite"), ("gate_recover", 0.0, "at least 1"),
-    ("gate", 3.0, "at most 2"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "value", "expected"),
+    [
+        ("gate_floor", 0.0, "at least 0.001 m"),
+        ("gate_floor", -1.0, "at least 0.001 m"),
+        ("gate_floor", float("inf"), "finite"),
+        ("gate_drift", -0.1, "at least 0"),
+        ("gate_spread", float("nan"), "finite"),
+        ("gate_recover", 0.0, "at least 1"),
+        ("gate", 3.0, "at most 2"),
+    ],
+)
 def test_a_gate_that_cannot_be_is_refused(name: str, value: float, expected: str) -> None:
     bench = Bench(OBSERVERS["differentiator_cdo"](), **{name: value})
-    said = rf"differentiator_cdo: time cannot run with these parameters: {name} must be .*{expected}.* \({name} = {value}\)"
+    said = (
+        rf"differentiator_cdo: time cannot run with these parameters: {name} must be .*{expected}.* \({name} = "
+        rf"{value}\)"
+    )
     with pytest.raises(ValueError, match=said):
         bench.runtime.start(0.0)

@@ -8,14 +8,17 @@ from fmu_observer.design.noise_amplification import POINTS, noise_amplification
 
 
 def test_the_largest_error_within_a_gap_counts() -> None:
-    """A fast correction in a weak loop: the newest balise's own noise moves the estimate within the gap, and fades again."""
+    """A fast correction in a weak loop: the newest balise's own noise moves the estimate within the gap, and fades
+    again.
+    """
     error, gap = SampledError.of([[-2.0, 1.0], [0.0, -3.0]], (6.0, 1.0), 8.0), 1.0
     rng = np.random.default_rng(0)
     count, instants = 4000, np.linspace(0.0, gap, POINTS)
     transitions = [expm(error.generator * t) for t in instants]
     e, spread = np.zeros((count, 2)), np.zeros((POINTS, 2))
     for k in range(30):
-        start = np.column_stack([e, e[:, 0] + rng.standard_normal(count)])  # the innovation: error and noise of the balise
+        # the innovation: error and noise of the balise
+        start = np.column_stack([e, e[:, 0] + rng.standard_normal(count)])
         moved = [start @ m.T for m in transitions]
         e = moved[-1][:, :2]
         if k >= 20:

@@ -43,7 +43,8 @@ def test_the_modes_are_those_of_the_hautus_test(hidden: list[float], seen: list[
     draw = np.random.default_rng(seed)
     n = len(hidden) + len(seen)
     A = np.diag([*hidden, *seen])
-    A[: len(hidden), len(hidden) :] = draw.normal(size=(len(hidden), len(seen)))  # the seen states may drive the hidden ones
+    # the seen states may drive the hidden ones
+    A[: len(hidden), len(hidden) :] = draw.normal(size=(len(hidden), len(seen)))
     C = np.hstack([np.zeros((1, len(hidden))), draw.uniform(0.5, 2.0, (1, len(seen)))])
     turn = np.linalg.qr(draw.normal(size=(n, n)))[0]
     system = MeasuredSystem(turn @ A @ turn.T, C @ turn.T)
@@ -85,7 +86,9 @@ def test_a_chain_of_integrators_behind_the_sensor_is_found_whole(turned: bool) -
 
 
 def test_the_printed_unknown_input_observer_has_rank_four_and_the_corrected_one_six() -> None:
-    """Bouchama 2024, (3.88)-(3.89): printed with a 1 in column 3 of row 2; the observability ranks are independently measured."""
+    """Bouchama 2024, (3.88)-(3.89): printed with a 1 in column 3 of row 2; the observability ranks are independently
+    measured.
+    """
     drag = (32.4 + 1.65287 * 13.9) / 90e3
     A = np.zeros((6, 6))
     A[0, 1] = A[0, 2] = A[2, 4] = A[3, 5] = 1.0
@@ -110,9 +113,13 @@ def test_slow_modes_beside_a_fast_one_are_not_lost() -> None:
 
 def steady(speed: float) -> tuple[dict[str, float], dict[str, float]]:
     point = operating_point(
-        Locomotive(), {"train_speed": speed, "wheel_rate": speed / RADIUS}, {"effort": 1e3},
-        hold=("train_position", "train_speed"), drift=("train_position",), find=("effort",),
-    )  # fmt: skip
+        Locomotive(),
+        {"train_speed": speed, "wheel_rate": speed / RADIUS},
+        {"effort": 1e3},
+        hold=("train_position", "train_speed"),
+        drift=("train_position",),
+        find=("effort",),
+    )
     return dict(point.states), dict(point.inputs)
 
 

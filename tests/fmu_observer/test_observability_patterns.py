@@ -112,7 +112,9 @@ def test_samples_in_step_with_an_oscillation_miss_half_of_it() -> None:
     in_step = observability(system, SamplePattern(np.pi * np.arange(1, 6)))
     assert (in_step.rank, in_step.unobservable) == (1, ())
     np.testing.assert_allclose(np.abs(in_step.unseen[:, 0]), [0.0, 1.0], atol=1e-9)
-    with pytest.raises(UnobservableError, match=r"coupler: 5 samples .* tell 1 of 2 states; not measured: \+?-?1 rate.*in step"):
+    with pytest.raises(
+        UnobservableError, match=r"coupler: 5 samples .* tell 1 of 2 states; not measured: \+?-?1 rate.*in step"
+    ):
         in_step.require()
     observability(system, SamplePattern(0.9 * np.pi * np.arange(1, 6))).require()
 
@@ -147,7 +149,7 @@ def test_a_hidden_offset_is_named_by_the_pattern_too() -> None:
 # -- patterns -------------------------------------------------------------------------------------------------------
 
 
-def test_balises_become_the_instants_of_passing() -> None:
+def test_balises_become_the_instants_of_crossing() -> None:
     forward = SamplePattern.of_balises([300.0, 100.0, 50.0], 10.0, start=60.0)  # the one at 50 m lies behind
     np.testing.assert_allclose(forward.instants, [4.0, 24.0])
     np.testing.assert_allclose(forward.gaps, [4.0, 20.0, 0.0])

@@ -9,7 +9,8 @@ from observer_bench import INERTIA, MASS, RADIUS, TRAIN_OBSERVERS, SteadyMotion,
 from fmu_observer.observers.train import DifferentiatorCdo, DiscreteUio, MultirateCdo, TakagiSugenoCdo, TrainObserver
 
 CONVERGED = (
-    1e-4  # [m], [m/s] after 20 s: decay rates are 0.5 1/s and faster, so exp(-10) of an error of 19 m/s would remain at most
+    # [m], [m/s] after 20 s: decay rates are 0.5 1/s and faster, so exp(-10) of an error of 19 m/s would remain at most
+    1e-4
 )
 
 
@@ -39,7 +40,8 @@ def test_wheel_scaling_the_adhesion_force_is_the_effort_less_the_wheels_share(
     t = bench.runtime.t
     share = n_axles * INERTIA / RADIUS**2 * motion.acceleration
     assert motion.effort(t) - motion.adhesion_force(t) == pytest.approx(share)
-    # The estimates lag the slowly growing force and chatter: 5 % of the wheels' share tells right from wrong scaling by far.
+    # The estimates lag the slowly growing force and chatter: 5 % of the wheels' share tells right from wrong scaling by
+    # far.
     assert bench.outputs()["adhesion_force"] == pytest.approx(motion.adhesion_force(t), abs=0.05 * abs(share))
     assert bench.outputs()["speed"] == pytest.approx(motion.v(t), abs=0.01)
 
@@ -64,6 +66,7 @@ def test_slip_is_told_from_speed(make: Callable[[], TrainObserver], slip_speed: 
     bench = started(make(), motion)
     bench.follow(motion, random_gaps(8, 0.5, 130))
     outputs = bench.outputs()
-    assert outputs["speed"] == pytest.approx(15.0, abs=1e-3)  # the odometer gains 1e-5 of the T-S observer pass 1e-5 of the slip
+    # the odometer gains 1e-5 of the T-S observer pass 1e-5 of the slip
+    assert outputs["speed"] == pytest.approx(15.0, abs=1e-3)
     assert outputs["slip"] == pytest.approx(slip_speed / (15.0 + slip_speed), abs=1e-4)
     assert outputs["slip_indicator"] == 2.0

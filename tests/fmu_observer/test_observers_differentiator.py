@@ -6,14 +6,20 @@ import numpy as np
 import pytest
 from observer_bench import INERTIA, RADIUS, Bench, SteadyMotion
 
-from fmu_observer.observers.continuous.differentiator import differentiator_flow, filtering_differentiator_flow, signed_power
+from fmu_observer.observers.continuous.differentiator import (
+    differentiator_flow,
+    filtering_differentiator_flow,
+    signed_power,
+)
 from fmu_observer.observers.continuous.differentiator_gains import LEVANT_GAINS
 from fmu_observer.observers.train import DifferentiatorCdo
 
 STEP, END = 1e-3, 10.0
 
 
-def sine_errors(flow: Callable[[np.ndarray, float], np.ndarray], size: int, first: int, noise: float = 0.0) -> np.ndarray:
+def sine_errors(
+    flow: Callable[[np.ndarray, float], np.ndarray], size: int, first: int, noise: float = 0.0
+) -> np.ndarray:
     """Largest errors of the estimated derivatives of sin(t) over the last 3 s, explicit Euler."""
     x, worst = np.zeros(size), np.zeros(size - first)
     for k in range(round(END / STEP)):
@@ -28,8 +34,8 @@ def sine_errors(flow: Callable[[np.ndarray, float], np.ndarray], size: int, firs
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_derivatives_of_a_sine(order: int) -> None:
     errors = sine_errors(lambda z, f: np.array(differentiator_flow(list(z), f, 1.0)), order + 1, 0)
-    # At a step of 1 ms every further derivative is some ten times less accurate. With the table in the printed order the
-    # independently measured errors are 0.2 (first state, order 2) and 35 (order 3).
+    # At a step of 1 ms every further derivative is some ten times less accurate. With the table in the printed order
+    # the independently measured errors are 0.2 (first state, order 2) and 35 (order 3).
     assert np.all(errors <= [1e-3, 0.01, 0.05, 0.3][: order + 1])
 
 

@@ -86,7 +86,9 @@ def test_the_takagi_sugeno_innovation_is_the_published_gain() -> None:
         model = np.array([x[1], (MOTION.effort(0.0) - DAVIS_A) / MASS - slope * x[1]])
         return np.asarray(model - odometer_gain * (x[1] - 20.0))
 
-    np.testing.assert_allclose(observed(TakagiSugenoCdo(premise="live")), published(drift, gain, 9.9), atol=RK4_ACCURACY)
+    np.testing.assert_allclose(
+        observed(TakagiSugenoCdo(premise="live")), published(drift, gain, 9.9), atol=RK4_ACCURACY
+    )
 
 
 def test_the_gain_shape_solves_the_corrected_lyapunov_equation() -> None:

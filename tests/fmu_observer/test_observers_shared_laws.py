@@ -29,8 +29,13 @@ def test_the_shared_signals_are_declared(make: Make) -> None:
     assert [s.name for s in observer.triggered_events[0].payload] == ["balise_position", "balise_location_accuracy"]
     units = {s.name: s.unit for s in observer.outputs}
     assert units == {
-        "position": "m", "speed": "m/s", "slip": "1", "adhesion_force": "N", "slip_indicator": "1", "innovation": "m"
-    }  # fmt: skip
+        "position": "m",
+        "speed": "m/s",
+        "slip": "1",
+        "adhesion_force": "N",
+        "slip_indicator": "1",
+        "innovation": "m",
+    }
     shared = {"mass", "wheel_inertia", "n_axles", "wheel_radius", "davis_a", "davis_b", "davis_c", "slip_floor"}
     assert shared <= {s.name for s in observer.parameters}
     assert all(s.description for s in (*observer.parameters, *observer.states, *observer.inputs, *observer.outputs))
@@ -75,14 +80,17 @@ def test_the_traced_kernel_and_plain_numpy_agree(make: Make) -> None:
     traced, python = started(make(), MOTION), started(make(), MOTION, python=True)
     for bench in (traced, python):
         bench.follow(MOTION, random_gaps(3, 0.5, 3), feed=0.05)
-    # The same operations in another order: rounding only, which the differentiator's sign may amplify by its chatter (1e-9).
+    # The same operations in another order: rounding only, which the differentiator's sign may amplify by its chatter
+    # (1e-9).
     np.testing.assert_allclose(traced.runtime.x, python.runtime.x, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(traced.runtime.update_outputs(), python.runtime.update_outputs(), rtol=1e-9, atol=1e-6)
 
 
 @every_observer
 @pytest.mark.parametrize(
-    ("effort", "odometer"), [(0.0, 0.0), (-60e3, 0.0), (-350e3, 0.0), (350e3, 60.0)], ids=["rest", "held", "lock", "spin"]
+    ("effort", "odometer"),
+    [(0.0, 0.0), (-60e3, 0.0), (-350e3, 0.0), (350e3, 60.0)],
+    ids=["rest", "held", "lock", "spin"],
 )
 def test_outputs_stay_finite_without_any_balise(make: Make, effort: float, odometer: float) -> None:
     bench = Bench(make())
@@ -125,16 +133,23 @@ def test_a_batch_flows_like_its_members(make: Make) -> None:
     flows, jumps = observer.state_derivative(0.0, x, u, p), observer.jump_vector("balise", 0.0, x, u, p)
     for k in range(3):
         np.testing.assert_allclose(flows[:, k], observer.state_derivative(0.0, x[:, k], u[:, k], p[:, k]), rtol=1e-12)
-        np.testing.assert_allclose(jumps[:, k], observer.jump_vector("balise", 0.0, x[:, k], u[:, k], p[:, k]), rtol=1e-12)
+        np.testing.assert_allclose(
+            jumps[:, k], observer.jump_vector("balise", 0.0, x[:, k], u[:, k], p[:, k]), rtol=1e-12
+        )
 
 
 def test_the_registry_names_every_observer() -> None:
-    assert {"differentiator_cdo", "takagi_sugeno_cdo", "multirate_cdo", "discrete_uio", "slip_indicator"} <= set(OBSERVERS)
+    assert {"differentiator_cdo", "takagi_sugeno_cdo", "multirate_cdo", "discrete_uio", "slip_indicator"} <= set(
+        OBSERVERS
+    )
     assert all(system.name == name for name, system in OBSERVERS.items())
     assert len(OBSERVERS) == sum(len(room.SYSTEMS) for room in ROOMS), "two systems of one name"
     assert OBSERVERS["slip_indicator"] is SlipIndicator
 
 
 def test_importing_the_package_does_not_import_casadi() -> None:
-    code = "import fmu_observer, sys; assert 'casadi' not in sys.modules; fmu_observer.OBSERVERS; assert 'casadi' in sys.modules"
+    code = (
+        "import fmu_observer, sys; assert 'casadi' not in sys.modules; fmu_observer.OBSERVERS; assert 'casadi' in "
+        "sys.modules"
+    )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -9,14 +9,16 @@ from fmu_observer.design.uio_design import UioCovariances, discretise, uio_gains
 from fmu_observer.observers.train import DiscreteUio
 
 SLOPE = (DAVIS_B + DAVIS_C * 50.0 / 3.6) / MASS
-PRINTED_AD = np.array([
-    [1.0, 0.1, 0.1, 0.005, 0.005, 0.0002],
-    [0.0, 0.9999, 0.0, 0.1, 0.0, 0.005],
-    [0.0, 0.0, 1.0, 0.0, 0.1, 0.0],
-    [0.0, 0.0, 0.0, 1.0, 0.0, 0.1],
-    [0.0, 0.0, 0.0, 0.0, 1.0, 0.0],
-    [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
-])  # fmt: skip
+PRINTED_AD = np.array(
+    [
+        [1.0, 0.1, 0.1, 0.005, 0.005, 0.0002],
+        [0.0, 0.9999, 0.0, 0.1, 0.0, 0.005],
+        [0.0, 0.0, 1.0, 0.0, 0.1, 0.0],
+        [0.0, 0.0, 0.0, 1.0, 0.0, 0.1],
+        [0.0, 0.0, 0.0, 0.0, 1.0, 0.0],
+        [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+    ]
+)
 PRINTED_BD = 1e-5 * np.array([0.0056, 0.1111, 0.0, 0.0, 0.0, 0.0])
 PRINT_ROUNDING = 5e-5  # four decimals; the largest difference is 3.8e-5
 
@@ -51,7 +53,8 @@ def test_the_observer_between_samples_is_the_discrete_model() -> None:
     bench.set("u", {"effort": 40e3})
     bench.runtime.advance(0.0999)
     Ad, Bd = discretise(*uio_matrices(MASS, SLOPE), 0.0999)
-    np.testing.assert_allclose(bench.runtime.x[:6], Ad @ x + Bd * (40e3 - 900.0), atol=1e-11)  # RK4 is nearly exact here
+    # RK4 is nearly exact here
+    np.testing.assert_allclose(bench.runtime.x[:6], Ad @ x + Bd * (40e3 - 900.0), atol=1e-11)
 
 
 def test_declared_gains_are_those_of_the_design() -> None:

@@ -66,5 +66,7 @@ def test_presets_carry_the_two_published_thresholds() -> None:
 
 
 def test_level_over_a_batch() -> None:
-    levels = indicator_level(np.array([0.03, 0.01, -0.03]), np.array([10.0, 10.0, 0.0]), np.array([9.0, 9.0, 0.0]), 0.02, 0.5)
+    levels = indicator_level(
+        np.array([0.03, 0.01, -0.03]), np.array([10.0, 10.0, 0.0]), np.array([9.0, 9.0, 0.0]), 0.02, 0.5
+    )
     np.testing.assert_array_equal(levels, [2.0, 1.0, 1.0])

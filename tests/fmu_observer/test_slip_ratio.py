@@ -15,7 +15,9 @@ from fmu_observer.detection import (
 ROUNDING = 1e-12  # a handful of operations on numbers of order one
 
 
-@pytest.mark.parametrize(("by_odometer", "by_speed"), [(0.35, 0.35 / 0.65), (0.02, 0.02 / 0.98), (0.0, 0.0), (-1.0, -0.5)])
+@pytest.mark.parametrize(
+    ("by_odometer", "by_speed"), [(0.35, 0.35 / 0.65), (0.02, 0.02 / 0.98), (0.0, 0.0), (-1.0, -0.5)]
+)
 def test_conversion_matches_the_published_pairs(by_odometer: float, by_speed: float) -> None:
     assert speed_slip_from_odometer_slip(by_odometer) == pytest.approx(by_speed, abs=ROUNDING)
     assert odometer_slip_from_speed_slip(by_speed) == pytest.approx(by_odometer, abs=ROUNDING)

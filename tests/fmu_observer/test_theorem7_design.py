@@ -1,4 +1,6 @@
-"""Theorem 7: feasibility and gamma against independently measured numbers, and its promise against exact transitions."""
+"""Theorem 7: feasibility and gamma against independently measured numbers, and its promise against exact
+transitions.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,13 @@ from fmu_observer.design.theorem7 import (
     search_eta,
 )
 from fmu_observer.models import find_takagi_sugeno_model
-from fmu_observer.observers.sampled.takagi_sugeno_gains import DESIGNS, E1_PUBLISHED, E2_PUBLISHED, GAINS, TRAIN_PUBLISHED
+from fmu_observer.observers.sampled.takagi_sugeno_gains import (
+    DESIGNS,
+    E1_PUBLISHED,
+    E2_PUBLISHED,
+    GAINS,
+    TRAIN_PUBLISHED,
+)
 from fmu_observer.observers.train import TakagiSugenoCdo
 
 READING = 0.005  # relative: the independent measurement gives three digits
@@ -36,20 +44,33 @@ def design(model: str, gap: float, eta: float, **options: Any) -> Theorem7Design
 
 @pytest.mark.parametrize(
     ("gap", "eta", "gamma"),
-    [(0.02, 3.0, 1.54), (0.05, 3.0, 1.71), (0.1, 3.0, 2.00), (0.15, 3.0, 2.18), (0.2, 3.0, 2.72), (0.25, 3.0, 5.84),
-     (0.5, 0.5, 2.24), (0.5, 1.0, 4.13), (0.5, 1.5, 36.8)],
-)  # fmt: skip
+    [
+        (0.02, 3.0, 1.54),
+        (0.05, 3.0, 1.71),
+        (0.1, 3.0, 2.00),
+        (0.15, 3.0, 2.18),
+        (0.2, 3.0, 2.72),
+        (0.25, 3.0, 5.84),
+        (0.5, 0.5, 2.24),
+        (0.5, 1.0, 4.13),
+        (0.5, 1.5, 36.8),
+    ],
+)
 def test_gamma_of_the_train(gap: float, eta: float, gamma: float) -> None:
     assert design(TRAIN, gap, eta).gamma == pytest.approx(gamma, rel=READING)
 
 
 @pytest.mark.parametrize(
     ("options", "gamma"),
-    [({}, 4.38), ({"mu": 0.1}, 6.66), ({"gains": SECOND_GAINS}, 4.96),
-     ({"gains": SECOND_GAINS, "disturbance": False}, 3.24),
-     ({"gains": SECOND_GAINS, "disturbance": False, "two_vertex": True}, 2.87)],
+    [
+        ({}, 4.38),
+        ({"mu": 0.1}, 6.66),
+        ({"gains": SECOND_GAINS}, 4.96),
+        ({"gains": SECOND_GAINS, "disturbance": False}, 3.24),
+        ({"gains": SECOND_GAINS, "disturbance": False, "two_vertex": True}, 2.87),
+    ],
     ids=["free", "mu", "published", "published without G", "published two-vertex"],
-)  # fmt: skip
+)
 def test_gamma_of_the_second_example(options: dict[str, Any], gamma: float) -> None:
     found = design_theorem7(SECOND, 0.4, 0.1, **options)
     assert found.gamma == pytest.approx(gamma, rel=READING)
@@ -151,7 +172,9 @@ def test_the_error_falls_as_proven_over_every_gap_and_blend(case: str, share: fl
     model, found = find_takagi_sugeno_model(name), design(name, gap, eta, **dict(options))
     h = np.array([weight, 1.0 - weight])
     drift = np.tensordot(h, model.A, 1) - np.tensordot(h, found.continuous_gain, 1) @ model.C_continuous
-    error = ImpulsiveError.with_innovation(drift, np.tensordot(h, found.sampled_gain, 1), eta * np.eye(1), model.C_sampled)
+    error = ImpulsiveError.with_innovation(
+        drift, np.tensordot(h, found.sampled_gain, 1), eta * np.eye(1), model.C_sampled
+    )
     moved = error.transition(share * gap)
     P = found.lyapunov_matrix
     left = np.exp(-2.0 * eta * share * gap) * P - moved.T @ P @ moved

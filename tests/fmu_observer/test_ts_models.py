@@ -1,4 +1,6 @@
-"""Takagi-Sugeno models: exact inside the bounds of their premises, the nearest corner beyond, and bad input in words."""
+"""Takagi-Sugeno models: exact inside the bounds of their premises, the nearest corner beyond, and bad input in
+words.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,10 @@ def plant_flow(plant: HybridSystem, x: np.ndarray, drive: float) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("name", "make", "size"),
-    [("triangularisable_example", TriangularisablePlant, 4), ("non_triangularisable_example", NonTriangularisablePlant, 5)],
+    [
+        ("triangularisable_example", TriangularisablePlant, 4),
+        ("non_triangularisable_example", NonTriangularisablePlant, 5),
+    ],
 )
 @settings(max_examples=40, deadline=None)
 @given(values=st.lists(numbers, min_size=6, max_size=6))
@@ -41,7 +46,9 @@ def test_the_blend_is_the_plant_inside_the_bounds(name: str, make: Any, size: in
 @given(angle=st.floats(-30.0, 30.0), rate=st.floats(-5.0, 5.0), torque=numbers)
 def test_the_pendulum_is_exact_at_every_angle(angle: float, rate: float, torque: float) -> None:
     x, u = np.array([angle, rate]), np.array([torque])
-    np.testing.assert_allclose(find_takagi_sugeno_model("pendulum").flow(x, u), pendulum().flow(x, u), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(
+        find_takagi_sugeno_model("pendulum").flow(x, u), pendulum().flow(x, u), rtol=1e-9, atol=1e-12
+    )
 
 
 def test_the_chain_of_the_first_example_is_the_same_plant() -> None:
@@ -94,10 +101,16 @@ def own_model(**changes: Any) -> Any:
         "premises": (Premise("speed", "m/s", 0.0, 2.0, lambda x, _u: x[0]),),
         "A": lambda f: [[-f[0]]],
         "B": lambda _f: [[1.0]],
-        "name": "own", "description": "own", "source": "tests", "states": (state("v", "m/s"),),
-        "inputs": (input_signal("a", "m/s2"),), "sampled": (input_signal("v", "m/s"),), "continuous": (),
-        "C_sampled": np.eye(1), "C_continuous": np.zeros((0, 1)),
-    }  # fmt: skip
+        "name": "own",
+        "description": "own",
+        "source": "tests",
+        "states": (state("v", "m/s"),),
+        "inputs": (input_signal("a", "m/s2"),),
+        "sampled": (input_signal("v", "m/s"),),
+        "continuous": (),
+        "C_sampled": np.eye(1),
+        "C_continuous": np.zeros((0, 1)),
+    }
     return sector_nonlinearity(**(arguments | changes))
 
 

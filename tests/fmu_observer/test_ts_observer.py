@@ -1,4 +1,6 @@
-"""The general Takagi-Sugeno observer on both academic examples: exact stability, premises, noise, counters, bad input."""
+"""The general Takagi-Sugeno observer on both academic examples: exact stability, premises, noise, counters, bad
+input.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,8 @@ def run(name: str, premise: Any, seed: int = 0, **noise: Any) -> tuple[np.ndarra
     return errors(PLANTS[name](), observer, instants, STOP, seed=seed, overrides=overrides, **noise)
 
 
-# -- exact stability, measured independently to three digits -------------------------------------------------------------
+# -- exact stability, measured independently to three digits
+# -------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -40,7 +43,9 @@ def run(name: str, premise: Any, seed: int = 0, **noise: Any) -> tuple[np.ndarra
         (TRAIN, [-4.952, -4.952], [2.7226, 2.7226], [0.286, 0.286]),
     ],
 )
-def test_printed_gains_by_vertex(name: str, abscissas: list[float], radii: list[float], limits: list[float] | None) -> None:
+def test_printed_gains_by_vertex(
+    name: str, abscissas: list[float], radii: list[float], limits: list[float] | None
+) -> None:
     observer = GeneralTakagiSugenoCdo(name)
     vertices = observer.vertex_errors(preset="as_published")
     found = list(observer.condition(preset="as_published").values.values())
@@ -75,14 +80,21 @@ def test_the_train_as_a_general_model_has_the_certificate_of_its_own_observer() 
     assert GeneralTakagiSugenoCdo(TRAIN).certify(0.5).holds
 
 
-# -- premises: sampling pattern and seeds are ours, so sizes are compared within the spread of seeds ----------------------
+# -- premises: sampling pattern and seeds are ours, so sizes are compared within the spread of seeds
+# ----------------------
 
 
 @pytest.mark.parametrize(
     ("name", "premise", "largest", "rms"),
-    [(FIRST, "frozen", (0.7, 3.0), (0.2, 0.6)), (FIRST, "live", (0.4, 2.0), (0.1, 0.5)),  # independently 1.45 (rms .37) and .90
-     (SECOND, "frozen", (0.02, 0.08), (0.01, 0.04)), (SECOND, "live", (0.01, 0.04), (0.004, 0.02))],  # .043 (rms .022) and .0227
-)  # fmt: skip
+    # independently 1.45 (rms .37) and .90
+    [
+        (FIRST, "frozen", (0.7, 3.0), (0.2, 0.6)),
+        (FIRST, "live", (0.4, 2.0), (0.1, 0.5)),
+        # .043 (rms .022) and .0227
+        (SECOND, "frozen", (0.02, 0.08), (0.01, 0.04)),
+        (SECOND, "live", (0.01, 0.04), (0.004, 0.02)),
+    ],
+)
 def test_held_premises_leave_an_error_without_noise(
     name: str, premise: str, largest: tuple[float, float], rms: tuple[float, float]
 ) -> None:
@@ -100,7 +112,8 @@ def test_the_first_example_converges_as_measured() -> None:
     times, values = run(FIRST, "estimated")
     norms = np.linalg.norm(values, axis=1)
     at = [norms[np.searchsorted(times, t - 1e-6)] for t in (0.5, 1.0, 2.0)]
-    np.testing.assert_allclose(np.log10(at), np.log10([0.088, 0.018, 0.0032]), atol=0.3)  # another sampling pattern: factor 2
+    # another sampling pattern: factor 2
+    np.testing.assert_allclose(np.log10(at), np.log10([0.088, 0.018, 0.0032]), atol=0.3)
     assert norms.max() == pytest.approx(43.0, rel=0.05)
 
 
@@ -118,7 +131,9 @@ def test_the_chain_observer_is_slower_and_far_less_sensitive_to_noise() -> None:
     assert noisy < 2.5  # independently 1.1
     assert 14.0 < fuzzy < 27.0  # independently 18 to 21
     limit = np.linalg.eigvals(chain.model.A - np.reshape(CHAIN_GAINS["high_gain"], (4, 2)) @ chain.model.C)
-    np.testing.assert_allclose(sorted(limit[limit.imag != 0.0], key=np.imag), [-0.2017 - 0.0041j, -0.2017 + 0.0041j], atol=5e-5)
+    np.testing.assert_allclose(
+        sorted(limit[limit.imag != 0.0], key=np.imag), [-0.2017 - 0.0041j, -0.2017 + 0.0041j], atol=5e-5
+    )
 
 
 @pytest.mark.parametrize(
@@ -126,14 +141,18 @@ def test_the_chain_observer_is_slower_and_far_less_sensitive_to_noise() -> None:
     [(0.001, 0.019, 0.034), (0.005, 0.035, 0.076), (0.01, 0.030, 0.094)],
     ids=["1 ms", "5 ms", "10 ms"],
 )
-def test_the_noise_that_the_second_example_passes_grows_with_its_holding_time(hold: float, rms: float, largest: float) -> None:
+def test_the_noise_that_the_second_example_passes_grows_with_its_holding_time(
+    hold: float, rms: float, largest: float
+) -> None:
     peak, mean = final_quarter(*run(SECOND, "estimated", noise=0.3, hold=hold))
     assert mean == pytest.approx(rms, rel=0.45)  # 5 s of one seed; over seeds the mean spreads by a third
     assert peak == pytest.approx(largest, rel=0.45)
 
 
 def test_two_runs_part_by_the_transition_that_is_certified() -> None:
-    """Same inputs, two starts: with weights that do not depend on the estimate the difference is the certificate's own error."""
+    """Same inputs, two starts: with weights that do not depend on the estimate the difference is the certificate's own
+    error.
+    """
     observer, gap = GeneralTakagiSugenoCdo(TRAIN, "frozen"), 0.37
     ends = []
     for offset in (np.zeros(2), np.array([0.7, -0.4])):
@@ -149,7 +168,8 @@ def test_two_runs_part_by_the_transition_that_is_certified() -> None:
     np.testing.assert_allclose(ends[1] - ends[0], error.transition(gap) @ [0.7, -0.4], rtol=1e-9)
 
 
-# -- what the observer counts --------------------------------------------------------------------------------------------
+# -- what the observer counts
+# --------------------------------------------------------------------------------------------
 
 
 def bench(observer: GeneralTakagiSugenoCdo, **inputs: float) -> Runtime:
@@ -209,7 +229,8 @@ def test_traced_and_plain_agree_for_every_model_and_premise(name: str, premise: 
     np.testing.assert_allclose(states[0], states[1], rtol=1e-12, atol=1e-13)
 
 
-# -- bad input -----------------------------------------------------------------------------------------------------------
+# -- bad input
+# -----------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,6 @@
-"""The host programs in C: compiled once, fed with wirings, read back. Knows the folder ``hosts`` and nothing of the tests."""
+"""The host programs in C: compiled once, fed with wirings, read back. Knows the folder ``hosts`` and nothing of the
+tests.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Small systems that between them use everything a system can declare, and a common handle on FMI 2 and FMI 3 instances."""
+"""Small systems that between them use everything a system can declare, and a common handle on FMI 2 and FMI 3
+instances.
+"""
 
 from __future__ import annotations
 
@@ -136,7 +138,8 @@ class Tracker(HybridSystem):
             innovation = u.balise_position - x[0]
             return vector(x[0] + p.gain * innovation, x[1], innovation)
         if event == "telegram":
-            return vector(x[0], x[1] + u.telegram_weight * (u.telegram_speed - x[1]) + 0.1 * x[2], x[2])  # order matters
+            # order matters
+            return vector(x[0], x[1] + u.telegram_weight * (u.telegram_speed - x[1]) + 0.1 * x[2], x[2])
         return vector(x[0], x[1], 0.9 * x[2])
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
@@ -155,7 +158,9 @@ class Gain(HybridSystem):
 
 
 class Booster(HybridSystem):
-    """A body pushed by 3 m/s2 on one stretch of its way and by 2 m/s2 in one span of time: a parabola between switches."""
+    """A body pushed by 3 m/s2 on one stretch of its way and by 2 m/s2 in one span of time: a parabola between
+    switches.
+    """
 
     name = "booster"
     states = (state("place", "m"), state("rate", "m/s", 1.0))
@@ -182,7 +187,9 @@ class Booster(HybridSystem):
 
 
 class Hopper(HybridSystem):
-    """Everything that can be part of a replay: friction, a tunable parameter, noise, communication events, an integer output."""
+    """Everything that can be part of a replay: friction, a tunable parameter, noise, communication events, an integer
+    output.
+    """
 
     name = "hopper"
     states = (
@@ -194,7 +201,10 @@ class Hopper(HybridSystem):
         memory("marks", "1"),
     )
     inputs = (input_signal("force", "N"), input_signal("wind", "N", (0.1, -0.2), size=2))
-    outputs = (output_signal("position_out", "m"), output_signal("marks_out", "1", variability="discrete", integer=True))
+    outputs = (
+        output_signal("position_out", "m"),
+        output_signal("marks_out", "1", variability="discrete", integer=True),
+    )
     parameters = (
         parameter("grip", "N", 0.3),
         parameter("drag", "N.s/m", 0.2, variability="tunable"),
@@ -236,15 +246,31 @@ class Hopper(HybridSystem):
         return vector(x[0], x[1], x[0] + 0.1 * u.jitter, x[3], x[4], x[5])
 
 
-SMALL: dict[str, type[HybridSystem]] = {cls.name: cls for cls in (Oscillator, Slider, Sampler, Tracker, Gain, Booster, Hopper)}
+SMALL: dict[str, type[HybridSystem]] = {
+    cls.name: cls for cls in (Oscillator, Slider, Sampler, Tracker, Gain, Booster, Hopper)
+}
 SHIPPED = tuple(RECIPES)
 OF_EACH_KIND = {
-    "locomotive", "train", "odometer", "balise_reader", "gps", "driver", "mdpe_controller", "takagi_sugeno_cdo", "multirate_cdo",
-    "discrete_uio", "differentiator_cdo", "augmented_high_gain_cdo", "levant_differentiator", "kalman_filter",
-    "exponential_gain", "slip_indicator",
-}  # fmt: skip
-"""Both faces of FMI stand on one model code, so every shipped system is tested as FMI 3.0, and as FMI 2.0 one of each kind: stiff
-with dry friction, sampled, noisy, with memory, with events of its own and from outside, with a sliding mode, with matrices."""
+    "locomotive",
+    "train",
+    "odometer",
+    "balise_reader",
+    "gps",
+    "driver",
+    "mdpe_controller",
+    "takagi_sugeno_cdo",
+    "multirate_cdo",
+    "discrete_uio",
+    "differentiator_cdo",
+    "augmented_high_gain_cdo",
+    "levant_differentiator",
+    "kalman_filter",
+    "exponential_gain",
+    "slip_indicator",
+}
+"""Both faces of FMI stand on one model code, so every shipped system is tested as FMI 3.0, and as FMI 2.0 one of each
+kind: stiff with dry friction, sampled, noisy, with memory, with events of its own and from outside, with a sliding
+mode, with matrices."""
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -351,7 +377,11 @@ class Component:
 
     def _getter(self, name: str) -> Callable[..., Any]:
         real = self.slave.getReal if self.version == 2 else self.slave.getFloat64
-        others = {"Integer": "getInteger", "Int32": "getInt32", "Enumeration": "getInteger" if self.version == 2 else "getInt64"}
+        others = {
+            "Integer": "getInteger",
+            "Int32": "getInt32",
+            "Enumeration": "getInteger" if self.version == 2 else "getInt64",
+        }
         kind = self.by_name[name].type
         return getattr(self.slave, others[kind]) if kind in others else real
 
@@ -385,7 +415,9 @@ class Component:
 
     def set_policy(self, number: int) -> None:
         """Set the parameter `late_policy`."""
-        (self.slave.setInteger if self.version == 2 else self.slave.setInt64)(self.references(["late_policy"]), [number])
+        (self.slave.setInteger if self.version == 2 else self.slave.setInt64)(
+            self.references(["late_policy"]), [number]
+        )
 
     def save(self) -> Any:
         return self.slave.getFMUstate() if self.version == 2 else self.slave.getFMUState()
@@ -443,8 +475,8 @@ class Reference:
 
 @pytest.fixture
 def component(unpacked: Callable[[Path], Path]) -> Iterator[Callable[..., Component]]:
-    """Instances of FMUs, freed at the end: ``component(name, system or path, fmi_version)``; not yet initialised. With `counts`,
-    one that is told of events by counts in FMI 3 too."""
+    """Instances of FMUs, freed at the end: ``component(name, system or path, fmi_version)``; not yet initialised. With
+    `counts`, one that is told of events by counts in FMI 3 too."""
     alive: list[Component] = []
 
     def make(system: str | HybridSystem | Path, version: int, logging: bool = False, counts: bool = False) -> Component:
@@ -463,7 +495,9 @@ def component(unpacked: Callable[[Path], Path]) -> Iterator[Callable[..., Compon
 
 @pytest.fixture
 def exchange(unpacked: Callable[[Path], Path]) -> Iterator[Callable[..., Exchange]]:
-    """Model exchange instances, freed at the end: ``exchange(name, system or path, fmi_version)``; not yet initialised."""
+    """Model exchange instances, freed at the end: ``exchange(name, system or path, fmi_version)``; not yet
+    initialised.
+    """
     alive: list[Exchange] = []
 
     def make(system: str | HybridSystem | Path, version: int, logging: bool = False) -> Exchange:
@@ -504,7 +538,9 @@ def system(system_name: str) -> HybridSystem:
 
 @pytest.fixture
 def drive() -> Callable[..., np.ndarray]:
-    """Runs a component or the reference with inputs that vary: ``drive(one, start, step, count)`` -> values after each step."""
+    """Runs a component or the reference with inputs that vary: ``drive(one, start, step, count)`` -> values after each
+    step.
+    """
 
     def run(one: Component | Reference, h: float, count: int, first: int = 0) -> np.ndarray:
         rows = []

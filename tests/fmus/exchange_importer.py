@@ -1,6 +1,8 @@
-"""A small importer of model exchange FMUs: SciPy's solvers, event indicators, time events, told events. For the tests only.
+"""A small importer of model exchange FMUs: SciPy's solvers, event indicators, time events, told events. For the tests
+only.
 
-Independent of the runtime it drives: all it knows of a model is what the FMI functions say. fmpy's own importer knows no clocks.
+Independent of the runtime it drives: all it knows of a model is what the FMI functions say. fmpy's own importer knows
+no clocks.
 """
 
 from __future__ import annotations
@@ -182,7 +184,9 @@ class Exchange:
 
 @dataclass
 class Run:
-    """What an importer did: states, and values of variables, at the asked instants; instants of state events and time events."""
+    """What an importer did: states, and values of variables, at the asked instants; instants of state events and time
+    events.
+    """
 
     times: list[float] = field(default_factory=list)
     rows: list[np.ndarray] = field(default_factory=list)
@@ -204,9 +208,15 @@ class Importer:
     """
 
     def __init__(
-        self, exchange: Exchange, update: Update, *, method: str = "DOP853", rtol: float = 1e-10, atol: float = 1e-12,
+        self,
+        exchange: Exchange,
+        update: Update,
+        *,
+        method: str = "DOP853",
+        rtol: float = 1e-10,
+        atol: float = 1e-12,
         inputs: Callable[[float], Mapping[str, float]] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.exchange, self.method, self.rtol, self.atol, self.inputs = exchange, method, rtol, atol, inputs
         self.next_time = update.next_time
         self.t = float(exchange.get("time")[0])

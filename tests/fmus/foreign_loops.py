@@ -1,7 +1,9 @@
-"""The loop of train, odometer, driver, reader and observer in masters that know nothing of this package, and a fine solution.
+"""The loop of train, odometer, driver, reader and observer in masters that know nothing of this package, and a fine
+solution.
 
-`container` is the FMU container of fmu-manipulation-toolbox, itself an FMU; `libcosim` the master of the Open Simulation
-Platform, `program` the one in C beside the tests. All step FMI 2.0 with events by counts, and know nothing of events.
+`container` is the FMU container of fmu-manipulation-toolbox, itself an FMU; `libcosim` the master of the Open
+Simulation Platform, `program` the one in C beside the tests. All step FMI 2.0 with events by counts, and know nothing
+of events.
 """
 
 from __future__ import annotations
@@ -47,15 +49,26 @@ LINKS = (
     ("reader.balise_position", "observer.balise_position"),
 )
 RECORDED = (
-    "train.position", "train.speed", "driver.effort", "odometer.reading", "reader.balise_count", "reader.balise_time",
-    "reader.balise_position", "reader.lost_count", "observer.position", "observer.speed", "observer.adhesion_force",
-)  # fmt: skip
+    "train.position",
+    "train.speed",
+    "driver.effort",
+    "odometer.reading",
+    "reader.balise_count",
+    "reader.balise_time",
+    "reader.balise_position",
+    "reader.lost_count",
+    "observer.position",
+    "observer.speed",
+    "observer.adhesion_force",
+)
 
 
 def starts(input_instant: int) -> Iterator[tuple[str, str, float]]:
     """Component, parameter, value."""
     for name, (_, _, values) in MODELS.items():
-        for parameter, value in (values | ({"input_instant": float(input_instant)} if name == "reader" else {})).items():
+        for parameter, value in (
+            values | ({"input_instant": float(input_instant)} if name == "reader" else {})
+        ).items():
             yield name, parameter, value
 
 
@@ -86,8 +99,13 @@ def container(folder: Path, sequential: bool, input_instant: int) -> np.ndarray:
     for name, parameter, value in starts(input_instant):
         made.add_start_value(f"{name}.fmu", parameter, repr(value))
     made.make_fmu("loop.fmu", step_size=STEP, sequential=sequential)
-    result = simulate_fmu(str(folder / "loop.fmu"), stop_time=STEPS * STEP, step_size=STEP, output_interval=STEP,
-                          output=[f"out_{name.replace('.', '_')}" for name in RECORDED])  # fmt: skip
+    result = simulate_fmu(
+        str(folder / "loop.fmu"),
+        stop_time=STEPS * STEP,
+        step_size=STEP,
+        output_interval=STEP,
+        output=[f"out_{name.replace('.', '_')}" for name in RECORDED],
+    )
     table = empty_table(len(result))
     table["time"] = np.arange(len(result)) * STEP
     for name in RECORDED:
@@ -195,7 +213,9 @@ def run_master(name: str, input_instant: int, folder: Path) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Accuracy:
-    """Largest errors of a run: of stamps [s], and of observed position [m] and speed [m/s] at the rows it has been told at."""
+    """Largest errors of a run: of stamps [s], and of observed position [m] and speed [m/s] at the rows it has been told
+    at.
+    """
 
     stamps: float
     position: float
@@ -207,14 +227,16 @@ def accuracy(table: np.ndarray, lag: int) -> Accuracy:
     instants, _ = fine_crossings(table)
     exact, told = exact_observer(table, instants, lag), in_time(table, instants, lag)
     errors = {name: np.abs(table[f"observer.{name}"] - exact[name])[told].max() for name in ("position", "speed")}
-    return Accuracy(float(np.abs(Passings.of(table).stamps - instants).max()), float(errors["position"]), float(errors["speed"]))
+    return Accuracy(
+        float(np.abs(Crossings.of(table).stamps - instants).max()), float(errors["position"]), float(errors["speed"])
+    )
 
 
 # -- the fine solution ----------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
-class Passings:
+class Crossings:
     """What the reader announced: row of the announcement, stamp [s], place [m]."""
 
     rows: np.ndarray
@@ -222,8 +244,8 @@ class Passings:
     places: np.ndarray
 
     @classmethod
-    def of(cls, table: np.ndarray) -> Passings:
-        """The passings in a result."""
+    def of(cls, table: np.ndarray) -> Crossings:
+        """The crossings in a result."""
         rows = np.flatnonzero(np.diff(table["reader.balise_count"]) > 0) + 1
         return cls(rows, table["reader.balise_time"][rows], table["reader.balise_position"][rows])
 
@@ -239,7 +261,9 @@ def _runtime(system: HybridSystem, preset: str | None = None, **values: float) -
 
 
 def fine_crossings(table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The plant alone, driven by the recorded effort, halved down to its crossings: instants [s], positions at the rows [m]."""
+    """The plant alone, driven by the recorded effort, halved down to its crossings: instants [s], positions at the rows
+    [m].
+    """
     plant = _runtime(Locomotive(), PLANT_PRESET)
     plant.u[:] = table["driver.effort"][0]
     plant.start(0.0)
@@ -268,8 +292,9 @@ def _halved(plant: Runtime, before: Any, low: float, high: float, place: float) 
 
 
 def exact_observer(table: np.ndarray, instants: np.ndarray, lag: int) -> dict[str, np.ndarray]:
-    """The observer told of each passing at its own instant, with the recorded inputs: the effort of the start of each step, which
-    the train was given too, and the odometer of its end, or, with a `lag` of 1, of its start. Position [m] and speed [m/s]."""
+    """The observer told of each crossing at its own instant, with the recorded inputs: the effort of the start of each
+    step, which the train was given too, and the odometer of its end, or, with a `lag` of 1, of its start. Position [m]
+    and speed [m/s]."""
     system = OBSERVERS["takagi_sugeno_cdo"]()
     observer = _runtime(system, None, **TRAIN)
     names = scalar_names(system.input_signals)
@@ -292,11 +317,11 @@ def exact_observer(table: np.ndarray, instants: np.ndarray, lag: int) -> dict[st
 
 
 def in_time(table: np.ndarray, instants: np.ndarray, lag: int) -> np.ndarray:
-    """Rows at which the observer has been told of every passing so far: all but those between a passing and its telegram, and
-    the first, which not every master records."""
-    passings = Passings.of(table)
+    """Rows at which the observer has been told of every crossing so far: all but those between a crossing and its
+    telegram, and the first, which not every master records."""
+    crossings = Crossings.of(table)
     known = np.ones(len(table), dtype=bool)
     known[0] = False
-    for row, instant in zip(passings.rows, instants, strict=True):
+    for row, instant in zip(crossings.rows, instants, strict=True):
         known[int(np.ceil(instant / STEP - 1e-9)) : row + lag] = False
     return known

@@ -21,7 +21,7 @@ from plant_models.hybrid import (
 
 
 class Gatekeeper(HybridSystem):
-    """Counts train passings and decides with loops and branches; sampled, marked and noisy."""
+    """Counts train crossings and decides with loops and branches; sampled, marked and noisy."""
 
     name = "gatekeeper"
     description = "Ordinary Python with every kind of event"
@@ -72,12 +72,20 @@ class Lister:
     def __init__(self) -> None:
         real = {"type": "Real", "python_type": float}
         u = ModelVariable(name="u", valueReference=0, causality="input", variability="continuous", start="0.0", **real)
-        y = ModelVariable(name="y", valueReference=1, causality="output", variability="continuous", initial="calculated", **real)
+        y = ModelVariable(
+            name="y", valueReference=1, causality="output", variability="continuous", initial="calculated", **real
+        )
         self.model_description = ModelDescription(
-            fmiVersion="2.0", modelName="lister", description="A list", instantiationToken="{1}", variableNamingConvention="flat",
+            fmiVersion="2.0",
+            modelName="lister",
+            description="A list",
+            instantiationToken="{1}",
+            variableNamingConvention="flat",
             coSimulation=CoSimulation(modelIdentifier="lister", canGetAndSetFMUstate=True, canSerializeFMUstate=True),
-            modelVariables=[u, y], outputs=[Unknown(index=2, variable=y)], initialUnknowns=[Unknown(index=2, variable=y)],
-        )  # fmt: skip
+            modelVariables=[u, y],
+            outputs=[Unknown(index=2, variable=y)],
+            initialUnknowns=[Unknown(index=2, variable=y)],
+        )
         self.instantiate()
 
     def instantiate(self) -> None:

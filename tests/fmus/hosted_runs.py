@@ -1,4 +1,6 @@
-"""One run for blocks and hosted FMUs alike, by fmpy's calls; run as a program it does its part of it in a process of its own."""
+"""One run for blocks and hosted FMUs alike, by fmpy's calls; run as a program it does its part of it in a process of
+its own.
+"""
 
 from __future__ import annotations
 
@@ -33,16 +35,20 @@ class Loaded:
         self.log: list[tuple[int, str]] = []
         self._made: list[Any] = []
         self.callbacks = fmi2CallbackFunctions()
-        self.callbacks.logger = fmi2CallbackLoggerTYPE(lambda _e, _n, status, _c, text: self.log.append((status, text.decode())))
+        self.callbacks.logger = fmi2CallbackLoggerTYPE(
+            lambda _e, _n, status, _c, text: self.log.append((status, text.decode()))
+        )
         self.callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
         self.callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
 
     def make(self) -> Any:
         """A new instance; logging is off, failures are logged all the same."""
         slave = FMU2Slave(
-            unzipDirectory=self.folder, guid=self.description.guid, instanceName="one",
+            unzipDirectory=self.folder,
+            guid=self.description.guid,
+            instanceName="one",
             modelIdentifier=self.description.coSimulation.modelIdentifier,
-        )  # fmt: skip
+        )
         slave.instantiate(callbacks=self.callbacks)
         self._made.append(slave)
         return slave
@@ -79,7 +85,9 @@ def drive(slave: Any, first: int, last: int) -> list[float]:
     """Steps `first` to `last - 1` of `Gatekeeper` with its events: all real values after each step."""
     description = slave_description(slave)
     refs = references(description)
-    real = [v.valueReference for v in description.modelVariables if v.type == "Real" and v.causality in ("output", "local")]
+    real = [
+        v.valueReference for v in description.modelVariables if v.type == "Real" and v.causality in ("output", "local")
+    ]
     values: list[float] = []
     for k in range(first, last):
         slave.setReal([refs["speed"]], [1.5 + sin(0.7 * k)])

@@ -20,7 +20,8 @@ def life_wiring(fmu: Unpacked, path: Path, library: Path | None = None) -> Path:
     names = [v.name for v in variables if v.causality == "input"]
     w.starts("one", {name: SIZES.get(name, 14.0) for name in names if not name.startswith("balise")})
     if "balise_time" in names:
-        payload = {"one.balise_time": "one.time", "one.balise_position": "one.time"}  # the program has values of its own
+        # the program has values of its own
+        payload = {"one.balise_time": "one.time", "one.balise_position": "one.time"}
         w.event("one.time" if clocks else "one.balise_count", "one.balise" if clocks else "one.time", payload)
     reals = [v.name for v in variables if v.causality in ("output", "local") and v.type in ("Real", "Float64")]
     w.record(*(f"one.{name}" for name in reals[:60]))

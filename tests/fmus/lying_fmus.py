@@ -50,7 +50,7 @@ def description(slave: Mapping[str, str] | None = SLAVE, model: Mapping[str, str
     <InitialUnknowns><Unknown index="4"/><Unknown index="5"/></InitialUnknowns>
   </ModelStructure>
 </fmiModelDescription>
-"""
+"""  # noqa: E501
 
 
 def build(folder: Path, *lies: str, xml: str | None = None) -> Path:

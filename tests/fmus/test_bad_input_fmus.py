@@ -1,4 +1,6 @@
-"""Bad input of the exporter: what it says, that it exits with 2 and no traceback, and that nothing half-written is left."""
+"""Bad input of the exporter: what it says, that it exits with 2 and no traceback, and that nothing half-written is
+left.
+"""
 
 from __future__ import annotations
 
@@ -77,7 +79,9 @@ def own_model(tmp_path: Path) -> Callable[..., Path]:
 
 
 @pytest.mark.compiler
-def test_a_users_own_system_is_built_from_its_file(own_model: Callable[..., Path], tmp_path: Path, capsys: Output) -> None:
+def test_a_users_own_system_is_built_from_its_file(
+    own_model: Callable[..., Path], tmp_path: Path, capsys: Output
+) -> None:
     path = own_model()
     for name in (f"{path}:Trolley", str(path)):  # one class in the file: it need not be named
         assert main(["build", name, "--option", "brake=linear", "-o", str(tmp_path / "out")]) == 0
@@ -116,7 +120,11 @@ def test_what_cannot_be_traced(
         ("own.py:Trolley", {'"effort", "N"': '"ef fort", "N"'}, "'ef fort' is not a legal identifier"),
         ("own.py:Trolley", {'name = "trolley"': 'name = "trolley 2"'}, "must be a legal identifier"),
         ("own.py:Trolley", {'name = "trolley"': 'name = "double"'}, "'double' is a word of C"),
-        ("own.py:Trolley", {'"effort", "N"': '"kraft_größe", "N"'}, "'kraft_größe' of a signal is not legal in C and FMI"),
+        (
+            "own.py:Trolley",
+            {'"effort", "N"': '"kraft_größe", "N"'},
+            "'kraft_größe' of a signal is not legal in C and FMI",
+        ),
         ("own.py:Trolley", {'"effort", "N"': '"effort", "furlong"'}, "furlong"),
         ("own.py:Trolley", {'"effort", "N"': '"effort", "N", 0.0, "Pull\\x01"'}, "'effort' holds the character U+0001"),
     ],
@@ -182,18 +190,23 @@ def test_contradictions(arguments: list[str], words: str, capsys: Output) -> Non
     assert words in refused(["build", *arguments], capsys)
 
 
-def test_without_any_compiler_both_ways_out_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Output) -> None:
+def test_without_any_compiler_both_ways_out_are_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Output
+) -> None:
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setitem(sys.modules, "ziglang", None)
     said = refused(["build", "odometer", "-o", str(tmp_path)], capsys)
     assert "Install one" in said
     assert "pip install 'fmu-observer[cross]'" in said
-    assert "pip install 'fmu-observer[cross]'" in refused(["build", "odometer", "--platform", "all", "-o", str(tmp_path)], capsys)
+    assert "pip install 'fmu-observer[cross]'" in refused(
+        ["build", "odometer", "--platform", "all", "-o", str(tmp_path)], capsys
+    )
     assert list(tmp_path.iterdir()) == []
 
 
-# -- targets that cannot be written --------------------------------------------------------------------------------------
+# -- targets that cannot be written
+# --------------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -232,7 +245,8 @@ def test_a_target_that_can_be_written_is_left_as_it_was(tmp_path: Path) -> None:
     assert older.read_text() == "older"
 
 
-# -- a disk that is full, and a user who has had enough --------------------------------------------------------------------
+# -- a disk that is full, and a user who has had enough
+# --------------------------------------------------------------------
 
 FULL = """
 import errno, os, resource, sys
@@ -302,7 +316,8 @@ def test_an_interrupted_hosted_build_leaves_nothing(handling: str, tmp_path: Pat
     model.write_text(own)
     scratch.mkdir()
     start = (
-        f"import signal; signal.signal(signal.SIGINT, signal.{handling}); import os, sys; os.execv(sys.executable, sys.argv[1:])"
+        f"import signal; signal.signal(signal.SIGINT, signal.{handling}); import os, sys; os.execv(sys.executable, "
+        f"sys.argv[1:])"
     )
     build = [sys.executable, "-m", "fmus.cli", "build", f"{model}:Trolley", "--hosted", "-o", str(out)]
     done = in_another_process([sys.executable, "-c", start, *build], tmp_path, TMPDIR=str(scratch))
@@ -312,10 +327,13 @@ def test_an_interrupted_hosted_build_leaves_nothing(handling: str, tmp_path: Pat
     assert list(scratch.iterdir()) == []
 
 
-# -- what nobody foresaw ------------------------------------------------------------------------------------------------
+# -- what nobody foresaw
+# ------------------------------------------------------------------------------------------------
 
 
-def test_an_unexpected_key_error_says_what_failed(tmp_path: Path, capsys: Output, own_model: Callable[..., Path]) -> None:
+def test_an_unexpected_key_error_says_what_failed(
+    tmp_path: Path, capsys: Output, own_model: Callable[..., Path]
+) -> None:
     """From a user's class, in a place that nothing guards."""
     path = own_model()
     path.write_text(
@@ -342,7 +360,8 @@ def test_words_for_errors_without_a_file_name() -> None:
     )
 
 
-# -- info on files that are no good -------------------------------------------------------------------------------------
+# -- info on files that are no good
+# -------------------------------------------------------------------------------------
 
 
 def rewritten(source: Path, target: Path, change: Callable[[str, bytes], tuple[str, bytes] | None]) -> Path:
@@ -364,7 +383,9 @@ def test_info_on_a_corrupt_archive(tmp_path: Path, capsys: Output) -> None:
     with zipfile.ZipFile(cached_fmu(recipe("odometer"))) as archive:
         start = archive.getinfo("sources/runtime.c").header_offset + 200
     flipped = tmp_path / "flipped.fmu"
-    flipped.write_bytes(content[:start] + bytes(255 - byte for byte in content[start : start + 50]) + content[start + 50 :])
+    flipped.write_bytes(
+        content[:start] + bytes(255 - byte for byte in content[start : start + 50]) + content[start + 50 :]
+    )
     assert main(["info", str(flipped)]) == 1
     assert "problem: The archive is damaged" in capsys.readouterr().out
 

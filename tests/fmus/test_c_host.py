@@ -1,4 +1,6 @@
-"""The whole loop in a plain C program that knows nothing but the functions of FMI, against this package's own master."""
+"""The whole loop in a plain C program that knows nothing but the functions of FMI, against this package's own
+master.
+"""
 
 from __future__ import annotations
 
@@ -76,7 +78,9 @@ def wire(
         w.slave(name, model(kind, version, announcement), version == 3 and announcement == "clocks", **values)
     if driver:
         with_driver(w, model, version)
-    w.connect("train.wheel_speed -> odometer.wheel_speed", "train.position -> reader.position", "train.speed -> reader.speed")
+    w.connect(
+        "train.wheel_speed -> odometer.wheel_speed", "train.position -> reader.position", "train.speed -> reader.speed"
+    )
     for name in observers:
         w.connect(f"driver.effort -> {name}.effort", f"odometer.reading -> {name}.odometer")
         payload = {f"{name}.balise_{x}": f"reader.balise_{x}" for x in ("time", "position")}
@@ -87,13 +91,17 @@ def wire(
             w.connect(f"reader.balise_count -> {name}.balise_count")
     w.record("train.position", "train.speed", "reader.balise_count", "reader.balise_time", "reader.balise_position")
     w.record("reader.lost_count")
-    return w.record(*(f"{name}.{x}" for name in observers for x in ("position", "speed", "adhesion_force", "innovation")))
+    return w.record(
+        *(f"{name}.{x}" for name in observers for x in ("position", "speed", "adhesion_force", "innovation"))
+    )
 
 
 S2 = {"observer": ("takagi_sugeno_cdo", TRAIN)}
 
 
-def carried_out(loop: Path, wiring: Wiring, folder: Path, name: str = "run", steps: int = int(STOP / STEP)) -> np.ndarray:
+def carried_out(
+    loop: Path, wiring: Wiring, folder: Path, name: str = "run", steps: int = int(STOP / STEP)
+) -> np.ndarray:
     file = wiring.write(folder / f"{name}.txt", 0.0, STEP, steps)
     run([str(loop), str(file), str(folder / f"{name}.csv")])
     return wiring.read(folder / f"{name}.csv")
@@ -146,24 +154,29 @@ def test_the_loop_in_c_is_the_loop_of_the_master(
     same, exact = master("interpolate"), master("rollback")
     for outcome in (same, exact):
         np.testing.assert_array_equal(table["train.position"], at_points(outcome, "train.position", table["time"]))
-        np.testing.assert_array_equal(table["reader.balise_position"][rows], [e.position for e in outcome.result.events])
+        np.testing.assert_array_equal(
+            table["reader.balise_position"][rows], [e.position for e in outcome.result.events]
+        )
 
-    # The same cubic, solved twice: two roundings of a time of 60 s (7e-15) are all that can differ, and what they do to the
-    # observer, which corrects its speed by about 20 1/s of the position that the train ran in between.
+    # The same cubic, solved twice: two roundings of a time of 60 s (7e-15) are all that can differ, and what they do to
+    # the observer, which corrects its speed by about 20 1/s of the position that the train ran in between.
     stamps = table["reader.balise_time"][rows]
     np.testing.assert_allclose(stamps, [e.stamp for e in same.result.events], rtol=0.0, atol=1e-13)
     for name in OBSERVED:
         np.testing.assert_allclose(table[name], at_points(same, name, table["time"]), rtol=1e-12, atol=1e-11)
 
-    # Against the plant's own crossing by root search on re-done steps what differs is the cubic: h^4/384 times the fourth
-    # derivative of the position over the speed. The jerk of this train changes by its own size within some 50 ms (the driver's
-    # corrections of each odometer reading): 3e-10 s was measured, and 20 1/s * 14 m/s times that in the observer's speed.
+    # Against the plant's own crossing by root search on re-done steps what differs is the cubic: h^4/384 times the
+    # fourth derivative of the position over the speed. The jerk of this train changes by its own size within some 50 ms
+    # (the driver's corrections of each odometer reading): 3e-10 s was measured, and 20 1/s * 14 m/s times that in the
+    # observer's speed.
     np.testing.assert_allclose(stamps, [e.stamp for e in exact.result.events], rtol=0.0, atol=1e-9)
     for name, atol in (("observer.position", 3e-8), ("observer.speed", 1e-7)):
         np.testing.assert_allclose(table[name], at_points(exact, name, table["time"]), rtol=0.0, atol=atol)
 
 
-def test_observers_beside_each_other_are_what_each_is_alone(loop: Path, model: Callable[..., Unpacked], tmp_path: Path) -> None:
+def test_observers_beside_each_other_are_what_each_is_alone(
+    loop: Path, model: Callable[..., Unpacked], tmp_path: Path
+) -> None:
     """Two instances of one FMU with other parameters, and another FMU of ours, in one process."""
     observers: dict[str, tuple[str, dict[str, float]]] = {
         "first": ("takagi_sugeno_cdo", TRAIN),

@@ -46,7 +46,9 @@ def test_a_state_continues_in_another_process(
 
 @pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.parametrize("name", ["takagi_sugeno_cdo", "balise_reader"])
-def test_a_thousand_lives_leave_nothing_behind(name: str, version: int, life: Path, wiring: Callable[[str, int], Path]) -> None:
+def test_a_thousand_lives_leave_nothing_behind(
+    name: str, version: int, life: Path, wiring: Callable[[str, int], Path]
+) -> None:
     lines = run([str(life), "many", str(wiring(name, version)), "1000"]).splitlines()
     (early_memory, early_files), (memory, files) = (map(int, line.split()) for line in lines)
     assert files == early_files

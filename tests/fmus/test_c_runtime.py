@@ -39,7 +39,18 @@ def noise(tmp_path_factory: pytest.TempPathFactory) -> Any:
     for name in ("noise.c", "noise.h", "private.h"):
         (folder / name).write_bytes(runtime_sources()[name])
     visible = find_compiler()
-    command = [*visible.command, "-shared", "-fPIC", "-O2", "-ffp-contract=off", "-DPRIVATE=", "noise.c", "-o", "noise.so", "-lm"]
+    command = [
+        *visible.command,
+        "-shared",
+        "-fPIC",
+        "-O2",
+        "-ffp-contract=off",
+        "-DPRIVATE=",
+        "noise.c",
+        "-o",
+        "noise.so",
+        "-lm",
+    ]
     subprocess.run(command, cwd=folder, check=True)
     library = CDLL(str(folder / "noise.so"))
     library.noise_standard_normal.restype = c_double
@@ -56,7 +67,9 @@ def _philox(library: Any, counter: tuple[int, ...], key: tuple[int, int]) -> tup
 
 
 @pytest.mark.parametrize(("counter", "key", "answer"), KNOWN_ANSWERS)
-def test_philox_known_answers(noise: Any, counter: tuple[int, ...], key: tuple[int, int], answer: tuple[int, ...]) -> None:
+def test_philox_known_answers(
+    noise: Any, counter: tuple[int, ...], key: tuple[int, int], answer: tuple[int, ...]
+) -> None:
     assert _philox(noise, counter, key) == answer
 
 
@@ -100,7 +113,9 @@ def test_only_fmi_functions_are_visible(version: int, tmp_path: Path, reference:
     own = re.findall(
         r"^\w[\w *]*?\b(\w+)\(",
         "\n".join(
-            (tmp_path / n).read_text() for n in plan_fmu(reference("tracker").system, version).source_files() if n.endswith(".c")
+            (tmp_path / n).read_text()
+            for n in plan_fmu(reference("tracker").system, version).source_files()
+            if n.endswith(".c")
         ),
         flags=re.MULTILINE,
     )
@@ -114,5 +129,7 @@ def test_nothing_is_writable_data(version: int, tmp_path: Path, reference: Calla
     _write_sources(reference("tracker").system, version, tmp_path)
     for file in tmp_path.iterdir():
         text = file.read_text()
-        statics = [line for line in text.splitlines() if line.startswith("static ") and line.rstrip().endswith((";", "= {"))]
+        statics = [
+            line for line in text.splitlines() if line.startswith("static ") and line.rstrip().endswith((";", "= {"))
+        ]
         assert all("const" in line or "(" in line for line in statics), statics

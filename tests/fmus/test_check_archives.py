@@ -1,4 +1,6 @@
-"""Files that are no FMU, broken, dangerous or for another machine: refused with the reason before anything is unpacked."""
+"""Files that are no FMU, broken, dangerous or for another machine: refused with the reason before anything is
+unpacked.
+"""
 
 from __future__ import annotations
 
@@ -60,14 +62,20 @@ def test_missing_files_folders_and_no_archives(tmp_path: Path) -> None:
         ({"readme.txt": "hello"}, "it has no modelDescription.xml"),
         ({"modelDescription.xml": "<fmiModelDescription"}, "modelDescription.xml cannot be parsed"),
         ({"modelDescription.xml": description(None)}, "neither co-simulation, model exchange, scheduled execution"),
-        ({"modelDescription.xml": description(), "../evil": ""}, "'../evil', which leads outside of the archive; refused"),
+        (
+            {"modelDescription.xml": description(), "../evil": ""},
+            "'../evil', which leads outside of the archive; refused",
+        ),
         ({"modelDescription.xml": description(), "/evil": ""}, "leads outside"),
         ({"modelDescription.xml": description(), "resources/../../evil": ""}, "leads outside"),
         ({"modelDescription.xml": description(), "C:evil": ""}, "leads outside"),
         ({"modelDescription.xml": description(), "resources\\evil": ""}, "leads outside"),
         ({"modelDescription.xml": description()}, rf"\(binaries/{fmpy.platform} is needed\); it offers: none"),
         ({"modelDescription.xml": description(), "binaries/vax/liar.so": ""}, "is needed.*it offers: vax"),
-        ({"modelDescription.xml": description(), LIBRARY.replace("liar", "other"): ""}, "other.so where .*liar.so is wanted"),
+        (
+            {"modelDescription.xml": description(), LIBRARY.replace("liar", "other"): ""},
+            "other.so where .*liar.so is wanted",
+        ),
     ],
 )
 def test_archives_that_are_refused(files: Mapping[str, str], match: str, tmp_path: Path) -> None:

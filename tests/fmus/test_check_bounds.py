@@ -51,7 +51,8 @@ def marked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 @pytest.mark.parametrize("lie", ["FORKS", "FORKS_COPIES"])
 def test_an_fmu_that_forks_in_each_step_is_stopped_and_nothing_is_left(lie: str, marked: Path) -> None:
     begin = time.monotonic()
-    report = check_fmu(build(marked, lie), timeout=20.0, steps=100_000)  # fifty may be over before the processes are counted
+    # fifty may be over before the processes are counted
+    report = check_fmu(build(marked, lie), timeout=20.0, steps=100_000)
     finding = report.finding("stepping")
     assert finding.detail == f"started more than {isolated.PROCESSES} processes in 'stepping'", finding
     assert report.verdict is Class.DISTRUST
@@ -111,7 +112,11 @@ def test_where_equal_runs_differ_nothing_is_compared() -> None:
 def test_escape_sequences_of_an_fmu_never_reach_the_terminal(
     arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    xml = description().replace('modelName="liar"', 'modelName="li&#x9b;31mar&#x202e;"').replace('"force"', '"fo&#x9b;2Jrce"')
+    xml = (
+        description()
+        .replace('modelName="liar"', 'modelName="li&#x9b;31mar&#x202e;"')
+        .replace('"force"', '"fo&#x9b;2Jrce"')
+    )
     path = build(tmp_path, "ESCAPES", xml=xml)
     assert main(["check", str(path), *arguments]) == 1
     assert main(["info", str(path)]) in (0, 1)

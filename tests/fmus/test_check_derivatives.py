@@ -21,7 +21,9 @@ CURVES: dict[str, tuple[Callable[[float], float], Callable[[float], float]]] = {
 
 
 def compared(curve: Callable[[float], float], slope: float, at: float) -> Outcome:
-    return compare(lambda _n, value: np.array([curve(value)]), lambda _n: np.array([slope]), {"x": at}, ["y"], {"x": 1.0})
+    return compare(
+        lambda _n, value: np.array([curve(value)]), lambda _n: np.array([slope]), {"x": at}, ["y"], {"x": 1.0}
+    )
 
 
 @given(st.sampled_from(sorted(CURVES)), st.floats(-100.0, 100.0))
@@ -30,7 +32,9 @@ def test_exact_derivatives_pass_anywhere(name: str, at: float) -> None:
     assert compared(curve, slope(at), at).verdict is Verdict.PASS
 
 
-@given(st.sampled_from(["cube", "large", "exponential"]), st.floats(1.0, 100.0), st.sampled_from([0.98, 1.02, -1.0, 0.0]))
+@given(
+    st.sampled_from(["cube", "large", "exponential"]), st.floats(1.0, 100.0), st.sampled_from([0.98, 1.02, -1.0, 0.0])
+)
 def test_wrong_derivatives_fail(name: str, at: float, factor: float) -> None:
     curve, slope = CURVES[name]
     outcome = compared(curve, factor * slope(at), at)
@@ -38,6 +42,8 @@ def test_wrong_derivatives_fail(name: str, at: float, factor: float) -> None:
     assert "the derivative of y along x is said to be" in outcome.detail
 
 
-@pytest.mark.parametrize(("slope", "verdict"), [(1.0, "pass"), (-1.0, "pass"), (0.0, "pass"), (1.1, None), (np.nan, None)])
+@pytest.mark.parametrize(
+    ("slope", "verdict"), [(1.0, "pass"), (-1.0, "pass"), (0.0, "pass"), (1.1, None), (np.nan, None)]
+)
 def test_at_a_kink_every_slope_between_is_right(slope: float, verdict: str | None) -> None:
     assert compared(abs, slope, 0.0).verdict == verdict

@@ -1,4 +1,6 @@
-"""What `fmus check` looks at: start values and ranges, arrays, local variables, aliases, the default experiment, longer runs."""
+"""What `fmus check` looks at: start values and ranges, arrays, local variables, aliases, the default experiment, longer
+runs.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,7 @@ import numpy as np
 import pytest
 from fmpy.model_description import ModelVariable, VariableAlias
 from lying_fmus import build, description
-from zoo.typed import expected, typed_fmu
+from test_fmus.typed import expected, typed_fmu
 
 from fmus.check import Class, Verdict, check_fmu
 from fmus.check.archive import open_archive
@@ -38,7 +40,8 @@ def bench_of(path: Path, starts: Mapping[str, Any] | None = None, until: float |
 
 def test_inputs_begin_at_their_start_values_and_stay_in_their_range(tmp_path: Path) -> None:
     xml = description().replace(
-        '"input" variability="continuous"><Real start="0"/>', '"input" variability="continuous"><Real start="5" min="4" max="6"/>'
+        '"input" variability="continuous"><Real start="0"/>',
+        '"input" variability="continuous"><Real start="5" min="4" max="6"/>',
     )
     path = build(tmp_path, xml=xml)
     for starts, own in (({}, 5.0), ({"force": 4.5}, 4.5)):
@@ -116,7 +119,9 @@ def test_the_announced_end_is_that_of_the_experiment(tmp_path: Path) -> None:
 
 
 def test_an_alias_is_its_variable() -> None:
-    own = ModelVariable(name="v", valueReference=2, type="Float64", causality="output", aliases=[VariableAlias(name="mass.v")])
+    own = ModelVariable(
+        name="v", valueReference=2, type="Float64", causality="output", aliases=[VariableAlias(name="mass.v")]
+    )
     alias = ModelVariable(name="mass.v", valueReference=2, type="Float64", causality="output", alias=own)
     described = SimpleNamespace(description=SimpleNamespace(modelVariables=[own, alias]))
     assert FmuInstance.names(described, "output") == ["v"]  # type: ignore[arg-type]

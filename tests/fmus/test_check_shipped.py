@@ -22,7 +22,13 @@ def test_a_shipped_fmu_passes_clean(name: str, version: Any) -> None:
     assert {f.check: f.detail for f in report.findings if f.verdict not in (Verdict.PASS, Verdict.SKIPPED)} == {}
     assert report.verdict is Class.USE
     passed = {f.check for f in report.findings if f.verdict is Verdict.PASS}
-    assert {"divided steps", "short step", "state round trip", "state in another instance", "reset and re-run"} <= passed
+    assert {
+        "divided steps",
+        "short step",
+        "state round trip",
+        "state in another instance",
+        "reset and re-run",
+    } <= passed
 
 
 @pytest.mark.parametrize("version", [2, 3])

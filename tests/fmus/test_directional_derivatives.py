@@ -1,4 +1,6 @@
-"""Directional derivatives of FMUs and blocks: exact, linear, the same everywhere, and refused by name where there are none."""
+"""Directional derivatives of FMUs and blocks: exact, linear, the same everywhere, and refused by name where there are
+none.
+"""
 
 from __future__ import annotations
 
@@ -67,7 +69,8 @@ def _point(system: HybridSystem, draw: Callable[[], float]) -> dict[str, float]:
     names = [*scalar_names(system.inputs), *scalar_names(system.states)[: system.continuous_count]]
     starts = {name: size.get(name, 9.0) * (1.0 + 0.05 * draw()) for name in names}
     filtered = [name for name in names if name.startswith(("filter_", "filtered_slip"))]
-    return starts | {name: 0.015 + 0.004 * draw() for name in filtered}  # below the limit of 0.02 at which indicators switch
+    # below the limit of 0.02 at which indicators switch
+    return starts | {name: 0.015 + 0.004 * draw() for name in filtered}
 
 
 def _values_at(one: Exchange, unknowns: list[str], values: dict[str, float], states: list[str]) -> np.ndarray:
@@ -87,7 +90,9 @@ def test_they_are_the_limits_of_central_differences(
     one.initialize(**_point(system, lambda: 0.0))
 
     def around(values: dict[str, float], seed: dict[str, float], step: float) -> np.ndarray:
-        ends = [_values_at(one, unknowns, {k: values[k] + s * step * seed[k] for k in knowns}, states) for s in (1.0, -1.0)]
+        ends = [
+            _values_at(one, unknowns, {k: values[k] + s * step * seed[k] for k in knowns}, states) for s in (1.0, -1.0)
+        ]
         return (ends[0] - ends[1]) / (2.0 * step)
 
     @POINTS
@@ -98,9 +103,9 @@ def test_they_are_the_limits_of_central_differences(
         seed = {known: max(abs(values[known]), 0.1) * draw() for known in knowns}
         centre = np.abs(_values_at(one, unknowns, values, states))
         exact = _derivative(one, unknowns, knowns, [seed[k] for k in knowns])
-        # A central difference with step s is wrong by rounding, eps |f| / s, and by a term of order s^2, or of order s where a
-        # second derivative jumps. Either is at most what the differences with the steps s and 2 s differ by. With
-        # s = eps^(1/3) all of them are small.
+        # A central difference with step s is wrong by rounding, eps |f| / s, and by a term of order s^2, or of order s
+        # where a second derivative jumps. Either is at most what the differences with the steps s and 2 s differ by.
+        # With s = eps^(1/3) all of them are small.
         step = np.finfo(float).eps ** (1.0 / 3.0)
         difference, wider = around(values, seed, step), around(values, seed, 2.0 * step)
         allowed = 20.0 * np.finfo(float).eps * (centre + np.abs(difference) + 1.0) / step * _terms(system)
@@ -111,7 +116,9 @@ def test_they_are_the_limits_of_central_differences(
 
 
 def _terms(system: HybridSystem) -> float:
-    """How much larger than its result a term inside a model can be, by which rounding goes: forces and masses of a train."""
+    """How much larger than its result a term inside a model can be, by which rounding goes: forces and masses of a
+    train.
+    """
     return 100.0 if system.name in RECIPES else 1.0
 
 
@@ -126,8 +133,12 @@ def test_every_known_has_the_column_of_the_jacobian(
     one.initialize(0.25, **point)
     x, p = one.get(*scalar_names(system.states)), one.get(*scalar_names(system.parameter_signals))
     u = np.concatenate([one.get(*_exposed(system)), np.zeros(sum(s.width for s in system.noises))])
-    places = [i for i, s in enumerate(s for s in system.outputs for _ in range(s.width)) if not s.integer]  # a count has none
-    rows, columns = [scalar_names(system.outputs)[i] for i in places], {"x": scalar_names(system.states), "u": _exposed(system)}
+    # a count has none
+    places = [i for i, s in enumerate(s for s in system.outputs for _ in range(s.width)) if not s.integer]
+    rows, columns = (
+        [scalar_names(system.outputs)[i] for i in places],
+        {"x": scalar_names(system.states), "u": _exposed(system)},
+    )
     columns |= {"t": ["time"], "p": scalar_names(system.parameter_signals)}
     for group, names in columns.items():
         jacobian = np.asarray(traced.jacobian("output", group)(0.25, x, u, p), dtype=float)
@@ -167,7 +178,11 @@ def test_they_are_linear_in_the_seed(
 
 @pytest.mark.parametrize("name", EXCHANGED)
 def test_block_and_both_kinds_of_fmu_agree_to_the_bit(
-    name: str, version: int, exchange: Callable[..., Exchange], component: Callable[..., Any], reference: Callable[[str], Any]
+    name: str,
+    version: int,
+    exchange: Callable[..., Exchange],
+    component: Callable[..., Any],
+    reference: Callable[[str], Any],
 ) -> None:
     system = reference(name).system
     unknowns, knowns = _names(system)
@@ -272,7 +287,8 @@ def test_where_the_equations_have_no_derivative_there_is_none(version: int, comp
             _derivative(owner, ["count"], ["time"], [1.0])
     assert any("root_of_level is not a finite number" in line for line in one.log)
     one.step(0.0, 0.25)
-    assert _derivative(one, ["root_of_level"], ["level"], [1.0])[0] == pytest.approx(1.0, rel=1e-15)  # 1 / (2 sqrt(1/4))
+    # 1 / (2 sqrt(1/4))
+    assert _derivative(one, ["root_of_level"], ["level"], [1.0])[0] == pytest.approx(1.0, rel=1e-15)
 
 
 def test_block_that_cannot_be_traced_has_none(version: int) -> None:

@@ -1,4 +1,6 @@
-"""Documentation inside an FMU: a well-formed page that says everything the system and its description say, and the licences."""
+"""Documentation inside an FMU: a well-formed page that says everything the system and its description say, and the
+licences.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +53,14 @@ def test_the_page_is_well_formed_and_complete(name: str, version: int) -> None:
         if variable.causality in {"input", "output", "parameter"}:
             assert variable.name in text
             assert " ".join((variable.description or "").split()) in text.replace("’", "'")
-    for words in (system.description, system.source, f"FMI {version}.0", system.method, host_platform().name, *system.presets):
+    for words in (
+        system.description,
+        system.source,
+        f"FMI {version}.0",
+        system.method,
+        host_platform().name,
+        *system.presets,
+    ):
         assert " ".join(words.split()) in text
     assert str(type(system).__doc__).split()[0] in text
 
@@ -62,7 +71,8 @@ def test_starts_and_presets_are_those_of_the_model() -> None:
     rows = {row[0].text_content(): [cell.text_content() for cell in row[1:]] for row in tables.xpath("//tbody/tr")}
     names = list(system.presets)
     for parameter_name, value in system.preset_values(names[1]).items():
-        assert float(rows[parameter_name][1 + names.index(names[1])]) == pytest.approx(value, rel=1e-11)  # 12 digits are printed
+        # 12 digits are printed
+        assert float(rows[parameter_name][1 + names.index(names[1])]) == pytest.approx(value, rel=1e-11)
     titles = [cell.text_content() for cell in tables.xpath("//th")]
     assert f"{system.default_preset} (this FMU)" in titles
 
@@ -75,14 +85,18 @@ def test_certificates_are_those_of_the_observer(name: str) -> None:
     for preset in list(system.presets) or [None]:
         certificate = system.certify(0.2, preset=preset)
         found = (certificate.aperiodic_limit, certificate.constant_limit)
-        limits = [f"none up to {certificate.horizon:g} s" if limit == float("inf") else f"{limit:.3g} s" for limit in found]
+        limits = [
+            f"none up to {certificate.horizon:g} s" if limit == float("inf") else f"{limit:.3g} s" for limit in found
+        ]
         assert rows[preset or "declared starts"][-2:] == limits
         assert certificate.error_model in tables.text_content()
         assert f"mixed {certificate.event} gaps certified up to" in tables.text_content()
 
 
 def test_events_are_told_as_the_version_of_fmi_does() -> None:
-    counted, clocked = (text_of(documentation(recipe("takagi_sugeno_cdo"), version)["index.html"]) for version in (2, 3))
+    counted, clocked = (
+        text_of(documentation(recipe("takagi_sugeno_cdo"), version)["index.html"]) for version in (2, 3)
+    )
     assert "raise balise_count by one" in counted
     assert "triggered input clock balise" not in counted
     assert "The triggered input clock balise: enter event mode, set the clock and balise_position, " in clocked
@@ -135,10 +149,21 @@ def test_nothing_of_a_users_text_becomes_html(version: int) -> None:
     parts = documentation(Odd(), version)
     tree = etree.fromstring(parts["index.html"].removeprefix("<!DOCTYPE html>\n"))
     text = text_of(parts["index.html"])
-    for words in ('A <model> & "more"', "a < b & c = d", "<b>bold</b>", "K&R, <1978>", "5 < 6 & code", "kind = <none>", "1 < 0"):
+    for words in (
+        'A <model> & "more"',
+        "a < b & c = d",
+        "<b>bold</b>",
+        "K&R, <1978>",
+        "5 < 6 & code",
+        "kind = <none>",
+        "1 < 0",
+    ):
         assert words in text
     assert "never told" not in text
-    assert [" ".join(item.itertext()).split() for item in tree.iter("li")][:2] == [["first", "one", "goes", "on"], ["second"]]
+    assert [" ".join(item.itertext()).split() for item in tree.iter("li")][:2] == [
+        ["first", "one", "goes", "on"],
+        ["second"],
+    ]
     assert "Its noise is a function of seed" in text
     assert "its terms are its author's to state" in text
 
@@ -147,7 +172,10 @@ def test_a_docstring_becomes_paragraphs_lists_and_formulae() -> None:
     assert prose("One ``x = 1`` two\nlines.\n\n1. a\n2. b") == (
         '<p>One <code class="formula">x = 1</code> two lines.</p>\n<ol><li>a</li><li>b</li></ol>'
     )
-    assert prose("Args:\n    gain: of it.") == "<h3>Options of the model</h3>\n<dl><dt><code>gain</code></dt><dd>of it.</dd></dl>"
+    assert (
+        prose("Args:\n    gain: of it.")
+        == "<h3>Options of the model</h3>\n<dl><dt><code>gain</code></dt><dd>of it.</dd></dl>"
+    )
     assert prose("") == ""
 
 

@@ -1,4 +1,6 @@
-"""Counts of what became of events: FMU and block, all ways of telling, all policies, against what the stamps alone say."""
+"""Counts of what became of events: FMU and block, all ways of telling, all policies, against what the stamps alone
+say.
+"""
 
 from __future__ import annotations
 
@@ -102,7 +104,9 @@ def begin(one: Any, policy: str) -> None:
 @settings(max_examples=60, deadline=None, suppress_health_check=FIXTURES_LIVE_ON)
 @given(happenings=HAPPENINGS, policy=st.sampled_from(LATE_POLICIES), cut=st.integers(0, STEPS))
 def test_any_telegrams(happenings: list[Announced], policy: str, cut: int, trackers: list[Any]) -> None:
-    """On time, ahead and late, in any order; then from a state that was saved on the way, once as it is and once as bytes."""
+    """On time, ahead and late, in any order; then from a state that was saved on the way, once as it is and once as
+    bytes.
+    """
     for one in trackers:
         begin(one, policy)
         assert outcomes(one) == counted()

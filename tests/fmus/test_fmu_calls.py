@@ -146,7 +146,10 @@ def _identity(made: Any) -> tuple[Any, Any]:
 def test_other_interface_types_are_refused(component: Callable[..., Any]) -> None:
     slave = component("gain", 3).slave
     other = FMU3ScheduledExecution(
-        guid=slave.guid, unzipDirectory=slave.unzipDirectory, modelIdentifier=slave.modelIdentifier, instanceName="other"
+        guid=slave.guid,
+        unzipDirectory=slave.unzipDirectory,
+        modelIdentifier=slave.modelIdentifier,
+        instanceName="other",
     )
     with pytest.raises(Exception, match=r"[Ii]nstantiate"):
         other.instantiate()

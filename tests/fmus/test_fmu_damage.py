@@ -1,4 +1,6 @@
-"""Saved states that are damaged or belong elsewhere are refused: what decides how time runs, counts, modes of the other type."""
+"""Saved states that are damaged or belong elsewhere are refused: what decides how time runs, counts, modes of the other
+type.
+"""
 
 from __future__ import annotations
 
@@ -24,19 +26,34 @@ NO_COUNT = (*NO_TIME, 0.5, 2.0**31)
 
 
 def tracker_words() -> dict[int, tuple[float, ...]]:
-    """Words of a tracker's state without a past, and what must not stand there: memory is x, u, p, then what is named here."""
+    """Words of a tracker's state without a past, and what must not stand there: memory is x, u, p, then what is named
+    here.
+    """
     x, u, p = 3, 4, 3  # gain, period, internal_step
     periods = MEMORY + x + u + p
     offsets, ticks, resolved, active = periods + 1, periods + 2, periods + 3, periods + 4
     raised, seen, policy = active + 2, active + 4, active + 8
     horizon, outcomes, queue_length, queue = policy + 1, policy + 2, policy + 9, policy + 10
     return {
-        T: NO_TIME, T0: NO_TIME, START: NO_TIME, STEP: (*NOT_POSITIVE, 1e300),
-        periods: NOT_POSITIVE, offsets: (*NO_TIME, -1e300), ticks: NO_TICK, resolved: (nan, 0.5, 2.0, -1.0),
-        active: (nan, 0.5, -1.0), raised: NO_COUNT, seen + 1: NO_COUNT,
-        policy: (*NO_TIME, 0.0, 4.0, 1.5), horizon: (*NO_TIME, -1.0), outcomes: NO_TICK, outcomes + 6: NO_TICK,
-        queue_length: (*NO_TIME, -1.0, 0.5, 65.0), queue: (nan, -1.0, 2.0, 0.5), queue + 1: NO_TIME,
-    }  # fmt: skip
+        T: NO_TIME,
+        T0: NO_TIME,
+        START: NO_TIME,
+        STEP: (*NOT_POSITIVE, 1e300),
+        periods: NOT_POSITIVE,
+        offsets: (*NO_TIME, -1e300),
+        ticks: NO_TICK,
+        resolved: (nan, 0.5, 2.0, -1.0),
+        active: (nan, 0.5, -1.0),
+        raised: NO_COUNT,
+        seen + 1: NO_COUNT,
+        policy: (*NO_TIME, 0.0, 4.0, 1.5),
+        horizon: (*NO_TIME, -1.0),
+        outcomes: NO_TICK,
+        outcomes + 6: NO_TICK,
+        queue_length: (*NO_TIME, -1.0, 0.5, 65.0),
+        queue: (nan, -1.0, 2.0, 0.5),
+        queue + 1: NO_TIME,
+    }
 
 
 def damaged(content: bytes, place: int, value: float) -> bytes:
@@ -128,7 +145,8 @@ def test_before_time_runs_anything_may_be_set(version: int, component: Callable[
     made.step(0.0, H)
 
 
-# -- modes --------------------------------------------------------------------------------------------------------------
+# -- modes
+# --------------------------------------------------------------------------------------------------------------
 
 
 def test_model_exchange_refuses_step_mode(version: int, exchange: Callable[..., Any]) -> None:
@@ -162,7 +180,8 @@ def test_co_simulation_refuses_modes_it_has_not(
     made.step(0.0, H)
 
 
-# -- the importer's table of functions ------------------------------------------------------------------------------------
+# -- the importer's table of functions
+# ------------------------------------------------------------------------------------
 
 
 def test_table_of_callbacks_may_be_gone_after_instantiation(component: Callable[..., Any]) -> None:

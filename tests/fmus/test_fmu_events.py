@@ -95,7 +95,9 @@ def test_any_stamps_in_one_step(
     np.testing.assert_array_equal(made.values(), expected.values())
 
 
-def test_event_without_stamp_happens_now(version: int, component: Callable[..., Any], reference: Callable[[str], Any]) -> None:
+def test_event_without_stamp_happens_now(
+    version: int, component: Callable[..., Any], reference: Callable[[str], Any]
+) -> None:
     made, expected = component("tracker", version), reference("tracker")
     made.initialize()
     expected.initialize()
@@ -116,7 +118,9 @@ def test_fmi3_jump_is_seen_before_the_next_step(component: Callable[..., Any]) -
     np.testing.assert_array_equal(made.get("position", "innovation_out"), [7.0, 10.0])  # gain 0.7
 
 
-def test_event_ahead_waits_for_its_step(version: int, component: Callable[..., Any], reference: Callable[[str], Any]) -> None:
+def test_event_ahead_waits_for_its_step(
+    version: int, component: Callable[..., Any], reference: Callable[[str], Any]
+) -> None:
     made, expected = component("tracker", version), reference("tracker")
     made.initialize()
     expected.initialize()
@@ -223,7 +227,8 @@ def test_fmu_and_block_treat_events_alike(
     assert (block.counters.replayed, block.counters.rejected) == (1, 0)
 
 
-# -- what is no event ---------------------------------------------------------------------------------------------------
+# -- what is no event
+# ---------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(params=[(2, False), (2, True), (3, False), (3, True)], ids=["fmi2", "fmi2 block", "fmi3", "fmi3 block"])
@@ -261,7 +266,9 @@ def test_count_that_stands_is_no_event_in_model_exchange(exchange: Callable[...,
 
 
 @pytest.mark.parametrize("stamp", [np.inf, np.nan])
-def test_stamp_that_is_no_number_is_lost_with_a_warning(stamp: float, counting: Any, caplog: pytest.LogCaptureFixture) -> None:
+def test_stamp_that_is_no_number_is_lost_with_a_warning(
+    stamp: float, counting: Any, caplog: pytest.LogCaptureFixture
+) -> None:
     """It would wait for ever."""
     counting.initialize()
     counting.event("balise", stamp=stamp, balise_position=50.0)
@@ -290,8 +297,11 @@ def test_importer_without_event_mode_is_warned(
 ) -> None:
     warned = {}
     for name, counts, event_mode in [
-        ("tracker", False, False), ("tracker", False, True), ("tracker", True, False), ("oscillator", False, False),
-    ]:  # fmt: skip
+        ("tracker", False, False),
+        ("tracker", False, True),
+        ("tracker", True, False),
+        ("oscillator", False, False),
+    ]:
         made = component(name, 3, counts=counts)
         made.slave.freeInstance()
         if is_block:

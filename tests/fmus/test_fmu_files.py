@@ -89,7 +89,9 @@ def test_cache_returns_the_same_file(tracker: HybridSystem, version: int, refere
 def test_cache_tells_systems_apart(tracker: HybridSystem, reference: Callable[[str], Any]) -> None:
     changed = type("Tracker", (type(tracker),), {"jump": lambda _s, _e, _t, x, _u, _p: 2.0 * x})()
     changed_start = type("Tracker", (type(tracker),), {"internal_step": 0.02})()
-    paths = {cached_fmu(one) for one in (tracker, changed, changed_start, reference("slider").system)} | {cached_fmu(tracker, 2)}
+    paths = {cached_fmu(one) for one in (tracker, changed, changed_start, reference("slider").system)} | {
+        cached_fmu(tracker, 2)
+    }
     assert len(paths) == 5
 
 
@@ -102,7 +104,9 @@ def test_cache_rebuilds_what_was_deleted(tracker: HybridSystem) -> None:
 
 
 @pytest.mark.compiler
-def test_cache_serves_many_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reference: Callable[[str], Any]) -> None:
+def test_cache_serves_many_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reference: Callable[[str], Any]
+) -> None:
     monkeypatch.setenv("FMU_OBSERVER_CACHE", str(tmp_path / "shared"))
     with ThreadPoolExecutor(4) as pool:
         paths = list(pool.map(lambda _: cached_fmu(reference("gain").system), range(4)))
@@ -145,7 +149,9 @@ def test_interrupted_packing_leaves_nothing(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_missing_compiler_says_what_to_install(tracker: HybridSystem, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_compiler_says_what_to_install(
+    tracker: HybridSystem, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setitem(sys.modules, "ziglang", None)
@@ -162,7 +168,8 @@ def test_what_cannot_be_traced_is_refused(tracker: HybridSystem, tmp_path: Path)
     with pytest.raises(GenerationError, match="cannot be traced"):
         build_fmu(opaque, tmp_path)
     short = type("Short", (type(tracker),), {"jump": lambda _s, _e, _t, x, _u, _p: vector(x[0], x[1])})()
-    with pytest.raises(TracingError, match="returns 2 values, expected 3"):  # its C would write past the end of an array
+    # its C would write past the end of an array
+    with pytest.raises(TracingError, match="returns 2 values, expected 3"):
         build_fmu(short, tmp_path)
     with pytest.raises(ValueError, match="FMI version 1"):
         build_fmu(tracker, tmp_path, 1)  # type: ignore[arg-type]

@@ -16,7 +16,9 @@ from plant_models.hybrid import HybridSystem
 pytestmark = pytest.mark.compiler
 
 AGREEMENT = 1e-12
-"""Python and C do the same operations in the same order; the room is for a C library whose `sin` or `exp` rounds differently."""
+"""Python and C do the same operations in the same order; the room is for a C library whose `sin` or `exp` rounds
+differently.
+"""
 
 
 def test_every_fmu_is_valid(system: HybridSystem, version: int) -> None:

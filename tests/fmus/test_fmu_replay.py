@@ -1,4 +1,6 @@
-"""Late events inside the FMU: FMI 2, FMI 3 with clocks, FMI 3 with counts and the Python block do the same, bit for bit."""
+"""Late events inside the FMU: FMI 2, FMI 3 with clocks, FMI 3 with counts and the Python block do the same, bit for
+bit.
+"""
 
 from __future__ import annotations
 
@@ -239,7 +241,9 @@ def test_what_was_set_as_payload_stays_whatever_happens_inside(tracker: Any, twi
         one.event("telegram", 0.13, telegram_speed=12.0, telegram_weight=0.75)
         for k in range(8, 12):
             one.step(k * H, H)
-        np.testing.assert_array_equal(one.get("balise_position", "telegram_speed", "telegram_weight"), [5.0, 12.0, 0.75])
+        np.testing.assert_array_equal(
+            one.get("balise_position", "telegram_speed", "telegram_weight"), [5.0, 12.0, 0.75]
+        )
     np.testing.assert_array_equal(tracker.values(), twin.values())
 
 

@@ -29,7 +29,9 @@ DISCARD = 2
 KINDS = {"fmi2": (2, False), "fmi3 clocks": (3, False), "fmi3 counts": (3, True)}
 
 
-@pytest.fixture(params=[(kind, block) for kind in KINDS for block in (False, True)], ids=lambda p: f"{p[0]}{' block' * p[1]}")
+@pytest.fixture(
+    params=[(kind, block) for kind in KINDS for block in (False, True)], ids=lambda p: f"{p[0]}{' block' * p[1]}"
+)
 def hopper(request: pytest.FixtureRequest, component: Callable[..., Any], reference: Callable[[str], Any]) -> Any:
     """A hopper of each kind, the FMU and the block."""
     kind, is_block = request.param
@@ -60,10 +62,17 @@ def _discarded(one: Any, t: float) -> None:
 
 
 def _hop(one: Any, failing: set[int], steps: int = 20, horizon: float = 10.0) -> np.ndarray:
-    """A run with events ahead, on time and late; before the steps in `failing` one that cannot be done is tried, twice."""
+    """A run with events ahead, on time and late; before the steps in `failing` one that cannot be done is tried,
+    twice.
+    """
     one.slave.reset()
     one.initialize(replay_horizon=horizon)
-    events = {2: [("mark", 14.5 * H)], 5: [("mark", 2.3 * H), ("kick", 5.5 * H)], 8: [("kick", 1.7 * H)], 12: [("kick", 7.1 * H)]}
+    events = {
+        2: [("mark", 14.5 * H)],
+        5: [("mark", 2.3 * H), ("kick", 5.5 * H)],
+        8: [("kick", 1.7 * H)],
+        12: [("kick", 7.1 * H)],
+    }
     rows = []
     for k in range(steps):
         one.set(force=float(np.sin(k)), drag=0.2 + 0.01 * k)
@@ -83,7 +92,9 @@ def _hop(one: Any, failing: set[int], steps: int = 20, horizon: float = 10.0) ->
 @settings(max_examples=12, deadline=None, suppress_health_check=FIXTURES_LIVE_ON)
 @given(failing=st.sets(st.integers(0, 19), min_size=1, max_size=6))
 def test_a_discarded_step_leaves_no_trace(failing: set[int], hopper: Any) -> None:
-    """State, queue, counts, time and the remembered past are as before: all that follows is as if it had not been tried."""
+    """State, queue, counts, time and the remembered past are as before: all that follows is as if it had not been
+    tried.
+    """
     np.testing.assert_array_equal(_hop(hopper, failing), _hop(hopper, set()))
 
 
@@ -150,13 +161,16 @@ def test_fmpy_stops_at_a_step_that_cannot_be_done(component: Callable[..., Any])
     from fmpy import simulate_fmu
 
     one = component("hopper", 2)
-    signals = np.array([(0.0, 0.0), (0.2, 0.0), (0.21, np.nan), (1.0, np.nan)], dtype=[("time", float), ("force", float)])
+    signals = np.array(
+        [(0.0, 0.0), (0.2, 0.0), (0.21, np.nan), (1.0, np.nan)], dtype=[("time", float), ("force", float)]
+    )
     result = simulate_fmu(one.slave.unzipDirectory, stop_time=1.0, output_interval=0.05, input=signals)
     assert 0.1 < result["time"][-1] < 0.5
     assert np.isfinite(result["position_out"]).all()
 
 
-# -- early return -------------------------------------------------------------------------------------------------------
+# -- early return
+# -------------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -230,7 +244,8 @@ def test_who_does_not_allow_early_returns_gets_none(version: int, component: Cal
     assert one.slave.doStep(0.0, 0.1) == (None if version == 2 else (False, False, False, 0.1))
 
 
-# -- whole numbers, rates, log ------------------------------------------------------------------------------------------
+# -- whole numbers, rates, log
+# ------------------------------------------------------------------------------------------
 
 
 def test_whole_numbers_are_whole_to_the_outside(hopper: Any) -> None:
@@ -245,7 +260,9 @@ def test_whole_numbers_are_whole_to_the_outside(hopper: Any) -> None:
         lambda: setter(hopper.references(["marks_out"]), [3]),
         lambda: setter(hopper.references(["force"]), [3]),
         lambda: getter(hopper.references(["force"])),
-        lambda: (hopper.slave.getReal if hopper.version == 2 else hopper.slave.getFloat64)(hopper.references(["marks_out"])),
+        lambda: (hopper.slave.getReal if hopper.version == 2 else hopper.slave.getFloat64)(
+            hopper.references(["marks_out"])
+        ),
     ):
         with pytest.raises(FMICallException):
             call()
@@ -277,7 +294,9 @@ def test_log_categories_are_those_of_the_description(hopper: Any) -> None:
 
 
 def test_messages_with_a_percent_sign_reach_every_logger(component: Callable[..., Any]) -> None:
-    """Many FMI 2 importers print the format as it is: a message is a format without conversions, or "%s" and the message."""
+    """Many FMI 2 importers print the format as it is: a message is a format without conversions, or "%s" and the
+    message.
+    """
     from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 
     made = component("gain", 2)
@@ -292,7 +311,8 @@ def test_messages_with_a_percent_sign_reach_every_logger(component: Callable[...
     assert seen[1] == b"%s"
 
 
-# -- memory -------------------------------------------------------------------------------------------------------------
+# -- memory
+# -------------------------------------------------------------------------------------------------------------
 
 COUNTING = """
 #include <stdlib.h>
@@ -342,7 +362,8 @@ def test_nothing_is_allocated_after_instantiation(counting: Any) -> None:
     assert count() == 2
 
 
-# -- steps without an end -----------------------------------------------------------------------------------------------
+# -- steps without an end
+# -----------------------------------------------------------------------------------------------
 
 
 def test_a_step_of_too_many_internal_steps_is_discarded(hopper: Any) -> None:

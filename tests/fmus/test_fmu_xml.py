@@ -43,7 +43,9 @@ def both(system: HybridSystem, version: Any, tmp_path: Path) -> tuple[ModelDescr
     written = describe(system, version, model_exchange=can_exchange(system))
     file = tmp_path / "modelDescription.xml"
     file.write_text(model_description_xml(written, [MAIN_SOURCE]), encoding="utf-8")
-    return written, read_model_description(str(file), validate=True, validate_variable_names=True, validate_model_structure=True)
+    return written, read_model_description(
+        str(file), validate=True, validate_variable_names=True, validate_model_structure=True
+    )
 
 
 def test_head_and_capabilities(both: tuple[ModelDescription, ModelDescription]) -> None:
@@ -51,7 +53,12 @@ def test_head_and_capabilities(both: tuple[ModelDescription, ModelDescription]) 
     for name in ("fmiVersion", "modelName", "guid", "generationTool", "variableNamingConvention"):
         assert getattr(read, name) == getattr(written, name), name
     assert read.coSimulation.modelIdentifier == written.coSimulation.modelIdentifier
-    for name in ("canHandleVariableCommunicationStepSize", "canGetAndSetFMUstate", "canSerializeFMUstate", "hasEventMode"):
+    for name in (
+        "canHandleVariableCommunicationStepSize",
+        "canGetAndSetFMUstate",
+        "canSerializeFMUstate",
+        "hasEventMode",
+    ):
         assert getattr(read.coSimulation, name) == getattr(written.coSimulation, name), name
     assert (read.modelExchange is None) == (written.modelExchange is None)
     if read.modelExchange is not None:
@@ -65,7 +72,9 @@ def test_head_and_capabilities(both: tuple[ModelDescription, ModelDescription]) 
 
 def test_what_fmpy_does_not_read(system: HybridSystem, version: Any) -> None:
     """Directional derivatives (FMI 3 spells them in the plural) and `reinit`, from the XML itself."""
-    root = fromstring(model_description_xml(describe(system, version, model_exchange=can_exchange(system)), [MAIN_SOURCE]))
+    root = fromstring(
+        model_description_xml(describe(system, version, model_exchange=can_exchange(system)), [MAIN_SOURCE])
+    )
     flag = "providesDirectionalDerivative" + ("s" if version == 3 else "")
     kinds = ("ModelExchange", "CoSimulation") if can_exchange(system) else ("CoSimulation",)
     assert [root.find(tag).get(flag) for tag in kinds] == ["true"] * len(kinds)  # type: ignore[union-attr]
@@ -101,7 +110,12 @@ def test_units(both: tuple[ModelDescription, ModelDescription]) -> None:
 
 def test_structure(both: tuple[ModelDescription, ModelDescription]) -> None:
     written, read = both
-    for name in ("outputs", "derivatives", "initialUnknowns", *(["eventIndicators"] if read.fmiMajorVersion == 3 else [])):
+    for name in (
+        "outputs",
+        "derivatives",
+        "initialUnknowns",
+        *(["eventIndicators"] if read.fmiMajorVersion == 3 else []),
+    ):
         got, wanted = ([_unknown(u) for u in getattr(d, name)] for d in (read, written))
         assert got == wanted
 
@@ -115,7 +129,9 @@ def test_build_description_lists_the_sources(tmp_path: Path) -> None:
     assert configuration.sourceFileSets[0].sourceFiles == ["model.c", "fmi3.c"]
 
 
-@pytest.mark.parametrize(("value", "text"), [(1.0 / (1.0 / 3.6), "3.6"), (1000.0, "1000.0"), (-273.15, "-273.15"), (0.0, "0.0")])
+@pytest.mark.parametrize(
+    ("value", "text"), [(1.0 / (1.0 / 3.6), "3.6"), (1000.0, "1000.0"), (-273.15, "-273.15"), (0.0, "0.0")]
+)
 def test_a_number_that_is_next_to_a_short_decimal_is_written_as_that(value: float, text: str) -> None:
     assert number_text(value) == text
 
@@ -143,7 +159,9 @@ def test_characters_that_xml_forbids_are_refused(character: str, version: Any) -
     described = describe(recipe("odometer"), version)
     variable = next(v for v in described.modelVariables if v.name == "reading")
     variable.description = f"Reading{character}"
-    with pytest.raises(TextRefusedError, match=rf"description of \w+ 'reading' .* U\+{ord(character):04X} at position 8, which"):
+    with pytest.raises(
+        TextRefusedError, match=rf"description of \w+ 'reading' .* U\+{ord(character):04X} at position 8, which"
+    ):
         model_description_xml(described)
     variable.description, described.description = "Reading", f"{character}odometer"
     with pytest.raises(TextRefusedError, match=r"description of fmiModelDescription 'odometer' .* at position 1,"):
@@ -170,12 +188,16 @@ def _reference(clock: ModelVariable | int) -> int:
 
 
 def _unit(unit: Any) -> tuple[Any, ...]:
-    base = tuple(float(getattr(unit.baseUnit, n)) for n in ("kg", "m", "s", "A", "K", "mol", "cd", "rad", "factor", "offset"))
+    base = tuple(
+        float(getattr(unit.baseUnit, n)) for n in ("kg", "m", "s", "A", "K", "mol", "cd", "rad", "factor", "offset")
+    )
     return unit.name, _neat(*base), [(d.name, *_neat(float(d.factor), float(d.offset))) for d in unit.displayUnits]
 
 
 def _neat(*values: float) -> tuple[Any, ...]:
-    """A factor may be written as the decimal that is next to it: one unit in the last place, which `approx` takes with room."""
+    """A factor may be written as the decimal that is next to it: one unit in the last place, which `approx` takes with
+    room.
+    """
     return tuple(pytest.approx(value, rel=4.0 * EPS, abs=0.0) for value in values)
 
 

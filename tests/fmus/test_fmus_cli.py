@@ -64,7 +64,9 @@ def test_build_all(tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPat
         monkeypatch.setattr(f"fmus.recipes.{registry}", {name: RECIPES[name] for name in names})
     assert main(["build", "--all", "-o", str(tmp_path)]) == 0
     assert (
-        {Path(line).stem for line in capsys.readouterr().out.splitlines()} == set(RECIPES) == {p.stem for p in tmp_path.iterdir()}
+        {Path(line).stem for line in capsys.readouterr().out.splitlines()}
+        == set(RECIPES)
+        == {p.stem for p in tmp_path.iterdir()}
     )
 
 
@@ -124,14 +126,19 @@ def test_wrong_usage_ends_with_two(arguments: list[str], capsys: Output) -> None
 @pytest.mark.compiler
 def test_info_tells_capabilities_of_each_interface_and_items_by_name(capsys: Output) -> None:
     common = "canHandleVariableCommunicationStepSize, "
-    for version, tail in ((2, "canGetAndSetFMUstate, canSerializeFMUstate, providesDirectionalDerivative"),
-                          (3, "canGetAndSetFMUState, canSerializeFMUState, ")):  # fmt: skip
+    for version, tail in (
+        (2, "canGetAndSetFMUstate, canSerializeFMUstate, providesDirectionalDerivative"),
+        (3, "canGetAndSetFMUState, canSerializeFMUState, "),
+    ):
         assert main(["info", str(cached_fmu(recipe("takagi_sugeno_cdo"), version))]) == 0
         shown = capsys.readouterr().out
         assert f"capabilities in co-simulation: {common}{tail}" in shown
         assert "  late_policy = replay [replay, reject, late]" in shown
     lines = [line for line in shown.splitlines() if line.startswith("capabilities")]
-    assert [line.partition(":")[0] for line in lines] == ["capabilities in co-simulation", "capabilities in model exchange"]
+    assert [line.partition(":")[0] for line in lines] == [
+        "capabilities in co-simulation",
+        "capabilities in model exchange",
+    ]
     assert all(line.endswith("providesDirectionalDerivatives") for line in lines)
     assert main(["info", str(cached_fmu(recipe("odometer"), 3))]) == 0
     assert "mightReturnEarlyFromDoStep, providesDirectionalDerivatives" in capsys.readouterr().out

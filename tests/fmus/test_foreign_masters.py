@@ -1,4 +1,6 @@
-"""The exported loop in somebody else's master: how exact its events are, in sequence, in parallel, and with a wrong setting."""
+"""The exported loop in somebody else's master: how exact its events are, in sequence, in parallel, and with a wrong
+setting.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,7 @@ from foreign_loops import (
     STEP,
     STEPS,
     TRAIN,
-    Passings,
+    Crossings,
     accuracy,
     exact_observer,
     fine_crossings,
@@ -53,14 +55,14 @@ def test_events_are_exact_in_a_foreign_master(
 ) -> None:
     lag = MASTERS[master].lag
     table = ran(master, 1 - lag)
-    passings = Passings.of(table)
+    crossings = Crossings.of(table)
     instants, positions = fine_crossings(table)
     assert len(instants) > 80
     assert table["reader.lost_count"].max() == 0.0
     # libcosim sets the plant's clock in nanoseconds, the container adds times up: the plant's own grid is the same.
     np.testing.assert_allclose(table["train.position"], positions, rtol=0.0, atol=1e-10)
-    np.testing.assert_array_equal(passings.places, SPACING * (1.0 + np.arange(len(passings.places))))
-    assert len(passings.stamps) == len(instants)
+    np.testing.assert_array_equal(crossings.places, SPACING * (1.0 + np.arange(len(crossings.places))))
+    assert len(crossings.stamps) == len(instants)
     found = accuracy(table, lag)
     for name, value in asdict(found).items():
         record_property(name, value)  # into the report, with --junit-xml; the benchmark native_fmu.py prints them
@@ -81,10 +83,10 @@ def test_events_are_exact_in_a_foreign_master(
 def test_the_wrong_input_instant_shifts_the_train_by_a_step(master: str, ran: Callable[[str, int], np.ndarray]) -> None:
     lag = MASTERS[master].lag
     table = ran(master, lag)
-    passings = Passings.of(table)
+    crossings = Crossings.of(table)
     instants, _ = fine_crossings(table)
     shift = STEP if lag else -STEP
-    np.testing.assert_allclose(passings.stamps, instants + shift, rtol=0.0, atol=STAMP)
+    np.testing.assert_allclose(crossings.stamps, instants + shift, rtol=0.0, atol=STAMP)
     # Where the train holds its speed, a constant delay is a constant error of the position: speed times step.
     hold = table["time"] > 30.0
     error = (table["observer.position"] - table["train.position"])[hold]
@@ -103,7 +105,9 @@ def test_two_masters_of_the_same_order_agree(ran: Callable[[str, int], np.ndarra
 def test_in_sequence_it_is_the_run_of_the_package_own_master(ran: Callable[[str, int], np.ndarray]) -> None:
     table = ran("container-sequential", 1)
     s = cosim.Scenario(stop=STEPS * STEP, step=STEP, certificates="ignore")
-    s.add("train", model="locomotive", preset=PLANT_PRESET).add("odometer", model="odometer").add("driver", model="driver")
+    s.add("train", model="locomotive", preset=PLANT_PRESET).add("odometer", model="odometer").add(
+        "driver", model="driver"
+    )
     s.add("observer", observer="takagi_sugeno_cdo", parameters=TRAIN)
     s.connect(
         "driver.effort -> train.effort, observer.effort",
@@ -113,7 +117,9 @@ def test_in_sequence_it_is_the_run_of_the_package_own_master(ran: Callable[[str,
     where = {"position": "train.position", "speed": "train.speed", "track_end": 3000.0}
     s.balises(**where, layout="spacing", spacing=SPACING, method="rollback")
     outcome = s.run()
-    np.testing.assert_allclose(Passings.of(table).stamps, [e.stamp for e in outcome.result.events], rtol=0.0, atol=STAMP)
+    np.testing.assert_allclose(
+        Crossings.of(table).stamps, [e.stamp for e in outcome.result.events], rtol=0.0, atol=STAMP
+    )
     rows = np.searchsorted(np.asarray(outcome["time"]), table["time"] + 1e-6) - 1
     for name, atol in (("train.position", 1e-10), ("observer.position", POSITION), ("observer.speed", SPEED)):
         np.testing.assert_allclose(table[name], np.asarray(outcome[name])[rows], rtol=0.0, atol=atol)

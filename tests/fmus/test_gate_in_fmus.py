@@ -17,7 +17,8 @@ from plant_models.hybrid import scalar_names
 pytestmark = pytest.mark.compiler
 
 H, STEPS, SPEED, NAME = 0.05, 60, 14.0, "takagi_sugeno_cdo"
-OFFSETS = {4: 100.0, 5: 1.0, 6: -30.0, 9: 50.0, 10: 50.0, 11: 50.0}  # [m], by number of the telegram: one every fifth of a second
+# [m], by number of the telegram: one every fifth of a second
+OFFSETS = {4: 100.0, 5: 1.0, 6: -30.0, 9: 50.0, 10: 50.0, 11: 50.0}
 KINDS = {"fmi2": (2, False), "fmi3": (3, False), "fmi3 counts": (3, True)}
 
 
@@ -49,7 +50,9 @@ def begin(one: Any, **starts: float) -> None:
 
 
 def drive(one: Any, told: list[tuple[int, float, float]], first: int = 0, last: int = STEPS, parts: int = 1) -> None:
-    """Steps `first` up to `last`, each in so many parts; of telegrams of one step the one announced by a count comes alone."""
+    """Steps `first` up to `last`, each in so many parts; of telegrams of one step the one announced by a count comes
+    alone.
+    """
     for k in range(first, last):
         for step, stamp, position in told:
             if step == k:
@@ -65,7 +68,11 @@ def test_block_and_fmu_judge_alike(pair: list[Any]) -> None:
         drive(one, telegrams())
     np.testing.assert_allclose(pair[0].values(), pair[1].values(), rtol=1e-12, atol=1e-12)
     assert outcomes(pair[0]) == outcomes(pair[1])
-    assert {k: outcomes(pair[0])[k] for k in ("accepted", "doubted", "ignored")} == {"accepted": 7, "doubted": 1, "ignored": 5}
+    assert {k: outcomes(pair[0])[k] for k in ("accepted", "doubted", "ignored")} == {
+        "accepted": 7,
+        "doubted": 1,
+        "ignored": 5,
+    }
 
 
 def test_it_survives_splitting_saving_and_bytes(pair: list[Any]) -> None:
@@ -95,13 +102,23 @@ def test_late_telegrams_are_judged_as_those_in_time(pair: list[Any]) -> None:
         drive(one, late, last=STEPS)  # type: ignore[arg-type]
         np.testing.assert_allclose(one.values(), in_time, rtol=1e-12, atol=1e-12)
     assert outcomes(pair[0]) == outcomes(pair[1])
-    assert {k: outcomes(pair[0])[k] for k in ("accepted", "replayed", "ignored")} == {"accepted": 7, "replayed": 4, "ignored": 5}
+    assert {k: outcomes(pair[0])[k] for k in ("accepted", "replayed", "ignored")} == {
+        "accepted": 7,
+        "replayed": 4,
+        "ignored": 5,
+    }
 
 
-@pytest.mark.parametrize(("name", "value", "expected"), [
-    ("gate_floor", 0.0, "at least 0.001 m"), ("gate_floor", -1.0, "at least 0.001 m"), ("gate_drift", float("nan"), "at least 0"),
-    ("gate_drift", float("inf"), "at least 0"), ("gate", 3.0, "at least 0 and at most 2"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "value", "expected"),
+    [
+        ("gate_floor", 0.0, "at least 0.001 m"),
+        ("gate_floor", -1.0, "at least 0.001 m"),
+        ("gate_drift", float("nan"), "at least 0"),
+        ("gate_drift", float("inf"), "at least 0"),
+        ("gate", 3.0, "at least 0 and at most 2"),
+    ],
+)
 def test_a_gate_that_cannot_be_is_refused_in_words(name: str, value: float, expected: str, pair: list[Any]) -> None:
     sealed, block = pair
     with pytest.raises(FMICallException):

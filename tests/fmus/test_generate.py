@@ -10,7 +10,16 @@ import numpy as np
 import pytest
 
 from fmus.content.generate import GenerationError, trace_equations
-from plant_models.hybrid import HybridSystem, Signal, TracingError, TriggeredEvent, input_signal, output_signal, state, vector
+from plant_models.hybrid import (
+    HybridSystem,
+    Signal,
+    TracingError,
+    TriggeredEvent,
+    input_signal,
+    output_signal,
+    state,
+    vector,
+)
 
 
 class Hasty(HybridSystem):
@@ -32,7 +41,9 @@ class Hasty(HybridSystem):
 
 
 def test_a_payload_read_outside_its_event_is_refused() -> None:
-    with pytest.raises(ValueError, match="hasty: step reads tell_place, which is known only at the event; keep it in memory"):
+    with pytest.raises(
+        ValueError, match="hasty: step reads tell_place, which is known only at the event; keep it in memory"
+    ):
         trace_equations(Hasty())
 
 
@@ -94,7 +105,9 @@ ADVICE = "Write it in plain NumPy without branching on values"
         (Misspelt, "cannot trace flow: 'Inputs' object has no attribute 'frce'", "return -x * u.frce", False),
     ],
 )
-def test_what_cannot_be_traced_is_said_with_its_own_line(system: type[Plain], message: str, line: str, advised: bool) -> None:
+def test_what_cannot_be_traced_is_said_with_its_own_line(
+    system: type[Plain], message: str, line: str, advised: bool
+) -> None:
     with pytest.raises(TracingError) as caught:
         trace_equations(system())
     text = str(caught.value)

@@ -84,7 +84,9 @@ def test_restored_state_continues_exactly(loaded: Loaded) -> None:
     assert first == drive(_driven_block(8), 8, STEPS)
 
 
-def test_state_moves_to_another_instance_another_process_and_the_block(loaded: Loaded, fmu: Path, tmp_path: Path) -> None:
+def test_state_moves_to_another_instance_another_process_and_the_block(
+    loaded: Loaded, fmu: Path, tmp_path: Path
+) -> None:
     slave, other = initialize(loaded.make()), initialize(loaded.make(), limit=0.5)
     drive(slave, 0, 8)
     content = slave.serializeFMUstate(slave.getFMUstate())
@@ -109,7 +111,9 @@ def test_registered_variables_alone_would_not_be_the_state(loaded: Loaded) -> No
     """What pythonfmu saves by itself: the values of the variables. The waiting event and the past are lost with it."""
     slave, naive = initialize(loaded.make()), initialize(loaded.make())
     drive(slave, 0, 8)
-    settable = [v.valueReference for v in loaded.description.modelVariables if v.name in ("place", "passed", "sample", "last")]
+    settable = [
+        v.valueReference for v in loaded.description.modelVariables if v.name in ("place", "passed", "sample", "last")
+    ]
     naive.reset()
     naive.setReal(settable, slave.getReal(settable))
     initialize(naive)
@@ -146,7 +150,8 @@ def test_many_lives_in_one_process(loaded: Loaded) -> None:
     assert drive(slave, 0, 5) == drive(initialize(block()), 0, 5)
 
 
-# -- failures -----------------------------------------------------------------------------------------------------------
+# -- failures
+# -----------------------------------------------------------------------------------------------------------
 
 
 def test_an_error_in_the_model_is_fmi2_error_with_function_line_and_time(loaded: Loaded) -> None:
@@ -217,7 +222,8 @@ def test_another_guid_is_refused(loaded: Loaded) -> None:
     assert "GUID" in loaded.log[0][1]
 
 
-# -- hand-written objects -------------------------------------------------------------------------------------------------
+# -- hand-written objects
+# -------------------------------------------------------------------------------------------------
 
 
 def test_an_object_with_the_calls_of_a_block(tmp_path: Path) -> None:
@@ -246,5 +252,6 @@ def test_the_description_begins_with_what_it_needs(fmu: Path) -> None:
     assert 'description="NEEDS PYTHON: this FMU runs Python code and needs Python 3.11 or later with the package' in xml
     assert 'needsExecutionTool="true"' in xml
     assert all(
-        words in page for words in ("FMU_OBSERVER_LIBPYTHON", "Not for real-time targets", "balise_count", "hosted_models.py")
+        words in page
+        for words in ("FMU_OBSERVER_LIBPYTHON", "Not for real-time targets", "balise_count", "hosted_models.py")
     )

@@ -43,7 +43,8 @@ def recipe_of(fmu: Path) -> dict[str, object]:
         return content
 
 
-# -- what goes in -------------------------------------------------------------------------------------------------------
+# -- what goes in
+# -------------------------------------------------------------------------------------------------------
 
 
 def test_the_same_model_gives_the_same_bytes(tmp_path: Path) -> None:
@@ -71,12 +72,16 @@ def test_an_installed_package_is_imported_and_not_copied(tmp_path: Path) -> None
 def test_extra_files_lie_beside_the_model(tmp_path: Path) -> None:
     helper = write(tmp_path, "gate_helper.py", "from hosted_base import Gatekeeper\n")
     base = write(tmp_path, "hosted_base.py", MODELS.read_text())
-    model = write(tmp_path, "gate.py", 'from gate_helper import Gatekeeper\n\nclass Gate(Gatekeeper):\n    name = "gate"\n')
+    model = write(
+        tmp_path, "gate.py", 'from gate_helper import Gatekeeper\n\nclass Gate(Gatekeeper):\n    name = "gate"\n'
+    )
     fmu = build_hosted_fmu(f"{model}:Gate", tmp_path, extra_files=[helper, base])
     loaded = Loaded(fmu, tmp_path / "unpacked")
     initialize(loaded.make()).doStep(0.0, 0.1)
     loaded.close()
-    with pytest.raises(HostedExportError, match=r"gate\.py imports 'gate_helper', which is not installed .* extra_files"):
+    with pytest.raises(
+        HostedExportError, match=r"gate\.py imports 'gate_helper', which is not installed .* extra_files"
+    ):
         build_hosted_fmu(f"{model}:Gate", tmp_path / "no")
     assert not (tmp_path / "no").exists()
 
@@ -86,7 +91,9 @@ def test_the_licences_of_all_that_is_inside(tmp_path: Path) -> None:
     for fmu, terms in ((own, "its terms are its author's to state"), (ours, "TakagiSugenoCdo is part of fmu-observer")):
         with zipfile.ZipFile(fmu) as archive:
             folder = "documentation/licenses/"
-            texts = {n.removeprefix(folder): archive.read(n).decode() for n in archive.namelist() if n.startswith(folder)}
+            texts = {
+                n.removeprefix(folder): archive.read(n).decode() for n in archive.namelist() if n.startswith(folder)
+            }
         assert sorted(texts) == ["fmi-headers.txt", "fmu-observer.txt", "license.txt", "pythonfmu.txt"]
         assert texts["fmu-observer.txt"] == (PROJECT / "LICENSE").read_text()
         assert "MIT License" in texts["pythonfmu.txt"]
@@ -114,7 +121,8 @@ def test_two_fmus_that_bring_a_file_of_the_same_name(tmp_path: Path) -> None:
     assert values == pytest.approx([0.25, 1.25, 0.5, 1.5], rel=1e-12)  # 1 m and one second at the limit
 
 
-# -- what does not go in ------------------------------------------------------------------------------------------------
+# -- what does not go in
+# ------------------------------------------------------------------------------------------------
 
 
 def test_models_that_cannot_be_hosted_are_refused_with_advice(tmp_path: Path) -> None:
@@ -164,7 +172,8 @@ def test_the_command_line_builds_and_suggests_it(tmp_path: Path, capsys: pytest.
     assert "gain must not be negative" in capsys.readouterr().err
 
 
-# -- where it runs ------------------------------------------------------------------------------------------------------
+# -- where it runs
+# ------------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -184,7 +193,7 @@ callbacks = Callbacks(Logger(lambda e, n, status, c, text: said.append(f"{status
 library.fmi2Instantiate.restype = ctypes.c_void_p
 made = library.fmi2Instantiate(b"bare", 1, sys.argv[4].encode(), sys.argv[2].encode(), ctypes.byref(callbacks), 0, 0)
 print(made, *said)
-"""
+"""  # noqa: E501
 
 
 def test_a_python_without_the_package_says_so_and_does_not_crash(unpacked: Path) -> None:
@@ -192,7 +201,9 @@ def test_a_python_without_the_package_says_so_and_does_not_crash(unpacked: Path)
     uri = (unpacked / "resources").as_uri()
     command = [sys.executable, "-S", "-c", BARE, str(library_of(unpacked)), uri, str(PROJECT), description.guid]
     environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "VIRTUAL_ENV")}
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment, cwd=unpacked, timeout=60)
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=False, env=environment, cwd=unpacked, timeout=60
+    )
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("None 3 fmi2Instantiate: this FMU needs the Python package fmu-observer")
     assert "missing: plant_models, fmu_observer, fmus" in done.stdout
@@ -212,7 +223,9 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def run_program(program: Path, unpacked: Path, guid: str | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
+def run_program(
+    program: Path, unpacked: Path, guid: str | None = None, **environment: str
+) -> subprocess.CompletedProcess[str]:
     description = read_model_description(str(unpacked), validate=False)
     refs = references(description)
     words = [
@@ -225,7 +238,12 @@ def run_program(program: Path, unpacked: Path, guid: str | None = None, **enviro
     ]
     clean = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "VIRTUAL_ENV", "FMU_OBSERVER_LIBPYTHON")}
     return subprocess.run(
-        [str(program), *map(str, words)], capture_output=True, text=True, check=False, env=clean | environment, timeout=60
+        [str(program), *map(str, words)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=clean | environment,
+        timeout=60,
     )
 
 
@@ -234,7 +252,9 @@ def test_a_plain_c_program_gets_the_block_s_values(program: Path, unpacked: Path
     packages = os.pathsep.join(map(str, (PROJECT, sysconfig.get_path("purelib"))))
     done = run_program(program, unpacked, FMU_OBSERVER_LIBPYTHON=str(python), PYTHONPATH=packages)
     if not python.is_file():  # a Python without a shared library: no C program can load it, and is told so
-        assert done.stdout.startswith("3 fmi2Instantiate: this FMU runs Python code, and there is no Python in this process")
+        assert done.stdout.startswith(
+            "3 fmi2Instantiate: this FMU runs Python code, and there is no Python in this process"
+        )
         return
     assert done.returncode == 0, done.stdout + done.stderr
     block = make_block(Gatekeeper(), 2)
@@ -249,7 +269,9 @@ def test_a_plain_c_program_gets_the_block_s_values(program: Path, unpacked: Path
 def test_a_plain_c_program_without_python_is_told_what_to_set(program: Path, unpacked: Path) -> None:
     done = run_program(program, unpacked, FMU_OBSERVER_LIBPYTHON="nowhere/libpython.so")
     assert done.returncode == 2
-    assert done.stdout.startswith("3 fmi2Instantiate: this FMU runs Python code, and there is no Python in this process")
+    assert done.stdout.startswith(
+        "3 fmi2Instantiate: this FMU runs Python code, and there is no Python in this process"
+    )
     assert "FMU_OBSERVER_LIBPYTHON" in done.stdout
     refused = run_program(program, unpacked, guid="{of another}")
     assert refused.returncode == 2
@@ -261,7 +283,9 @@ def test_a_folder_that_is_not_the_fmu_s_is_refused(unpacked: Path, tmp_path: Pat
     (tmp_path / "binaries" / "linux64").mkdir(parents=True)
     library = tmp_path / "binaries" / "linux64" / library_of(unpacked).name
     library.write_bytes(library_of(unpacked).read_bytes())
-    slave = FMU2Slave(guid=description.guid, unzipDirectory=str(tmp_path), modelIdentifier="gatekeeper", instanceName="lost")
+    slave = FMU2Slave(
+        guid=description.guid, unzipDirectory=str(tmp_path), modelIdentifier="gatekeeper", instanceName="lost"
+    )
     with pytest.raises(Exception, match="instantiate"):
         slave.instantiate()
     slave.freeLibrary()

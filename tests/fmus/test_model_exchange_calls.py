@@ -1,4 +1,6 @@
-"""Model exchange call by call: modes, what may be set when, told events, late ones, values that are no numbers, saved states."""
+"""Model exchange call by call: modes, what may be set when, told events, late ones, values that are no numbers, saved
+states.
+"""
 
 from __future__ import annotations
 
@@ -81,7 +83,8 @@ def reference_system() -> HybridSystem:
     return recipe("takagi_sugeno_cdo")
 
 
-# -- modes --------------------------------------------------------------------------------------------------------------
+# -- modes
+# --------------------------------------------------------------------------------------------------------------
 
 
 def test_life_runs_through_event_mode_and_continuous_time_mode(version: int, exchange: Callable[..., Exchange]) -> None:
@@ -119,7 +122,10 @@ def test_numbers_of_states_and_indicators(version: int, exchange: Callable[..., 
     one.model.getNominalsOfContinuousStates(cast(nominals.ctypes.data, POINTER(c_double)), 3)
     assert nominals.tolist() == [1.0, 1.0, 1.0]
     for wrong in (2, 4):
-        assert _status(one.model.getNominalsOfContinuousStates, cast(nominals.ctypes.data, POINTER(c_double)), wrong) == ERROR
+        assert (
+            _status(one.model.getNominalsOfContinuousStates, cast(nominals.ctypes.data, POINTER(c_double)), wrong)
+            == ERROR
+        )
     assert f"{wrong} values, expected 3" in one.log[-1]
 
 
@@ -167,7 +173,8 @@ def test_co_simulation_and_model_exchange_keep_apart(
     model.component = stepped.slave.component  # model exchange calls on the co-simulation instance
     try:
         refused = [
-            _status(call) for call in (model.enterContinuousTimeMode, model.completedIntegratorStep, one.update, one.states)
+            _status(call)
+            for call in (model.enterContinuousTimeMode, model.completedIntegratorStep, one.update, one.states)
         ]
         refused.append(_status(model.setTime, 1.0))
     finally:
@@ -201,7 +208,8 @@ def test_system_of_communication_steps_has_no_model_exchange(version: int, tmp_p
     model.freeLibrary()
 
 
-# -- told events --------------------------------------------------------------------------------------------------------
+# -- told events
+# --------------------------------------------------------------------------------------------------------
 
 
 def test_stamp_ahead_waits_and_is_the_next_time_event(version: int, exchange: Callable[..., Exchange]) -> None:
@@ -230,7 +238,9 @@ def test_payload_is_that_of_the_announcement(version: int, exchange: Callable[..
 
 
 @pytest.mark.parametrize(("policy", "applied"), [(REPLAY, False), (REJECT, False), (LATE, True)])
-def test_late_event_goes_by_the_policy(version: int, policy: int, applied: bool, exchange: Callable[..., Exchange]) -> None:
+def test_late_event_goes_by_the_policy(
+    version: int, policy: int, applied: bool, exchange: Callable[..., Exchange]
+) -> None:
     one = exchange("tracker", version)
     reference = [one.by_name["late_policy"].valueReference]
     (one.model.setInteger if version == 2 else one.model.setInt64)(reference, [policy])
@@ -246,7 +256,9 @@ def test_late_event_goes_by_the_policy(version: int, policy: int, applied: bool,
     assert importer.next_time == pytest.approx(0.35)
 
 
-def test_event_that_waited_is_not_late_where_the_solver_stops_behind_it(version: int, exchange: Callable[..., Exchange]) -> None:
+def test_event_that_waited_is_not_late_where_the_solver_stops_behind_it(
+    version: int, exchange: Callable[..., Exchange]
+) -> None:
     one = exchange("tracker", version)
     one.initialize()
     assert one.happen([Told(0.0, "balise", {"balise_position": 50.0}, stamp=0.02)]).next_time == 0.02
@@ -283,7 +295,8 @@ def test_clock_belongs_into_event_mode(exchange: Callable[..., Exchange]) -> Non
     assert one.model.getClock(clock) == [False]
 
 
-# -- what is no number --------------------------------------------------------------------------------------------------
+# -- what is no number
+# --------------------------------------------------------------------------------------------------
 
 
 def test_derivative_that_is_no_number_is_discarded(version: int, exchange: Callable[..., Exchange]) -> None:
@@ -298,7 +311,8 @@ def test_derivative_that_is_no_number_is_discarded(version: int, exchange: Calla
         assert _status(one.model.setTime, bad) == ERROR
 
 
-# -- saved states -------------------------------------------------------------------------------------------------------
+# -- saved states
+# -------------------------------------------------------------------------------------------------------
 
 
 def _prepared(one: Exchange, system: HybridSystem) -> Importer:
@@ -394,7 +408,9 @@ def test_reset_begins_anew(version: int, exchange: Callable[..., Exchange], refe
     np.testing.assert_array_equal(_continued(one, _prepared(one, system).next_time), first)
 
 
-def test_wrong_token_is_refused(version: int, unpacked: Callable[[Path], Path], reference: Callable[[str], Any]) -> None:
+def test_wrong_token_is_refused(
+    version: int, unpacked: Callable[[Path], Path], reference: Callable[[str], Any]
+) -> None:
     fmu = cached_fmu(reference("gain").system, version)  # type: ignore[arg-type]
     cls = FMU2Model if version == 2 else FMU3Model
     model = cls(guid="another", unzipDirectory=str(unpacked(fmu)), modelIdentifier="gain", instanceName="g")

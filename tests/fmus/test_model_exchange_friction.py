@@ -20,11 +20,15 @@ pytestmark = pytest.mark.compiler
 MASS, GRIP = 2.0, 3.0
 TOLERANCE = 1e-11
 AGREEMENT = 1e-9
-"""Of values that the solver integrated with `TOLERANCE` over some tens of steps, and of instants where one crosses zero."""
+"""Of values that the solver integrated with `TOLERANCE` over some tens of steps, and of instants where one crosses
+zero.
+"""
 
 
 class SlidingMass(HybridSystem):
-    """A mass on dry friction under a force that is a sine of time plus an input; a blow gives it another speed at once."""
+    """A mass on dry friction under a force that is a sine of time plus an input; a blow gives it another speed at
+    once.
+    """
 
     name = "sliding_mass"
     states = (state("place", "m"), state("speed", "m/s"))
@@ -67,7 +71,8 @@ def test_ramp_sticks_then_breaks_away(version: int, exchange: Callable[..., Exch
         importer.advance(0.1 * k)
         importer.record("speed", "place")
     breakaway = GRIP / rate
-    assert importer.run.state_events == pytest.approx([breakaway], rel=1e-14)  # the indicator is linear in time: only rounding
+    # the indicator is linear in time: only rounding
+    assert importer.run.state_events == pytest.approx([breakaway], rel=1e-14)
     times = np.array(importer.run.times)
     since = np.maximum(times - breakaway, 0.0)
     expected = np.stack([rate * since**2 / (2.0 * MASS), rate * since**3 / (6.0 * MASS)], axis=1)
@@ -115,7 +120,8 @@ def test_strong_sine_turns_round_without_a_rest(version: int, exchange: Callable
         signs.append(np.sign(model.get("speed")[0]))
     assert len(importer.run.state_events) >= 3
     assert 0.0 not in signs
-    assert np.count_nonzero(np.diff(signs)) == len(importer.run.state_events) - 1  # each but the first break-away is one turn
+    # each but the first break-away is one turn
+    assert np.count_nonzero(np.diff(signs)) == len(importer.run.state_events) - 1
     assert np.diff(importer.run.state_events).min() > 0.1
 
 
@@ -149,7 +155,9 @@ def test_indicators_are_speed_while_it_moves_and_what_friction_is_left_at_rest(
 
 
 def test_derivatives_stay_smooth_beyond_the_event(version: int, exchange: Callable[..., Exchange]) -> None:
-    """A solver looks a little beyond zero before it finds the event: the direction of friction must not change on the way."""
+    """A solver looks a little beyond zero before it finds the event: the direction of friction must not change on the
+    way.
+    """
     model = exchange(SYSTEM, version)
     model.initialize(speed=1.0)
     for speed in (1.0, 1e-9, 0.0, -1e-3):
@@ -192,13 +200,16 @@ def test_fmpy_finds_the_same_events(version: int) -> None:
     assert events[0] == pytest.approx(breakaway, abs=1e-6)
 
 
-# -- the locomotive ---------------------------------------------------------------------------------------------------------
+# -- the locomotive
+# ---------------------------------------------------------------------------------------------------------
 
 LOCOMOTIVE = {"davis_b": 0.0, "davis_c": 0.0}
 """Without the resistances that depend on speed the train brakes evenly."""
 
 
-def _locomotive(model: Exchange, inputs: Callable[[float], dict[str, float]] | None = None, **starts: float) -> Importer:
+def _locomotive(
+    model: Exchange, inputs: Callable[[float], dict[str, float]] | None = None, **starts: float
+) -> Importer:
     update = model.initialize(**LOCOMOTIVE, **starts)
     return Importer(model, update, method="Radau", rtol=1e-9, atol=1e-10, inputs=inputs)
 

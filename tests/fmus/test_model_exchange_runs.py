@@ -1,4 +1,6 @@
-"""Model exchange and co-simulation are two ways along one trajectory: they meet as the co-simulation's internal step shrinks."""
+"""Model exchange and co-simulation are two ways along one trajectory: they meet as the co-simulation's internal step
+shrinks.
+"""
 
 from __future__ import annotations
 
@@ -30,15 +32,17 @@ EVENT_TIME = 0.337
 
 ORDER = {"locomotive": 2, "train": 2, "slider": 2, "differentiator_cdo": 1}
 ORDER |= {"levant_differentiator": 1, "filtering_differentiator": 1}
-"""Of the internal method; 4 for the others. The differentiators' right-hand sides have roots and signs, which leaves order 1."""
+"""Of the internal method; 4 for the others. The differentiators' right-hand sides have roots and signs, which leaves
+order 1.
+"""
 
 TOLERANCE = 1e-11
 FLOOR = 2e-10
 """What the solver itself may be wrong by, relative: some tens of steps with local errors of `TOLERANCE`."""
 
 GAIN = 0.55
-"""Share of the asymptotic gain of a halved step that must be seen: events cut internal steps, and the cuts fall elsewhere. More
-than half tells an order from the one below."""
+"""Share of the asymptotic gain of a halved step that must be seen: events cut internal steps, and the cuts fall
+elsewhere. More than half tells an order from the one below."""
 
 INPUTS = {"effort": 2.0e4, "force": 4.0}
 STARTS: Mapping[str, Mapping[str, float]] = {
@@ -93,7 +97,11 @@ def _cosimulated(made: Any, name: str, system: HybridSystem, factor: float) -> n
 
 @pytest.mark.parametrize("name", EXCHANGED)
 def test_cosimulation_converges_to_model_exchange_at_its_order(
-    name: str, version: int, exchange: Callable[..., Exchange], component: Callable[..., Any], reference: Callable[[str], Any]
+    name: str,
+    version: int,
+    exchange: Callable[..., Exchange],
+    component: Callable[..., Any],
+    reference: Callable[[str], Any],
 ) -> None:
     system = reference(name).system
     expected = _exchanged(exchange(name, version), name, system)
@@ -120,7 +128,13 @@ def test_fmpy_simulates_it_in_model_exchange(name: str, version: int, reference:
     common: dict[str, Any] = {"stop_time": 1.0, "output_interval": STEP, "start_values": _starts(name, system)}
     outputs = list(scalar_names(system.outputs)) + list(scalar_names(system.states))
     solved = simulate_fmu(
-        fmu, fmi_type="ModelExchange", solver="CVode", relative_tolerance=1e-9, output=outputs, record_events=False, **common
+        fmu,
+        fmi_type="ModelExchange",
+        solver="CVode",
+        relative_tolerance=1e-9,
+        output=outputs,
+        record_events=False,
+        **common,
     )
     common["start_values"] = {**common["start_values"], "internal_step": system.internal_step / 4.0}
     stepped = simulate_fmu(fmu, fmi_type="CoSimulation", output=outputs, **common)
@@ -141,7 +155,8 @@ def test_time_events_are_hit_exactly(
     instants = set()
     for event in system.periodic_events:
         period, offset = model.get(event.period)[0], 0.0 if event.offset is None else model.get(event.offset)[0]
-        instants |= {start + offset + k * period for k in range(round(1.0 / period) + 1)}  # as the grid is defined, to the bit
+        # as the grid is defined, to the bit
+        instants |= {start + offset + k * period for k in range(round(1.0 / period) + 1)}
     expected = sorted(t for t in instants if start < t <= start + 1.0)
     assert importer.run.time_events == expected
 
@@ -174,7 +189,8 @@ def test_observer_with_balises_follows_its_block(
         block.enterStepMode()
         now = instant
         got, expected = model.get(*names), np.array(block.getFloat64(references))
-        # half the internal step leaves 1e-11 of the block's error of order 4, the solver as much; times the size of forces
+        # half the internal step leaves 1e-11 of the block's error of order 4, the solver as much; times the size of
+        # forces
         np.testing.assert_allclose(got, expected, rtol=1e-9, atol=1e-8)
     assert len(importer.run.time_events) == (10 if system.periodic_events else 0)
     assert abs(model.get("innovation")[0]) > 0.01  # the balises told something

@@ -1,4 +1,6 @@
-"""Prepared calls of native FMUs do what fmpy's own calls do: the same values, failures, log of calls and replaced functions."""
+"""Prepared calls of native FMUs do what fmpy's own calls do: the same values, failures, log of calls and replaced
+functions.
+"""
 
 from __future__ import annotations
 
@@ -83,7 +85,13 @@ def test_results_by_reference_arrive(tmp_path: Path) -> None:
     flags, reached = [ctypes.c_bool(True) for _ in range(3)], ctypes.c_double()
     results = [ctypes.byref(x) for x in (*flags, reached)]
     prepared_call(
-        slave, "fmi3DoStep", slave.component, ctypes.c_double(0.0), ctypes.c_double(0.25), ctypes.c_bool(False), *results
+        slave,
+        "fmi3DoStep",
+        slave.component,
+        ctypes.c_double(0.0),
+        ctypes.c_double(0.25),
+        ctypes.c_bool(False),
+        *results,
     )()
     slave.terminate()
     slave.freeInstance()
@@ -92,15 +100,19 @@ def test_results_by_reference_arrive(tmp_path: Path) -> None:
 
 
 def test_a_failure_is_fmpys_exception(slave: Any) -> None:
-    step = prepared_call(slave, "fmi2DoStep", slave.component, ctypes.c_double(0.0), ctypes.c_double(0.1), ctypes.c_int(0))
+    step = prepared_call(
+        slave, "fmi2DoStep", slave.component, ctypes.c_double(0.0), ctypes.c_double(0.1), ctypes.c_int(0)
+    )
     step()
     with pytest.raises(FMICallException) as ours:
         step()  # from a time that is over
     with pytest.raises(FMICallException) as theirs:
         slave.doStep(0.0, 0.1, False)
     assert (ours.value.function, ours.value.status, str(ours.value)) == (
-        theirs.value.function, theirs.value.status, str(theirs.value),
-    )  # fmt: skip
+        theirs.value.function,
+        theirs.value.status,
+        str(theirs.value),
+    )
 
 
 def test_a_logger_of_calls_sees_them_also_when_it_comes_later(slave: Any) -> None:

@@ -1,4 +1,6 @@
-"""Platforms without a compiler: their names, their folders in both FMI versions, fat libraries, whose library a file is."""
+"""Platforms without a compiler: their names, their folders in both FMI versions, fat libraries, whose library a file
+is.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ def mach_o(processor: int, size: int) -> bytes:
 
 
 X86_64, AARCH64 = mach_o(0x01000007, 5000), mach_o(0x0100000C, 40000)
-LIBRARIES = {PLATFORMS[name]: content for name, content in zip(FIVE, (b"lx", b"la", b"w", X86_64, AARCH64), strict=True)}
+LIBRARIES = {
+    PLATFORMS[name]: content for name, content in zip(FIVE, (b"lx", b"la", b"w", X86_64, AARCH64), strict=True)
+}
 
 
 # -- names ----------------------------------------------------------------------------------------------------------
@@ -65,7 +69,11 @@ def test_unknown_platforms_are_refused(wanted: str, words: str) -> None:
 
 def test_this_machine_is_the_one_that_fmpy_sees() -> None:
     host = host_platform()
-    assert (host.name, host.fmi2_folder, host.extension) == (fmpy.platform_tuple, fmpy.platform, fmpy.sharedLibraryExtension)
+    assert (host.name, host.fmi2_folder, host.extension) == (
+        fmpy.platform_tuple,
+        fmpy.platform,
+        fmpy.sharedLibraryExtension,
+    )
 
 
 def test_without_ziglang_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -43,7 +43,9 @@ pytestmark = pytest.mark.compiler
 
 @pytest.fixture(scope="session", autouse=True)
 def zig_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """The C libraries of the targets are compiled once for all workers (a minute), or were in a folder of the user's choice."""
+    """The C libraries of the targets are compiled once for all workers (a minute), or were in a folder of the user's
+    choice.
+    """
     base = tmp_path_factory.getbasetemp()
     folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "zig"
     with pytest.MonkeyPatch.context() as patch:
@@ -65,7 +67,12 @@ def libraries(version: int, fmu: Path, folder: Path) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for platform in PLATFORMS.values():
         old = version == 2 and platform.name.startswith("x86_64")
-        path = folder / "binaries" / (platform.fmi2_folder if old else platform.name) / f"takagi_sugeno_cdo{platform.extension}"
+        path = (
+            folder
+            / "binaries"
+            / (platform.fmi2_folder if old else platform.name)
+            / f"takagi_sugeno_cdo{platform.extension}"
+        )
         found[platform.name] = lief.parse(str(path))
     return found
 
@@ -82,8 +89,11 @@ def test_headers_and_symbols(everywhere: tuple[int, Path], tmp_path: Path) -> No
     assert len(declared) == {2: 44, 3: 75}[version]
     for name, library in libraries(version, fmu, tmp_path).items():
         kind, machine = MACHINES[name]
-        found = library.header.cpu_type if kind == lief.Binary.FORMATS.MACHO else (
-            library.header.machine if kind == lief.Binary.FORMATS.PE else library.header.machine_type)  # fmt: skip
+        found = (
+            library.header.cpu_type
+            if kind == lief.Binary.FORMATS.MACHO
+            else (library.header.machine if kind == lief.Binary.FORMATS.PE else library.header.machine_type)
+        )
         assert (library.format, found) == (kind, machine), name
         assert exported(library) - {mark.removeprefix("_") for mark in LOADER_MARKS} == declared, name
     assert validate_fmu(str(fmu)) == []
@@ -93,7 +103,9 @@ def test_nothing_but_the_system_is_needed(everywhere: tuple[int, Path], tmp_path
     version, fmu = everywhere
     for name, library in libraries(version, fmu, tmp_path).items():
         needed = [entry if isinstance(entry, str) else entry.name for entry in library.libraries]
-        needed = [entry for entry in needed if entry not in ("takagi_sugeno_cdo.dylib", "@rpath/takagi_sugeno_cdo.dylib")]
+        needed = [
+            entry for entry in needed if entry not in ("takagi_sugeno_cdo.dylib", "@rpath/takagi_sugeno_cdo.dylib")
+        ]
         assert needed, name
         assert [entry for entry in needed if not ALLOWED_LIBRARIES.fullmatch(entry)] == [], name
 
@@ -166,7 +178,9 @@ def test_same_bytes_on_any_day_and_in_any_place(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("model", ["locomotive", "takagi_sugeno_cdo"])
 def test_the_system_compiler_and_zig_give_the_same_numbers(model: str, version: int, tmp_path: Path) -> None:
-    """Every output and state, bit for bit: no contraction, no other order of operations, the same mathematical library."""
+    """Every output and state, bit for bit: no contraction, no other order of operations, the same mathematical
+    library.
+    """
     inputs = _effort() if model == "locomotive" else _observed(version)
     rows = []
     for platform in ("host", host_platform().name):

@@ -1,4 +1,6 @@
-"""The balise list that travels with an FMU: found by URI and by path, read at instantiation, refused where it is wrong."""
+"""The balise list that travels with an FMU: found by URI and by path, read at instantiation, refused where it is
+wrong.
+"""
 
 from __future__ import annotations
 
@@ -85,7 +87,9 @@ def table(folder: Path, text: str | bytes) -> Path:
 
 
 @pytest.mark.parametrize("version", [2, 3])
-def test_an_fmu_reads_what_it_was_built_with(version: int, loop: Path, readers: dict[int, Unpacked], tmp_path: Path) -> None:
+def test_an_fmu_reads_what_it_was_built_with(
+    version: int, loop: Path, readers: dict[int, Unpacked], tmp_path: Path
+) -> None:
     assert (readers[version].folder / "resources" / "balises.csv").read_text() == "position\n0.30000000000000004\n7.0\n"
     assert positions(loop, readers[version], tmp_path) == [0.1 + 0.2, 7.0, UNUSED, UNUSED]
 
@@ -111,7 +115,9 @@ def test_the_folder_is_found(form: str, version: int, loop: Path, readers: dict[
 
 
 @pytest.mark.parametrize("location", ["", "file:///no/such/folder", "https://example.org/resources", "%zz"])
-def test_without_a_file_the_start_values_stand(location: str, loop: Path, readers: dict[int, Unpacked], tmp_path: Path) -> None:
+def test_without_a_file_the_start_values_stand(
+    location: str, loop: Path, readers: dict[int, Unpacked], tmp_path: Path
+) -> None:
     assert positions(loop, readers[2], tmp_path, location) == [0.1 + 0.2, 7.0, UNUSED, UNUSED]
 
 
@@ -126,7 +132,9 @@ RIGHT = [
 
 
 @pytest.mark.parametrize("text", RIGHT)
-def test_what_the_master_reads_the_fmu_reads(text: str, loop: Path, readers: dict[int, Unpacked], tmp_path: Path) -> None:
+def test_what_the_master_reads_the_fmu_reads(
+    text: str, loop: Path, readers: dict[int, Unpacked], tmp_path: Path
+) -> None:
     place = table(tmp_path, text.replace(" position ", " position"))
     try:
         expected = from_csv(place / "balises.csv").positions.tolist()

@@ -61,7 +61,9 @@ def test_a_whole_life_is_clean(name: str, version: int, life: Path, sanitized: S
 def test_damaged_states_are_refused_or_harmless(
     name: str, version: int, life: Path, sanitized: Sanitized, tmp_path: Path
 ) -> None:
-    """A state is accepted where a damaged word only changes a value; then steps come to an end and touch nothing else."""
+    """A state is accepted where a damaged word only changes a value; then steps come to an end and touch nothing
+    else.
+    """
     fmu = Unpacked.of(cached_fmu(recipe(name), version), tmp_path / name)  # type: ignore[arg-type]
     printed = run([str(life), "damage", str(life_wiring(fmu, tmp_path / "wiring.txt", sanitized(fmu)))])
     tried, accepted = map(int, printed.split())

@@ -36,7 +36,7 @@ DECLARE(third_)
     prefix##fmi2EnterInitializationMode(c); prefix##fmi2ExitInitializationMode(c); \\
     for (int i = 0; i < 100; i++) { prefix##fmi2SetReal(c, &in, 1, &u); prefix##fmi2DoStep(c, 0.01 * i, 0.01, 1); } \\
     prefix##fmi2GetReal(c, &out, 1, &y); printf("%.17g\\n", y); prefix##fmi2FreeInstance(c); } while (0)
-""",
+""",  # noqa: E501
     3: """
 #include <stdio.h>
 #include "fmi3FunctionTypes.h"
@@ -55,7 +55,7 @@ DECLARE(third_)
     for (int i = 0; i < 100; i++) { \\
         prefix##fmi3SetFloat64(c, &in, 1, &u, 1); prefix##fmi3DoStep(c, 0.01 * i, 0.01, 1, &a, &b, &d, &last); } \\
     prefix##fmi3GetFloat64(c, &out, 1, &y, 1); printf("%.17g\\n", y); prefix##fmi3FreeInstance(c); } while (0)
-""",
+""",  # noqa: E501
 }
 MODELS = {
     "first_": ("locomotive", "effort", 5e4, "speed"),
@@ -74,7 +74,13 @@ def constant_input(version: int, model: str, name: str, value: float, output: st
     """The last output of the same FMU as a shared library, stepped by fmpy with the same input."""
     fmu = str(cached_fmu(recipe(model), version))  # type: ignore[arg-type]
     signal = np.array([(0.0, value), (2.0, value)], [("time", float), (name, float)])
-    run = {"stop_time": 1.0, "step_size": 0.01, "output_interval": 0.01, "fmi_type": "CoSimulation", "use_event_mode": False}
+    run = {
+        "stop_time": 1.0,
+        "step_size": 0.01,
+        "output_interval": 0.01,
+        "fmi_type": "CoSimulation",
+        "use_event_mode": False,
+    }
     return float(fmpy.simulate_fmu(fmu, input=signal, output=[output], **run)[output][-1])
 
 
@@ -84,12 +90,30 @@ def test_three_models_in_one_program(version: int, tmp_path: Path) -> None:
         folder = Path(extract(str(cached_fmu(recipe(model), version)), str(tmp_path / prefix)))  # type: ignore[arg-type]
         by_name = {v.name: v for v in read_model_description(str(folder)).modelVariables}
         token = read_model_description(str(folder)).guid
-        calls.append(f'RUN({prefix}, "{token}", {by_name[name].valueReference}, {value}, {by_name[output].valueReference});')
+        calls.append(
+            f'RUN({prefix}, "{token}", {by_name[name].valueReference}, {value}, {by_name[output].valueReference});'
+        )
         objects.append(str(folder / "sources" / "model.o"))
-        command = [*find_compiler().command, "-std=c11", "-O2", "-ffp-contract=off", f"-DFMI{version}_FUNCTION_PREFIX={prefix}"]
+        command = [
+            *find_compiler().command,
+            "-std=c11",
+            "-O2",
+            "-ffp-contract=off",
+            f"-DFMI{version}_FUNCTION_PREFIX={prefix}",
+        ]
         run([*command, "-c", "all.c", "-o", "model.o"], folder / "sources")
     (tmp_path / "main.c").write_text(MAIN[version] + f"int main(void) {{ {' '.join(calls)} return 0; }}\n")
-    command = [*find_compiler().command, "-std=c11", "-I", str(folder / "sources"), "main.c", *objects, "-o", "program", "-lm"]
+    command = [
+        *find_compiler().command,
+        "-std=c11",
+        "-I",
+        str(folder / "sources"),
+        "main.c",
+        *objects,
+        "-o",
+        "program",
+        "-lm",
+    ]
     run(command, tmp_path)
     numbers = [float(line) for line in run([str(tmp_path / "program")], tmp_path).split()]
     assert numbers == [constant_input(version, *model) for model in MODELS.values()]
@@ -108,7 +132,9 @@ def test_the_sources_alone_give_a_library(version: int, tmp_path: Path) -> None:
     (tmp_path / "alone" / library.name).rename(library)
     effort = np.array([(0.0, 8e4), (3.0, -8e4)], [("time", float), ("effort", float)])
     results = [
-        fmpy.simulate_fmu(str(where), stop_time=3.0, step_size=0.01, output_interval=0.01, input=effort, fmi_type="CoSimulation")
+        fmpy.simulate_fmu(
+            str(where), stop_time=3.0, step_size=0.01, output_interval=0.01, input=effort, fmi_type="CoSimulation"
+        )
         for where in (fmu, folder)
     ]
     assert np.array_equal(results[0], results[1])

@@ -1,4 +1,6 @@
-"""Edges of zones in exported FMUs: exact events in co-simulation and in model exchange, and refused where they make no zone."""
+"""Edges of zones in exported FMUs: exact events in co-simulation and in model exchange, and refused where they make no
+zone.
+"""
 
 from __future__ import annotations
 
@@ -92,7 +94,10 @@ def test_what_parameters_must_fulfil_together_is_refused_with_their_values(compo
     made = component(Chattering(), 3)
     with pytest.raises(Exception, match="xitInitializationMode"):
         made.initialize(middle=0.25)
-    said = "these parameters: middle must lie between left and right (middle = 0.25, left = 0, right = 0.20000000000000001)"
+    said = (
+        "these parameters: middle must lie between left and right (middle = 0.25, left = 0, right = "
+        "0.20000000000000001)"
+    )
     assert said in made.log[-1]
 
 

@@ -14,7 +14,9 @@ from plant_models.railway.control import Mission
 class Controller:
     """A controller whose inputs are set and whose memory is read by name; `at(t)` moves it there."""
 
-    def __init__(self, system: HybridSystem, preset: str | None = None, start: dict[str, float] | None = None, **changes: float):
+    def __init__(
+        self, system: HybridSystem, preset: str | None = None, start: dict[str, float] | None = None, **changes: float
+    ):
         self.system = system
         self.inputs = list(scalar_names(system.input_signals))
         self.states = list(scalar_names(system.states))
@@ -45,8 +47,10 @@ class Controller:
 
 def journey(
     train: Runtime, controller: Controller, mission: Runtime, duration: float, step: float = 0.1
-) -> dict[str, np.ndarray]:  # fmt: skip
-    """Mission, controller and train in one loop with perfect estimates, exchanged every `step` [s]: every output by name."""
+) -> dict[str, np.ndarray]:
+    """Mission, controller and train in one loop with perfect estimates, exchanged every `step` [s]: every output by
+    name.
+    """
     rows = []
     air = [i for i, s in enumerate(train.system.inputs) if s.name == "brake_demand"]
     assert isinstance(mission.system, Mission)

@@ -1,4 +1,6 @@
-"""Runs that several tests share: a runtime with parameters by name, and the closed loop of driver, train and odometer."""
+"""Runs that several tests share: a runtime with parameters by name, and the closed loop of driver, train and
+odometer.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ def parameters(system: HybridSystem, preset: str | None = None, **changes: float
     return values
 
 
-def started(system: HybridSystem, preset: str | None = None, x0: Any = None, u0: Any = None, **changes: float) -> Runtime:
+def started(
+    system: HybridSystem, preset: str | None = None, x0: Any = None, u0: Any = None, **changes: float
+) -> Runtime:
     """A runtime at time zero with these parameters, this initial state and these inputs."""
     runtime = Runtime(system)
     runtime.p[:] = parameters(system, preset, **changes)

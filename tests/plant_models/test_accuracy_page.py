@@ -11,7 +11,9 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 
 @pytest.mark.parametrize(("run", "output"), [("60 kN from rest", "speed"), ("as printed", "x1")])
-def test_the_error_at_the_shipped_step_is_that_of_the_page(run: str, output: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_error_at_the_shipped_step_is_that_of_the_page(
+    run: str, output: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.syspath_prepend(str(DOCS / "studies"))
     import accuracy  # type: ignore[import-not-found] # a script of the documentation
 

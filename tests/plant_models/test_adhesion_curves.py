@@ -34,9 +34,12 @@ TRUNCATED = {(5, 10.0), (10, 20.0)}  # printed slips that are cut from 10.4 and 
 
 
 @pytest.mark.parametrize(("curve", "kmh", "coefficient", "percent"), ROWS)
-def test_polach_peaks_are_those_of_table_4_5(curve: PolachCurve, kmh: float, coefficient: float, percent: float) -> None:
+def test_polach_peaks_are_those_of_table_4_5(
+    curve: PolachCurve, kmh: float, coefficient: float, percent: float
+) -> None:
     slip, peak = curve.peak(kmh / 3.6)
-    # The print took its peaks from a slip grid of 0.8 %: 0.6 % of mu and 1.8 points of slip are what that grid explains.
+    # The print took its peaks from a slip grid of 0.8 %: 0.6 % of mu and 1.8 points of slip are what that grid
+    # explains.
     assert peak == pytest.approx(coefficient, rel=6e-3)
     assert 100.0 * slip == pytest.approx(percent, abs=1.8)
 

@@ -45,8 +45,12 @@ def reader(system: BaliseReader = SPACING, **values: float) -> Runtime:
     return runtime
 
 
-def ride(runtime: Runtime, motion: Motion, times: Sequence[float], *, lag: bool = False, exchanged: bool = True) -> list[Heard]:
-    """Drive a reader along a motion as a sequential master does; with `lag` as a parallel one, whose inputs are a step old."""
+def ride(
+    runtime: Runtime, motion: Motion, times: Sequence[float], *, lag: bool = False, exchanged: bool = True
+) -> list[Heard]:
+    """Drive a reader along a motion as a sequential master does; with `lag` as a parallel one, whose inputs are a step
+    old.
+    """
     heard: list[Heard] = []
     count = 0.0
     runtime.u[:] = motion(times[0]) if exchanged else (0.0, 0.0)
@@ -97,7 +101,8 @@ def test_constant_acceleration_is_exact(h: float) -> None:
 def test_a_start_from_rest_is_exact_where_the_cubic_has_a_double_root() -> None:
     runtime = reader(first_balise=1e-4, balise_spacing=0.5)
     heard = ride(runtime, accelerated(0.0, 0.0, 1.0), grid(0.5, 4))
-    # The slope at the first balise is 0.014 m/s, so the rounding of a position of 1e-4 m is not enlarged beyond 1e-15 s.
+    # The slope at the first balise is 0.014 m/s, so the rounding of a position of 1e-4 m is not enlarged beyond 1e-15
+    # s.
     np.testing.assert_allclose(stamps(heard[:2]), [np.sqrt(2e-4), np.sqrt(2.0 * 0.5001)], rtol=0.0, atol=1e-14)
 
 
@@ -105,7 +110,9 @@ ROOT = 4e-13  # [m] rounding of a position of some hundred metres
 
 
 def _spread(step: HermiteStep, t: float) -> float:
-    """How far apart two roots near `t` may lie [s]: where the cubic's position, slope or curvature alone leaves the rounding."""
+    """How far apart two roots near `t` may lie [s]: where the cubic's position, slope or curvature alone leaves the
+    rounding.
+    """
     jerk = (step.acceleration(step.h) - step.acceleration(0.0)) / step.h
     slopes = ((1.0, step.speed(t)), (2.0, step.acceleration(t)), (3.0, jerk))
     factorials = (1.0, 2.0, 6.0)
@@ -114,17 +121,27 @@ def _spread(step: HermiteStep, t: float) -> float:
 
 
 @given(
-    p0=st.floats(-500.0, 500.0), v0=st.floats(-40.0, 40.0), a=st.floats(-3.0, 3.0), b=st.floats(-3.0, 3.0),
-    h=st.floats(0.01, 1.0), spacing=st.floats(5.0, 60.0),
-)  # fmt: skip
+    p0=st.floats(-500.0, 500.0),
+    v0=st.floats(-40.0, 40.0),
+    a=st.floats(-3.0, 3.0),
+    b=st.floats(-3.0, 3.0),
+    h=st.floats(0.01, 1.0),
+    spacing=st.floats(5.0, 60.0),
+)
 @example(p0=-1e-278, v0=0.0, a=0.0, b=1.0, h=1.0, spacing=5.0)  # a saddle on a balise
 @example(p0=0.0, v0=1.0, a=-3.0, b=0.0, h=1.0, spacing=0.12)  # turns after a third of the step; passes some twice
-def test_one_step_finds_what_the_master_finds(p0: float, v0: float, a: float, b: float, h: float, spacing: float) -> None:
+def test_one_step_finds_what_the_master_finds(
+    p0: float, v0: float, a: float, b: float, h: float, spacing: float
+) -> None:
     """Against `HermiteStep` and `TrackLayout` of the package's own master, which share no code with the reader."""
     p1, v1 = p0 + v0 * h + a * h * h / 2.0 + b * h**3 / 6.0, v0 + a * h + b * h * h / 2.0
     step, layout = HermiteStep(h, p0, v0, p1, v1), by_spacing(spacing, -700.0, 700.0)
-    expected = [(t, b_.position) for s in step.stretches() for b_ in layout.crossed(s.before, s.after)
-                for t in (step.crossing(b_.position, s),)]  # fmt: skip
+    expected = [
+        (t, b_.position)
+        for s in step.stretches()
+        for b_ in layout.crossed(s.before, s.after)
+        for t in (step.crossing(b_.position, s),)
+    ]
     runtime = reader(first_balise=-700.0, balise_spacing=spacing, balise_total=float(len(layout.balises)))
     runtime.u[:] = p0, v0
     runtime.start(0.0)
@@ -155,7 +172,8 @@ def test_backwards_and_forwards_again() -> None:
     down = [np.arccos(p / 50.0) / 0.2 for p in (30.0, 0.0, -30.0)]
     up = [2.0 * np.pi / 0.2 - t for t in reversed(down)]
     assert places(heard) == [30.0, 0.0, -30.0, -30.0, 0.0, 30.0]
-    # Hermite: h^4/384 times the fourth derivative of the position, 50 * 0.2^4, over the speed, 8 m/s and more: 2.6e-13 s.
+    # Hermite: h^4/384 times the fourth derivative of the position, 50 * 0.2^4, over the speed, 8 m/s and more: 2.6e-13
+    # s.
     np.testing.assert_allclose(stamps(heard), [*down, *up], rtol=0.0, atol=2.6e-13 + ROUNDING)
 
 
@@ -275,10 +293,16 @@ def test_a_list_of_positions_finds_what_the_layout_of_the_master_finds() -> None
     assert places(backwards) == places_[::-1]
 
 
-@given(first=st.floats(-1e4, 1e4), spacing=st.floats(0.3, 3e3), i=st.integers(0, 60), j=st.integers(0, 60), data=st.data())
+@given(
+    first=st.floats(-1e4, 1e4), spacing=st.floats(0.3, 3e3), i=st.integers(0, 60), j=st.integers(0, 60), data=st.data()
+)
 @example(first=0.1, spacing=0.7, i=3, j=20, data=None)
-def test_equal_spacing_counts_to_the_last_bit(first: float, spacing: float, i: int, j: int, data: st.DataObject | None) -> None:
-    """From one balise to another, and from just before or behind it: the quotient that numbers them may round either way."""
+def test_equal_spacing_counts_to_the_last_bit(
+    first: float, spacing: float, i: int, j: int, data: st.DataObject | None
+) -> None:
+    """From one balise to another, and from just before or behind it: the quotient that numbers them may round either
+    way.
+    """
     layout, oracle = Spacing(), by_spacing(spacing, first, first + 60.5 * spacing)
     p = SimpleNamespace(first_balise=first, balise_spacing=spacing, balise_total=float(len(oracle.balises)))
     sides = (-inf, None, inf)
@@ -321,16 +345,27 @@ def test_positions_that_are_set_later_need_no_order() -> None:
 @pytest.mark.parametrize("step", [0.1, 2.0])
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 def test_entries_at_one_place_are_one_balise(entries: tuple[float, ...], step: float, sense: float) -> None:
-    """Parameters can be set to anything in an FMU; counted twice, such a place announced the next balise before its time."""
-    values = {f"positions[{i + 1}]": sense * p for i, p in enumerate(entries)} | {"positions[4]": 1e30, "positions[5]": 1e30}
-    heard = ride(reader(POSITIONS, **values), accelerated(sense * 5.0, sense * 10.0, 0.0), grid(step, round(6.0 / step)))
+    """Parameters can be set to anything in an FMU; counted twice, such a place announced the next balise before its
+    time.
+    """
+    values = {f"positions[{i + 1}]": sense * p for i, p in enumerate(entries)} | {
+        "positions[4]": 1e30,
+        "positions[5]": 1e30,
+    }
+    heard = ride(
+        reader(POSITIONS, **values), accelerated(sense * 5.0, sense * 10.0, 0.0), grid(step, round(6.0 / step))
+    )
     assert places(heard) == [sense * p for p in sorted(set(entries))]
     assert stamps(heard) == pytest.approx([(p - 5.0) / 10.0 for p in sorted(set(entries))])
 
 
 @pytest.mark.parametrize("system", [SPACING, POSITIONS], ids=["spacing", "positions"])
 def test_traced_and_numpy_kernels_agree(system: BaliseReader) -> None:
-    values = {"positions[1]": 7.0, "positions[2]": 3.0} if system is POSITIONS else {"first_balise": 3.0, "balise_spacing": 4.0}
+    values = (
+        {"positions[1]": 7.0, "positions[2]": 3.0}
+        if system is POSITIONS
+        else {"first_balise": 3.0, "balise_spacing": 4.0}
+    )
     runs = []
     for kernel in (None, NumpyKernel(system)):
         runtime = Runtime(system, kernel)
@@ -374,7 +409,10 @@ def test_a_restored_reader_continues_as_it_did() -> None:
         ({"layout": "circle"}, "Unknown layout 'circle'; choose one of: spacing, positions"),
         ({"pending_capacity": 0}, "pending_capacity must be at least 1, got 0"),
         ({"layout": "positions", "balise_capacity": 0}, "balise_capacity must be at least 1, got 0"),
-        ({"layout": "positions", "balise_capacity": 2, "positions": [1.0, 2.0, 3.0]}, "3 positions were given, but .* is 2"),
+        (
+            {"layout": "positions", "balise_capacity": 2, "positions": [1.0, 2.0, 3.0]},
+            "3 positions were given, but .* is 2",
+        ),
         ({"layout": "positions", "positions": [1.0, 1.0]}, "increasing position, one at a place"),
         ({"layout": "positions", "positions": [1.0, float("nan")]}, "not a finite number"),
     ],

@@ -33,12 +33,16 @@ def test_the_speed_follows_the_profile(profile_d: dict[str, np.ndarray]) -> None
 def test_the_slip_exceeds_two_per_cent_in_the_zones_of_traction_and_braking(profile_d: dict[str, np.ndarray]) -> None:
     t, slip = profile_d["time"], profile_d["slip"]
     traction, braking = (t > 12.0) & (t < 20.0), (t > 72.0) & (t < 80.0)
-    # Independently measured: 2.15 to 2.29 % without rotating mass and resistance in the balance; with them a little more.
+    # Independently measured: 2.15 to 2.29 % without rotating mass and resistance in the balance; with them a little
+    # more.
     assert 0.0215 < slip[traction].min() <= slip[traction].max() < 0.0240
     assert -0.0240 < slip[braking].min() <= slip[braking].max() < -0.0200
-    outside = (profile_d["adhesion_degraded"] == 0.0) & (t > 2.0) & ~((t >= 20.0) & (t < 21.0)) & ~((t >= 80.0) & (t < 81.0))
+    outside = (
+        (profile_d["adhesion_degraded"] == 0.0) & (t > 2.0) & ~((t >= 20.0) & (t < 21.0)) & ~((t >= 80.0) & (t < 81.0))
+    )
     assert np.abs(slip[outside]).max() < 0.01
-    assert np.mean(np.abs(slip[t <= 85.0]) > 0.02) == pytest.approx(0.218, abs=0.02)  # independently measured: 21.8 % of the time
+    # independently measured: 21.8 % of the time
+    assert np.mean(np.abs(slip[t <= 85.0]) > 0.02) == pytest.approx(0.218, abs=0.02)
 
 
 def test_the_train_stops_at_the_end_and_stays_under_its_brake(profile_d: dict[str, np.ndarray]) -> None:

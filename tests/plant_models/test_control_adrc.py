@@ -53,7 +53,9 @@ def test_a_constant_gradient_leaves_no_error(disturbance: float) -> None:
     times = np.linspace(0.0, 40.0, 81)
     states = sampled(loop, times)
     # From the disturbance to the speed, by hand: s (s + wc + 2 wo) / ((s + wc) (s + wo)^2), zero at s = 0.
-    transfer = signal.TransferFunction([1.0, WC + 2.0 * WO, 0.0], np.polymul([1.0, WC], np.polymul([1.0, WO], [1.0, WO])))
+    transfer = signal.TransferFunction(
+        [1.0, WC + 2.0 * WO, 0.0], np.polymul([1.0, WC], np.polymul([1.0, WO], [1.0, WO]))
+    )
     _, response = signal.step(transfer, T=times)
     np.testing.assert_allclose(states[:, 3] - 10.0, disturbance * response, atol=1e-7)
     assert abs(states[-1, 3] - 10.0) < 1e-6
@@ -127,7 +129,8 @@ def test_air_takes_over_from_the_electric_brake_in_service_braking() -> None:
     assert controller.at(0.0)["effort"] == pytest.approx(-0.25 * force)
     controller.set(built_up_brake=force)
     assert controller.at(0.0)["effort"] == pytest.approx(0.0, abs=1e-6)
-    light = controller.at(0.0, acceleration_reference=-0.1)  # not service braking: electric alone, and the air is released
+    # not service braking: electric alone, and the air is released
+    light = controller.at(0.0, acceleration_reference=-0.1)
     assert light["brake_demand"] == 0.0
 
 

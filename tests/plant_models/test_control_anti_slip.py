@@ -26,7 +26,9 @@ def device(*speeds: float, effort: float = 100e3, **changes: float) -> Controlle
 
 
 @given(speeds=SPEEDS, effort=st.sampled_from([-80e3, 0.0, 80e3]))
-def test_the_reference_is_the_slowest_axle_in_traction_and_the_fastest_in_braking(speeds: list[float], effort: float) -> None:
+def test_the_reference_is_the_slowest_axle_in_traction_and_the_fastest_in_braking(
+    speeds: list[float], effort: float
+) -> None:
     out = device(*speeds, effort=effort).at(0.0)
     reference = max(speeds) if effort < 0.0 else min(speeds)
     assert out["reference_speed"] == reference
@@ -54,8 +56,16 @@ def restored(elapsed: float, cut: float, break_point: float, fast: float, slow: 
     fast=st.floats(0.1, 3.0),
     slow=st.floats(0.01, 0.5),
 )
-def test_the_effort_is_cut_and_restored_in_two_exact_slopes(cut: float, break_share: float, fast: float, slow: float) -> None:
-    changes = {"cut_share": cut, "break_share": break_share, "fast_restoring": fast, "slow_restoring": slow, "filter_time": 1e-4}
+def test_the_effort_is_cut_and_restored_in_two_exact_slopes(
+    cut: float, break_share: float, fast: float, slow: float
+) -> None:
+    changes = {
+        "cut_share": cut,
+        "break_share": break_share,
+        "fast_restoring": fast,
+        "slow_restoring": slow,
+        "filter_time": 1e-4,
+    }
     slipping = device(10.0, 10.0, 10.0, 11.0, **changes)
     out = slipping.at(0.0)
     assert out["effort"] == pytest.approx(cut * 100e3)
@@ -77,9 +87,13 @@ def test_a_second_slip_cuts_what_was_left_and_moves_the_break_point() -> None:
 
 
 @pytest.mark.parametrize("speed", [SAND_SPEED - 0.5, SAND_SPEED + 0.5])
-@pytest.mark.parametrize("deviation", [THRESHOLD - 0.05, THRESHOLD + 0.05, SAND_DEVIATION - 0.05, SAND_DEVIATION + 0.05])
+@pytest.mark.parametrize(
+    "deviation", [THRESHOLD - 0.05, THRESHOLD + 0.05, SAND_DEVIATION - 0.05, SAND_DEVIATION + 0.05]
+)
 @pytest.mark.parametrize("effort", [100e3, -100e3])
-def test_sand_is_requested_at_low_speed_in_slip_or_at_a_large_deviation(speed: float, deviation: float, effort: float) -> None:
+def test_sand_is_requested_at_low_speed_in_slip_or_at_a_large_deviation(
+    speed: float, deviation: float, effort: float
+) -> None:
     sign = 1.0 if effort > 0.0 else -1.0
     out = device(speed, speed, speed + sign * deviation, speed, effort=effort).at(0.0)
     expected = (speed < SAND_SPEED and deviation > THRESHOLD) or deviation > SAND_DEVIATION

@@ -27,7 +27,8 @@ MODES: list[tuple[int, float, dict[str, float], dict[str, float]]] = [
 def driven(mode: int, level: float, error: float, inputs: dict[str, float], changes: dict[str, float]) -> np.ndarray:
     """Tracking errors of a mass whose force is the controller's target, period by period."""
     names = {"odometer": 10.0, "speed": 10.0, "speed_reference": 10.0 + error, "adhesion_condition": level, **inputs}
-    # Under degraded adhesion the available effort must not be what limits here; an electric brake is left where there is no air.
+    # Under degraded adhesion the available effort must not be what limits here; an electric brake is left where there
+    # is no air.
     controller = Controller(MDPE, start={**names, "adhesion_force": 350e3}, **FREE, **changes)
     speed, reference, errors = 10.0, 10.0 + error, []
     rise = inputs.get("acceleration_reference", 0.0)
@@ -41,7 +42,9 @@ def driven(mode: int, level: float, error: float, inputs: dict[str, float], chan
     return np.array(errors)
 
 
-@pytest.mark.parametrize(("mode", "error", "inputs", "changes"), MODES, ids=["traction", "electric", "indirect", "combined"])
+@pytest.mark.parametrize(
+    ("mode", "error", "inputs", "changes"), MODES, ids=["traction", "electric", "indirect", "combined"]
+)
 @pytest.mark.parametrize("level", [1.0, 2.0])
 def test_the_error_dies_with_the_designed_double_pole(
     mode: int, level: float, error: float, inputs: dict[str, float], changes: dict[str, float]
@@ -50,7 +53,8 @@ def test_the_error_dies_with_the_designed_double_pole(
     # From e and a zero integral under (z - rho)^2: e_k = rho^k (e + c k) with e_1 = (2 rho - 1) e.
     k = np.arange(80)
     expected = rho**k * (error + error * (rho - 1.0) / rho * k)
-    # The first control instant switches mode or level and takes over a zero force there: its integral is not the free one.
+    # The first control instant switches mode or level and takes over a zero force there: its integral is not the free
+    # one.
     measured = driven(mode, level, error, inputs, changes)
     first = int(mode != 1 or level != 1.0)
     if first:
@@ -75,17 +79,24 @@ def test_an_unknown_constant_load_leaves_no_error(load: float) -> None:
 
 
 def test_a_known_slope_is_fed_forward_without_waiting_for_an_error() -> None:
-    controller = Controller(MDPE, start={"odometer": 10.0, "speed": 10.0, "speed_reference": 10.0, "slope": 0.008}, **FREE)
+    controller = Controller(
+        MDPE, start={"odometer": 10.0, "speed": 10.0, "speed_reference": 10.0, "slope": 0.008}, **FREE
+    )
     assert controller.at(0.0)["effort"] == pytest.approx(166e3 * 9.81 * 0.008)
     assert controller.at(5.0, disturbance_force=5e3)["effort"] == pytest.approx(166e3 * 9.81 * 0.008 + 5e3)
 
 
 @given(
-    error=st.floats(-3.0, 3.0), load=st.floats(0.0, 100e3), level=st.sampled_from([1.0, 2.0]), periods=st.integers(1, 40)
-)  # fmt: skip
+    error=st.floats(-3.0, 3.0),
+    load=st.floats(0.0, 100e3),
+    level=st.sampled_from([1.0, 2.0]),
+    periods=st.integers(1, 40),
+)
 def test_a_change_of_adhesion_level_moves_no_force(error: float, load: float, level: float, periods: int) -> None:
     told = {"odometer": 10.0, "speed": 10.0, "speed_reference": 10.0 + error, "disturbance_force": load}
-    controller = Controller(MDPE, start={**told, "adhesion_force": 400e3, "adhesion_condition": level}, recovery_time=0.0)
+    controller = Controller(
+        MDPE, start={**told, "adhesion_force": 400e3, "adhesion_condition": level}, recovery_time=0.0
+    )
     controller.at(periods * T)
     mode, before = controller.memory("held_mode"), controller.memory("target_force")
     controller.at((periods + 1) * T, adhesion_condition=3.0 - level)
@@ -163,7 +174,9 @@ def test_limits_and_rates_hold_whatever_comes_in(samples: list[dict[str, float]]
 
 
 @given(samples=st.lists(SAMPLE, min_size=2, max_size=10), other=st.floats(-400e3, 400e3))
-def test_the_demanded_change_of_force_stays_within_what_the_coupler_allows(samples: list[dict[str, float]], other: float) -> None:
+def test_the_demanded_change_of_force_stays_within_what_the_coupler_allows(
+    samples: list[dict[str, float]], other: float
+) -> None:
     steady = {"odometer": 10.0, "slip": 0.0, "adhesion_condition": 1.0, "coupler_force": other}
     controller = Controller(MDPE, start={**samples[0], **steady})
     previous = 0.0
@@ -200,14 +213,18 @@ def test_the_available_effort_follows_slip_and_recovers_at_its_rates() -> None:
 @pytest.mark.parametrize("slip", [0.05, -0.05, 0.1, -0.1])
 @pytest.mark.parametrize("error", [1.5, -1.5, 2.5, -2.5])
 def test_sand_is_requested_where_slip_and_error_are_beyond_their_limits(slip: float, error: float) -> None:
-    controller = Controller(MDPE, start={"odometer": 10.0, "speed": 10.0, "speed_reference": 10.0 + error, "slip": slip})
+    controller = Controller(
+        MDPE, start={"odometer": 10.0, "speed": 10.0, "speed_reference": 10.0 + error, "slip": slip}
+    )
     assert bool(controller.at(0.0)["sanding_request"]) is (abs(slip) > 0.072 and abs(error) > 2.0)
 
 
 @pytest.mark.parametrize(
     ("preset", "effort", "demand", "mode"), [("train", 0.0, 60e3 / 164e3, 3.0), ("single_mass", -60e3, 0.0, 2.0)]
 )
-def test_a_standing_train_is_held_until_the_reference_rises(preset: str, effort: float, demand: float, mode: float) -> None:
+def test_a_standing_train_is_held_until_the_reference_rises(
+    preset: str, effort: float, demand: float, mode: float
+) -> None:
     controller = Controller(MDPE, preset)
     out = controller.at(10.0)
     assert (out["effort"], out["brake_demand"], out["mode"]) == (pytest.approx(effort), pytest.approx(demand), mode)

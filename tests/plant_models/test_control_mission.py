@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 from plant_models.railway.control import Mission
 from plant_models.railway.control.trapezoid import Trapezoid
 
-JOURNEYS = st.builds(Trapezoid, st.floats(1.0, 40.0), st.floats(0.05, 1.5), st.floats(0.05, 1.5), st.floats(5.0, 5000.0))
+JOURNEYS = st.builds(
+    Trapezoid, st.floats(1.0, 40.0), st.floats(0.05, 1.5), st.floats(0.05, 1.5), st.floats(5.0, 5000.0)
+)
 
 
 @given(journey=JOURNEYS)
@@ -29,26 +31,35 @@ def test_the_journey_covers_its_distance_at_no_more_than_its_top_speed(journey: 
 @given(journey=JOURNEYS, share=st.floats(0.0, 1.0))
 def test_position_is_the_integral_of_speed(journey: Trapezoid, share: float) -> None:
     end = sum(journey.durations)
-    grid = np.unique([*np.linspace(0.0, share * end, 2001), *[c for c in np.cumsum(journey.durations) if c < share * end]])
+    grid = np.unique(
+        [*np.linspace(0.0, share * end, 2001), *[c for c in np.cumsum(journey.durations) if c < share * end]]
+    )
     integral = np.trapezoid([float(journey.speed(t)) for t in grid], grid)
     assert float(journey.position(share * end)) == pytest.approx(integral, rel=1e-9, abs=1e-9)
 
 
 @pytest.mark.parametrize(
-    ("preset", "kmh", "acceleration"), [("sc1", 35.0, 0.35), ("sc2", 35.0, 0.5), ("sc3", 35.0, 0.5), ("sc4", 50.0, 0.35)]
+    ("preset", "kmh", "acceleration"),
+    [("sc1", 35.0, 0.35), ("sc2", 35.0, 0.5), ("sc3", 35.0, 0.5), ("sc4", 50.0, 0.35)],
 )
 def test_the_presets_are_the_published_missions(preset: str, kmh: float, acceleration: float) -> None:
     mission = Controller(Mission(), preset)
     top, up = kmh / 3.6, kmh / 3.6 / acceleration
     start = mission.at(1.0)
     assert (start["speed_reference"], start["acceleration_reference"], start["phase"]) == (
-        pytest.approx(acceleration), acceleration, 1.0,
-    )  # fmt: skip
+        pytest.approx(acceleration),
+        acceleration,
+        1.0,
+    )
     hold = mission.at(up + 1.0)
     assert (hold["speed_reference"], hold["acceleration_reference"], hold["phase"]) == (pytest.approx(top), 0.0, 2.0)
     end = 850.0 / top + 0.5 * top / acceleration + 0.5 * top / 0.4
     brake = mission.at(end - 2.0)
-    assert (brake["speed_reference"], brake["acceleration_reference"], brake["phase"]) == (pytest.approx(0.8), -0.4, 3.0)
+    assert (brake["speed_reference"], brake["acceleration_reference"], brake["phase"]) == (
+        pytest.approx(0.8),
+        -0.4,
+        3.0,
+    )
     stop = mission.at(end + 1.0)
     assert (stop["speed_reference"], stop["acceleration_reference"], stop["phase"]) == (0.0, 0.0, 4.0)
     assert stop["position_reference"] == pytest.approx(850.0)

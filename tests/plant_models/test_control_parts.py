@@ -25,7 +25,7 @@ NO_AIR = MdpeController().unpack_parameters(MdpeController().start_parameters("s
 @given(bandwidth=st.floats(0.01, 5.0), mass=st.floats(1e3, 1e7), period=st.floats(0.01, 1.0))
 def test_both_poles_of_a_mass_under_the_regulator_lie_where_they_were_placed(
     bandwidth: float, mass: float, period: float
-) -> None:  # fmt: skip
+) -> None:
     gains = pole_placement(bandwidth, mass, period)
     closed = np.array([[1.0 - period / mass * gains.proportional, -period / mass], [gains.integral, 1.0]])
     rho = np.exp(-bandwidth * period)
@@ -36,11 +36,11 @@ def test_both_poles_of_a_mass_under_the_regulator_lie_where_they_were_placed(
 @given(force=FORCES, feedforward=FORCES, error=st.floats(-10.0, 10.0), bandwidth=st.floats(0.01, 5.0))
 def test_an_inactive_regulator_would_ask_for_the_force_that_is_applied(
     force: float, feedforward: float, error: float, bandwidth: float
-) -> None:  # fmt: skip
+) -> None:
     gains = pole_placement(bandwidth, 166e3, 0.1)
-    assert wanted_force(gains, tracking_integral(gains, force, feedforward, error), feedforward, error) == pytest.approx(
-        force, abs=1e-3
-    )
+    assert wanted_force(
+        gains, tracking_integral(gains, force, feedforward, error), feedforward, error
+    ) == pytest.approx(force, abs=1e-3)
 
 
 def test_traction_is_limited_by_effort_and_power() -> None:
@@ -86,7 +86,9 @@ def test_air_builds_up_quickly_and_is_released_slowly() -> None:
 
 def test_the_headroom_of_a_coupler_falls_from_its_soft_limit_through_zero_at_the_limit() -> None:
     loads = [-50e3, 0.0, 150e3, 200e3, 250e3, 300e3, 500e3]
-    assert [coupler_headroom(load, 150e3, 250e3) for load in loads] == pytest.approx([1.0, 1.0, 1.0, 0.5, 0.0, -0.5, -1.0])
+    assert [coupler_headroom(load, 150e3, 250e3) for load in loads] == pytest.approx(
+        [1.0, 1.0, 1.0, 0.5, 0.0, -0.5, -1.0]
+    )
 
 
 @given(effort=FORCES, coupler=st.floats(-600e3, 600e3), wanted=st.one_of(st.just(0.0), FORCES))
@@ -111,9 +113,7 @@ def test_a_loaded_coupler_is_not_loaded_further(effort: float, coupler: float, w
 
 
 def available(before: float, force: float, sliding: float = 0.0, newly: float = 0.0) -> float:
-    return float(
-        next_available_effort(before, force, sliding, newly, 500.0, margin=0.85, floor=10e3, limit=350e3)
-    )  # fmt: skip
+    return float(next_available_effort(before, force, sliding, newly, 500.0, margin=0.85, floor=10e3, limit=350e3))
 
 
 def test_the_available_effort_is_cut_in_slip_and_probed_upwards() -> None:
@@ -128,9 +128,15 @@ def test_the_available_effort_is_cut_in_slip_and_probed_upwards() -> None:
 
 def situation(**changes: float) -> Situation:
     usual: dict[str, Any] = {
-        "mode": 1.0, "level": 1.0, "wanted": 0.0, "error": 0.0, "acceleration": 0.0, "speed": 10.0, "coupler_force": 0.0,
+        "mode": 1.0,
+        "level": 1.0,
+        "wanted": 0.0,
+        "error": 0.0,
+        "acceleration": 0.0,
+        "speed": 10.0,
+        "coupler_force": 0.0,
         "standing": 0.0,
-    }  # fmt: skip
+    }
     return Situation(**(usual | changes))
 
 
@@ -167,15 +173,26 @@ def test_the_switch_chooses_the_mode(now: dict[str, float], mode: float) -> None
 
 
 @given(
-    mode=st.sampled_from([1.0, 2.0, 3.0, 4.0]), wanted=FORCES, error=st.floats(-5.0, 5.0), acceleration=st.floats(-1.0, 1.0),
-    level=st.sampled_from([1.0, 2.0]), coupler=FORCES, speed=st.floats(0.0, 50.0),
-)  # fmt: skip
+    mode=st.sampled_from([1.0, 2.0, 3.0, 4.0]),
+    wanted=FORCES,
+    error=st.floats(-5.0, 5.0),
+    acceleration=st.floats(-1.0, 1.0),
+    level=st.sampled_from([1.0, 2.0]),
+    coupler=FORCES,
+    speed=st.floats(0.0, 50.0),
+)
 def test_the_switch_settles_at_once_and_never_asks_for_air_that_is_not_there(
     mode: float, wanted: float, error: float, acceleration: float, level: float, coupler: float, speed: float
 ) -> None:
     s = situation(
-        mode=mode, wanted=wanted, error=error, acceleration=acceleration, level=level, coupler_force=coupler, speed=speed
-    )  # fmt: skip
+        mode=mode,
+        wanted=wanted,
+        error=error,
+        acceleration=acceleration,
+        level=level,
+        coupler_force=coupler,
+        speed=speed,
+    )
     chosen = next_mode(s, P)
     assert next_mode(s._replace(mode=chosen), P) == chosen  # the same situation gives the same mode: no chatter
     assert float(next_mode(s, NO_AIR)) in {1.0, 2.0}

@@ -1,4 +1,6 @@
-"""The controllers on trains: missions driven to their stop, slippery rails with and without estimates, axles that slip."""
+"""The controllers on trains: missions driven to their stop, slippery rails with and without estimates, axles that
+slip.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,13 @@ from plant_models.railway.control import AdrcController, AntiSlipDevice, MdpeCon
 from plant_models.railway.vehicle.train import Train
 
 CONTROLLERS = {"adrc": AdrcController, "mdpe": MdpeController}
-SLIPPERY = {**NO_ZONES, "zone_from[1]": 20.0, "zone_to[1]": 250.0, "burckhardt_degraded_a1": 0.08, "burckhardt_degraded_a3": 0.05}
+SLIPPERY = {
+    **NO_ZONES,
+    "zone_from[1]": 20.0,
+    "zone_to[1]": 250.0,
+    "burckhardt_degraded_a1": 0.08,
+    "burckhardt_degraded_a3": 0.05,
+}
 
 
 @pytest.mark.parametrize(("controller", "preset"), [("mdpe", "sc1"), ("adrc", "sc2")])

@@ -28,7 +28,9 @@ def test_dry_friction_opposes_motion_and_holds_at_rest(speed: float, push: float
     assert runtime.derivatives().tolist() == pytest.approx([speed, expected], abs=1e-15)  # one rounding
 
 
-@pytest.mark.parametrize(("speed", "push", "expected"), [(1.5, 0.2, 1.5), (-1.5, 9.0, 1.5), (0.0, 0.4, 0.1), (0.0, -0.9, -0.4)])
+@pytest.mark.parametrize(
+    ("speed", "push", "expected"), [(1.5, 0.2, 1.5), (-1.5, 9.0, 1.5), (0.0, 0.4, 0.1), (0.0, -0.9, -0.4)]
+)
 def test_the_indicator_is_the_way_to_the_next_change(speed: float, push: float, expected: float) -> None:
     runtime = Runtime(Slider())
     runtime.x[:], runtime.u[0] = (0.0, speed), push

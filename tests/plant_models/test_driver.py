@@ -31,7 +31,8 @@ def test_the_profiles_cover_the_distances_they_claim() -> None:
     for preset, distance in (("profile_d", 65.0 * KMH_50), ("profile_b", 3000.0)):
         p = DRIVER.unpack_parameters(DRIVER.start_parameters(preset))
         reference = [
-            float(DRIVER.output(s, np.zeros(2), DRIVER.unpack_inputs(np.zeros(1)), p)["speed_reference"]) for s in t[::100]
+            float(DRIVER.output(s, np.zeros(2), DRIVER.unpack_inputs(np.zeros(1)), p)["speed_reference"])
+            for s in t[::100]
         ]
         assert np.trapezoid(reference, t[::100]) == pytest.approx(distance, rel=1e-9)  # corners lie on the grid
 
@@ -61,7 +62,8 @@ def test_the_controller_is_the_printed_pi_between_the_limits() -> None:
     runtime.start(30.0)
     runtime.u[0] = KMH_50 - 0.02  # 14.4 kN proportional
     runtime.advance(32.0)
-    assert outputs(runtime)["effort"] == pytest.approx(7.2e5 * 0.02 + 4.5e5 * 0.02 * 2.0, rel=1e-2)  # the lag's 10 ms of ramp
+    # the lag's 10 ms of ramp
+    assert outputs(runtime)["effort"] == pytest.approx(7.2e5 * 0.02 + 4.5e5 * 0.02 * 2.0, rel=1e-2)
     assert runtime.x[0] == pytest.approx(4.5e5 * 0.02 * 2.0, rel=1e-9)
 
 
@@ -70,7 +72,8 @@ def test_the_effort_follows_the_demand_with_the_lag_of_the_traction_chain() -> N
     runtime.start(30.0)
     runtime.u[0] = KMH_50 - 0.1
     runtime.advance(30.3)
-    assert outputs(runtime)["effort"] == pytest.approx(72e3 * (1.0 - np.exp(-0.3 / 0.2)), rel=1e-6)  # RK4 at a 20th of the lag
+    # RK4 at a 20th of the lag
+    assert outputs(runtime)["effort"] == pytest.approx(72e3 * (1.0 - np.exp(-0.3 / 0.2)), rel=1e-6)
 
 
 def test_a_minute_in_the_limit_does_not_wind_the_integral_up() -> None:

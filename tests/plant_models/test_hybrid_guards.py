@@ -37,7 +37,9 @@ def _system(**attributes: Any) -> HybridSystem:
 
 @pytest.mark.parametrize("name", ["balise_time", "balise_count"])
 def test_a_payload_cannot_take_the_name_of_the_count_or_the_stamp(name: str) -> None:
-    with pytest.raises(ValueError, match=f"Payload '{name}' of event 'balise' takes a name that every event has itself"):
+    with pytest.raises(
+        ValueError, match=f"Payload '{name}' of event 'balise' takes a name that every event has itself"
+    ):
         TriggeredEvent("balise", (_payload(name),))
 
 
@@ -162,7 +164,8 @@ def test_payload_is_read_at_its_event_only(reads: str, function: str) -> None:
     TracedKernel(_Reader("tell"))
 
 
-# -- time ---------------------------------------------------------------------------------------------------------------
+# -- time
+# ---------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -182,7 +185,9 @@ def test_time_does_not_start_with_illegal_parameters(name: str, value: float, ex
     runtime = Runtime(system)
     position = 2 + ["period", "offset", "internal_step", "seed"].index(name)  # behind a vector of two
     runtime.p[position] = value
-    with pytest.raises(ValueError, match=f"clockwork: time cannot run with parameter {name} = {value!r}; expected {expected}"):
+    with pytest.raises(
+        ValueError, match=f"clockwork: time cannot run with parameter {name} = {value!r}; expected {expected}"
+    ):
         runtime.start(0.0)
 
 

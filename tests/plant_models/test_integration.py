@@ -38,7 +38,8 @@ def test_the_implicit_step_follows_a_stiff_equation_at_steps_ten_thousand_times_
 def test_the_implicit_step_forgets_a_wrong_start_at_once() -> None:
     runtime = started(Stiff(), x0=[5.0])
     runtime.advance(0.02)
-    assert runtime.x[0] == pytest.approx(np.cos(0.02), abs=1e-3)  # L-stability: the first step removes all but h-small parts
+    # L-stability: the first step removes all but h-small parts
+    assert runtime.x[0] == pytest.approx(np.cos(0.02), abs=1e-3)
 
 
 @pytest.mark.parametrize("system", [Slider(), ImplicitSlider()])

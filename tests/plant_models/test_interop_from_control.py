@@ -20,9 +20,15 @@ from plant_models.interop import from_nonlinear_io, from_state_space, to_nonline
 
 RADIUS = 0.575
 LAG = control.ss(
-    [[-1.0, 2.0], [0.0, -3.0]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.25]],
-    name="lag", states=["slow", "fast"], inputs=["drive"], outputs=["level"],
-)  # fmt: skip
+    [[-1.0, 2.0], [0.0, -3.0]],
+    [[0.0], [1.0]],
+    [[1.0, 0.0]],
+    [[0.25]],
+    name="lag",
+    states=["slow", "fast"],
+    inputs=["drive"],
+    outputs=["level"],
+)
 
 
 def pendulum(_t: Any, x: Any, u: Any, params: Mapping[str, Any]) -> Any:
@@ -35,9 +41,14 @@ def array_pendulum(_t: Any, x: Any, u: Any, params: Mapping[str, Any]) -> Any:
 
 def make_pendulum(update: Any = pendulum) -> Any:
     return control.NonlinearIOSystem(
-        update, lambda _t, x, _u, _params: [x[0]], name="pendulum",
-        states=["angle", "rate"], inputs=["torque"], outputs=["angle"], params={"stiffness": 9.81, "label": "left"},
-    )  # fmt: skip
+        update,
+        lambda _t, x, _u, _params: [x[0]],
+        name="pendulum",
+        states=["angle", "rate"],
+        inputs=["torque"],
+        outputs=["angle"],
+        params={"stiffness": 9.81, "label": "left"},
+    )
 
 
 def run(system: HybridSystem, until: float, u0: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -85,7 +96,11 @@ def test_a_hybrid_system_there_and_back_runs_the_same(
 
 def test_a_linear_system_follows_the_matrix_exponential() -> None:
     system = from_state_space(LAG, {"slow": 2.0}, units={"drive": "N", "slow": "m"})
-    assert [(s.name, s.unit) for s in (*system.states, *system.inputs)] == [("slow", "m"), ("fast", "1"), ("drive", "N")]
+    assert [(s.name, s.unit) for s in (*system.states, *system.inputs)] == [
+        ("slow", "m"),
+        ("fast", "1"),
+        ("drive", "N"),
+    ]
     x, y = run(system, 1.5, u0=2.0)
     steady = -np.linalg.solve(LAG.A, LAG.B[:, 0] * 2.0)
     expected = steady + expm(LAG.A * 1.5) @ ([2.0, 0.0] - steady)
@@ -104,7 +119,10 @@ def test_a_gain_without_states_is_accepted() -> None:
 
 
 def test_nonlinear_functions_are_traced_where_they_can_be() -> None:
-    traced, plain = from_nonlinear_io(make_pendulum(), [1.0, 0.0]), from_nonlinear_io(make_pendulum(array_pendulum), [1.0, 0.0])
+    traced, plain = (
+        from_nonlinear_io(make_pendulum(), [1.0, 0.0]),
+        from_nonlinear_io(make_pendulum(array_pendulum), [1.0, 0.0]),
+    )
     assert (traced.traceable, plain.traceable) == (True, False)
     np.testing.assert_allclose(run(traced, 1.0, 0.5)[0], run(plain, 1.0, 0.5)[0], rtol=1e-12)
     times = np.linspace(0.0, 1.0, 11)
@@ -120,16 +138,23 @@ def test_numbers_in_params_become_parameters() -> None:
     soft = started(system, x0=[0.1, 0.0], stiffness=0.0)
     soft.advance(1.0)
     assert soft.x[0] == 0.1
-    assert [s.name for s in (*system.states, *system.outputs)] == ["angle_state", "rate", "angle"]  # the output came first
+    # the output came first
+    assert [s.name for s in (*system.states, *system.outputs)] == ["angle_state", "rate", "angle"]
 
 
 def test_an_interconnected_system_runs_as_python() -> None:
     spring = control.ss([], [], [], [[-4.0]], inputs=["place"], outputs=["force"], name="spring")
-    mass = control.ss([[0, 1], [0, 0]], [[0], [1]], [[1, 0]], 0, inputs=["force"], outputs=["place"], name="mass", states=2)
+    mass = control.ss(
+        [[0, 1], [0, 0]], [[0], [1]], [[1, 0]], 0, inputs=["force"], outputs=["place"], name="mass", states=2
+    )
     nonlinear = control.NonlinearIOSystem(
-        lambda _t, x, u, _params: mass.A @ x + mass.B @ u, lambda _t, x, _u, _params: x[:1],
-        states=["p", "v"], inputs=["force"], outputs=["place"], name="body",
-    )  # fmt: skip
+        lambda _t, x, u, _params: mass.A @ x + mass.B @ u,
+        lambda _t, x, _u, _params: x[:1],
+        states=["p", "v"],
+        inputs=["force"],
+        outputs=["place"],
+        name="body",
+    )
     system = from_nonlinear_io(control.interconnect([nonlinear, spring], outputs=["place"]), [1.0, 0.0])
     assert not system.traceable
     assert run(system, 1.0)[1][0] == pytest.approx(np.cos(2.0), abs=1e-9)
@@ -145,9 +170,14 @@ def test_a_discrete_system_steps_as_python_control_does(nonlinear: bool) -> None
     times = 0.25 * np.arange(9)
     if nonlinear:
         source = control.NonlinearIOSystem(
-            lambda _t, x, u, _params: linear.A @ x + linear.B @ u, lambda _t, x, u, _params: linear.C @ x + linear.D @ u,
-            states=2, inputs=1, outputs=1, dt=0.25, name="filter",
-        )  # fmt: skip
+            lambda _t, x, u, _params: linear.A @ x + linear.B @ u,
+            lambda _t, x, u, _params: linear.C @ x + linear.D @ u,
+            states=2,
+            inputs=1,
+            outputs=1,
+            dt=0.25,
+            name="filter",
+        )
         system = from_nonlinear_io(source, [1.0, -1.0])
     else:
         system = from_state_space(linear, [1.0, -1.0])
@@ -182,15 +212,26 @@ def test_names_become_legal_and_unique() -> None:
     )
     assert [s.name for s in (*system.states, *system.inputs, *system.outputs)] == ["v_1st", "v_lambda", "y_0"]
     assert system.name == "a_b"
-    same = from_state_space(control.ss([[-1.0]], [[1.0]], [[1.0]], 0, inputs=["v"], states=["v"], outputs=["v"], name="v"))
+    same = from_state_space(
+        control.ss([[-1.0]], [[1.0]], [[1.0]], 0, inputs=["v"], states=["v"], outputs=["v"], name="v")
+    )
     assert [s.name for s in (*same.inputs, *same.outputs, *same.states)] == ["v", "v_output", "v_state"]
     clash = from_nonlinear_io(
         control.NonlinearIOSystem(
-            lambda _t, x, _u, params: vector(-params["seed"] * x[0]), None, states=["time"], outputs=["time"], inputs=[],
-            params={"seed": 2.0}, name="reserved",
+            lambda _t, x, _u, params: vector(-params["seed"] * x[0]),
+            None,
+            states=["time"],
+            outputs=["time"],
+            inputs=[],
+            params={"seed": 2.0},
+            name="reserved",
         )
-    )  # fmt: skip
-    assert [s.name for s in (*clash.outputs, *clash.states, *clash.parameters)] == ["time_output", "time_state", "seed_parameter"]
+    )
+    assert [s.name for s in (*clash.outputs, *clash.states, *clash.parameters)] == [
+        "time_output",
+        "time_state",
+        "seed_parameter",
+    ]
     assert run(clash, 1.0)[1][0] == 0.0
 
 

@@ -14,7 +14,16 @@ from toy_systems import Clockwork, Hyperbola, Slider
 
 from fmu_observer.observers.parameter_values import parameter_values
 from plant_models import Locomotive, Odometer
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, state, vector
+from plant_models.hybrid import (
+    HybridSystem,
+    PeriodicEvent,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+    state,
+    vector,
+)
 from plant_models.interop import OperatingPointError, left_out, operating_point, to_nonlinear_io, to_state_space
 from plant_models.railway.adhesion import BURCKHARDT_NOMINAL
 
@@ -133,7 +142,8 @@ def test_the_response_of_python_control_is_that_of_our_runtime() -> None:
     for t in times:
         runtime.advance(float(t))
         rows.append(runtime.update_outputs().copy())
-    np.testing.assert_allclose(response.outputs, np.transpose(rows), rtol=1e-8, atol=1e-8)  # the solver's 1e-10 over 5 s
+    # the solver's 1e-10 over 5 s
+    np.testing.assert_allclose(response.outputs, np.transpose(rows), rtol=1e-8, atol=1e-8)
 
 
 def test_a_locomotive_in_python_control_runs_as_in_our_runtime() -> None:
@@ -145,12 +155,15 @@ def test_a_locomotive_in_python_control_runs_as_in_our_runtime() -> None:
     runtime = started(TRAIN, "chapter_3", x0=start, u0=[effort], **NO_ZONES)
     runtime.advance(4.0)
     found = dict(zip(system.output_labels, response.outputs[:, -1], strict=True))
-    assert found["position"] == pytest.approx(runtime.x[0], abs=1e-5)  # test_locomotive_accuracy: 1e-7 m, 1e-9 m/s, and Radau
+    # test_locomotive_accuracy: 1e-7 m, 1e-9 m/s, and Radau
+    assert found["position"] == pytest.approx(runtime.x[0], abs=1e-5)
     assert found["speed"] == pytest.approx(runtime.x[1], abs=1e-5)
 
 
 def test_time_and_held_memory_enter() -> None:
-    response = control.input_output_response(to_nonlinear_io(Hyperbola()), [0.0, 1.0, 2.0], 0.0, [1.0], solve_ivp_kwargs=TIGHT)
+    response = control.input_output_response(
+        to_nonlinear_io(Hyperbola()), [0.0, 1.0, 2.0], 0.0, [1.0], solve_ivp_kwargs=TIGHT
+    )
     np.testing.assert_allclose(response.outputs[0], [1.0, 0.5, 0.2], rtol=1e-8)
     clock = to_nonlinear_io(Clockwork(), memory={"sample": 4.5})
     assert clock.output(0.0, [0.0, 0.0], [0.0])[clock.output_labels.index("last")] == 4.5
@@ -178,7 +191,9 @@ def test_a_system_without_anything_continuous_is_refused() -> None:
     for convert in (to_nonlinear_io, to_state_space):
         with pytest.raises(ValueError, match=r"counter: nothing in it is continuous.*periodic 'tick'.*Runtime"):
             convert(Counter())
-    with pytest.raises(ValueError, match=r"hyperbola: it has no inputs, and a StateSpace needs some; .*to_nonlinear_io"):
+    with pytest.raises(
+        ValueError, match=r"hyperbola: it has no inputs, and a StateSpace needs some; .*to_nonlinear_io"
+    ):
         to_state_space(Hyperbola())
 
 
@@ -217,14 +232,20 @@ def test_as_many_unknowns_as_equations_are_asked_for() -> None:
 def test_a_train_that_nothing_drives_has_no_equilibrium_at_speed() -> None:
     with pytest.raises(OperatingPointError, match=r"locomotive: no operating point .*d train_speed/dt is off by"):
         operating_point(
-            TRAIN, {"train_speed": 10.0, "wheel_rate": 10.0 / RADIUS}, parameters={"gradient[1]": 0.9},
-            hold=("train_position", "train_speed"), drift=("train_position",), find=("effort",),
-        )  # fmt: skip
+            TRAIN,
+            {"train_speed": 10.0, "wheel_rate": 10.0 / RADIUS},
+            parameters={"gradient[1]": 0.9},
+            hold=("train_position", "train_speed"),
+            drift=("train_position",),
+            find=("effort",),
+        )
 
 
 @pytest.mark.parametrize("t", [5.0, 15.0])
 def test_a_plant_with_switchings_is_linearised_on_the_side_where_it_is(t: float) -> None:
-    """At 15 s the rail is degraded (a zone from 10 to 20 s): the slope of the adhesion is that of central differences there."""
+    """At 15 s the rail is degraded (a zone from 10 to 20 s): the slope of the adhesion is that of central differences
+    there.
+    """
     train, zones = Locomotive(), {"zone_from[1]": 10.0, "zone_to[1]": 20.0}
     x = np.array([0.0, 10.0, 10.05])
     A = to_state_space(train, x, parameters=zones, t=t).A

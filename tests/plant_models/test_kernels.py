@@ -64,9 +64,11 @@ def test_a_batch_is_its_members(system: HybridSystem) -> None:
     u = np.stack([_inputs_in_use(system, rng) for _ in range(members)], axis=1)
     p = np.stack([system.start_parameters() * f for f in np.linspace(1.0, 1.2, members)], axis=1)
     functions = {
-        "flow": system.state_derivative, "output": system.output_vector, "friction": system.friction_vector,
+        "flow": system.state_derivative,
+        "output": system.output_vector,
+        "friction": system.friction_vector,
         **{e.name: lambda t, x, u, p, e=e: system.jump_vector(e.name, t, x, u, p) for e in system.events},
-    }  # fmt: skip
+    }
     if not system.frictions:
         del functions["friction"]
     if system.method == "rk4":

@@ -27,9 +27,13 @@ PEAK = {0.0: BURCKHARDT_NOMINAL.peak(), 1.0: BURCKHARDT_DEGRADED.peak()}
 
 @pytest.mark.parametrize("speed", [1.0, 13.9, 50.0])
 def test_the_wheels_time_constant_is_4_6e_minus_5_seconds_per_speed(speed: float) -> None:
-    jacobian = np.asarray(TracedSystem(TRAIN).jacobian("flow", "x")(0.0, rolling(speed), [0.0], parameters(TRAIN, **NO_ZONES)))
+    jacobian = np.asarray(
+        TracedSystem(TRAIN).jacobian("flow", "x")(0.0, rolling(speed), [0.0], parameters(TRAIN, **NO_ZONES))
+    )
     assert -1.0 / jacobian[2, 2] / speed == pytest.approx(4.6e-5, abs=5e-7)  # independently measured, two digits
-    assert -1.0 / jacobian[2, 2] == pytest.approx(ROTATING * speed / (WEIGHT * BURCKHARDT_NOMINAL.initial_slope()), rel=1e-12)
+    assert -1.0 / jacobian[2, 2] == pytest.approx(
+        ROTATING * speed / (WEIGHT * BURCKHARDT_NOMINAL.initial_slope()), rel=1e-12
+    )
 
 
 def test_a_train_under_constant_force_accelerates_at_the_closed_form_rate() -> None:
@@ -78,7 +82,9 @@ def test_work_is_kinetic_energy_and_losses(name: str, effort: float) -> None:
         rows.append(outputs(runtime))
     y = {key: np.array([row[key] for row in rows]) for key in rows[0]}
     kinetic = 0.5 * MASS * y["speed"] ** 2 + 0.5 * ROTATING * y["wheel_speed"] ** 2
-    loss = (y["resistance_force"] + y["gradient_force"]) * y["speed"] + y["adhesion_force"] * (y["wheel_speed"] - y["speed"])
+    loss = (y["resistance_force"] + y["gradient_force"]) * y["speed"] + y["adhesion_force"] * (
+        y["wheel_speed"] - y["speed"]
+    )
     balance = np.trapezoid(effort * y["wheel_speed"] - loss, times) - (kinetic[-1] - kinetic[0])
     # Trapezoids of 1 ms resolve the millisecond transients at start and zone edges to some tens of joules.
     assert abs(balance) < 1e-5 * kinetic[0]
@@ -119,9 +125,10 @@ def test_the_slip_is_that_of_3_13_above_the_floor_and_guarded_below() -> None:
     assert outputs(runtime)["slip"] == pytest.approx(0.1 / 0.5, rel=1e-12)
 
 
-# Below the slip floor the creep curve saturates within 0.05 m/s while the brake moves the wheel by 0.07 m/s in an internal step:
-# a linearly implicit step may throw the wheel across the curve once and nudge the train. Over a grid of 420 speeds and brakes
-# the worst nudge was 4.0e-4 m/s; a real push of even 1 kN over the 10 ms of a row would be 1.1e-4 m/s at every row.
+# Below the slip floor the creep curve saturates within 0.05 m/s while the brake moves the wheel by 0.07 m/s in an
+# internal step: a linearly implicit step may throw the wheel across the curve once and nudge the train. Over a grid of
+# 420 speeds and brakes the worst nudge was 4.0e-4 m/s; a real push of even 1 kN over the 10 ms of a row would be 1.1e-4
+# m/s at every row.
 CREEP_OVERSHOOT = 5e-4  # [m/s]
 
 
@@ -129,7 +136,9 @@ CREEP_OVERSHOOT = 5e-4  # [m/s]
 
 
 @settings(max_examples=25)
-@given(name=st.sampled_from(list(TRAINS)), speed=st.floats(0.0, 15.0), brake=st.floats(0.0, 350e3), degraded=st.booleans())
+@given(
+    name=st.sampled_from(list(TRAINS)), speed=st.floats(0.0, 15.0), brake=st.floats(0.0, 350e3), degraded=st.booleans()
+)
 def test_a_brake_never_turns_the_wheel_backwards_nor_pushes_the_train(
     name: str, speed: float, brake: float, degraded: bool
 ) -> None:
@@ -146,7 +155,12 @@ def test_a_brake_never_turns_the_wheel_backwards_nor_pushes_the_train(
 
 
 @settings(max_examples=40)
-@given(name=st.sampled_from(list(TRAINS)), brake=st.floats(0.0, 350e3), part=st.floats(-0.999, 0.999), degraded=st.booleans())
+@given(
+    name=st.sampled_from(list(TRAINS)),
+    brake=st.floats(0.0, 350e3),
+    part=st.floats(-0.999, 0.999),
+    degraded=st.booleans(),
+)
 def test_a_standing_train_stays_exactly_where_brake_and_resistance_can_hold_it(
     name: str, brake: float, part: float, degraded: bool
 ) -> None:
@@ -205,11 +219,18 @@ def test_a_wheel_that_spins_from_standstill_stays_finite_and_the_rail_gives_no_m
 
 
 @settings(max_examples=20)
-@given(name=st.sampled_from(list(TRAINS)), speed=st.floats(-5.0, 5.0), gradient=st.floats(-0.03, 0.03), brake=st.floats(0.0, 5e4))
+@given(
+    name=st.sampled_from(list(TRAINS)),
+    speed=st.floats(-5.0, 5.0),
+    gradient=st.floats(-0.03, 0.03),
+    brake=st.floats(0.0, 5e4),
+)
 def test_the_train_is_the_same_in_the_mirror(name: str, speed: float, gradient: float, brake: float) -> None:
     runs = []
     for sign in (1.0, -1.0):
-        runtime = started(TRAINS[name], x0=sign * np.array(rolling(speed)), **NO_ZONES, **{"gradient[1]": sign * gradient})
+        runtime = started(
+            TRAINS[name], x0=sign * np.array(rolling(speed)), **NO_ZONES, **{"gradient[1]": sign * gradient}
+        )
         runtime.u[0] = -brake  # coasting or braked: both act against the motion, whichever way it goes
         runs.append(sign * sampled(runtime, TIMES[:100]))
     np.testing.assert_allclose(runs[0], runs[1], rtol=1e-12, atol=1e-12)
@@ -222,7 +243,8 @@ def test_a_train_without_brake_rolls_back_through_standstill() -> None:
     up, down = (pull + 900.0) / (MASS + ROTATING), (pull - 900.0) / (MASS + ROTATING)
     top = 0.5 / up
     assert rows[:, 0].max() == pytest.approx(0.5 * 0.5**2 / up, abs=1e-4)
-    assert rows[-1, 1] == pytest.approx(-down * (19.99 - top), rel=1e-4)  # creep: slip times the wheel's share of the mass
+    # creep: slip times the wheel's share of the mass
+    assert rows[-1, 1] == pytest.approx(-down * (19.99 - top), rel=1e-4)
 
 
 def test_a_locked_wheel_slides_on_the_friction_of_full_slip_and_recovers_when_released() -> None:
@@ -257,7 +279,13 @@ def test_presets_hold_the_printed_numbers() -> None:
         p = TRAIN.unpack_parameters(TRAIN.start_parameters(preset))
         return float(getattr(p, name))
 
-    assert [value("chapter_3", n) for n in ("mass", "davis_a", "davis_b", "davis_c", "n_axles")] == [90e3, 900.0, 32.0, 1.7, 1.0]
+    assert [value("chapter_3", n) for n in ("mass", "davis_a", "davis_b", "davis_c", "n_axles")] == [
+        90e3,
+        900.0,
+        32.0,
+        1.7,
+        1.0,
+    ]
     assert value("chapter_3_four_axles", "n_axles") == 4.0
     assert [value("table_4_1", n) for n in ("mass", "davis_b", "davis_c")] == [166e3, 32.4, 1.6529]
     peak = BURCKHARDT_NOMINAL.peak()

@@ -1,7 +1,7 @@
 """The locomotive's internal step against SciPy's Radau at 1e-10 on the same equations.
 
-The bounds are two to four times what was measured at a step of 1 ms, twice the default, on the worse of the two curves; they fail
-when the integrator loses its order.
+The bounds are two to four times what was measured at a step of 1 ms, twice the default, on the worse of the two curves;
+they fail when the integrator loses its order.
 """
 
 from __future__ import annotations
@@ -54,7 +54,9 @@ def _errors(train: Locomotive, run: str, internal_step: float) -> np.ndarray:
 
 def _cut(phases: list[tuple[float, float]], changes: dict[str, float]) -> list[tuple[float, float]]:
     """The phases, cut at the edges of the zones too, so that the reference never steps over one."""
-    edges = {t for name, t in changes.items() if name.startswith("zone") and 0.0 < t < phases[-1][0]} | {end for end, _ in phases}
+    edges = {t for name, t in changes.items() if name.startswith("zone") and 0.0 < t < phases[-1][0]} | {
+        end for end, _ in phases
+    }
     return [(edge, next(effort for end, effort in phases if edge <= end)) for edge in sorted(edges)]
 
 

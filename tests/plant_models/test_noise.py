@@ -46,7 +46,10 @@ def test_normal_numbers_are_standard_normal_and_uncorrelated() -> None:
 
 def test_seeds_and_signals_give_independent_streams() -> None:
     streams = np.array(
-        [[standard_normal(seed, signal, i) for i in range(4000)] for seed, signal in ((0, 0), (1, 0), (0, 1), (2**40, 0))]
+        [
+            [standard_normal(seed, signal, i) for i in range(4000)]
+            for seed, signal in ((0, 0), (1, 0), (0, 1), (2**40, 0))
+        ]
     )
     correlation = np.corrcoef(streams) - np.eye(len(streams))
     assert np.abs(correlation).max() < 4.5 / np.sqrt(4000)  # six pairs: a little more than four standard errors

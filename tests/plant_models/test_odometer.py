@@ -80,7 +80,9 @@ def test_the_noise_is_the_declared_one_and_comes_from_the_seed() -> None:
         return np.array(values)
 
     first = readings(5.0)
-    np.testing.assert_allclose(first, 10.0 + 0.05 * np.array([standard_normal(5, 0, k) for k in range(2000)]), rtol=1e-14)
+    np.testing.assert_allclose(
+        first, 10.0 + 0.05 * np.array([standard_normal(5, 0, k) for k in range(2000)]), rtol=1e-14
+    )
     np.testing.assert_array_equal(first, readings(5.0))
     assert np.abs(first - readings(6.0)).max() > 0.05
     assert first.std() == pytest.approx(0.05, rel=4.0 / np.sqrt(2.0 * 2000))  # four standard errors

@@ -60,10 +60,30 @@ def test_the_names_shared_with_the_observers_are_there() -> None:
     locomotive, odometer, driver = (PLANTS[n]() for n in ("locomotive", "odometer", "driver"))
     assert [s.name for s in locomotive.inputs] == ["effort"]
     assert [s.name for s in locomotive.outputs] == [
-        "position", "speed", "acceleration", "wheel_speed", "slip",
-        "adhesion_force", "resistance_force", "gradient_force", "adhesion_degraded",
-    ]  # fmt: skip
-    shared = {"mass", "wheel_inertia", "n_axles", "wheel_radius", "gravity", "davis_a", "davis_b", "davis_c", "slip_floor"}
+        "position",
+        "speed",
+        "acceleration",
+        "wheel_speed",
+        "slip",
+        "adhesion_force",
+        "resistance_force",
+        "gradient_force",
+        "adhesion_degraded",
+    ]
+    shared = {
+        "mass",
+        "wheel_inertia",
+        "n_axles",
+        "wheel_radius",
+        "gravity",
+        "davis_a",
+        "davis_b",
+        "davis_c",
+        "slip_floor",
+    }
     assert shared <= {s.name for s in locomotive.parameters}
     assert ([s.name for s in odometer.inputs], odometer.outputs[0].name) == (["wheel_speed"], "reading")
-    assert ([s.name for s in driver.inputs], [s.name for s in driver.outputs]) == (["odometer"], ["effort", "speed_reference"])
+    assert ([s.name for s in driver.inputs], [s.name for s in driver.outputs]) == (
+        ["odometer"],
+        ["effort", "speed_reference"],
+    )

@@ -57,7 +57,8 @@ POINTS = st.composite(_points)()
 
 @given(points=POINTS, at=st.floats(-20.0, 350.0))
 def test_a_broken_line_is_numpys_interpolation(points: tuple[np.ndarray, np.ndarray], at: float) -> None:
-    assert piecewise_linear(at, *points) == pytest.approx(np.interp(at, *points), abs=1e-11)  # slope up to 100, x to 300
+    # slope up to 100, x to 300
+    assert piecewise_linear(at, *points) == pytest.approx(np.interp(at, *points), abs=1e-11)
 
 
 def test_padded_points_and_jumps_of_a_broken_line() -> None:
@@ -80,7 +81,9 @@ def test_a_track_lies_along_time_or_position() -> None:
         names = [n for s in train.parameter_signals for n in s.scalar_names]
         p[names.index("zone_from[1]")], p[names.index("zone_to[1]")] = 10.0, 20.0
         x = np.array([[5.0, 15.0], [3.0, 3.0], [5.0, 5.0]])
-        degraded = train.output(12.0, x, train.unpack_inputs(np.zeros((1, 2))), train.unpack_parameters(p))["adhesion_degraded"]
+        degraded = train.output(12.0, x, train.unpack_inputs(np.zeros((1, 2))), train.unpack_parameters(p))[
+            "adhesion_degraded"
+        ]
         assert list(degraded) == expected
 
 
@@ -92,7 +95,9 @@ def test_the_gradient_between_two_points(shape: str, middle: float) -> None:
         gradient_position = np.array([100.0, 300.0])
         gradient = np.array([0.002, 0.008])
 
-    assert [float(track.gradient(s, Values)) for s in (0.0, 200.0, 300.0, 900.0)] == pytest.approx([0.002, middle, 0.008, 0.008])
+    assert [float(track.gradient(s, Values)) for s in (0.0, 200.0, 300.0, 900.0)] == pytest.approx(
+        [0.002, middle, 0.008, 0.008]
+    )
 
 
 def test_setting_the_first_gradient_alone_tilts_the_whole_track() -> None:

@@ -70,7 +70,9 @@ def test_the_value_sampled_is_the_state_at_the_instant() -> None:
 @given(
     before=st.floats(0.0, 0.5), piece=st.floats(0.001, 0.4), impulse=st.floats(-2.0, 2.0), which=st.sampled_from([0, 1])
 )  # any time, on the grid or off it
-def test_what_follows_a_restore_is_what_followed_the_snapshot(before: float, piece: float, impulse: float, which: int) -> None:
+def test_what_follows_a_restore_is_what_followed_the_snapshot(
+    before: float, piece: float, impulse: float, which: int
+) -> None:
     runtime = started(SYSTEMS[which])
     runtime.advance(before)
     saved = runtime.snapshot()
@@ -145,7 +147,9 @@ def test_advancing_to_now_does_nothing(system: HybridSystem) -> None:
 
 @pytest.mark.parametrize("towards", [-np.inf, np.inf])
 def test_a_target_that_misses_a_grid_point_by_rounding_is_the_grid_point(towards: float) -> None:
-    """After a stop inside a cell: a master that adds up times arrives one unit in the last place beside the boundary."""
+    """After a stop inside a cell: a master that adds up times arrives one unit in the last place beside the
+    boundary.
+    """
 
     def run(end: float) -> np.ndarray:
         runtime = started(Locomotive(), x0=rolling(8.0), internal_step=0.0077)

@@ -1,4 +1,6 @@
-"""A wheel that slides at low speed finds its adhesion again as soon as the equations say, whatever the internal step."""
+"""A wheel that slides at low speed finds its adhesion again as soon as the equations say, whatever the internal
+step.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +53,9 @@ def test_a_sliding_wheel_settles_where_radau_says(speed: float, slip: float, eff
 
 @pytest.mark.parametrize("effort", [2e4, 1e5, 2e5, 2.6e5])
 def test_a_train_starts_from_standstill_without_sliding(effort: float) -> None:
-    """Up to the adhesion limit the slip follows the effort; a wheel that had been thrown over the limit would show it."""
+    """Up to the adhesion limit the slip follows the effort; a wheel that had been thrown over the limit would show
+    it.
+    """
     runtime = Runtime(LOCOMOTIVE)
     runtime.u[0] = effort
     runtime.start(0.0)

@@ -1,4 +1,6 @@
-"""Edges of zones are exact events: what comes out moves with them, and no stage of an integration step sees one early."""
+"""Edges of zones are exact events: what comes out moves with them, and no stage of an integration step sees one
+early.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +24,8 @@ IN_TIME = {"zone_from[1]": 0.5003, "zone_to[1]": 1.2, "zone_from[2]": 2.0, "zone
 ON_TRACK = {"zone_from[1]": 5.0003, "zone_to[1]": 12.0, "zone_from[2]": 20.0, "zone_to[2]": 25.0019}
 UNUSED = {"zone_from[3]": 0.0, "zone_to[3]": 0.0}
 SHARPEST = {"speed": 3.0, "wheel_speed": 400.0}
-"""What a zone moved by 1 s or 1 m may change, in m/s: at an edge the rail's force jumps by up to 190 kN, 2.1 m/s2 of the
-locomotive and, of a wheel of 680 kg at its rim, 280 m/s2."""
+"""What a zone moved by 1 s or 1 m may change, in m/s: at an edge the rail's force jumps by up to 190 kN, 2.1 m/s2 of
+the locomotive and, of a wheel of 680 kg at its rim, 280 m/s2."""
 
 TRAINS: Mapping[str, tuple[HybridSystem, Any, dict[str, float]]] = {
     "locomotive in time": (Locomotive(), rolling(10.0), IN_TIME),
@@ -73,11 +75,14 @@ def test_splitting_and_restoring_between_edges_changes_nothing(name: str) -> Non
 
 @settings(max_examples=25)
 @given(
-    stretch=st.tuples(st.floats(0.05, 0.5), st.floats(0.01, 0.5)), span=st.tuples(st.floats(0.0, 0.5), st.floats(0.001, 0.5)),
+    stretch=st.tuples(st.floats(0.05, 0.5), st.floats(0.01, 0.5)),
+    span=st.tuples(st.floats(0.0, 0.5), st.floats(0.001, 0.5)),
     which=st.sampled_from([0, 1]),
-)  # fmt: skip
+)
 def test_the_work_done_between_switches_is_exact(stretch: tuple, span: tuple, which: int) -> None:
-    """``v(T)^2 = 1 + 2 * 3 * length`` on a stretch alone, ``v(T) = 1 + 2 * duration`` in a span alone, both at any edges."""
+    """``v(T)^2 = 1 + 2 * 3 * length`` on a stretch alone, ``v(T) = 1 + 2 * duration`` in a span alone, both at any
+    edges.
+    """
     system = (Booster(), ImplicitBooster())[which]
     off = {"span[1]": 90.0, "span[2]": 91.0}
     runtime = started(system, **{"stretch[1]": stretch[0], "stretch[2]": sum(stretch)}, **off)
@@ -117,13 +122,17 @@ def test_switches_that_chatter_do_not_stop_time() -> None:
     runtime.advance(0.1)
     assert runtime.t == 0.1
     assert abs(runtime.x[0] - 0.1) < 0.6
-    assert runtime.x[2] == pytest.approx(0.1, abs=1e-12)  # what is left of a step after its last division is integrated too
+    # what is left of a step after its last division is integrated too
+    assert runtime.x[2] == pytest.approx(0.1, abs=1e-12)
 
 
 @pytest.mark.parametrize(
     ("ends", "said"),
     [
-        ({"zone_from[2]": 40.0, "zone_to[2]": 40.0}, "zone 2 has no length: zone_to\\[2\\] must lie behind zone_from\\[2\\]"),
+        (
+            {"zone_from[2]": 40.0, "zone_to[2]": 40.0},
+            "zone 2 has no length: zone_to\\[2\\] must lie behind zone_from\\[2\\]",
+        ),
         ({"zone_from[1]": 20.0, "zone_to[1]": 10.0}, "zone 1 has no length"),
         ({"zone_from[3]": 15.0}, "zone 3 overlaps one before it in the list"),
         ({"zone_from[1]": float("nan")}, "zone 1 has no length"),

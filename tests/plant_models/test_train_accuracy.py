@@ -1,7 +1,7 @@
 """The train's internal step against SciPy's Radau at 1e-9 on the same equations.
 
-The bounds are two to three times what was measured at the default step of 1 ms on the worse of the two curves. Runs that start,
-stop, lock or meet free play contain steps of first order; the others are of second order.
+The bounds are two to three times what was measured at the default step of 1 ms on the worse of the two curves. Runs
+that start, stop, lock or meet free play contain steps of first order; the others are of second order.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from plant_models.railway.vehicle.train import Train
 
 ZONE = {"zone_from[1]": 5.0, "zone_to[1]": 40.0}
 WET = {"zone_from[1]": -100.0, "zone_to[1]": 1e6}
-# name: (phases [(end s, (effort N, brake demand))], start speed m/s, parameters, bounds on position m, elongation m, speeds m/s,
-# wheel speeds m/s)
+# name: (phases [(end s, (effort N, brake demand))], start speed m/s, parameters, bounds on position m, elongation m,
+# speeds m/s, wheel speeds m/s)
 RUNS: dict[str, Any] = {
     "traction": ([(3.0, (60e3, 0.0))], 5.0, {}, (4e-7, 8e-7, 9e-6, 3e-6)),
     "from rest": ([(3.0, (83e3, 0.0))], 0.0, {}, (1.5e-3, 5e-5, 1e-3, 7e-4)),

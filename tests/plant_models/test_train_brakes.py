@@ -71,7 +71,8 @@ def test_full_service_slows_the_train_down_by_braked_mass_over_mass() -> None:
     assert now["wagon_brake_force"] == pytest.approx(4 * 21e3, rel=2e-4)
     # The rail carries the locomotive's brake less what the wheels' own inertia takes; slip makes them turn 1 % slower.
     assert -now["adhesion_force"] == pytest.approx(80e3 + rotating * now["acceleration"], rel=5e-4)
-    assert -now["acceleration"] == pytest.approx(164e3 / (166e3 + rotating), rel=5e-3)  # the couplers still ring a little
+    # the couplers still ring a little
+    assert -now["acceleration"] == pytest.approx(164e3 / (166e3 + rotating), rel=5e-3)
 
 
 def test_the_brake_stops_the_train_on_a_hill_and_holds_it() -> None:
@@ -84,7 +85,8 @@ def test_the_brake_stops_the_train_on_a_hill_and_holds_it() -> None:
     now = outputs(runtime)
     assert now["gradient_force"] == pytest.approx(-13.03e3, abs=5.0)  # 166 t, 8 per mille: independently measured
     assert now["acceleration"] == 0.0
-    # What holds each vehicle is what pulls at it: rail, brakes and the constant Davis terms carry the weight between them.
+    # What holds each vehicle is what pulls at it: rail, brakes and the constant Davis terms carry the weight between
+    # them.
     total = now["adhesion_force"] - now["resistance_force"] - now["gradient_force"] - now["wagon_brake_force"]
     assert total == pytest.approx(0.0, abs=1e-6)
     runtime.u[1] = 0.0

@@ -1,4 +1,6 @@
-"""Couplers of the train: the modes and the step response that were measured independently, and the laws of mechanics."""
+"""Couplers of the train: the modes and the step response that were measured independently, and the laws of
+mechanics.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,8 @@ def _modes(preset: str) -> np.ndarray:
 
 def test_the_coupler_modes_are_those_measured() -> None:
     modes = np.array(_modes("table_4_2"))
-    assert np.abs(modes) / (2.0 * np.pi) == pytest.approx([0.822, 1.893, 2.822, 3.437], abs=5e-4)  # three digits are given
+    # three digits are given
+    assert np.abs(modes) / (2.0 * np.pi) == pytest.approx([0.822, 1.893, 2.822, 3.437], abs=5e-4)
     assert -modes.real / np.abs(modes) == pytest.approx([0.052, 0.119, 0.177, 0.216], abs=5e-4)
     assert modes.real == pytest.approx([-0.27, -1.41, -3.14, -4.66], abs=5e-3)
 
@@ -46,14 +49,15 @@ def test_the_printed_damping_sign_makes_every_mode_grow() -> None:
     assert np.ptp(runtime.x[5:10]) > 100.0  # [m/s] between vehicles
 
 
-# -- the step of 83 kN --------------------------------------------------------------------------------------------------
+# -- the step of 83 kN
+# --------------------------------------------------------------------------------------------------
 
 TIMES = np.round(np.arange(0.0, 60.0005, 0.01), 9)
 
 
 def _printed_step() -> np.ndarray:
-    """(4.1)-(4.6) with the repaired sign by SciPy: rigid wheels, the constant Davis terms always against the track's direction.
-    Coupler forces and speed of the locomotive, shape (len(TIMES), 5)."""
+    """(4.1)-(4.6) with the repaired sign by SciPy: rigid wheels, the constant Davis terms always against the track's
+    direction. Coupler forces and speed of the locomotive, shape (len(TIMES), 5)."""
     a, b, c = (np.array([loco, *[wagon] * 4]) for loco, wagon in ((900.0, 190.0), (32.4, 6.8), (1.6529, 2.3)))
 
     def couplers(y: np.ndarray) -> np.ndarray:
@@ -61,7 +65,14 @@ def _printed_step() -> np.ndarray:
 
     def flow(_t: float, y: np.ndarray) -> np.ndarray:
         v, force = y[5:], couplers(y)
-        push = np.array([83e3, 0.0, 0.0, 0.0, 0.0]) - a - b * v - c * v * np.abs(v) + [0.0, *force] - np.array([*force, 0.0])
+        push = (
+            np.array([83e3, 0.0, 0.0, 0.0, 0.0])
+            - a
+            - b * v
+            - c * v * np.abs(v)
+            + [0.0, *force]
+            - np.array([*force, 0.0])
+        )
         return np.concatenate([v, push / MASSES])
 
     found = solve_ivp(flow, (0.0, 60.0), np.zeros(10), method="DOP853", rtol=1e-10, atol=1e-12, t_eval=TIMES)
@@ -76,7 +87,8 @@ def _train_step(until: float = 60.0, **changes: float) -> np.ndarray:
 
 def test_the_step_response_of_a_train_with_rigid_wheels_is_that_measured() -> None:
     found, printed = _train_step(**RIGID), _printed_step()
-    # Against the independent measurement 0.3 %: SciPy at 1e-10 finds 62.30 kN for the first peak, where 62.16 were measured.
+    # Against the independent measurement 0.3 %: SciPy at 1e-10 finds 62.30 kN for the first peak, where 62.16 were
+    # measured.
     measured = pytest.approx([62.16, 53.9, 41.5, 23.8], rel=3e-3)
     assert printed[:, :4].max(axis=0) / 1e3 == measured
     assert found[:, :4].max(axis=0) / 1e3 == measured
@@ -96,14 +108,18 @@ def test_wheel_inertia_takes_its_share_of_the_step() -> None:
     assert four / rigid == pytest.approx(166e3 / (166e3 + 4 * ROTATING), rel=5e-3)
 
 
-# -- free play and pre-load ---------------------------------------------------------------------------------------------
+# -- free play and pre-load
+# ---------------------------------------------------------------------------------------------
 
 
 def _coupler(elongation: float, rate: float = 0.0, play: float = 0.0, preload: float = 0.0) -> float:
     p = SimpleNamespace(
-        coupler_stiffness=STIFFNESS, coupler_damping=DAMPING, coupler_free_play=play,
-        coupler_preload=preload, coupler_preload_stiffness=5e7,
-    )  # fmt: skip
+        coupler_stiffness=STIFFNESS,
+        coupler_damping=DAMPING,
+        coupler_free_play=play,
+        coupler_preload=preload,
+        coupler_preload_stiffness=5e7,
+    )
     return float(coupler_force(elongation, rate, p))
 
 
@@ -116,7 +132,9 @@ def test_without_free_play_and_preload_the_coupler_is_spring_and_damper(e: float
 
 
 @given(e=E, rate=RATE, play=PLAY, preload=PRELOAD)
-def test_a_coupler_is_odd_and_with_free_play_never_changes_sides(e: float, rate: float, play: float, preload: float) -> None:
+def test_a_coupler_is_odd_and_with_free_play_never_changes_sides(
+    e: float, rate: float, play: float, preload: float
+) -> None:
     force = _coupler(e, rate, play, preload)
     assert _coupler(-e, -rate, play, preload) == -force
     assert force * e >= 0.0
@@ -128,7 +146,9 @@ def test_a_coupler_is_odd_and_with_free_play_never_changes_sides(e: float, rate:
 def test_the_elongation_at_rest_is_the_closed_form(play: float, preload: float, excess: float) -> None:
     e = 0.5 * play + preload / 5e7 + excess / STIFFNESS
     assert _coupler(e, 0.0, play, preload) == pytest.approx(preload + excess, rel=1e-9, abs=1e-4)
-    assert _coupler(0.5 * play + 0.5 * preload / 5e7, 0.0, play, preload) == pytest.approx(0.5 * preload, rel=1e-6, abs=1e-4)
+    assert _coupler(0.5 * play + 0.5 * preload / 5e7, 0.0, play, preload) == pytest.approx(
+        0.5 * preload, rel=1e-6, abs=1e-4
+    )
 
 
 def test_free_play_is_run_through_before_the_wagon_is_pulled() -> None:
@@ -142,9 +162,11 @@ def test_free_play_is_run_through_before_the_wagon_is_pulled() -> None:
     assert outputs(runtime)["coupler_force[1]"] > 0.0
 
 
-# -- laws of mechanics --------------------------------------------------------------------------------------------------
+# -- laws of mechanics
+# --------------------------------------------------------------------------------------------------
 
-# No vehicle comes to a stand: where dry friction is declared, a speed that changes its sign rests at zero for a part of a step.
+# No vehicle comes to a stand: where dry friction is declared, a speed that changes its sign rests at zero for a part of
+# a step.
 SPEEDS = st.lists(st.floats(10.0, 13.0), min_size=5, max_size=5)
 ELONGATIONS = st.lists(st.floats(-0.02, 0.02), min_size=4, max_size=4)
 

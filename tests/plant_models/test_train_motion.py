@@ -1,4 +1,6 @@
-"""The train's locomotive, track and signals: axles one by one, gradients under each vehicle, outputs that agree with the flow."""
+"""The train's locomotive, track and signals: axles one by one, gradients under each vehicle, outputs that agree with
+the flow.
+"""
 
 from __future__ import annotations
 
@@ -46,10 +48,14 @@ def test_each_vehicle_feels_the_gradient_under_its_own_middle() -> None:
 def test_the_axles_enter_a_wet_zone_one_after_the_other(front: float, inside: int) -> None:
     # 3.3, 5.9, 13.6 and 16.2 m behind the front; the slips settle within milliseconds, the front moves by 3 cm.
     runtime = started(
-        TRAIN, x0=start(TRAIN, 3.0, train_position=front), u0=[80e3, 0.0], **{"zone_from[1]": 100.0, "zone_to[1]": 200.0}
+        TRAIN,
+        x0=start(TRAIN, 3.0, train_position=front),
+        u0=[80e3, 0.0],
+        **{"zone_from[1]": 100.0, "zone_to[1]": 200.0},
     )
     runtime.advance(0.01)
-    before, wet = 80e3 / 4 / (22.5e3 * 9.81) / 16.848, 80e3 / 4 / (22.5e3 * 9.81) / 4.025  # over the curves' first slopes
+    # over the curves' first slopes
+    before, wet = 80e3 / 4 / (22.5e3 * 9.81) / 16.848, 80e3 / 4 / (22.5e3 * 9.81) / 4.025
     slips = np.array(_axles(outputs(runtime), "axle_slip"))
     assert (slips[:inside] > 0.9 * wet).all()
     assert (slips[inside:] < 1.2 * before).all()
@@ -94,11 +100,13 @@ SPEED = st.sampled_from([-3.0, -1e-3, 0.0, 1e-4, 0.3, 20.0])
 
 
 @given(
-    speeds=st.lists(SPEED, min_size=5, max_size=5), rates=st.lists(SPEED, min_size=4, max_size=4),
+    speeds=st.lists(SPEED, min_size=5, max_size=5),
+    rates=st.lists(SPEED, min_size=4, max_size=4),
     elongations=st.lists(st.floats(-0.02, 0.02), min_size=4, max_size=4),
     pressures=st.lists(st.floats(0.0, 3.5e5), min_size=5, max_size=5),
-    effort=st.sampled_from([-3e5, -5e3, 0.0, 2e3, 3e5]), gradient=st.floats(-0.03, 0.03),
-)  # fmt: skip
+    effort=st.sampled_from([-3e5, -5e3, 0.0, 2e3, 3e5]),
+    gradient=st.floats(-0.03, 0.03),
+)
 def test_the_outputs_are_the_forces_the_integrator_uses(
     speeds: list, rates: list, elongations: list, pressures: list, effort: float, gradient: float
 ) -> None:
@@ -146,7 +154,8 @@ def test_the_start_values_of_a_rolling_train_have_no_slip_and_no_coupler_force()
     assert _axles(now, "axle_speed") == pytest.approx([12.0] * 4, rel=1e-12)
 
 
-# -- stiff states alone are implicit ------------------------------------------------------------------------------------
+# -- stiff states alone are implicit
+# ------------------------------------------------------------------------------------
 
 
 def test_plain_numpy_and_the_traced_step_agree_where_a_part_is_implicit() -> None:

@@ -100,7 +100,8 @@ def test_there_and_back_is_the_identity(a: float, b: float, p: float, q: float, 
     source, target = Unit(powers, a, p), Unit(powers, b, q)
     there, back = conversion(source, target), conversion(target, source)
     converted = there[0] * value + there[1]
-    # Each conversion is four operations; what is large on the way (the value and the shifts, in the source unit) is rounded.
+    # Each conversion is four operations; what is large on the way (the value and the shifts, in the source unit) is
+    # rounded.
     scale = abs(value) + (abs(p) + abs(q)) / a
     assert abs(back[0] * converted + back[1] - value) <= 16 * 2.0**-53 * scale
 

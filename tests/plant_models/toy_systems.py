@@ -99,7 +99,9 @@ class ImplicitClockwork(Clockwork):
 
 
 class Slider(HybridSystem):
-    """A block on a rough floor: ``dv = a(t) - friction``; dry friction alone decides when it stops and when it starts."""
+    """A block on a rough floor: ``dv = a(t) - friction``; dry friction alone decides when it stops and when it
+    starts.
+    """
 
     name = "slider"
     states = (state("x", "m"), state("v", "m/s", 1.0))
@@ -120,7 +122,9 @@ class Slider(HybridSystem):
 
 
 class Booster(HybridSystem):
-    """A body pushed by 3 m/s2 on one stretch of its way and by 2 m/s2 in one span of time: a parabola between switches."""
+    """A body pushed by 3 m/s2 on one stretch of its way and by 2 m/s2 in one span of time: a parabola between
+    switches.
+    """
 
     name = "booster"
     states = (state("place", "m"), state("rate", "m/s", 1.0))

@@ -1,4 +1,6 @@
-"""Runs of the multi-vehicle train that several tests share, in the runtime and as a reference solution by SciPy's Radau."""
+"""Runs of the multi-vehicle train that several tests share, in the runtime and as a reference solution by SciPy's
+Radau.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,14 @@ from plant_models.hybrid import Runtime, TracedSystem, scalar_names
 from plant_models.railway.vehicle.train import Train
 
 DELAY = 0.05  # [s], 5 readings of 10 ms
-NO_DRAG = {"davis_a": 0.0, "davis_b": 0.0, "davis_c": 0.0, "wagon_davis_a": 0.0, "wagon_davis_b": 0.0, "wagon_davis_c": 0.0}
+NO_DRAG = {
+    "davis_a": 0.0,
+    "davis_b": 0.0,
+    "davis_c": 0.0,
+    "wagon_davis_a": 0.0,
+    "wagon_davis_b": 0.0,
+    "wagon_davis_c": 0.0,
+}
 RIGID = {"wheel_inertia": 1e-3}  # wheels that turn with the locomotive: 0.01 kg of it
 
 
@@ -43,7 +52,9 @@ def recorded(runtime: Runtime, times: np.ndarray) -> np.ndarray:
 
 
 def followed(train: Train, x0: np.ndarray, phases: list, times: np.ndarray, **changes: float) -> np.ndarray:
-    """States in the runtime at the times, inputs held over phases ``(end [s], (effort, brake))``, shape (len(times), n)."""
+    """States in the runtime at the times, inputs held over phases ``(end [s], (effort, brake))``, shape (len(times),
+    n).
+    """
     runtime = started(train, x0=x0, u0=phases[0][1], **changes)
     rows, remaining = [runtime.x.copy()], list(phases)
     for t in times[1:]:
@@ -72,8 +83,8 @@ def reference(train: Train, x0: np.ndarray, phases: list, times: np.ndarray, **c
 
 
 class _Radau:
-    """Radau on the traced flow, cut where dry friction changes its mind (a state stops, or what is at rest is let go) and at the
-    edges of zones."""
+    """Radau on the traced flow, cut where dry friction changes its mind (a state stops, or what is at rest is let go)
+    and at the edges of zones."""
 
     def __init__(self, train: Train, p: np.ndarray) -> None:
         traced = TracedSystem(train)
@@ -98,10 +109,17 @@ class _Radau:
 
             events = [self._event(call, j, held) for j in range(len(held))]
             found = solve_ivp(
-                lambda time, state, s=held, c=call: c(self._flow, time, state, s).ravel(), (t, end), x[: self._count],
+                lambda time, state, s=held, c=call: c(self._flow, time, state, s).ravel(),
+                (t, end),
+                x[: self._count],
                 jac=lambda time, state, s=held, c=call: c(self._by_x, time, state, s),
-                method="Radau", rtol=1e-9, atol=1e-11, max_step=0.1, events=events, dense_output=True,
-            )  # fmt: skip
+                method="Radau",
+                rtol=1e-9,
+                atol=1e-11,
+                max_step=0.1,
+                events=events,
+                dense_output=True,
+            )
             assert found.success, found.message
             inside = (at > t) & (at <= found.t[-1])
             if inside.any():

@@ -32,7 +32,10 @@ class Block:
 def blocks(page: Path) -> list[Block]:
     """Fenced blocks with a language, in order."""
     text = page.read_text(encoding="utf-8")
-    return [Block(m["language"], m["code"], text.count("\n", 0, m.start("code")) + 1, m["command"]) for m in FENCE.finditer(text)]
+    return [
+        Block(m["language"], m["code"], text.count("\n", 0, m.start("code")) + 1, m["command"])
+        for m in FENCE.finditer(text)
+    ]
 
 
 def generator() -> ModuleType:

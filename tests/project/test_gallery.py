@@ -28,7 +28,9 @@ def builder() -> ModuleType:
 @pytest.mark.compiler
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda s: s.stem)
 def test_a_script_gives_the_numbers_of_the_page(script: Path, tmp_path: Path) -> None:
-    done = subprocess.run([sys.executable, str(script), "--out", str(tmp_path)], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, str(script), "--out", str(tmp_path)], capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     fresh = json.loads((tmp_path / f"{script.stem}.json").read_text())
     kept = json.loads((GALLERY / "numbers" / f"{script.stem}.json").read_text())
@@ -39,9 +41,11 @@ def test_a_script_gives_the_numbers_of_the_page(script: Path, tmp_path: Path) ->
         else:
             assert now["measured"] == pytest.approx(then["measured"], rel=now["repeats"], abs=1e-12), now["quantity"]
     assert "published" in done.stdout
-    assert fresh["figure"] == (tmp_path / f"{script.stem}.png").exists() == (
-        ROOT / "docs" / "images" / "gallery" / f"{script.stem}.png"
-    ).exists()  # fmt: skip
+    assert (
+        fresh["figure"]
+        == (tmp_path / f"{script.stem}.png").exists()
+        == (ROOT / "docs" / "images" / "gallery" / f"{script.stem}.png").exists()
+    )
 
 
 def test_the_page_shows_the_numbers_kept() -> None:

@@ -24,9 +24,16 @@ print(json.dumps({"programs": programs, "modules": sorted(sys.modules)}))
 def import_and_watch(statement: str, folder: Path) -> dict[str, list[str]]:
     """Modules loaded and programs started by an import in a fresh interpreter that finds no program at all."""
     environment = {k: v for k, v in os.environ.items() if k not in ("CC", "PATH")}
-    environment |= {"PATH": "", "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1", "FMU_OBSERVER_CACHE": str(folder)}
+    environment |= {
+        "PATH": "",
+        "PYTHONPATH": str(ROOT),
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "FMU_OBSERVER_CACHE": str(folder),
+    }
     code = WATCHED.replace("IMPORTS", statement)
-    done = subprocess.run([sys.executable, "-c", code], env=environment, cwd=folder, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, cwd=folder, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     data: dict[str, list[str]] = json.loads(done.stdout)
     return data

@@ -70,7 +70,8 @@ def run_python(page: Path, block: Block, names: dict[str, Any]) -> None:
 @pytest.mark.parametrize("page", WITH_CODE, ids=lambda p: p.name)
 def test_blocks_of_a_page(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    fmus.build_fmu(plant_models.Locomotive(), "vendor.fmu", preset="chapter_3_four_axles")  # the reader's own, and two more
+    # the reader's own, and two more
+    fmus.build_fmu(plant_models.Locomotive(), "vendor.fmu", preset="chapter_3_four_axles")
     fmus.build_fmu(Engine(), "engine.fmu", fmi_version=2)
     fmus.build_fmu(Load(), "load.fmu", fmi_version=3)
     names: dict[str, Any] = {"__name__": "page"}

@@ -1,4 +1,6 @@
-"""Every public module, class, function, method and property of the four packages has a docstring and full annotations."""
+"""Every public module, class, function, method and property of the four packages has a docstring and full
+annotations.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +46,9 @@ def members(cls: type) -> Iterator[tuple[str, Any]]:
 def protocols(cls: type) -> list[type]:
     """Protocols of the same module that the class fulfils: what they document is documented."""
     offered = [c for c in vars(import_module(cls.__module__)).values() if is_protocol(c)]
-    calls = {p: [n for n, m in vars(p).items() if isinstance(m, FunctionType) and not n.startswith("_")] for p in offered}
+    calls = {
+        p: [n for n, m in vars(p).items() if isinstance(m, FunctionType) and not n.startswith("_")] for p in offered
+    }
     return [p for p in offered if all(hasattr(cls, n) for n in calls[p])]
 
 
@@ -57,7 +61,8 @@ def documented(thing: Any) -> bool:
         cls, name, _ = thing
         return any(getattr(vars(base).get(name), "__doc__", None) for base in (*cls.__mro__, *protocols(cls)))
     text = thing.__dict__.get("__doc__") if inspect.isclass(thing) else inspect.getdoc(thing)
-    generated = inspect.isclass(thing) and str(text).startswith(f"{thing.__name__}(")  # what a dataclass writes by itself
+    # what a dataclass writes by itself
+    generated = inspect.isclass(thing) and str(text).startswith(f"{thing.__name__}(")
     return bool(text) and not generated
 
 

@@ -84,7 +84,9 @@ def _is_number(text: str) -> bool:
 
 
 @pytest.mark.compiler
-def test_the_first_example_makes_sense_from_the_first_balise_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_first_example_makes_sense_from_the_first_balise_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """With the FMU that one command builds: no warning, errors that slip explains, roles without a report table."""
     monkeypatch.chdir(tmp_path)
     assert fmus.cli.main(["build", "locomotive", "--fmi", "2", "-o", "vendor.fmu"]) == 0
@@ -126,7 +128,9 @@ def test_nothing_is_imported_that_is_not_a_dependency() -> None:
     import sys
 
     extras = PROJECT["project"]["optional-dependencies"]
-    optional = [name for extra in ("hosted", "lmi", "frames", "parquet", "hdf5") for name in requirements(extras[extra])]
+    optional = [
+        name for extra in ("hosted", "lmi", "frames", "parquet", "hdf5") for name in requirements(extras[extra])
+    ]
     required = [name.replace("-", "_") for name in requirements(PROJECT["project"]["dependencies"])]
     known = {*required, *optional, *PACKAGES, *sys.stdlib_module_names, "pytest"}  # who loads the plugin has pytest
     assert imported_packages() - known == set()

@@ -1,4 +1,6 @@
-"""The tutorials do what they say, from the first line to the last, as a newcomer would type it: every command is a real one."""
+"""The tutorials do what they say, from the first line to the last, as a newcomer would type it: every command is a real
+one.
+"""
 
 from __future__ import annotations
 
@@ -28,14 +30,22 @@ def exits(page: Path, block: Block) -> int:
 def environment(folder: Path) -> dict[str, str]:
     """That of a reader who has activated the virtual environment; pytest in pytest must not know of the outer one."""
     inherited = {k: v for k, v in os.environ.items() if not k.startswith(("PYTEST_", "COV_")) and k != "CI"}
-    path = os.pathsep.join((sysconfig.get_path("scripts"), str(Path(sys.executable).parent), os.environ.get("PATH", "")))
-    own = {"PATH": path, "HOME": str(folder), "FMU_OBSERVER_CACHE": str(fmus.cache_folder())}  # builds are kept as a reader's are
+    path = os.pathsep.join(
+        (sysconfig.get_path("scripts"), str(Path(sys.executable).parent), os.environ.get("PATH", ""))
+    )
+    # builds are kept as a reader's are
+    own = {"PATH": path, "HOME": str(folder), "FMU_OBSERVER_CACHE": str(fmus.cache_folder())}
     return inherited | own | {"MPLBACKEND": "Agg", "PYTHONDONTWRITEBYTECODE": "1"}
 
 
 def run_line(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        ["bash", "-euo", "pipefail", "-c", line], cwd=folder, env=environment(folder), capture_output=True, text=True, check=False
+        ["bash", "-euo", "pipefail", "-c", line],
+        cwd=folder,
+        env=environment(folder),
+        capture_output=True,
+        text=True,
+        check=False,
     )
 
 

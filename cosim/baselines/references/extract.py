@@ -32,9 +32,14 @@ def extract_reference(fmu: str | Path, path: str | Path, name: str | None = None
         recipe = replace(recipe, inputs=str(_write_inputs(baseline, path).resolve()))
     draft = make_draft(baseline.result, baseline.tolerances, recipe=recipe, every=0.0)
     header = replace(
-        draft.header, title=baseline.header.title, span=baseline.header.span, components=baseline.header.components,
-        selection=baseline.header.selection, versions=baseline.header.versions, every=None,
-    )  # fmt: skip
+        draft.header,
+        title=baseline.header.title,
+        span=baseline.header.span,
+        components=baseline.header.components,
+        selection=baseline.header.selection,
+        versions=baseline.header.versions,
+        every=None,
+    )
     write_draft(replace(draft, header=header), path)
     return path
 

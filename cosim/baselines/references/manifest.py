@@ -1,10 +1,11 @@
 """The manifest and the experiments of FMI-LS-REF as plain data. Reads and writes XML text, no files.
 
-FMI-LS-REF (Modelica Association, https://github.com/modelica/fmi-ls-ref, 1.0.0-alpha.1 and -beta.1 of 2025 and 2026) keeps files
-that belong to an FMU under ``extra/org.fmi-standard.fmi-ls-ref/``. Its manifest names them with a role; a ``result`` is a
-table of outputs, as the Reference FMUs of the Modelica Association ship it (``NAME_out.csv``); an ``experiment`` names
-parameters (SSV), stimuli and references of a run. The format of experiments is that of the appendix of alpha.1; from
-beta.1 on it is a document of its own, of which the elements are read by their names whatever their namespace.
+FMI-LS-REF (Modelica Association, https://github.com/modelica/fmi-ls-ref, 1.0.0-alpha.1 and -beta.1 of 2025 and 2026)
+keeps files that belong to an FMU under ``extra/org.fmi-standard.fmi-ls-ref/``. Its manifest names them with a role; a
+``result`` is a table of outputs, as the Reference FMUs of the Modelica Association ship it (``NAME_out.csv``); an
+``experiment`` names parameters (SSV), stimuli and references of a run. The format of experiments is that of the
+appendix of alpha.1; from beta.1 on it is a document of its own, of which the elements are read by their names whatever
+their namespace.
 """
 
 from __future__ import annotations
@@ -24,7 +25,12 @@ NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
 NAME = "org.fmi-standard.fmi-ls-ref"
 VERSION = "1.0.0-alpha.1"
 DESCRIPTION = "Layered Standard providing information on related files included in an FMU."
-CSV, SSV, EXPERIMENTS, JSON = "text/csv", "application/x-ssp-parameter-set", "application/x-ma-ls-experiments", "application/json"
+CSV, SSV, EXPERIMENTS, JSON = (
+    "text/csv",
+    "application/x-ssp-parameter-set",
+    "application/x-ma-ls-experiments",
+    "application/json",
+)
 TIMES = ("startTime", "stopTime", "stepSize")
 
 
@@ -67,7 +73,9 @@ def parse(text: bytes, file: str) -> Any:
     Raises:
         BaselineError: it is not XML, or declares a document type.
     """
-    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True, remove_pis=True)
+    parser = etree.XMLParser(
+        resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True, remove_pis=True
+    )
     try:
         root = etree.fromstring(text, parser)
     except etree.XMLSyntaxError as error:
@@ -88,7 +96,10 @@ def read_manifest(text: bytes, file: str) -> list[Related]:
         raise BaselineError(f"{file}: expected the element fmiReferences of FMI-LS-REF, got {_local(root)}.")
     return [
         Related(
-            _member(node.get("source"), MANIFEST), node.get("role", "other"), node.get("type", ""), node.get("description", "")
+            _member(node.get("source"), MANIFEST),
+            node.get("role", "other"),
+            node.get("type", ""),
+            node.get("description", ""),
         )
         for node in root
         if _local(node) == "Related" and node.get("source")

@@ -70,7 +70,9 @@ def find_references(fmu: str | Path) -> list[Reference]:
             if experiment.references
         ]
     named = {experiment.references for experiment in experiments}
-    experiments += [_lone(entry, members) for entry in related if _is_table(entry, members) and entry.member not in named]
+    experiments += [
+        _lone(entry, members) for entry in related if _is_table(entry, members) and entry.member not in named
+    ]
     return [Reference(path, experiment) for experiment in experiments]
 
 
@@ -98,7 +100,9 @@ def read_reference(fmu: str | Path, name: str | None = None) -> Baseline:
     """
     found = find_references(fmu)
     if not found:
-        raise BaselineError(f"{fmu} holds no reference results: no experiment and no result in {MANIFEST} (FMI-LS-REF).")
+        raise BaselineError(
+            f"{fmu} holds no reference results: no experiment and no result in {MANIFEST} (FMI-LS-REF)."
+        )
     names = [reference.name for reference in found]
     if name is None and len(found) > 1:
         raise BaselineError(f"{fmu} holds {len(found)} references; name one of them: {', '.join(names)}.")
@@ -115,7 +119,9 @@ def _baseline(reference: Reference) -> Baseline:
         texts = {}
         for member in filter(None, (experiment.parameters, experiment.stimuli, experiment.references)):
             if member not in members:
-                raise BaselineError(f"{path}: the experiment {experiment.name!r} names {member}, which is not in the FMU.")
+                raise BaselineError(
+                    f"{path}: the experiment {experiment.name!r} names {member}, which is not in the FMU."
+                )
             texts[member] = archive.read(member)
         own = f"{FOLDER}/{experiment.name}.json"
         written = archive.read(own) if own in members else b""
@@ -152,9 +158,14 @@ def _header(reference: Reference, component: Component, table: Result, texts: Ma
     record = tuple(name for name in names if name.partition("[")[0] not in outputs and name in component.variables)
     description = component.description
     identity = Identity(
-        COMPONENT, "FMU", str(description.modelName), str(description.fmiVersion), str(description.guid), path.name,
+        COMPONENT,
+        "FMU",
+        str(description.modelName),
+        str(description.fmiVersion),
+        str(description.guid),
+        path.name,
         parameters=parameters,
-    )  # fmt: skip
+    )
     return Header(
         title=experiment.description or f"{experiment.name} of {path.name}",
         recipe=Recipe("fmu", str(path.resolve()), begin, end, step, {}, parameters, record),
@@ -200,9 +211,16 @@ def _with_own(header: Header, text: bytes, path: Path) -> Header:
     except (BaselineError, ValueError) as error:
         raise BaselineError(f"{path}: the header of the reference {header.title!r}: {error}") from error
     signals = {info.name: info for info in own.signals}
-    recipe = replace(header.recipe, inputs=own.recipe.inputs, parameters=own.recipe.parameters, record=own.recipe.record)
+    recipe = replace(
+        header.recipe, inputs=own.recipe.inputs, parameters=own.recipe.parameters, record=own.recipe.record
+    )
     return replace(
-        header, recipe=recipe, title=own.title, tolerances=own.tolerances, selection=own.selection, versions=own.versions,
+        header,
+        recipe=recipe,
+        title=own.title,
+        tolerances=own.tolerances,
+        selection=own.selection,
+        versions=own.versions,
         signals=[signals.get(info.name, info) for info in header.signals],
         components=[replace(entry, sha256="") for entry in own.components if entry.name == COMPONENT],
-    )  # fmt: skip
+    )

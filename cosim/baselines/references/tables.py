@@ -21,13 +21,17 @@ def prefix(component: str) -> str:
 
 
 def as_of_a_run(result: Result, component: Component) -> Result:
-    """A table of the FMU's variables as a run would give it: named by component, in SI, with what the FMU says of them."""
+    """A table of the FMU's variables as a run would give it: named by component, in SI, with what the FMU says of
+    them.
+    """
     names = [info.name for info in result.signals]
     table = np.empty(len(result.table), table_dtype(["time", *(prefix(component.name) + name for name in names)]))
     table["time"] = result.time
     for name in names:
         table[prefix(component.name) + name] = result.table[name]
-    table, signals = in_si(table, [_info(info, component) for info in result.signals], lambda name: _unit(name, component))
+    table, signals = in_si(
+        table, [_info(info, component) for info in result.signals], lambda name: _unit(name, component)
+    )
     return replace(result, table=table, signals=signals)
 
 

@@ -1,4 +1,6 @@
-"""A baseline written into a copy of its FMU, so that whoever receives the FMU can check that it runs there as it did here."""
+"""A baseline written into a copy of its FMU, so that whoever receives the FMU can check that it runs there as it did
+here.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +46,8 @@ def embed_baseline(baseline: Baseline, fmu: str | Path, target: str | Path, name
     """Write a copy of an FMU that holds a baseline as a reference of FMI-LS-REF.
 
     Args:
-        baseline: of this FMU alone. fmu: the FMU; all its files are kept as they are, but for the manifest of the standard.
+        baseline: of this FMU alone. fmu: the FMU; all its files are kept as they are, but for the manifest of the
+        standard.
         target: path of the copy; may be the FMU itself. name: of the reference; None for that of the baseline.
 
     Returns:
@@ -71,7 +74,8 @@ def _demand_own(baseline: Baseline, fmu: Path) -> Component:
     component = describe_fmu(fmu, identity.name)
     if component.description.modelName != identity.model:
         raise BaselineError(
-            f"{baseline.path.name} is a baseline of the model '{identity.model}' (GUID {identity.guid}); {fmu.name} is the model "
+            f"{baseline.path.name} is a baseline of the model '{identity.model}' (GUID {identity.guid}); {fmu.name} is "
+            f"the model "
             f"'{component.description.modelName}' (GUID {component.description.guid})."
         )
     return component
@@ -169,7 +173,11 @@ def _rewrite(source: Path, target: Path, files: Mapping[str, bytes | Related]) -
         target.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=".part", dir=target.parent)
         draft = Path(name)
-        with os.fdopen(handle, "wb") as stream, zipfile.ZipFile(source) as former, zipfile.ZipFile(stream, "w") as archive:
+        with (
+            os.fdopen(handle, "wb") as stream,
+            zipfile.ZipFile(source) as former,
+            zipfile.ZipFile(stream, "w") as archive,
+        ):
             entries = former.infolist()
             names = {entry.filename for entry in entries}
             added[MANIFEST] = manifest_text(related, former.read(MANIFEST) if MANIFEST in names else None)

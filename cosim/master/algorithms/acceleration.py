@@ -1,7 +1,7 @@
 """Acceleration: the next guess for the values on an interface, from the guesses so far and what came back for them.
 
-Wanted is ``z = G(z)``. One call of G is one sweep over the components of a loop. All methods see the same scaled residual; none
-knows what a component is.
+Wanted is ``z = G(z)``. One call of G is one sweep over the components of a loop. All methods see the same scaled
+residual; none knows what a component is.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 LONGEST = 1e4
-"""No guess moves further than so many times the largest residual. Without a bound a loop that has no solution is followed to
-values so large that the residual is a small share of them, which looks like convergence."""
+"""No guess moves further than so many times the largest residual. Without a bound a loop that has no solution is
+followed to values so large that the residual is a small share of them, which looks like convergence."""
 
 Jacobian = Callable[[], np.ndarray | None]
 
@@ -77,8 +77,9 @@ class Aitken(Acceleration):
     Args:
         size: length n of the interface. relaxation: the first w of each search.
 
-    Source: U. Kuettler, W. A. Wall, Fixed-point fluid-structure interaction solvers with dynamic relaxation, Computational
-    Mechanics 43 (2008) 61-72, equation (44); the residuals are scaled here, since values of different units meet in them.
+    Source: U. Kuettler, W. A. Wall, Fixed-point fluid-structure interaction solvers with dynamic relaxation,
+    Computational Mechanics 43 (2008) 61-72, equation (44); the residuals are scaled here, since values of different
+    units meet in them.
     """
 
     name = "aitken"
@@ -108,16 +109,17 @@ class Aitken(Acceleration):
 class Newton(Acceleration):
     """Solves ``(D + E - 1) dz = z - g``; D is the part of G' that is known, E what the sweeps have shown besides.
 
-    D comes from directional derivatives: it is what passes through the components at once. E starts at zero and takes Broyden's
-    (good) update with every sweep, so that also the part of G' is found that passes through states, and all of it where nothing
-    is known. E is kept from search to search.
+    D comes from directional derivatives: it is what passes through the components at once. E starts at zero and takes
+    Broyden's (good) update with every sweep, so that also the part of G' is found that passes through states, and all
+    of it where nothing is known. E is kept from search to search.
 
     Args:
         size: length n of the interface.
         jacobian: gives D where the last sweep ended, shape (n, n), or None where it is not to be had.
 
-    Source: C. G. Broyden, A class of methods for solving nonlinear simultaneous equations, Mathematics of Computation 19 (1965)
-    577-593, equation (4.5); the split of the Jacobian follows J. E. Dennis, H. F. Walker, SIAM J. Numer. Anal. 18 (1981) 949-987.
+    Source: C. G. Broyden, A class of methods for solving nonlinear simultaneous equations, Mathematics of Computation
+    19 (1965) 577-593, equation (4.5); the split of the Jacobian follows J. E. Dennis, H. F. Walker, SIAM J. Numer.
+    Anal. 18 (1981) 949-987.
     """
 
     name = "newton"
@@ -171,7 +173,9 @@ class Newton(Acceleration):
         return np.outer(dg - slope @ dz, weighted / length)
 
 
-def make_acceleration(method: str, size: int, relaxation: float = 1.0, jacobian: Jacobian | None = None) -> Acceleration:
+def make_acceleration(
+    method: str, size: int, relaxation: float = 1.0, jacobian: Jacobian | None = None
+) -> Acceleration:
     """An acceleration by name: ``fixed-point``, ``aitken`` or ``newton``."""
     if method == "newton":
         return Newton(size, jacobian)
@@ -179,7 +183,9 @@ def make_acceleration(method: str, size: int, relaxation: float = 1.0, jacobian:
 
 
 def scaled_norm(z: np.ndarray, g: np.ndarray, relative: float, absolute: float) -> float:
-    """Largest ``|g - z| / (absolute + relative * max(|z|, |g|))``: 1 or less is within tolerance; infinite where not a number."""
+    """Largest ``|g - z| / (absolute + relative * max(|z|, |g|))``: 1 or less is within tolerance; infinite where not a
+    number.
+    """
     if not (np.isfinite(z).all() and np.isfinite(g).all()):
         return np.inf
     with np.errstate(over="ignore"):

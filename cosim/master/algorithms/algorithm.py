@@ -14,8 +14,9 @@ from cosim.master.algorithms.choose import AlgorithmChoice
 class Algorithm(ABC):
     """Brings all components of a plan, and its values, over one step.
 
-    An algorithm calls `prepare` (gather the inputs) and `move` of the planned components, and nothing else of the components but
-    `save` and `restore`; who watches a plant or tells a receiver of balises takes their `move` over without its knowledge.
+    An algorithm calls `prepare` (gather the inputs) and `move` of the planned components, and nothing else of the
+    components but `save` and `restore`; who watches a plant or tells a receiver of balises takes their `move` over
+    without its knowledge.
 
     Args:
         plan: prepared, components instantiated.
@@ -52,7 +53,9 @@ class Algorithm(ABC):
         return [str(c) for c in others if c.source[0] not in loop or loop[c.source[0]] != loop.get(c.target[0])]
 
     def save(self) -> Any:
-        """What it remembers from step to step, so that a step taken again comes out the same; None where it is nothing."""
+        """What it remembers from step to step, so that a step taken again comes out the same; None where it is
+        nothing.
+        """
         return None
 
     def restore(self, state: Any) -> None:
@@ -60,7 +63,9 @@ class Algorithm(ABC):
         return
 
     def summary(self) -> Mapping[str, Any]:
-        """What to tell of it after the run, plain data: the name, why, groups, held and fresh connections, iterations."""
+        """What to tell of it after the run, plain data: the name, why, groups, held and fresh connections,
+        iterations.
+        """
         return {"name": self.name, **self.choice.summary(), "held": self.held(), "fresh": self.fresh()}
 
     def close(self) -> None:

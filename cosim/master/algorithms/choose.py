@@ -13,7 +13,8 @@ from cosim.errors import CouplingError
 
 Wanted = Literal["auto", "gauss-seidel", "jacobi", "iterate"]
 BREAK_IT = (
-    "break the loop with a component that holds a state or a sample (for instance a sampled sensor), or merge the components"
+    "break the loop with a component that holds a state or a sample (for instance a sampled sensor), or merge "
+    "the components"
 )
 
 
@@ -44,11 +45,13 @@ def choose_algorithm(wanted: Wanted, groups: Sequence[Group], components: Mappin
     """The algorithm of a run; needs descriptions only.
 
     Args:
-        wanted: ``auto`` iterates algebraic loops and steps everything else by Gauss-Seidel; ``iterate`` iterates all loops.
+        wanted: ``auto`` iterates algebraic loops and steps everything else by Gauss-Seidel; ``iterate`` iterates all
+        loops.
         groups: from `execution_groups`. components: by name.
 
     Raises:
-        CouplingError: an algebraic loop that the algorithm asked for does not solve, or components in a loop to be iterated that
+        CouplingError: an algebraic loop that the algorithm asked for does not solve, or components in a loop to be
+        iterated that
             cannot save their state.
     """
     algebraic = [loop for group in groups for loop in group.algebraic]
@@ -57,7 +60,8 @@ def choose_algorithm(wanted: Wanted, groups: Sequence[Group], components: Mappin
     if wanted in ("gauss-seidel", "jacobi"):
         if algebraic:
             raise CouplingError(
-                f"master.algorithm = '{wanted}' does not solve the algebraic loop {algebraic[0]}. Use 'auto' or 'iterate', or "
+                f"master.algorithm = '{wanted}' does not solve the algebraic loop {algebraic[0]}. Use 'auto' or "
+                f"'iterate', or "
                 f"{BREAK_IT}."
             )
         return AlgorithmChoice(wanted, "It was asked for.", (), names, notes)
@@ -70,9 +74,12 @@ def choose_algorithm(wanted: Wanted, groups: Sequence[Group], components: Mappin
 
 
 def _automatic(
-    algebraic: Sequence[AlgebraicLoop], groups: Sequence[Group], components: Mapping[str, Component],
-    names: tuple[tuple[str, ...], ...], notes: tuple[str, ...],
-) -> AlgorithmChoice:  # fmt: skip
+    algebraic: Sequence[AlgebraicLoop],
+    groups: Sequence[Group],
+    components: Mapping[str, Component],
+    names: tuple[tuple[str, ...], ...],
+    notes: tuple[str, ...],
+) -> AlgorithmChoice:
     if algebraic:
         knots = tuple(knot for group in groups for knot in group.knots)
         _demand_states(knots, algebraic, components)
@@ -94,17 +101,20 @@ def _demand_states(
         if not stateless:
             continue
         path = next(
-            (f"the algebraic loop {a}" for a in algebraic if set(a.components) <= set(loop)), f"the loop of {', '.join(loop)}"
+            (f"the algebraic loop {a}" for a in algebraic if set(a.components) <= set(loop)),
+            f"the loop of {', '.join(loop)}",
         )
         remedy = BREAK_IT if any(set(a.components) <= set(loop) for a in algebraic) else "use master.algorithm = 'auto'"
         raise CouplingError(
-            f"To iterate {path}, its components must save and restore their state (canGetAndSetFMUState), and these cannot: "
+            f"To iterate {path}, its components must save and restore their state (canGetAndSetFMUState), and these "
+            f"cannot: "
             f"{', '.join(stateless)}. Use FMUs that can, or {remedy}."
         )
 
 
 def _possible(loop: AlgebraicLoop) -> str:
     return (
-        f"Possible algebraic loop {loop}: an FMU in it does not say what its outputs depend on. It is stepped as if a state were "
+        f"Possible algebraic loop {loop}: an FMU in it does not say what its outputs depend on. It is stepped as if a "
+        f"state were "
         "in between; if there is none, master.algorithm = 'iterate' solves it."
     )

@@ -6,7 +6,9 @@ from cosim.master.algorithms.algorithm import Algorithm
 
 
 class GaussSeidel(Algorithm):
-    """Components in the order of the plan. A signal that is fed back to an earlier one is held over the step for all targets."""
+    """Components in the order of the plan. A signal that is fed back to an earlier one is held over the step for all
+    targets.
+    """
 
     name = "gauss-seidel"
 

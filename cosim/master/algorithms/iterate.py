@@ -20,8 +20,9 @@ class Iterate(Algorithm):
         loops: names of the components of each loop, consecutive in the plan.
         settings: method and tolerances.
 
-    Source: R. Kuebler, W. Schiehlen, Two methods of simulator coupling, Mathematical and Computer Modelling of Dynamical Systems
-    6 (2000) 93-113; M. Busch, Zur effizienten Kopplung von Simulationsprogrammen, Kassel 2012, chapter 2.
+    Source: R. Kuebler, W. Schiehlen, Two methods of simulator coupling, Mathematical and Computer Modelling of
+    Dynamical Systems 6 (2000) 93-113; M. Busch, Zur effizienten Kopplung von Simulationsprogrammen, Kassel 2012,
+    chapter 2.
     """
 
     name = "iterate"
@@ -40,7 +41,9 @@ class Iterate(Algorithm):
                 place += 1
                 continue
             members = range(place, place + len(first_of[place]))
-            assert {plan.steps[i].component.name for i in members} == set(first_of[place]), "a loop is consecutive in its plan"
+            assert {plan.steps[i].component.name for i in members} == set(first_of[place]), (
+                "a loop is consecutive in its plan"
+            )
             self.loops.append(IteratedLoop(plan, members, links, settings or IterationSettings()))
             self._parts.append(self.loops[-1])
             place = members.stop

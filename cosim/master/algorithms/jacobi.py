@@ -13,10 +13,10 @@ from cosim.master.algorithms.algorithm import Algorithm
 class Jacobi(Algorithm):
     """All components are moved with the values of the start of the step.
 
-    With threads the sealed FMUs step at the same time, since their C code runs outside Python's lock; blocks, and components
-    whose `move` somebody took over (a watched plant, a receiver of balises), are moved by the calling thread in the order of the
-    plan once the others have arrived. Results do not depend on the number of threads. FMI allows calls of different instances
-    at the same time; an FMU that does not stand it needs ``threads = 1``.
+    With threads the sealed FMUs step at the same time, since their C code runs outside Python's lock; blocks, and
+    components whose `move` somebody took over (a watched plant, a receiver of balises), are moved by the calling thread
+    in the order of the plan once the others have arrived. Results do not depend on the number of threads. FMI allows
+    calls of different instances at the same time; an FMU that does not stand it needs ``threads = 1``.
 
     Args:
         plan: prepared, components initialised.
@@ -64,7 +64,9 @@ class Jacobi(Algorithm):
 
 
 def _may_run_apart(step: PlannedComponent) -> bool:
-    """Only the plain step of a sealed library: it touches nothing but its own instance and its own part of the values."""
+    """Only the plain step of a sealed library: it touches nothing but its own instance and its own part of the
+    values.
+    """
     return step.component.kind != "block" and step.move == step.drive
 
 

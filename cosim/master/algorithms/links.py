@@ -15,7 +15,8 @@ class Link:
     """One connection as the plan holds it.
 
     Args:
-        text: ``a.y -> b.u``. column: of the source within the values. source, target: places of the components in the plan.
+        text: ``a.y -> b.u``. column: of the source within the values. source, target: places of the components in the
+        plan.
         place: of the input among the connected inputs of its component.
         held: whether the value is that of the start of a step.
     """
@@ -32,7 +33,14 @@ def plan_links(plan: Plan) -> list[Link]:
     """All connections of a plan, in its order."""
     owner = [place for place, step in enumerate(plan.steps) for _ in range(step.columns.start, step.columns.stop)]
     return [
-        Link(f"{plan.signals[column].name} -> {step.component.name}.{name}", int(column), owner[column], target, place, held)
+        Link(
+            f"{plan.signals[column].name} -> {step.component.name}.{name}",
+            int(column),
+            owner[column],
+            target,
+            place,
+            held,
+        )
         for target, step in enumerate(plan.steps)
         for place, (name, column, held) in enumerate(
             zip(step.inputs.names, step.inputs.sources, step.inputs.held.tolist(), strict=True)

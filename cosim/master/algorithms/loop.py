@@ -1,6 +1,7 @@
 """One loop, iterated within a communication step: save, sweep, compare, guess again, restore, sweep.
 
-What is iterated are the values that are fed back: outputs of components that are stepped no earlier than those who use them.
+What is iterated are the values that are fed back: outputs of components that are stepped no earlier than those who use
+them.
 """
 
 from __future__ import annotations
@@ -28,22 +29,22 @@ class Start:
     """Everything at the start of a step, and where in the values the members' part lies.
 
     Args:
-        states: of the members. values: of the members, shape (q,). untouched: of all components, shape (k,).
+        states: of the members. values: of the members, shape (q,). non_numeric: of all components, shape (k,).
         services: those of the plan and their states, where members are moved for good; None for trials.
     """
 
     states: list[Any]
     values: np.ndarray
-    untouched: np.ndarray
+    non_numeric: np.ndarray
     services: Sequence[tuple[Service, Any]] | None = None
 
 
 class IteratedLoop:
     """Consecutive components of a plan, stepped again and again from the same state until what is fed back agrees.
 
-    The last sweep is kept: the inputs of that sweep and the outputs it left agree within the tolerances. Where somebody took
-    over how a member is moved (balises are delivered within the loop), trial sweeps take the plain steps, and the last guess is
-    stepped once more, for good. What jumps then is iterated on with the jump.
+    The last sweep is kept: the inputs of that sweep and the outputs it left agree within the tolerances. Where somebody
+    took over how a member is moved (balises are delivered within the loop), trial sweeps take the plain steps, and the
+    last guess is stepped once more, for good. What jumps then is iterated on with the jump.
 
     Args:
         plan: prepared, components initialised. members: places of the loop's components in it. links: of the plan.
@@ -79,7 +80,7 @@ class IteratedLoop:
             RunError: a component failed, or the iteration does not converge; the residuals are told.
         """
         states = [step.component.save() for step in self.steps]
-        start = Start(states, self._plan.values[self._span].copy(), self._plan.untouched.copy())
+        start = Start(states, self._plan.values[self._span].copy(), self._plan.non_numeric.copy())
         try:
             self._iterate(t, until, start)
         except BaseException:
@@ -102,7 +103,9 @@ class IteratedLoop:
         """Plain data."""
         found = {"components": self.names, "iterated": self.signals, "method": self.settings.method}
         if self.settings.method == "newton":
-            found["jacobian"] = "directional derivatives and Broyden updates" if self._sensitivity.usable else "Broyden updates"
+            found["jacobian"] = (
+                "directional derivatives and Broyden updates" if self._sensitivity.usable else "Broyden updates"
+            )
         return found | self.history.summary()
 
     # -- iteration --------------------------------------------------------------------------------------------------
@@ -117,7 +120,9 @@ class IteratedLoop:
         self.history.add(Search(until, tuple(residuals)))
 
     def _search(self, t: float, until: float, start: Start, z: np.ndarray, residuals: list[float]) -> np.ndarray:
-        """Sweep until what comes back is the guess, shape (n,), which is returned; the residuals are added to those so far."""
+        """Sweep until what comes back is the guess, shape (n,), which is returned; the residuals are added to those so
+        far.
+        """
         settings, before = self.settings, len(residuals)
         while True:
             g = self._try(t, until, start, z, residuals)
@@ -143,17 +148,22 @@ class IteratedLoop:
             if not residuals:
                 raise
             self._plan.values[self._span] = start.values
-            told = f"sweep {len(residuals) + 1} of the iteration of {', '.join(self.names)}; residuals so far: {shown(residuals)}"
+            told = (
+                f"sweep {len(residuals) + 1} of the iteration of {', '.join(self.names)}; residuals so far: "
+                f"{shown(residuals)}"
+            )
             raise RunError(f"{error} (In {told}.)", error.component, error.time) from error
         back: np.ndarray = self._plan.values[self._columns]
         return back
 
     def _sweep(self, t: float, until: float, start: Start, z: np.ndarray) -> None:
-        """One step of all members; for good, each is moved by whoever took it over, and finds its outputs as they were at `t`."""
+        """One step of all members; for good, each is moved by whoever took it over, and finds its outputs as they were
+        at `t`.
+        """
         values, first = self._plan.values, self._span.start
         values[self._span] = start.values
         values[self._columns] = z
-        self._plan.untouched[:] = start.untouched
+        self._plan.non_numeric[:] = start.non_numeric
         for step, known in zip(self.steps, self._known, strict=True):
             step.prepare(t, until, ends_known=known)
             if start.services is not None:
@@ -172,7 +182,9 @@ class IteratedLoop:
         for step, state in zip(self.steps, start.states, strict=True):
             step.component.release(state)
 
-    def _failure(self, until: float, start: Start, z: np.ndarray, g: np.ndarray, residuals: Sequence[float]) -> RunError:
+    def _failure(
+        self, until: float, start: Start, z: np.ndarray, g: np.ndarray, residuals: Sequence[float]
+    ) -> RunError:
         method, signals = self.settings.method, self.signals
         if len(residuals) > 1:
             self._plan.values[self._span] = start.values  # a guess gone astray is no result, and hides no cause
@@ -182,9 +194,12 @@ class IteratedLoop:
         moving = ", ".join(f"{signals[i]} from {z[i]:.6g} to {g[i]:.6g}" for i in worst)
         other = "" if method == "newton" else "master.iteration.method = 'newton', "
         return RunError(
-            f"Loop of {', '.join(self.names)} at t = {until:g} s: {len(residuals)} sweeps by '{method}' do not converge. Scaled "
-            f"residuals (1 is converged): {shown(residuals)}. Moving most in the last sweep: {moving}. Try {other}a smaller "
-            "communication step, a smaller master.iteration.relaxation, larger tolerances or more max_iterations; if the "
+            f"Loop of {', '.join(self.names)} at t = {until:g} s: {len(residuals)} sweeps by '{method}' do not "
+            f"converge. Scaled "
+            f"residuals (1 is converged): {shown(residuals)}. Moving most in the last sweep: {moving}. Try {other}a "
+            f"smaller "
+            "communication step, a smaller master.iteration.relaxation, larger tolerances or more max_iterations; if "
+            "the "
             "equations of the loop have no solution, nothing helps.",
             self.steps[0].component.name,
             until,
@@ -192,5 +207,9 @@ class IteratedLoop:
 
 
 def _ends_known(links: Sequence[Link], place: int, members: range) -> np.ndarray:
-    """Of each input of a member, whether its value is that of the end of the step: not held, of a member or stepped before."""
-    return np.array([link.source < members.stop and not link.held for link in links if link.target == place], dtype=bool)
+    """Of each input of a member, whether its value is that of the end of the step: not held, of a member or stepped
+    before.
+    """
+    return np.array(
+        [link.source < members.stop and not link.held for link in links if link.target == place], dtype=bool
+    )

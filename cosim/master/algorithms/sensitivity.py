@@ -1,4 +1,6 @@
-"""Sensitivity: how what comes back over an interface depends on it at once, from the components' directional derivatives."""
+"""Sensitivity: how what comes back over an interface depends on it at once, from the components' directional
+derivatives.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +44,8 @@ class Sensitivity:
     """The Jacobian of a sweep over a loop as far as it passes through the components at once.
 
     Args:
-        plan: the plan. members: places of the loop's components. links: of the plan. interface: columns fed back, shape (n,).
+        plan: the plan. members: places of the loop's components. links: of the plan. interface: columns fed back, shape
+        (n,).
 
     `usable` says whether every component through which something passes at once declares directional derivatives.
     """
@@ -56,7 +59,9 @@ class Sensitivity:
         self._gains = [p.gains() for p in self._passages] if self.usable else []
 
     def __call__(self) -> np.ndarray | None:
-        """Derivatives of what comes back, where the components stand, shape (n, n); None where they are not to be had."""
+        """Derivatives of what comes back, where the components stand, shape (n, n); None where they are not to be
+        had.
+        """
         if not self.usable:
             return None
         size = len(self._interface)
@@ -82,10 +87,14 @@ def _passage(plan: Plan, place: int, inner: Sequence[Link]) -> Passage | None:
     taken = [
         k
         for k in inner
-        if k.target == place and _is_real(component, n := step.inputs.names[k.place]) and _variable(component, n) in used
+        if k.target == place
+        and _is_real(component, n := step.inputs.names[k.place])
+        and _variable(component, n) in used
     ]
     names = {column: plan.signals[column].name.removeprefix(f"{component.name}.") for column in given}
-    columns = sorted(c for c, name in names.items() if _is_real(component, name) and table.get(_variable(component, name)))
+    columns = sorted(
+        c for c, name in names.items() if _is_real(component, name) and table.get(_variable(component, name))
+    )
     if not taken or not columns:
         return None
     return Passage(

@@ -12,8 +12,8 @@ class IterationSettings:
     Args:
         method: ``fixed-point``, ``aitken`` or ``newton``.
         max_iterations: sweeps in one step, after which the run fails.
-        relative_tolerance, absolute_tolerance: a fed-back value has settled when one more sweep moves it by no more than
-            ``absolute + relative * |value|``; the absolute one is in the value's own unit.
+        relative_tolerance, absolute_tolerance: a fed-back value has settled when one more sweep moves it by no more
+            than ``absolute + relative * |value|``; the absolute one is in the value's own unit.
         relaxation: of ``fixed-point``, and the first one of ``aitken``.
     """
 

@@ -1,7 +1,8 @@
 """Error control by step doubling: every step is taken whole and in two halves, and the difference is its error.
 
-The halves are kept. Steps are the way between two communication points divided by powers of two, so that times are exact and
-rows stay where they are. Sources: Hairer, Norsett, Wanner 1993, II.4; Schierz, Arnold, Clauss 2012 for co-simulation.
+The halves are kept. Steps are the way between two communication points divided by powers of two, so that times are
+exact and rows stay where they are. Sources: Hairer, Norsett, Wanner 1993, II.4; Schierz, Arnold, Clauss 2012 for
+co-simulation.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ FINEST = 30
 
 
 @dataclass
-class Tally:
+class StepStatistics:
     """What became of the steps.
 
     Args:
@@ -63,12 +64,13 @@ class DoublingStep(StepControl):
         rigid = [step.component.name for step in system.plan.steps if not step.component.can_vary_step]
         if rigid:
             raise CouplingError(
-                "Error control (master.control = 'doubling') divides communication steps, and these components cannot vary "
+                "Error control (master.control = 'doubling') divides communication steps, and these components cannot "
+                "vary "
                 f"theirs: {', '.join(rigid)}. Use master.control = 'fixed'."
             )
         super().__init__(system)
         self.tolerance, self.order, self.smallest_step = tolerance, order, smallest_step
-        self.tally = Tally()
+        self.statistics = StepStatistics()
         self._level = 0
         self._watched = system.plan.continuous
 
@@ -95,19 +97,26 @@ class DoublingStep(StepControl):
         return rows
 
     def summary(self) -> Mapping[str, Any]:  # noqa: D102 - see StepControl
-        tally = self.tally
-        shortest = None if tally.shortest == inf else tally.shortest
+        statistics = self.statistics
+        shortest = None if statistics.shortest == inf else statistics.shortest
         return {
-            "name": self.name, "tolerance": self.tolerance, "accepted": tally.accepted, "rejected": tally.rejected,
-            "forced": tally.forced, "first_forced_at": tally.forced_at, "shortest_step": shortest, "worst_error": tally.worst,
-        }  # fmt: skip
+            "name": self.name,
+            "tolerance": self.tolerance,
+            "accepted": statistics.accepted,
+            "rejected": statistics.rejected,
+            "forced": statistics.forced,
+            "first_forced_at": statistics.forced_at,
+            "shortest_step": shortest,
+            "worst_error": statistics.worst,
+        }
 
     def warnings(self) -> list[str]:  # noqa: D102 - see StepControl
-        if not self.tally.forced:
+        if not self.statistics.forced:
             return []
         return [
-            f"Error control: {self.tally.forced} steps of the smallest length have a larger error than the tolerance "
-            f"{self.tolerance:g}, the first at t = {self.tally.forced_at:g} s (worst: {self.tally.worst:.3g} times); "
+            f"Error control: {self.statistics.forced} steps of the smallest length have a larger error than the "
+            f"tolerance {self.tolerance:g}, the first at t = {self.statistics.forced_at:g} s "
+            f"(worst: {self.statistics.worst:.3g} times); "
             "set a smaller master.smallest_step, or accept a larger master.tolerance."
         ]
 
@@ -122,14 +131,16 @@ class DoublingStep(StepControl):
             rows, error = self._twice(times, checkpoint, finest)
             if error > 1.0 and not finest:
                 system.restore(checkpoint)
-                self.tally.rejected += 1
+                self.statistics.rejected += 1
                 return None
         finally:
             system.release(checkpoint)
         self._count(begin, end - begin, error)
         return rows, error
 
-    def _twice(self, times: tuple[float, float, float], checkpoint: Checkpoint, finest: bool) -> tuple[list[Row], float]:
+    def _twice(
+        self, times: tuple[float, float, float], checkpoint: Checkpoint, finest: bool
+    ) -> tuple[list[Row], float]:
         """The step whole, then in two halves; a step that fails may be too long, so its error is infinite."""
         try:
             return self._whole_and_halves(times, checkpoint)
@@ -157,7 +168,9 @@ class DoublingStep(StepControl):
             rows.append((t, self.system.plan.values.copy()))
 
     def _error(self, coarse: np.ndarray) -> float:
-        """Error of the two halves as a multiple of the tolerance, by Richardson's extrapolation; of the worst signal."""
+        """Error of the two halves as a multiple of the tolerance, by Richardson's extrapolation; of the worst
+        signal.
+        """
         fine = self.system.plan.values[self._watched]
         scale = self.tolerance * np.maximum(1.0, np.abs(fine))
         with np.errstate(invalid="ignore"):  # what is no number is no small error
@@ -165,12 +178,15 @@ class DoublingStep(StepControl):
             return float(np.nan_to_num(np.max(difference / scale, initial=0.0), nan=inf, posinf=inf))
 
     def _count(self, begin: float, length: float, error: float) -> None:
-        tally = self.tally
-        tally.accepted += 1
-        tally.shortest, tally.worst = min(tally.shortest, length), max(tally.worst, error)
+        statistics = self.statistics
+        statistics.accepted += 1
+        statistics.shortest, statistics.worst = (
+            min(statistics.shortest, length),
+            max(statistics.worst, error),
+        )
         if error > 1.0:
-            tally.forced += 1
-            tally.forced_at = begin if tally.forced_at is None else tally.forced_at
+            statistics.forced += 1
+            statistics.forced_at = begin if statistics.forced_at is None else statistics.forced_at
 
     def _finest_level(self, length: float) -> int:
         if self.smallest_step is None:

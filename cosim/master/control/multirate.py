@@ -1,7 +1,8 @@
 """Multirate: a component that steps at an integer fraction of the communication rate, or at a multiple of it.
 
-A slow component is stepped last: when its own step is over it has the newest inputs, and its values are never from the future.
-In between they are held. A fast component takes several steps for one of the master's; lines give each of them its own inputs.
+A slow component is stepped last: when its own step is over it has the newest inputs, and its values are never from the
+future. In between they are held. A fast component takes several steps for one of the master's; lines give each of them
+its own inputs.
 """
 
 from __future__ import annotations
@@ -61,7 +62,8 @@ def set_rates(
         taken: component -> why it must take every communication step (it is watched, or told of balises).
 
     Raises:
-        CouplingError: a component that must take every step, cannot vary its step where a rest is left, or has both rates.
+        CouplingError: a component that must take every step, cannot vary its step where a rest is left, or has both
+        rates.
     """
     for name, count in substeps.items():
         plan.find(name).substeps = count
@@ -75,7 +77,8 @@ def set_rates(
             raise CouplingError(f"{name}: every = {count} is not possible: {taken[name]}.")
         if axis.count % count and not planned.component.can_vary_step:
             raise CouplingError(
-                f"{name}: every = {count} does not divide the {axis.count} steps of the run, and the component cannot vary its "
+                f"{name}: every = {count} does not divide the {axis.count} steps of the run, and the component cannot "
+                f"vary its "
                 "step for the rest; change 'stop', 'step' or 'every'."
             )
         SlowMover(planned, count, axis)

@@ -1,1 +1,3 @@
-"""Events of the components themselves: clocks, time events, early returns, and what follows from them at the same instant."""
+"""Events of the components themselves: clocks, time events, early returns, and what follows from them at the same
+instant.
+"""

@@ -45,7 +45,9 @@ def make_coordinator(system: System, events: Events) -> EventCoordinator | None:
     for wire in system.plan.clocks:
         if wire.source[0] in participants and wire.target[0] in participants:
             source, target = participants[wire.source[0]], participants[wire.target[0]]
-            clocks = [p.component.variables[c].valueReference for p, c in ((source, wire.source[1]), (target, wire.target[1]))]
+            clocks = [
+                p.component.variables[c].valueReference for p, c in ((source, wire.source[1]), (target, wire.target[1]))
+            ]
             source.wires.setdefault(clocks[0], []).append((target, clocks[1]))
     return EventCoordinator(system, list(participants.values()))
 
@@ -63,7 +65,7 @@ def _is_concerned(step: PlannedComponent, plan: Plan) -> bool:
         return True
     if _gives(step, plan) and not _waits_to_be_told(component):
         return True
-    names = [*step.inputs.names, *(step.inputs.untouched.names if step.inputs.untouched is not None else ())]
+    names = [*step.inputs.names, *(step.inputs.non_numeric.names if step.inputs.non_numeric is not None else ())]
     inputs = [component.variables[name] for name in names]
     return any(v.variability == "discrete" or clock_references(v) for v in inputs)
 
@@ -79,9 +81,13 @@ def _gives(step: PlannedComponent, plan: Plan) -> bool:
     component = step.component
     if any(component.name == wire.source[0] for wire in plan.clocks):
         return True
-    if any(((s.inputs.sources >= step.columns.start) & (s.inputs.sources < step.columns.stop)).any() for s in plan.steps):
+    if any(
+        ((s.inputs.sources >= step.columns.start) & (s.inputs.sources < step.columns.stop)).any() for s in plan.steps
+    ):
         return True
-    return len(plan.untouched) > 0 and any(v.causality == "output" and v.type in UNTOUCHED for v in component.variables.values())
+    return len(plan.non_numeric) > 0 and any(
+        v.causality == "output" and v.type in UNTOUCHED for v in component.variables.values()
+    )
 
 
 def _never_send_clocked(step: PlannedComponent) -> None:

@@ -1,7 +1,8 @@
-"""The coordinator: divides a communication step at events, so that all components meet at each of them. Knows the system.
+"""The coordinator: divides a communication step at events, so that all components meet at each of them. Knows the
+system.
 
-What is known in advance (time events, ticks of time-based clocks) is where everybody is stepped to. Where a component returns
-early, at an event that nobody knew of, the others are taken back and stepped to it as well.
+What is known in advance (time events, ticks of time-based clocks) is where everybody is stepped to. Where a component
+returns early, at an event that nobody knew of, the others are taken back and stepped to it as well.
 """
 
 from __future__ import annotations
@@ -33,7 +34,8 @@ class EventCoordinator:
     Args:
         system: what is stepped. participants: components that take part in events, in plan order.
 
-    `notes` says who cannot take part as it should; `redone` counts parts of steps taken again because of an early return.
+    `notes` says who cannot take part as it should; `redone` counts parts of steps taken again because of an early
+    return.
     """
 
     def __init__(self, system: System, participants: Sequence[Participant]) -> None:
@@ -76,7 +78,9 @@ class EventCoordinator:
             reached, found = self._part(now, self._next_stop(now, until))
             rows += found
             if any(step.component.terminated for step in self._system.plan.steps):
-                return rows if until - reached <= TIME_TOLERANCE else [*rows, (reached, self._system.plan.values.copy())]
+                return (
+                    rows if until - reached <= TIME_TOLERANCE else [*rows, (reached, self._system.plan.values.copy())]
+                )
             rows += self._handle(reached, until, bool(rows) and reached - rows[-1][0] <= TIME_TOLERANCE)
             ended = any(step.component.terminated for step in self._system.plan.steps)
             if ended or until - reached <= TIME_TOLERANCE:
@@ -162,14 +166,18 @@ class EventCoordinator:
     def _first_end(self, stop: float) -> Component | None:
         """The component that asked for the end of the run before `stop` [s], the first one of several."""
         ended = [
-            s.component for s in self._system.plan.steps if s.component.terminated and stop - s.component.time > TIME_TOLERANCE
+            s.component
+            for s in self._system.plan.steps
+            if s.component.terminated and stop - s.component.time > TIME_TOLERANCE
         ]
         return min(ended, key=lambda c: c.time, default=None)
 
     # -- at an event ------------------------------------------------------------------------------------------------
 
     def _handle(self, t: float, until: float, row_before: bool) -> Sequence[Row]:
-        """Handle what happens at `t` [s], and give the rows before and after it; the row of `until` itself is the master's."""
+        """Handle what happens at `t` [s], and give the rows before and after it; the row of `until` itself is the
+        master's.
+        """
         if not self.iteration.concerns_anybody(t):
             return ()
         plan = self._system.plan
@@ -186,9 +194,12 @@ class EventCoordinator:
     def _stuck(self, t: float) -> RunError:
         names = [p.name for p in self._participants if abs(p.component.time - t) <= TIME_TOLERANCE]
         return RunError(
-            f"Time stands still at t = {t:g} s: {MAX_EVENTS_WITHOUT_PROGRESS} events one after the other without any progress; "
-            f"components with events: {', '.join(names)}.", names[0] if names else "", t,
-        )  # fmt: skip
+            f"Time stands still at t = {t:g} s: {MAX_EVENTS_WITHOUT_PROGRESS} events one after the other without any "
+            f"progress; "
+            f"components with events: {', '.join(names)}.",
+            names[0] if names else "",
+            t,
+        )
 
     def _holder(self, step: PlannedComponent) -> Mover | None:
         balises = self._system.balises
@@ -205,13 +216,15 @@ class EventCoordinator:
         notes = []
         if whole:
             notes.append(
-                f"Cannot vary the communication step, so events between two communication points reach them at the later one: "
+                f"Cannot vary the communication step, so events between two communication points reach them at the "
+                f"later one: "
                 f"{', '.join(whole)}."
             )
         if self._interrupters and fixed:
             names = ", ".join(c.name for c in self._interrupters)
             notes.append(
-                f"{names} may return early from a step; components that cannot save their state are not taken back to the "
+                f"{names} may return early from a step; components that cannot save their state are not taken back to "
+                f"the "
                 f"event: {', '.join(fixed)}."
             )
         return notes

@@ -1,7 +1,7 @@
 """The gate: which connected inputs of a component with Event Mode may be sent when. Knows inputs and clocks, not time.
 
-FMI 3.0: discrete inputs change in Event Mode only, clocked ones only while one of their clocks is active; everything may be
-sent during initialisation except clocked inputs.
+FMI 3.0: discrete inputs change in Event Mode only, clocked ones only while one of their clocks is active; everything
+may be sent during initialisation except clocked inputs.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ class Gate:
 
     Args:
         component: with Event Mode. inputs: its connected inputs; `gather` stays as it is.
-        events_pass: discrete inputs are sent in Event Mode; otherwise in Step Mode like the others, and clocked ones never.
+        events_pass: discrete inputs are sent in Event Mode; otherwise in Step Mode like the others, and clocked ones
+        never.
     """
 
     def __init__(self, component: Component, inputs: Inputs, *, events_pass: bool = True) -> None:
@@ -34,12 +35,13 @@ class Gate:
         unclocked = [i for i, clocks in enumerate(self._clocks) if not clocks]
         self._discrete = np.array([i for i in unclocked if not flows[i]], dtype=np.intp)
         self._unclocked = np.array(unclocked, dtype=np.intp)
-        self._texts = inputs.untouched
+        self._texts = inputs.non_numeric
         self._text_clocks = self._clocks_of_texts(component)
         self._send_flowing = self._part(component, [i for i in unclocked if flows[i]])
         self._send_unclocked = self._part(component, unclocked)
         self._groups = [
-            (clocks, np.array(places, dtype=np.intp), self._part(component, places)) for clocks, places in self._clocked_groups()
+            (clocks, np.array(places, dtype=np.intp), self._part(component, places))
+            for clocks, places in self._clocked_groups()
         ]
         self._sent: tuple[object, ...] = ()
         self._sent_clocked: dict[int, bytes] = {}
@@ -134,7 +136,9 @@ class Gate:
 
 
 def clock_references(variable: ModelVariable) -> frozenset[int]:
-    """Value references of the clocks of a variable; fmpy holds the clocks themselves, descriptions made in Python references."""
+    """Value references of the clocks of a variable; fmpy holds the clocks themselves, descriptions made in Python
+    references.
+    """
     return frozenset(int(getattr(entry, "valueReference", entry)) for entry in variable.clocks or ())
 
 

@@ -1,7 +1,7 @@
 """Event iteration: all that happens at one instant, in super-dense time. Knows participants and the values of the plan.
 
-A super-dense instant: clocks and inputs are set and outputs passed on, in sweeps in plan order, until nothing changes; then
-discrete states are updated, which may begin the next super-dense instant. FMI 3.0.2, 2.3.5 (Event Mode).
+A super-dense instant: clocks and inputs are set and outputs passed on, in sweeps in plan order, until nothing changes;
+then discrete states are updated, which may begin the next super-dense instant. FMI 3.0.2, 2.3.5 (Event Mode).
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""A participant: one component with Event Mode, as the event iteration sees it. Knows its component, inputs and clocks."""
+"""A participant: one component with Event Mode, as the event iteration sees it. Knows its component, inputs and
+clocks.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +22,8 @@ class Participant:
         planned: an FMI 3 component with Event Mode, in the plan.
         gives: whether somebody takes something from it.
 
-    `wires` says which input clocks tick with each of its output clocks (by value reference). `interrupts` says that others are
-    taken back to the event where it returns early.
+    `wires` says which input clocks tick with each of its output clocks (by value reference). `interrupts` says that
+    others are taken back to the event where it returns early.
     """
 
     def __init__(self, planned: PlannedComponent, *, gives: bool) -> None:

@@ -1,4 +1,6 @@
-"""Strides: how a component that cannot stop everywhere takes part in a step that is divided at events. Knows one component."""
+"""Strides: how a component that cannot stop everywhere takes part in a step that is divided at events. Knows one
+component.
+"""
 
 from __future__ import annotations
 
@@ -23,15 +25,17 @@ class Span:
 class Stride:
     """Takes over how a planned component moves.
 
-    One that takes whole communication steps only waits for the last part of the step. One that has gone past an event, and could
-    not be taken back, waits where it is until the others have come there.
+    One that takes whole communication steps only waits for the last part of the step. One that has gone past an event,
+    and could not be taken back, waits where it is until the others have come there.
 
     Args:
         planned: the component. span: the step under way.
         hold: told of the parts that a waiting component does not take.
     """
 
-    def __init__(self, planned: PlannedComponent, span: Span, hold: Callable[[float, float], None] | None = None) -> None:
+    def __init__(
+        self, planned: PlannedComponent, span: Span, hold: Callable[[float, float], None] | None = None
+    ) -> None:
         self._component, self._span, self._hold = planned.component, span, hold
         self._whole = not planned.component.can_vary_step
         self._move: Mover = planned.move

@@ -34,7 +34,9 @@ LARGEST_SHARE = 0.3  # of the run that a zoom shows at most
 
 
 @styled
-def comparison_figure(signal: SignalComparison, ax: Axes | None = None, window: tuple[float, float] | None = None) -> Axes:
+def comparison_figure(
+    signal: SignalComparison, ax: Axes | None = None, window: tuple[float, float] | None = None
+) -> Axes:
     """Reference and result over the tolerance tube, against time.
 
     Args:
@@ -58,7 +60,13 @@ def comparison_figure(signal: SignalComparison, ax: Axes | None = None, window: 
         rows = _around(time, begin, end)
         few = window is not None and np.count_nonzero(rows) <= DOTTED
         curve(
-            ax, time[rows], bounded(values[rows]), limits, label=name, **line, **({"marker": ".", "markersize": 4} if few else {})
+            ax,
+            time[rows],
+            bounded(values[rows]),
+            limits,
+            label=name,
+            **line,
+            **({"marker": ".", "markersize": 4} if few else {}),
         )
     _mark_findings(ax, signal, begin, end)
     if limits is not None:
@@ -77,9 +85,25 @@ def comparison_error_figure(signal: SignalComparison, ax: Axes | None = None) ->
     largest = float(np.max(np.abs(error[np.isfinite(error)]), initial=0.0))
     limit = ROOM * max(largest, allowed) or 1.0
     if allowed > 0.0:
-        ax.axhspan(-allowed, allowed, color=TUBE_COLOUR, alpha=0.55, linewidth=0, zorder=0.5, label=f"allowed: {number(allowed)}")
+        ax.axhspan(
+            -allowed,
+            allowed,
+            color=TUBE_COLOUR,
+            alpha=0.55,
+            linewidth=0,
+            zorder=0.5,
+            label=f"allowed: {number(allowed)}",
+        )
     ax.axhline(0.0, color="#888888", linewidth=0.7, zorder=1)
-    curve(ax, curves.error_time, error, (-limit, limit), color=RESULT_COLOUR, linewidth=1.1, label="result minus reference")
+    curve(
+        ax,
+        curves.error_time,
+        error,
+        (-limit, limit),
+        color=RESULT_COLOUR,
+        linewidth=1.1,
+        label="result minus reference",
+    )
     if np.isfinite(signal.max_error_at) and not signal.passed:
         ax.axvline(signal.max_error_at, color=ALARM_COLOUR, linewidth=0.8, linestyle=(0, (2, 2)), label="largest")
     ax.set_ylim(-limit, limit)
@@ -113,7 +137,9 @@ def comparison_picture(signal: SignalComparison) -> Figure:
 
 
 def worst_window(signal: SignalComparison) -> tuple[float, float] | None:
-    """From when to when the worst point is worth a close look [s]; None without curves, or where nothing is the worst."""
+    """From when to when the worst point is worth a close look [s]; None without curves, or where nothing is the
+    worst.
+    """
     curves = signal.curves
     if curves is None or not len(curves.reference_time):
         return None
@@ -131,7 +157,9 @@ def worst_window(signal: SignalComparison) -> tuple[float, float] | None:
 
 
 def _centre(finding: Finding) -> tuple[float, float]:
-    """Where a finding is largest and how far a late jump reaches from there [s]; else where it begins, and its length [s]."""
+    """Where a finding is largest and how far a late jump reaches from there [s]; else where it begins, and its length
+    [s].
+    """
     if not np.isfinite(finding.worst):
         return finding.time, finding.end - finding.time
     return finding.worst, finding.size if finding.kind == "jump_time" else 0.0
@@ -170,7 +198,9 @@ def _value_limits(curves: Curves, begin: float, end: float) -> tuple[float, floa
     finite = bounded(result[np.isfinite(result)])
     anchors = [reference, *tube]
     known = np.concatenate([bounded(a[np.isfinite(a)]) for a in anchors])
-    if len(finite) and (not len(known) or np.ptp(np.concatenate([known, finite])) <= SPIKE * max(float(np.ptp(known)), 1e-300)):
+    if len(finite) and (
+        not len(known) or np.ptp(np.concatenate([known, finite])) <= SPIKE * max(float(np.ptp(known)), 1e-300)
+    ):
         anchors.append(finite)
     return value_limits(anchors, [result])
 
@@ -185,10 +215,16 @@ def _pieces(curves: Curves, begin: float, end: float) -> Iterator[slice]:
             yield rows
 
 
-def _draw_tube(ax: Axes, curves: Curves, begin: float, end: float, limits: tuple[float, float] | None, edge: float) -> None:
+def _draw_tube(
+    ax: Axes, curves: Curves, begin: float, end: float, limits: tuple[float, float] | None, edge: float
+) -> None:
     """The tube as one area for each piece; its edge keeps a narrow one visible."""
     shapes = []
-    reach = (-np.inf, np.inf) if limits is None else (limits[0] - SPIKE * np.ptp(limits), limits[1] + SPIKE * np.ptp(limits))
+    reach = (
+        (-np.inf, np.inf)
+        if limits is None
+        else (limits[0] - SPIKE * np.ptp(limits), limits[1] + SPIKE * np.ptp(limits))
+    )
     for rows in _pieces(curves, begin, end):
         time, lower, upper = curves.tube_time[rows], curves.lower[rows], curves.upper[rows]
         near = _around(time, begin, end)

@@ -85,7 +85,9 @@ def balise_ticks(ax: Axes, result: Result) -> None:
 def mark_evaluation(ax: Axes, result: Result, spec: ReportSpec) -> None:
     """Mark where the evaluation starts, if start-up is left out of it."""
     if len(result.time) and result.time[0] < spec.evaluate_after < result.time[-1]:
-        ax.axvline(spec.evaluate_after, color="#777777", linewidth=0.9, linestyle=(0, (1, 2)), label="evaluated from here on")
+        ax.axvline(
+            spec.evaluate_after, color="#777777", linewidth=0.9, linestyle=(0, (1, 2)), label="evaluated from here on"
+        )
 
 
 def time_axis(ax: Axes, result: Result) -> None:

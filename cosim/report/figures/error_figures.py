@@ -55,7 +55,8 @@ class ErrorCurve:
     """An error against time, and how it is drawn.
 
     Args:
-        time: [s], shape (rows,). error: shape (rows,). settled: rows after the start-up, which set the scale, shape (rows,).
+        time: [s], shape (rows,). error: shape (rows,). settled: rows after the start-up, which set the scale, shape
+        (rows,).
         line: colour, dashes, width. text: for the legend.
     """
 
@@ -77,7 +78,11 @@ def draw_errors(ax: Axes, curves: Sequence[ErrorCurve], quantity: Quantity, unit
     for c in curves:
         largest = error_size(c.time[c.settled], c.error[c.settled]).max_abs
         wild = largest > SPIKE * scale.limit
-        line = c.line | (WILD_LINE if wild else {}) | {"label": f"{c.text} ({_off_scale(largest, unit)})" if wild else c.text}
+        line = (
+            c.line
+            | (WILD_LINE if wild else {})
+            | {"label": f"{c.text} ({_off_scale(largest, unit)})" if wild else c.text}
+        )
         if scale.floor is None:
             curve(ax, c.time, c.error, (-scale.limit, scale.limit), **line)
         else:

@@ -26,14 +26,17 @@ def sampling_gaps(result: Result) -> tuple[np.ndarray, np.ndarray]:
         result: the run.
 
     Returns:
-        Times of the balises [s], shape (n,), and the gaps between them [s], shape (n - 1,), or empty without two balises.
+        Times of the balises [s], shape (n,), and the gaps between them [s], shape (n - 1,), or empty without two
+        balises.
     """
     stamps = np.array(accepted_stamps(result.events))
     return stamps, np.diff(stamps)
 
 
 def certified_gaps(result: Result, spec: ReportSpec) -> dict[str, float]:
-    """Largest gap each observer is certified for when the gaps vary [s]; observers without a finite limit are left out."""
+    """Largest gap each observer is certified for when the gaps vary [s]; observers without a finite limit are left
+    out.
+    """
     certificates = mapping_entry(result, "certificates")
     limits = {}
     for observer in spec.observers:

@@ -1,4 +1,6 @@
-"""Figures of a comparison of observers: how large their errors are, and what they cost. Draws on axes given, or on its own."""
+"""Figures of a comparison of observers: how large their errors are, and what they cost. Draws on axes given, or on its
+own.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,8 @@ MARKERS = "osD^vP*Xph"
 
 @styled
 def errors_figure(scores: Sequence[ObserverScore], ax: Axes | None = None) -> Axes:
-    """Speed errors of observers in m/s on a logarithmic axis: rms and largest over the whole run, rms just before telegrams.
+    """Speed errors of observers in m/s on a logarithmic axis: rms and largest over the whole run, rms just before
+    telegrams.
 
     Args:
         scores: of the observers, the first one on top. ax: axes to draw on; None for a figure of its own.
@@ -36,9 +39,15 @@ def errors_figure(scores: Sequence[ObserverScore], ax: Axes | None = None) -> Ax
         points = _points(score)
         for what, (value, marker, face) in points.items():
             ax.plot(
-                [value], [place], marker, markersize=8, markeredgecolor=colour, color=colour if face else "none",
-                label=None if what in seen else what, linestyle="none",
-            )  # fmt: skip
+                [value],
+                [place],
+                marker,
+                markersize=8,
+                markeredgecolor=colour,
+                color=colour if face else "none",
+                label=None if what in seen else what,
+                linestyle="none",
+            )
             seen.add(what)
         if len(points) > 1:
             ends = [value for value, _, _ in points.values()]
@@ -66,7 +75,11 @@ def _points(score: ObserverScore) -> dict[str, tuple[float, str, bool]]:
         "rms just before telegrams": (None if at is None else at.rms, "D", False),
         "largest": (None if speed is None else speed.max_abs, "|", True),
     }
-    return {what: (v, marker, face) for what, (v, marker, face) in values.items() if v is not None and isfinite(v) and v > 0.0}
+    return {
+        what: (v, marker, face)
+        for what, (v, marker, face) in values.items()
+        if v is not None and isfinite(v) and v > 0.0
+    }
 
 
 @styled

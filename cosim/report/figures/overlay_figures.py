@@ -50,17 +50,29 @@ def draw_overlays(runs: Sequence[Run], signals: Sequence[str] = ()) -> list[Over
         ("speed_error", "Speed error", "Estimated minus true speed.", error_overlay(runs, "speed")),
         ("position_error", "Position error", "Estimated minus true position.", error_overlay(runs, "position")),
         ("slip", "Slip", "Estimated slip, and the true slip of the first run.", estimate_overlay(runs, "slip")),
-        ("adhesion", "Adhesion force", "Estimated adhesion force, and the true one of the first run.",
-         estimate_overlay(runs, "adhesion_force")),
+        (
+            "adhesion",
+            "Adhesion force",
+            "Estimated adhesion force, and the true one of the first run.",
+            estimate_overlay(runs, "adhesion_force"),
+        ),
         *((f"signal_{i}", name, "As recorded.", signal_figure(runs, name)) for i, name in enumerate(signals, 1)),
-    ]  # fmt: skip
-    return [OverlayPicture(f"overlay_{key}", title, text, png(figure)) for key, title, text, figure in made if figure is not None]
+    ]
+    return [
+        OverlayPicture(f"overlay_{key}", title, text, png(figure))
+        for key, title, text, figure in made
+        if figure is not None
+    ]
 
 
 @styled
 def true_speed_figure(runs: Sequence[Run]) -> Figure | None:
     """True speed of all runs in km/h, or None without any."""
-    found = [(i, run, speed) for i, run in enumerate(runs) if (speed := recorded(run.result, run.spec.true_speed)) is not None]
+    found = [
+        (i, run, speed)
+        for i, run in enumerate(runs)
+        if (speed := recorded(run.result, run.spec.true_speed)) is not None
+    ]
     if not found:
         return None
     ax = _axes(runs, [("", {})])[0]
@@ -79,7 +91,9 @@ def error_overlay(runs: Sequence[Run], quantity: Literal["speed", "position"]) -
         return None
     axes = _axes(runs, panels)
     for ax, (_, members) in zip(axes, panels, strict=True):
-        draw_errors(ax, [_error_curve(runs[i], i, observer, quantity) for i, observer in members.items()], quantity, unit)
+        draw_errors(
+            ax, [_error_curve(runs[i], i, observer, quantity) for i, observer in members.items()], quantity, unit
+        )
         mark_evaluation(ax, runs[0].result, runs[0].spec)
     return _finished(axes)
 
@@ -96,7 +110,9 @@ def estimate_overlay(runs: Sequence[Run], signal: Literal["slip", "adhesion_forc
     anchors = [] if true is None else [factor * bounded(true)]
     for ax, (_, members) in zip(axes, panels, strict=True):
         values = {i: factor * bounded(runs[i].result[f"{observer}.{signal}"]) for i, observer in members.items()}
-        limits = value_limits(anchors, [v[runs[i].result.time >= runs[i].spec.evaluate_after] for i, v in values.items()])
+        limits = value_limits(
+            anchors, [v[runs[i].result.time >= runs[i].spec.evaluate_after] for i, v in values.items()]
+        )
         for band in anchors:
             curve(ax, runs[0].result.time, band, limits, label="true", **TRUE_LINE)
         for i, drawn in values.items():
@@ -128,7 +144,9 @@ def changing_signals(runs: Sequence[Run], most: int) -> list[str]:
         runs: from `make_runs`. most: how many names at most.
     """
     first = runs[0].result
-    common = [n for n in (first.table.dtype.names or ())[1:] if all(recorded(run.result, n) is not None for run in runs)]
+    common = [
+        n for n in (first.table.dtype.names or ())[1:] if all(recorded(run.result, n) is not None for run in runs)
+    ]
     changes = {name: max((_change(first, run, name) for run in runs[1:]), default=0.0) for name in common}
     chosen = sorted(common, key=lambda name: -changes[name])[:most]
     return [name for name in common if name in chosen]

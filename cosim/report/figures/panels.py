@@ -70,7 +70,8 @@ PANELS: tuple[Panel, ...] = (
     Panel(
         "speed_error",
         "Speed error",
-        "Estimated minus true speed. The scale follows the observers that work; one that leaves it is named in the legend.",
+        "Estimated minus true speed. The scale follows the observers that work; one that leaves it is named in the "
+        "legend.",
         speed_error_figure,
         _has_speed_error,
     ),
@@ -98,7 +99,8 @@ PANELS: tuple[Panel, ...] = (
     Panel(
         "gaps",
         "Sampling gaps",
-        "Time between consecutive balises that were used, beside the largest varying gap each observer is certified for.",
+        "Time between consecutive balises that were used, beside the largest varying gap each observer is certified "
+        "for.",
         gap_figure,
         _has_gaps,
     ),

@@ -135,12 +135,16 @@ def slip_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axe
 
 
 def _indicator_strips(ax: Axes, result: Result, spec: ReportSpec, limits: tuple[float, float] | None) -> None:
-    """One strip for each indicator at the bottom, in the observer's colour where it is on, in the order of the observers."""
+    """One strip for each indicator at the bottom, in the observer's colour where it is on, in the order of the
+    observers.
+    """
     low, high = limits or (0.0, 1.0)
     found = [(o, v) for o in spec.observers if (v := estimate(result, o, "slip_indicator")) is not None]
     share = STRIP * len(found)
     if found:
-        ax.add_patch(Rectangle((0.0, 0.0), 1.0, share, transform=ax.transAxes, color="#F1F1F1", linewidth=0, zorder=3.0))
+        ax.add_patch(
+            Rectangle((0.0, 0.0), 1.0, share, transform=ax.transAxes, color="#F1F1F1", linewidth=0, zorder=3.0)
+        )
     for i, (observer, values) in enumerate(found):
         bars = [(a, b - a) for a, b in on_intervals(result.time, values)]
         place = (share - (i + 0.9) * STRIP, 0.8 * STRIP)

@@ -20,7 +20,8 @@ class ErrorScale:
 
     Args:
         limit: the largest error on the axis.
-        floor: the smallest one on a logarithmic axis of absolute errors, or None for a linear axis from -limit to limit.
+        floor: the smallest one on a logarithmic axis of absolute errors, or None for a linear axis from -limit to
+        limit.
     """
 
     limit: float
@@ -33,7 +34,9 @@ def bounded(values: np.ndarray) -> np.ndarray:
 
 
 def curve_size(values: np.ndarray) -> float:
-    """Size that represents a curve: the 99th percentile of its finite absolute values; infinite where most are not finite."""
+    """Size that represents a curve: the 99th percentile of its finite absolute values; infinite where most are not
+    finite.
+    """
     finite = np.abs(bounded(values[np.isfinite(values)]))
     if not len(finite) or len(finite) * 2 < len(values):
         return float("inf")
@@ -43,8 +46,8 @@ def curve_size(values: np.ndarray) -> float:
 def error_scale(curves: Sequence[np.ndarray]) -> ErrorScale:
     """Scale for several error curves, taken after the start-up transient.
 
-    Curves are taken from the smallest up until one is a hundred times its forerunner: that one has diverged and leaves the
-    scale. Where the sizes that are left differ much, the axis is logarithmic.
+    Curves are taken from the smallest up until one is a hundred times its forerunner: that one has diverged and leaves
+    the scale. Where the sizes that are left differ much, the axis is logarithmic.
 
     Args:
         curves: errors, each of shape (rows,); values that are not finite are left out.
@@ -88,8 +91,8 @@ def _peak(values: np.ndarray) -> float:
 def value_limits(anchors: Sequence[np.ndarray], others: Sequence[np.ndarray]) -> tuple[float, float] | None:
     """Limits for curves of which some can be trusted.
 
-    The trusted curves are shown whole. Another one widens the axis to what it holds most of the time, by at most the same
-    range again on either side; one that needs more than that has diverged and widens nothing.
+    The trusted curves are shown whole. Another one widens the axis to what it holds most of the time, by at most the
+    same range again on either side; one that needs more than that has diverged and widens nothing.
 
     Args:
         anchors: trusted curves (the true value). others: estimates. Each of shape (rows,).

@@ -1,7 +1,7 @@
 """Colours, dashes and fonts of all figures, and the canvas they are drawn on. Touches no global state of matplotlib.
 
-Colours are those of Okabe and Ito, which colour-blind people can tell apart; each comes with a dash pattern, so that the lines
-can be told apart on grey paper as well.
+Colours are those of Okabe and Ito, which colour-blind people can tell apart; each comes with a dash pattern, so that
+the lines can be told apart on grey paper as well.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ OBSERVER_LINES: tuple[dict[str, Any], ...] = (
     {"color": "#E69F00", "linestyle": (0, (9, 3)), "linewidth": 1.5},
     {"color": "#56B4E9", "linestyle": (0, (4, 1.2, 1.2, 1.2, 1.2, 1.2)), "linewidth": 1.5},
 )
-TRUE_LINE: dict[str, Any] = {"color": "#B4B4B4", "linestyle": "-", "linewidth": 5.0}  # a band, on which the estimates lie
+# a band, on which the estimates lie
+TRUE_LINE: dict[str, Any] = {"color": "#B4B4B4", "linestyle": "-", "linewidth": 5.0}
 ODOMETER_LINE: dict[str, Any] = {"color": "#000000", "linestyle": "-", "linewidth": 0.8}
 REFERENCE_LINE: dict[str, Any] = {"color": "#000000", "linestyle": (0, (1, 3)), "linewidth": 1.2}
 TRUE_LINE_ABOVE: dict[str, Any] = {"color": "#000000", "linestyle": "-", "linewidth": 1.3, "zorder": 2.5}  # over noise

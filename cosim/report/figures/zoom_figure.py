@@ -1,4 +1,6 @@
-"""Zoom on one moment of a run: errors row by row, jumps at telegrams, stamp and delivery. Draws on a figure of its own."""
+"""Zoom on one moment of a run: errors row by row, jumps at telegrams, stamp and delivery. Draws on a figure of its
+own.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +13,9 @@ from matplotlib.figure import Figure
 from cosim.report.figures.drawing import FAR, legend_above
 from cosim.report.figures.scales import BOUND, bounded, error_scale
 from cosim.report.figures.style import ALARM_COLOUR, ZONE_COLOUR, new_figure, observer_line, styled
-from cosim.report.moments import Moment
 from cosim.report.roles import estimate, estimation_error, label, recorded
 from cosim.report.spec import ReportSpec
+from cosim.report.zoom_windows import ZoomWindow
 from cosim.results.result import BaliseRecord, Result
 
 SIZE, ONE_PANEL = (5.6, 4.3), (5.6, 2.8)  # inches
@@ -29,7 +31,7 @@ Curves = dict[str, np.ndarray]
 
 
 @styled
-def zoom_figure(result: Result, spec: ReportSpec, moment: Moment) -> Figure:
+def zoom_figure(result: Result, spec: ReportSpec, moment: ZoomWindow) -> Figure:
     """One or two panels over a window of time: speed error, and position error or slip.
 
     Args:
@@ -62,7 +64,7 @@ def zoom_figure(result: Result, spec: ReportSpec, moment: Moment) -> Figure:
     return figure
 
 
-def _panels(result: Result, spec: ReportSpec, moment: Moment) -> list[tuple[str, Curves, np.ndarray | None]]:
+def _panels(result: Result, spec: ReportSpec, moment: ZoomWindow) -> list[tuple[str, Curves, np.ndarray | None]]:
     """Label, curves and true curve of each panel."""
     speed = ("Speed error [m/s]", _errors(result, spec, "speed"), None)
     slip = {o: 100.0 * bounded(v) for o in spec.observers if (v := estimate(result, o, "slip")) is not None}
@@ -77,7 +79,7 @@ def _errors(result: Result, spec: ReportSpec, quantity: Any) -> Curves:
     return {o: bounded(e) for o, e in found.items() if e is not None}
 
 
-def _rows(time: np.ndarray, moment: Moment) -> np.ndarray:
+def _rows(time: np.ndarray, moment: ZoomWindow) -> np.ndarray:
     """Indices of the rows in a window, and one more on either side, so that curves reach its edges."""
     first, beyond = np.searchsorted(time, moment.start, "left") - 1, np.searchsorted(time, moment.end, "right") + 1
     return np.arange(max(int(first), 0), min(int(beyond), len(time)))
@@ -96,7 +98,13 @@ def _draw(ax: Axes, time: np.ndarray, curves: Curves, spec: ReportSpec, reach: f
         shown = _cut(values, reach)
         ax.plot(time, shown, label=label(spec, observer), **line)
         moved = pairs[shown[pairs] != shown[pairs + 1]]
-        mark: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 3.2, "color": line["color"], "zorder": 3.0}
+        mark: dict[str, Any] = {
+            "linestyle": "",
+            "marker": "o",
+            "markersize": 3.2,
+            "color": line["color"],
+            "zorder": 3.0,
+        }
         ax.plot(time[moved], shown[moved], markerfacecolor="#FFFFFF", **mark)
         ax.plot(time[moved], shown[moved + 1], **mark)
 
@@ -118,7 +126,7 @@ def _limits(ax: Axes, curves: list[np.ndarray], reach: float, *, zero: bool) -> 
     ax.set_ylim(low - room, high + room)
 
 
-def _background(ax: Axes, result: Result, spec: ReportSpec, moment: Moment) -> None:
+def _background(ax: Axes, result: Result, spec: ReportSpec, moment: ZoomWindow) -> None:
     """Low-adhesion zones, stamps and deliveries."""
     inside = [z for z in spec.zones if z[1] > moment.start and z[0] < moment.end]
     for start, end in inside:
@@ -131,7 +139,7 @@ def _background(ax: Axes, result: Result, spec: ReportSpec, moment: Moment) -> N
             seen.add(text)
 
 
-def _in_window(result: Result, moment: Moment) -> list[BaliseRecord]:
+def _in_window(result: Result, moment: ZoomWindow) -> list[BaliseRecord]:
     near = [e for e in result.events if e.stamp <= moment.end and max(e.stamp, e.delivered_at) >= moment.start]
     return sorted(near, key=lambda e: abs(e.stamp - moment.time))[:MOST_TELEGRAMS]
 
@@ -144,4 +152,7 @@ def _instants(event: BaliseRecord) -> list[tuple[float, str, dict[str, Any]]]:
     kind = "false telegram" if false else "balise"
     if not event.delivered_at > event.stamp:
         return [(event.stamp, kind, STAMP | false)]
-    return [(event.stamp, f"{kind}, passed", STAMP | false), (event.delivered_at, f"{kind}, delivered", DELIVERY | false)]
+    return [
+        (event.stamp, f"{kind}, passed", STAMP | false),
+        (event.delivered_at, f"{kind}, delivered", DELIVERY | false),
+    ]

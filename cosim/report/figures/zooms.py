@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from cosim.report.figures.panels import png
 from cosim.report.figures.zoom_figure import zoom_figure
-from cosim.report.moments import MOST, Moment, notable_moments
 from cosim.report.numbers import number
 from cosim.report.spec import ReportSpec
+from cosim.report.zoom_windows import MOST, ZoomWindow, notable_windows
 from cosim.results.result import Result
 
 ZOOM_KEYS = tuple(f"zoom_{i}" for i in range(1, MOST + 1))
@@ -32,14 +32,14 @@ class Zoom:
 
 def draw_zooms(result: Result, spec: ReportSpec) -> list[Zoom]:
     """All zoom figures of a run in order of time; none where it has no errors."""
-    moments = notable_moments(result, spec)
-    pictures = [png(zoom_figure(result, spec, moment)) for moment in moments]
+    windows = notable_windows(result, spec)
+    pictures = [png(zoom_figure(result, spec, moment)) for moment in windows]
     return [
         Zoom(key, moment.reasons[0], _caption(moment), picture)
-        for key, moment, picture in zip(ZOOM_KEYS, moments, pictures, strict=False)
+        for key, moment, picture in zip(ZOOM_KEYS, windows, pictures, strict=False)
     ]
 
 
-def _caption(moment: Moment) -> str:
+def _caption(moment: ZoomWindow) -> str:
     span = f"{VIEWS[moment.view]}, {number(moment.start, 4)} s to {number(moment.end, 4)} s."
     return " ".join([span, *(f"{reason}." for reason in moment.reasons[1:])])

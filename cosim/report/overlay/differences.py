@@ -26,7 +26,9 @@ def differences(runs: Sequence[Run]) -> list[list[str]]:
         runs: from `make_runs`.
     """
     known = [_properties(run) for run in runs]
-    names = sorted(dict.fromkeys(name for properties in known for name in properties), key=lambda name: name.startswith(VERSION))
+    names = sorted(
+        dict.fromkeys(name for properties in known for name in properties), key=lambda name: name.startswith(VERSION)
+    )
     rows = [[name, *(properties.get(name, DASH) for properties in known)] for name in names]
     return [row for row in rows if len(set(row[1:])) > 1]
 
@@ -43,7 +45,9 @@ def layout_note(runs: Sequence[Run]) -> str:
 
 
 def _same_layout(a: Mapping[str, BaliseRecord], b: Mapping[str, BaliseRecord]) -> bool:
-    """Whether the same balises were passed where they were (a layout by distance) or when they were (one by instants)."""
+    """Whether the same balises were passed where they were (a layout by distance) or when they were (one by
+    instants).
+    """
     if a.keys() != b.keys():
         return False
     same_places = all(abs(a[name].true_position - b[name].true_position) <= PLACE for name in a)
@@ -58,7 +62,9 @@ def _properties(run: Run) -> dict[str, str]:
     for entry in list_entry(result, "components"):
         if isinstance(entry, Mapping):
             found |= _component(entry)
-    found |= {"connections": f"{len(list_entry(result, 'connections'))} lines, {_digest(list_entry(result, 'connections'))}"}
+    found |= {
+        "connections": f"{len(list_entry(result, 'connections'))} lines, {_digest(list_entry(result, 'connections'))}"
+    }
     found |= _telegrams(result)
     found |= {"evaluated from": f"{number(run.own_spec.evaluate_after)} s", "phases": _phases(run)}
     return found | {f"{VERSION}{name}": str(version) for name, version in mapping_entry(result, "versions").items()}
@@ -67,12 +73,18 @@ def _properties(run: Run) -> dict[str, str]:
 def _master(result: Result) -> dict[str, str]:
     master = mapping_entry(result, "master")
     parts = {name: master.get(name) for name in ("algorithm", "control")}
-    return {f"master: {name}": str(part["name"]) for name, part in parts.items() if isinstance(part, Mapping) and "name" in part}
+    return {
+        f"master: {name}": str(part["name"])
+        for name, part in parts.items()
+        if isinstance(part, Mapping) and "name" in part
+    }
 
 
 def _component(entry: Mapping[str, Any]) -> dict[str, str]:
     name = str(entry.get("name"))
-    found = {f"{name}: {text}": _text(entry[key]) for key, text in COMPONENT_ENTRIES.items() if entry.get(key) is not None}
+    found = {
+        f"{name}: {text}": _text(entry[key]) for key, text in COMPONENT_ENTRIES.items() if entry.get(key) is not None
+    }
     for group in ("options", "parameters"):
         values = entry.get(group)
         if isinstance(values, Mapping):

@@ -40,7 +40,8 @@ def detailed(runs: Sequence[Run]) -> list[Measured]:
 
     def of(run: Run) -> dict[tuple[str, str], Values]:
         return {
-            (d.observer, d.phase): tuple(_scaled(getattr(d, f), f) for f in COLUMNS) for d in phase_details(run.result, run.spec)
+            (d.observer, d.phase): tuple(_scaled(getattr(d, f), f) for f in COLUMNS)
+            for d in phase_details(run.result, run.spec)
         }
 
     return _by_phase(runs, of)
@@ -92,9 +93,14 @@ def _by_phase(runs: Sequence[Run], of: Callable[[Run], dict[tuple[str, str], Val
     if one_each(runs):
         own = {run.label: run.spec.observers[0] for run in runs}
         texts = list(dict.fromkeys(label(run.spec, own[run.label]) for run in runs))
-        return [Measured(" / ".join(texts), p, {r: v[own[r], p] for r, v in known.items() if (own[r], p) in v}) for p in names]
+        return [
+            Measured(" / ".join(texts), p, {r: v[own[r], p] for r, v in known.items() if (own[r], p) in v})
+            for p in names
+        ]
     texts_of = {o: next(label(run.spec, o) for run in runs if o in run.spec.observers) for o in observers_of(runs)}
     rows = [
-        Measured(text, p, {r: v[o, p] for r, v in known.items() if (o, p) in v}) for o, text in texts_of.items() for p in names
+        Measured(text, p, {r: v[o, p] for r, v in known.items() if (o, p) in v})
+        for o, text in texts_of.items()
+        for p in names
     ]
     return [row for row in rows if row.values]

@@ -31,7 +31,8 @@ def make_runs(results: Sequence[Result], specs: Sequence[ReportSpec], labels: Se
     """Put results, roles and labels together; all are judged over the phases and zones of the first.
 
     Args:
-        results: the runs, the first one is what the others are compared with. specs: roles of each. labels: text for each.
+        results: the runs, the first one is what the others are compared with. specs: roles of each. labels: text for
+        each.
 
     Raises:
         ComparisonError: other numbers of results, roles and labels; a label twice; a run without rows; too many runs.
@@ -40,7 +41,9 @@ def make_runs(results: Sequence[Result], specs: Sequence[ReportSpec], labels: Se
         counts = f"{len(results)} results, {len(specs)} roles and {len(labels)} labels"
         raise ComparisonError(f"Each run needs its roles and its label: got {counts}.")
     if len(results) > MOST_RUNS:
-        raise ComparisonError(f"At most {MOST_RUNS} runs can be told apart in a figure (got {len(results)}): choose some.")
+        raise ComparisonError(
+            f"At most {MOST_RUNS} runs can be told apart in a figure (got {len(results)}): choose some."
+        )
     twice = sorted({label for label in labels if list(labels).count(label) > 1})
     if twice:
         raise ComparisonError(f"Two runs have the label {twice[0]!r}: give each its own, for instance with --labels.")
@@ -48,7 +51,10 @@ def make_runs(results: Sequence[Result], specs: Sequence[ReportSpec], labels: Se
         if not len(result.time):
             raise ComparisonError(f"{label} has no rows: {result.failure or 'an empty table'}. Leave it out.")
     shared = _shared(results, specs[0])
-    return [Run(label, result, _like(shared, spec), spec) for label, result, spec in zip(labels, results, specs, strict=True)]
+    return [
+        Run(label, result, _like(shared, spec), spec)
+        for label, result, spec in zip(labels, results, specs, strict=True)
+    ]
 
 
 def _shared(results: Sequence[Result], spec: ReportSpec) -> ReportSpec:

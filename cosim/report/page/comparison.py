@@ -1,4 +1,6 @@
-"""A comparison as files: one HTML page that needs nothing else, its pictures, its data. Touches only the folder it is given."""
+"""A comparison as files: one HTML page that needs nothing else, its pictures, its data. Touches only the folder it is
+given.
+"""
 
 from __future__ import annotations
 
@@ -24,8 +26,16 @@ MOST_PICTURES = 12  # on a page: the worst signals tell the story
 FINDINGS_SHOWN = 6
 EVENTS_SHOWN = 50
 HEADINGS = (
-    "Signal", "Unit", "Verdict", "Largest error", "Allowed", "At [s]", "Largest shift [s]", "Error, rms", "Outside [%]",
-)  # fmt: skip
+    "Signal",
+    "Unit",
+    "Verdict",
+    "Largest error",
+    "Allowed",
+    "At [s]",
+    "Largest shift [s]",
+    "Error, rms",
+    "Outside [%]",
+)
 VERDICTS = {
     "equal": "equal to the bit",
     "within": "within tolerance",
@@ -36,7 +46,9 @@ VERDICTS = {
 }
 
 
-def write_comparison(comparison: Comparison, directory: str | Path, most_pictures: int = MOST_PICTURES) -> dict[str, Path]:
+def write_comparison(
+    comparison: Comparison, directory: str | Path, most_pictures: int = MOST_PICTURES
+) -> dict[str, Path]:
     """Write a comparison to a folder: page, data, and one picture for each of the worst signals.
 
     Args:
@@ -70,7 +82,9 @@ def write_page(comparison: Comparison, path: str | Path, most_pictures: int = MO
     return file
 
 
-def write_pictures(comparison: Comparison, directory: str | Path, most_pictures: int = MOST_PICTURES) -> dict[str, Path]:
+def write_pictures(
+    comparison: Comparison, directory: str | Path, most_pictures: int = MOST_PICTURES
+) -> dict[str, Path]:
     """Write the pictures alone: paths by signal, the worst first; raises as `write_comparison` does."""
     pictures = draw_pictures(comparison, most_pictures)
     with _explained(Path(directory)):
@@ -102,7 +116,10 @@ def comparison_page(comparison: Comparison, pictures: Mapping[str, bytes]) -> st
             _verdict(comparison),
             chapters(
                 {
-                    "Signals that differ": [*(_signal(s, pictures) for s in comparison.failed), _left_out(comparison, pictures)],
+                    "Signals that differ": [
+                        *(_signal(s, pictures) for s in comparison.failed),
+                        _left_out(comparison, pictures),
+                    ],
                     "Balise telegrams": _events(comparison),
                     "All signals": [_table(comparison)],
                     "Notes": [bullets(comparison.notes)],
@@ -153,7 +170,10 @@ def verdict_text(comparison: Comparison) -> str:
     if not telegrams.compared:
         return text + " Telegrams were not compared: one side keeps none."
     if telegrams.differences:
-        text += f" Of the balise telegrams {telegrams.matched} match, and {len(telegrams.differences)} differences were found."
+        text += (
+            f" Of the balise telegrams {telegrams.matched} match, and {len(telegrams.differences)} differences "
+            f"were found."
+        )
     elif telegrams.matched:
         text += f" All {telegrams.matched} balise telegrams match."
     return text
@@ -196,7 +216,9 @@ def _signal(signal: SignalComparison, pictures: Mapping[str, bytes]) -> str:
 def _left_out(comparison: Comparison, pictures: Mapping[str, bytes]) -> str:
     drawable = sum(1 for s in comparison.failed if s.curves is not None)
     left = drawable - len(pictures)
-    return paragraph(f"Only the {len(pictures)} worst signals are drawn; {left} more could be drawn.") if left > 0 else ""
+    return (
+        paragraph(f"Only the {len(pictures)} worst signals are drawn; {left} more could be drawn.") if left > 0 else ""
+    )
 
 
 def _events(comparison: Comparison) -> list[str]:
@@ -208,7 +230,10 @@ def _events(comparison: Comparison) -> list[str]:
     shift = f", largest difference of two stamps {number(events.max_shift)} s" if events.max_shift > 0.0 else ""
     lines = [d.text for d in events.differences[:EVENTS_SHOWN]]
     left = len(events.differences) - len(lines)
-    return [paragraph(f"{events.matched} match{shift}."), bullets([*lines, *([f"and {left} more"] if left > 0 else [])])]
+    return [
+        paragraph(f"{events.matched} match{shift}."),
+        bullets([*lines, *([f"and {left} more"] if left > 0 else [])]),
+    ]
 
 
 def _table(comparison: Comparison) -> str:
@@ -233,9 +258,13 @@ def _row(signal: SignalComparison, failed: bool) -> str:
     outside = number(100.0 * signal.share_outside) if compared else DASH
     shift = number(signal.max_shift) if compared else DASH
     sizes = (
-        number(signal.max_error), number(signal.allowed), number(signal.max_error_at, 6), shift,
-        number(signal.rms_error), outside,
-    )  # fmt: skip
+        number(signal.max_error),
+        number(signal.allowed),
+        number(signal.max_error_at, 6),
+        shift,
+        number(signal.rms_error),
+        outside,
+    )
     cells = "".join(f'<td class="number">{escape(text)}</td>' for text in sizes)
     verdict = f'<td class="bad">{VERDICTS[signal.status]}</td>' if failed else f"<td>{VERDICTS[signal.status]}</td>"
     return f'<tr><th scope="row">{escape(signal.name)}</th><td>{escape(signal.unit)}</td>{verdict}{cells}</tr>'
@@ -276,7 +305,9 @@ def _write_pictures(pictures: Mapping[str, bytes], folder: Path) -> dict[str, Pa
 
 def _file_names(signals: Sequence[str]) -> list[str]:
     """File names that every system takes and no two signals share, in order of badness."""
-    return [f"{place:02d}_{re.sub(r'[^A-Za-z0-9._-]+', '_', name)[:80]}.png" for place, name in enumerate(signals, start=1)]
+    return [
+        f"{place:02d}_{re.sub(r'[^A-Za-z0-9._-]+', '_', name)[:80]}.png" for place, name in enumerate(signals, start=1)
+    ]
 
 
 def _remove_pictures(folder: Path) -> None:

@@ -1,4 +1,6 @@
-"""What the components were called for, what that took, and what they logged: as text and as HTML. Standard library only."""
+"""What the components were called for, what that took, and what they logged: as text and as HTML. Standard library
+only.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,10 @@ def cost_text(result: Result) -> str:
     lines = [["calls / ms", *KINDS, "messages"], *rows]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     texts = [
-        "  ".join(cell.rjust(width) if i else cell.ljust(width) for i, (cell, width) in enumerate(zip(line, widths, strict=True)))
+        "  ".join(
+            cell.rjust(width) if i else cell.ljust(width)
+            for i, (cell, width) in enumerate(zip(line, widths, strict=True))
+        )
         for line in lines
     ]
     return "\n".join([texts[0].rstrip(), "-" * len(texts[0]), *(text.rstrip() for text in texts[1:])])

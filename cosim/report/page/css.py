@@ -67,4 +67,4 @@ footer { margin-top: 2rem; color: var(--soft); font-size: .85rem; }
   details::details-content { content-visibility: visible; block-size: auto; } summary { list-style: none; color: inherit; }
   td.number small { white-space: normal; font-size: 6pt; }
   .contents { display: none; } a { color: inherit; text-decoration: none; } * { print-color-adjust: exact; } }
-"""
+"""  # noqa: E501

@@ -17,7 +17,9 @@ def unmet_box(result: Result) -> str:
     unmet = [j for j in judged if not j.passed]
     if not unmet:
         return ""
-    return box("failure", f"{len(unmet)} of {len(judged)} expectations not met", bullets(f"{j.name}: {j.text}" for j in unmet))
+    return box(
+        "failure", f"{len(unmet)} of {len(judged)} expectations not met", bullets(f"{j.name}: {j.text}" for j in unmet)
+    )
 
 
 def expectations_table(result: Result) -> list[str]:

@@ -1,4 +1,6 @@
-"""Files written whole or not at all. Touches only the file it is given, and a hidden folder beside it while it writes."""
+"""Files written whole or not at all. Touches only the file it is given, and a hidden folder beside it while it
+writes.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ def write_page(path: str | Path, text: str) -> Path:
         file.parent.mkdir(parents=True, exist_ok=True)
         write_file(file, text.encode("utf-8", "backslashreplace"))
     except OSError as error:
-        raise OutputError(f"{file} cannot be written: {error.strerror or error}. Choose another place with --out.") from error
+        raise OutputError(
+            f"{file} cannot be written: {error.strerror or error}. Choose another place with --out."
+        ) from error
     return file
 
 

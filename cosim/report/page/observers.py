@@ -53,7 +53,9 @@ def write_benchmark(benchmark: ObserverBenchmark, directory: str | Path) -> dict
                 (Path(scratch) / name).replace(folder / name)
     except OSError as error:
         reason = error.strerror or str(error)
-        raise OutputError(f"The comparison cannot be written to {folder}: {reason}. Choose another output folder.") from error
+        raise OutputError(
+            f"The comparison cannot be written to {folder}: {reason}. Choose another output folder."
+        ) from error
     return {"page": folder / PAGE, "picture": folder / PICTURE, "data": folder / DATA}
 
 
@@ -84,10 +86,14 @@ def benchmark_page(benchmark: ObserverBenchmark, picture: bytes) -> str:
 
 def _statement(benchmark: ObserverBenchmark) -> str:
     return (
-        f"{len(benchmark.scores)} observers, each alone beside the same recorded run of {benchmark.steps} communication steps. "
-        "v is the speed error, p the position error, estimate minus true value, from the start of the evaluation on. 'At "
-        "balises' is just before a telegram is used. 'Holds' says whether the certificate covers the gaps expected before the "
-        "run, and those seen in it. The cost is the time spent in the observer per communication step, called from Python."
+        f"{len(benchmark.scores)} observers, each alone beside the same recorded run of {benchmark.steps} "
+        f"communication steps. "
+        "v is the speed error, p the position error, estimate minus true value, from the start of the evaluation on. "
+        "'At "
+        "balises' is just before a telegram is used. 'Holds' says whether the certificate covers the gaps expected "
+        "before the "
+        "run, and those seen in it. The cost is the time spent in the observer per communication step, called from "
+        "Python."
     )
 
 
@@ -97,7 +103,9 @@ def _overview(benchmark: ObserverBenchmark) -> str:
     rows = benchmark.rows()
     if not rows:
         return ""
-    return simple_table(list(rows[0]), [[cell(value) for value in row.values()] for row in rows], range(1, len(rows[0])))
+    return simple_table(
+        list(rows[0]), [[cell(value) for value in row.values()] for row in rows], range(1, len(rows[0]))
+    )
 
 
 def _phases(benchmark: ObserverBenchmark) -> str:
@@ -109,18 +117,27 @@ def _certificates(benchmark: ObserverBenchmark) -> str:
     words = {True: "holds", False: "does not hold", None: DASH}
     rows = [
         [
-            score.label, number(c.limit), number(c.expected), words[c.holds_expected], number(c.seen), words[c.holds_seen],
+            score.label,
+            number(c.limit),
+            number(c.expected),
+            words[c.holds_expected],
+            number(c.seen),
+            words[c.holds_seen],
         ]
         for score in benchmark.scores
         if (c := score.certificate) is not None
-    ]  # fmt: skip
+    ]
     headings = ["Observer", "Certified [s]", "Expected gap [s]", "For it", "Longest gap seen [s]", "For it"]
-    return simple_table(headings, rows, (1, 2, 4)).replace("<td>does not hold</td>", '<td class="bad">does not hold</td>')
+    return simple_table(headings, rows, (1, 2, 4)).replace(
+        "<td>does not hold</td>", '<td class="bad">does not hold</td>'
+    )
 
 
 def _telegrams(benchmark: ObserverBenchmark) -> str:
     chosen = outcome_columns(score.telegrams for score in benchmark.scores)
-    rows = [[s.label, *(str(s.telegrams.get(outcome, 0)) for outcome in chosen)] for s in benchmark.scores if s.telegrams]
+    rows = [
+        [s.label, *(str(s.telegrams.get(outcome, 0)) for outcome in chosen)] for s in benchmark.scores if s.telegrams
+    ]
     return simple_table(["Observer", *chosen.values()], rows, range(1, len(chosen) + 1))
 
 

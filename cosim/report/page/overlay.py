@@ -1,4 +1,6 @@
-"""The page of several runs laid over each other, and its figures as files. Touches only the folder or file it is given."""
+"""The page of several runs laid over each other, and its figures as files. Touches only the folder or file it is
+given.
+"""
 
 from __future__ import annotations
 
@@ -38,9 +40,12 @@ RMS_SPEED = 1  # column of the rms speed error
 
 
 def write_overlay(
-    results: Sequence[Result], specs: Sequence[ReportSpec], labels: Sequence[str], directory: str | Path,
+    results: Sequence[Result],
+    specs: Sequence[ReportSpec],
+    labels: Sequence[str],
+    directory: str | Path,
     signals: Sequence[str] = (),
-) -> Path:  # fmt: skip
+) -> Path:
     """Lay several runs over each other: ``overlay.html`` with the figures inside, and these as files in ``figures/``.
 
     Args:
@@ -64,7 +69,9 @@ def write_overlay(
         for drawn in pictures:
             write_file(folder / FIGURES / f"{drawn.key}.png", drawn.png)
     except OSError as error:
-        raise OutputError(f"Figures cannot be written to {folder}: {error.strerror or error}. Choose another folder.") from error
+        raise OutputError(
+            f"Figures cannot be written to {folder}: {error.strerror or error}. Choose another folder."
+        ) from error
     return write_overlay_page(runs, folder / PAGE, pictures)
 
 
@@ -160,11 +167,16 @@ def _runs_table(runs: Sequence[Run]) -> str:
         step = number_entry(summary, "step")
         rows.append(
             [
-                run.label, str(summary.get("scenario") or DASH), number(float(time[0])), number(float(time[-1])),
-                DASH if step is None else number(1000 * step), str(len(time)), number(number_entry(summary, "wall_seconds")),
+                run.label,
+                str(summary.get("scenario") or DASH),
+                number(float(time[0])),
+                number(float(time[-1])),
+                DASH if step is None else number(1000 * step),
+                str(len(time)),
+                number(number_entry(summary, "wall_seconds")),
                 str(summary.get("created") or DASH),
             ]
-        )  # fmt: skip
+        )
     return simple_table(head, rows, range(2, 7))
 
 
@@ -177,7 +189,10 @@ def _numbers(runs: Sequence[Run], rows: Sequence[Measured], names: Sequence[str]
     groups = []
     for row in rows:
         first = row.values.get(reference)
-        lines = [[name, *(_cell(values[i], first, i, name == reference) for i in kept)] for name, values in row.values.items()]
+        lines = [
+            [name, *(_cell(values[i], first, i, name == reference) for i in kept)]
+            for name, values in row.values.items()
+        ]
         groups.append((f"{row.observer}, {row.phase}", lines))
     said = f"{text} Below each number: the difference to {reference}.".strip()
     return [paragraph(said), grouped_table(["Observer and phase", "Run", *shown], groups)]
@@ -198,7 +213,9 @@ def _differences(runs: Sequence[Run]) -> list[str]:
     rest = rows[DIFFERENCES_SHOWN:]
     more = details(f"{len(rest)} more", simple_table(head, rest))
     said = (
-        "" if rows else "Nothing the summaries tell of differs: settings, parameters, FMUs, telegrams and versions are the same."
+        ""
+        if rows
+        else "Nothing the summaries tell of differs: settings, parameters, FMUs, telegrams and versions are the same."
     )
     return [paragraph(said), paragraph(layout_note(runs)), simple_table(head, rows[:DIFFERENCES_SHOWN]), more]
 
@@ -215,5 +232,10 @@ def _notes(runs: Sequence[Run]) -> list[str]:
         notes.append(f"{', '.join(late)} were to be evaluated from another instant on; that of {first.label} is used.")
     short = [run.label for run in runs if abs(float(run.result.time[-1] - first.result.time[-1])) > 0.0]
     if short:
-        notes.append(f"{', '.join(short)} end at another time than {first.label}: phases beyond the end hold less, or nothing.")
-    return [*notes, *dict.fromkeys(f"{run.label}: {note}" for run in runs for note in run.own_spec.notes if run is first)]
+        notes.append(
+            f"{', '.join(short)} end at another time than {first.label}: phases beyond the end hold less, or nothing."
+        )
+    return [
+        *notes,
+        *dict.fromkeys(f"{run.label}: {note}" for run in runs for note in run.own_spec.notes if run is first),
+    ]

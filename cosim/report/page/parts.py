@@ -18,7 +18,9 @@ def page(title: str, content: Iterable[str]) -> str:
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{escape(title)}</title>\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<style>{CSS}</style>\n</head>\n<body>\n" + "\n".join(part for part in content if part) + "\n</body>\n</html>\n"
+        f"<style>{CSS}</style>\n</head>\n<body>\n"
+        + "\n".join(part for part in content if part)
+        + "\n</body>\n</html>\n"
     )
 
 
@@ -110,7 +112,8 @@ def grouped_table(headings: Sequence[str], groups: Sequence[tuple[str, Sequence[
     for name, rows in groups:
         first = f'<th scope="rowgroup" rowspan="{len(rows)}">{escape(name)}</th>'
         lines = [
-            f'<tr>{first if i == 0 else ""}<th scope="row">{escape(row[0])}</th>{"".join(map(_number_cell, row[1:]))}</tr>'
+            f"<tr>{first if i == 0 else ''}<th "
+            f'scope="row">{escape(row[0])}</th>{"".join(map(_number_cell, row[1:]))}</tr>'
             for i, row in enumerate(rows)
         ]
         bodies.append("<tbody>" + "\n".join(lines) + "</tbody>")
@@ -135,7 +138,11 @@ def picture(data: bytes, title: str, caption: str) -> str:
 
 def details(summary: str, content: str, *, opened: bool = False) -> str:
     """HTML `content` that unfolds below a line of text; in print it is unfolded. Empty without content."""
-    return f"<details{' open' if opened else ''}><summary>{escape(summary)}</summary>\n{content}\n</details>" if content else ""
+    return (
+        f"<details{' open' if opened else ''}><summary>{escape(summary)}</summary>\n{content}\n</details>"
+        if content
+        else ""
+    )
 
 
 def folded(text: object, longest: int = 220) -> str:

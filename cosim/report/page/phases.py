@@ -23,7 +23,8 @@ COLUMNS: dict[str, tuple[str, float]] = {  # field: heading with unit, factor to
     "telegrams": ("Telegrams used", 1.0),
 }
 TEXT = (
-    "Root mean squares of estimate minus true value. Before and after: in the last row before, and the first row after, "
+    "Root mean squares of estimate minus true value. Before and after: in the last row before, and the first row "
+    "after, "
     "each telegram that the observer used."
 )
 

@@ -1,4 +1,6 @@
-"""The report of a run: one HTML page that needs nothing else, and its figures as files. Touches only the folder it is given."""
+"""The report of a run: one HTML page that needs nothing else, and its figures as files. Touches only the folder it is
+given.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,6 @@ from html import escape
 from pathlib import Path
 
 from cosim.errors import OutputError
-from cosim.report.doubts import all_warnings
 from cosim.report.event_counts import count_events, outcome_columns
 from cosim.report.facts import list_entry, mapping_entry, statement
 from cosim.report.figures.panels import PANELS, Panel, draw_all
@@ -35,6 +36,7 @@ from cosim.report.page.phases import phases_html
 from cosim.report.page.table import html_table
 from cosim.report.page.verdict import verdict_facts
 from cosim.report.phase_details import phase_details
+from cosim.report.result_warnings import all_warnings
 from cosim.report.roles import label
 from cosim.report.spec import ReportSpec
 from cosim.results.result import Result
@@ -78,7 +80,9 @@ def write_report(result: Result, spec: ReportSpec, directory: str | Path) -> Pat
         write_file(folder / PAGE, text.encode("utf-8", "backslashreplace"))
     except OSError as error:
         reason = error.strerror or str(error)
-        raise OutputError(f"The report cannot be written to {folder}: {reason}. Choose another output folder.") from error
+        raise OutputError(
+            f"The report cannot be written to {folder}: {reason}. Choose another output folder."
+        ) from error
     return folder / PAGE
 
 
@@ -134,7 +138,8 @@ def _zooms(zooms: Sequence[Zoom]) -> list[str]:
     if not zooms:
         return []
     text = (
-        "Windows of time around the largest errors, telegrams gone wrong, low-adhesion zones and indicators. Marks: the last row "
+        "Windows of time around the largest errors, telegrams gone wrong, low-adhesion zones and indicators. Marks: "
+        "the last row "
         "before (hollow) and the first row after an event (filled)."
     )
     return [paragraph(text), side_by_side(picture(zoom.png, zoom.title, zoom.caption) for zoom in zooms)]
@@ -178,7 +183,9 @@ def _seed_study(result: Result) -> list[str]:
     if not rows:
         return []
     text = f"Maximal speed error in m/s over {len(study.get('seeds', []))} sampling patterns: quartiles and median."
-    cells = [[str(row.get("observer")), str(row.get("phase")), *(number(row.get(k)) for k in SEED_COLUMNS)] for row in rows]
+    cells = [
+        [str(row.get("observer")), str(row.get("phase")), *(number(row.get(k)) for k in SEED_COLUMNS)] for row in rows
+    ]
     headings = ["Observer", "Phase", *(f"{column} [m/s]" for column in SEED_COLUMNS)]
     return [paragraph(text), simple_table(headings, cells, range(2, 2 + len(SEED_COLUMNS)))]
 
@@ -194,9 +201,14 @@ def _certificates(result: Result, spec: ReportSpec) -> list[str]:
             sizes = [number(entry.get(key)) for key in CERTIFICATE_COLUMNS]
             rows.append([label(spec, observer), *sizes, holds])
             explained[label(spec, observer)] = str(entry.get("explanation") or "")
-    table = simple_table(["Observer", *CERTIFICATE_COLUMNS.values(), "Certificate"], rows, range(1, len(CERTIFICATE_COLUMNS) + 1))
+    table = simple_table(
+        ["Observer", *CERTIFICATE_COLUMNS.values(), "Certificate"], rows, range(1, len(CERTIFICATE_COLUMNS) + 1)
+    )
     marked = table.replace("<td>does not hold</td>", '<td class="bad">does not hold</td>')
-    return [marked, *(details(f"{name}: what was checked", paragraph(text)) for name, text in explained.items() if text)]
+    return [
+        marked,
+        *(details(f"{name}: what was checked", paragraph(text)) for name, text in explained.items() if text),
+    ]
 
 
 def _events(result: Result, spec: ReportSpec) -> list[str]:
@@ -204,7 +216,8 @@ def _events(result: Result, spec: ReportSpec) -> list[str]:
         return []
     counts = count_events(result.events)
     text = (
-        f"{counts.delivered} telegrams were delivered, {counts.missed} balises were missed; {counts.false} telegrams were false."
+        f"{counts.delivered} telegrams were delivered, {counts.missed} balises were missed; {counts.false} "
+        f"telegrams were false."
     )
     text += f" {counts.undelivered} were on their way when the run ended." if counts.undelivered else ""
     chosen = outcome_columns(counts.outcomes.values())
@@ -224,7 +237,9 @@ def _indicators(result: Result, spec: ReportSpec) -> str:
 
 def _components(result: Result) -> str:
     entries = [entry for entry in list_entry(result, "components") if isinstance(entry, Mapping)]
-    rows = [[str(entry.get(key) if entry.get(key) is not None else DASH) for key in COMPONENT_COLUMNS] for entry in entries]
+    rows = [
+        [str(entry.get(key) if entry.get(key) is not None else DASH) for key in COMPONENT_COLUMNS] for entry in entries
+    ]
     return simple_table(list(COMPONENT_COLUMNS.values()), rows)
 
 

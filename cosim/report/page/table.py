@@ -54,7 +54,11 @@ def columns(metrics: Sequence[PhaseMetrics]) -> list[Column]:
 
 def cells(entry: PhaseMetrics, chosen: Sequence[Column]) -> list[str]:
     """The numbers of a row as text."""
-    sizes = [size for error in (entry.speed, entry.position) for size in ((error.max_abs, error.rms) if error else (None, None))]
+    sizes = [
+        size
+        for error in (entry.speed, entry.position)
+        for size in ((error.max_abs, error.rms) if error else (None, None))
+    ]
     texts = dict(zip(MEASURED, map(error_number, sizes), strict=True))
     texts |= {PUBLISHED: number(entry.published), INDEPENDENT: number(entry.independent)}
     return [texts[column] for column in chosen]
@@ -74,7 +78,9 @@ def text_table(metrics: Sequence[PhaseMetrics], spec: ReportSpec) -> str:
     rows += [[label(spec, m.observer), m.phase, *cells(m, chosen)] for m in metrics]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [
-        "  ".join(text.ljust(w) if i < 2 else text.rjust(w) for i, (text, w) in enumerate(zip(row, widths, strict=True)))
+        "  ".join(
+            text.ljust(w) if i < 2 else text.rjust(w) for i, (text, w) in enumerate(zip(row, widths, strict=True))
+        )
         for row in rows
     ]
     return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])

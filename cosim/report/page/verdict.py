@@ -6,11 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cosim.report.doubts import all_warnings, result_doubts
 from cosim.report.event_counts import count_events
 from cosim.report.facts import list_entry, mapping_entry, number_entry
 from cosim.report.metrics import judged_size
 from cosim.report.numbers import DASH, error_number, number
+from cosim.report.result_warnings import all_warnings, result_warnings
 from cosim.report.roles import Quantity, estimation_error, label
 from cosim.report.spec import ReportSpec
 from cosim.results.result import Result
@@ -36,7 +36,7 @@ def _ending(result: Result, spec: ReportSpec) -> Fact:
     if result.failure:
         stop = number_entry(result.summary, "stop")
         return "Run", "ended early", f"at {reached} s" + (f" of {number(stop)} s" if stop is not None else ""), "bad"
-    if result_doubts(result, spec):
+    if result_warnings(result, spec):
         return "Run", "complete", f"to {reached} s, but it shows little: see the warnings", "doubt"
     return "Run", "complete", f"to {reached} s", "good"
 
@@ -76,7 +76,9 @@ def _telegrams(result: Result) -> Fact | None:
 
 
 def _certificates(result: Result) -> Fact | None:
-    known = [entry.get("holds") for entry in mapping_entry(result, "certificates").values() if isinstance(entry, Mapping)]
+    known = [
+        entry.get("holds") for entry in mapping_entry(result, "certificates").values() if isinstance(entry, Mapping)
+    ]
     judged = [str(holds) for holds in known if holds is not None]
     if not judged:
         return None

@@ -1,4 +1,6 @@
-"""The formats of result tables: names, file endings, who writes and who reads them. Packages are loaded where they are used."""
+"""The formats of result tables: names, file endings, who writes and who reads them. Packages are loaded where they are
+used.
+"""
 
 from __future__ import annotations
 
@@ -54,14 +56,31 @@ def _bare(read: Callable[[Path], Any]) -> Callable[[Path], Result]:
 
 FASTEST_FIRST = (
     Format("npy", (".npy",), lambda path, result: write_npy(path, result.table), _bare(read_npy), keeps=False),
-    Format("parquet", (".parquet", ".pq"), _later("parquet_file", "write_parquet"), _later("parquet_file", "read_parquet"),
-           package="pyarrow", extra="parquet"),
-    Format("hdf5", (".h5", ".hdf5"), _later("hdf5_file", "write_hdf5"), _later("hdf5_file", "read_hdf5"),
-           package="h5py", extra="hdf5"),
+    Format(
+        "parquet",
+        (".parquet", ".pq"),
+        _later("parquet_file", "write_parquet"),
+        _later("parquet_file", "read_parquet"),
+        package="pyarrow",
+        extra="parquet",
+    ),
+    Format(
+        "hdf5",
+        (".h5", ".hdf5"),
+        _later("hdf5_file", "write_hdf5"),
+        _later("hdf5_file", "read_hdf5"),
+        package="h5py",
+        extra="hdf5",
+    ),
     Format("csv", (".csv",), lambda path, result: write_csv(path, result.table), _bare(read_csv), keeps=False),
     Format("mat", (".mat",), _later("mat_file", "write_mat"), _later("mat_file", "read_mat")),
-    Format("modelica", (".modelica.mat",), _later("modelica_file", "write_modelica"), _later("foreign_mat", "read_modelica")),
-)  # fmt: skip
+    Format(
+        "modelica",
+        (".modelica.mat",),
+        _later("modelica_file", "write_modelica"),
+        _later("foreign_mat", "read_modelica"),
+    ),
+)
 _BY_NAME = {item.name: item for item in FASTEST_FIRST}
 FORMATS = {name: _BY_NAME[name] for name in ("csv", "mat", "npy", "parquet", "hdf5", "modelica")}
 

@@ -1,4 +1,6 @@
-"""Columns of a file of another tool as a result: the column of time found and checked, values in SI. Touches no file."""
+"""Columns of a file of another tool as a result: the column of time found and checked, values in SI. Touches no
+file.
+"""
 
 from __future__ import annotations
 
@@ -17,15 +19,18 @@ SHOWN = 8  # names in a message
 
 
 def result_of_columns(
-    source: str, names: Sequence[str], columns: Sequence[np.ndarray], units: Mapping[str, str | None],
+    source: str,
+    names: Sequence[str],
+    columns: Sequence[np.ndarray],
+    units: Mapping[str, str | None],
     described: Callable[[str], SignalInfo] = SignalInfo,
-) -> Result:  # fmt: skip
+) -> Result:
     """A result of columns as a file names them.
 
     Args:
         source: what to call the file in messages.
-        names: of the columns. One is ``time``, in capitals or not, or ``t``; a first one without a name (the row numbers of a
-            data frame) is left out; equal columns of the same name count once.
+        names: of the columns. One is ``time``, in capitals or not, or ``t``; a first one without a name (the row
+            numbers of a data frame) is left out; equal columns of the same name count once.
         columns: arrays of shape (rows,).
         units: of the columns, None where the file says nothing. What can be is converted to SI.
         described: what else is known of a signal.
@@ -89,7 +94,9 @@ def _time_name(source: str, names: Mapping[str, object]) -> str:
         if found:
             return found[0] if wanted not in names else wanted
     shown = ", ".join(list(names)[:SHOWN]) + (", ..." if len(names) > SHOWN else "")
-    raise OutputError(f"{source}: there is no column 'time'; columns: {shown or 'none'}. Call the column of time 'time'.")
+    raise OutputError(
+        f"{source}: there is no column 'time'; columns: {shown or 'none'}. Call the column of time 'time'."
+    )
 
 
 def _seconds(source: str, unit: str) -> float:

@@ -34,7 +34,9 @@ class Dialect:
     lines: int
 
     def rows(self) -> Iterator[str]:
-        """The lines behind the headings, empty ones left out. Where commas do not separate cells they are decimal: points."""
+        """The lines behind the headings, empty ones left out. Where commas do not separate cells they are decimal:
+        points.
+        """
         for _, line in self.numbered_rows():
             yield line
 
@@ -64,7 +66,9 @@ def csv_dialect(path: Path) -> Dialect:
         if line.strip().lower() in ("sep=;", "sep=,", "sep=\t", '"sep=;"'):  # a hint of spreadsheets
             number, line = next(numbered, (0, ""))
     if not line:
-        raise OutputError(f"{path} is empty: expected a line with the names of the columns, 'time' first, and rows of numbers.")
+        raise OutputError(
+            f"{path} is empty: expected a line with the names of the columns, 'time' first, and rows of numbers."
+        )
     separator = _separator(line)
     cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
     return Dialect(path, encoding, separator, tuple(cell.strip() for cell in cells), number)

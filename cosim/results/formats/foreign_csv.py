@@ -1,7 +1,8 @@
 """CSV tables of any tool as results: units from the headings, values in SI. Only reads the file it is given.
 
-Most files are read by NumPy at once. Those that it refuses are read cell by cell, which also finds the line to blame. An empty
-cell is NaN, ``true`` and ``false`` are 1 and 0, several numbers in one cell (arrays of fmpy) become ``name[1]``, ``name[2]``, ...
+Most files are read by NumPy at once. Those that it refuses are read cell by cell, which also finds the line to blame.
+An empty cell is NaN, ``true`` and ``false`` are 1 and 0, several numbers in one cell (arrays of fmpy) become
+``name[1]``, ``name[2]``, ...
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ TIME_UNITS = ("s", "ms", "min", "h")
 
 
 def read_foreign_csv(path: Path) -> Result:
-    """Read a table with a column ``time`` and columns of numbers; the separator, decimal comma, encoding and units are found out.
+    """Read a table with a column ``time`` and columns of numbers; the separator, decimal comma, encoding and units are
+    found out.
 
     Raises:
         OutputError: the file is no such table; the message names the line and the column.
@@ -34,7 +36,9 @@ def read_foreign_csv(path: Path) -> Result:
     if len(headings) > 1 and headings[-1] == "":  # OpenModelica and spreadsheets close lines with a separator
         headings.pop()
     if all(_is_number(heading) for heading in headings):
-        raise OutputError(f"{path}, line {dialect.lines}: expected names of columns, 'time' first, got numbers only. Add them.")
+        raise OutputError(
+            f"{path}, line {dialect.lines}: expected names of columns, 'time' first, got numbers only. Add them."
+        )
     dialect, units = _units_line(dialect, headings)
     headings, values = _values(dialect, headings)
     names, found = zip(*map(split_unit, headings), strict=True)
@@ -81,7 +85,9 @@ def _cell_by_cell(dialect: Dialect, headings: list[str]) -> tuple[list[str], np.
         widths = widths or [len(part) for part in parts]
         wrong = next((h for h, part, width in zip(headings, parts, widths, strict=True) if len(part) != width), None)
         if wrong is not None:
-            raise OutputError(f"{dialect.path}, line {number}, column {wrong!r}: expected as many numbers in a cell as above.")
+            raise OutputError(
+                f"{dialect.path}, line {number}, column {wrong!r}: expected as many numbers in a cell as above."
+            )
         rows.append([value for part in parts for value in part])
     return _elements(headings, widths), np.array(rows)
 
@@ -111,7 +117,9 @@ def _numbers(cell: str, dialect: Dialect, line: int, heading: str) -> list[float
         return [_number(part) for part in cell.split()] or [_number("")]
     except ValueError:
         where = f"{dialect.path}, line {line}, column {heading!r}"
-        raise OutputError(f"{where}: expected a number, got {cell!r}. Correct the cell, or leave the column out.") from None
+        raise OutputError(
+            f"{where}: expected a number, got {cell!r}. Correct the cell, or leave the column out."
+        ) from None
 
 
 def _number(text: str) -> float:

@@ -1,4 +1,6 @@
-"""MATLAB files as results: ours, trajectories of Modelica tools, vectors of equal length. Only reads the file it is given."""
+"""MATLAB files as results: ours, trajectories of Modelica tools, vectors of equal length. Only reads the file it is
+given.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,8 @@ TEXTS = 3  # in ``dataInfo``: a text over time, in the matrix ``stringData``
 
 
 def read_foreign_mat(path: Path) -> Result:
-    """Read a MAT file of version 4 to 7: ours, a Modelica trajectory (``binTrans`` or ``binNormal``), or vectors with ``time``.
+    """Read a MAT file of version 4 to 7: ours, a Modelica trajectory (``binTrans`` or ``binNormal``), or vectors with
+    ``time``.
 
     Raises:
         OutputError: it is none of these; the message says what it holds.
@@ -58,7 +61,8 @@ class _Trajectory:
     """The matrices of a trajectory of version 1.1, one variable a row.
 
     Args:
-        signals: the variables. info: matrix and place of each, shape (variables, 4). start: values at the start, of ``data_1``.
+        signals: the variables. info: matrix and place of each, shape (variables, 4). start: values at the start, of
+        ``data_1``.
         data: values over time, of ``data_2``. about: what we put into files of ours.
     """
 

@@ -14,7 +14,8 @@ from cosim.results.result import Result, SignalInfo
 
 
 def read_foreign_npy(path: Path) -> Result:
-    """Read a structured array with a field ``time``; one of ours stays in the file, whose pages are read when looked at.
+    """Read a structured array with a field ``time``; one of ours stays in the file, whose pages are read when looked
+    at.
 
     Raises:
         OutputError: it is another kind of array. ValueError: the file is broken. OSError: it cannot be read.

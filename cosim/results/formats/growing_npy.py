@@ -18,7 +18,8 @@ CHUNK = 65536
 
 
 def growing_header(dtype: np.dtype[np.void], rows: int) -> bytes:
-    """The first bytes of a NumPy file (format 3.0), as NumPy itself writes them; of the same length for any number of rows.
+    """The first bytes of a NumPy file (format 3.0), as NumPy itself writes them; of the same length for any number of
+    rows.
 
     Args:
         dtype: of a row. rows: how many there are.

@@ -1,7 +1,7 @@
 """A file that libraries write which cannot cope with a full disk: what the disk refuses is told at the end.
 
-HDF5 ends the process where a write fails and it cannot close its file. This file takes all that is written, remembers the
-first refusal, and raises it when it is closed. Touches only the file it is given.
+HDF5 ends the process where a write fails and it cannot close its file. This file takes all that is written, remembers
+the first refusal, and raises it when it is closed. Touches only the file it is given.
 """
 
 from __future__ import annotations
@@ -73,7 +73,9 @@ class GuardedFile:
     def __enter__(self) -> GuardedFile:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self._file.close()
         if self.refusal is not None:
             raise self.refusal

@@ -1,8 +1,9 @@
 """Results as HDF5, to the last bit: for MATLAB's ``h5read``, xarray, Julia. Touches only the file it is given.
 
-A dataset each for ``time`` and every signal with the attributes ``unit``, ``units`` (the name xarray knows), ``variability``,
-``description`` and, where there is one, ``display_unit``; ``time`` is the dimension scale of all. The group ``events`` holds the
-telegrams, a dataset each column. Summary and failure are attributes of the file, the summary as JSON.
+A dataset each for ``time`` and every signal with the attributes ``unit``, ``units`` (the name xarray knows),
+``variability``, ``description`` and, where there is one, ``display_unit``; ``time`` is the dimension scale of all. The
+group ``events`` holds the telegrams, a dataset each column. Summary and failure are attributes of the file, the summary
+as JSON.
 """
 
 from __future__ import annotations
@@ -63,7 +64,11 @@ def write_hdf5(path: str | Path, result: Result) -> None:
 
 def _columns(file: Any, rows: int, chunk: int, signals: Sequence[SignalInfo]) -> list[Any]:
     """Empty datasets of time and signals, `chunk` rows compressed together."""
-    storage = {"chunks": (min(rows, chunk),), "compression": "gzip", "compression_opts": 1, "shuffle": True} if rows > FEW else {}
+    storage = (
+        {"chunks": (min(rows, chunk),), "compression": "gzip", "compression_opts": 1, "shuffle": True}
+        if rows > FEW
+        else {}
+    )
     time = file.create_dataset(TIME, (rows,), "f8", **storage)
     time.make_scale(TIME)
     time.attrs.update({"unit": "s", "units": "s", "description": "time"})
@@ -72,7 +77,9 @@ def _columns(file: Any, rows: int, chunk: int, signals: Sequence[SignalInfo]) ->
         name = _dataset_name(signal.name, taken)
         dataset = file.create_dataset(name, (rows,), "f8", **storage)
         dataset.dims[0].attach_scale(time)
-        dataset.attrs.update({"column": place, "unit": signal.unit, "units": signal.unit, "variability": signal.variability})
+        dataset.attrs.update(
+            {"column": place, "unit": signal.unit, "units": signal.unit, "variability": signal.variability}
+        )
         dataset.attrs["description"] = signal.description
         if signal.description:
             dataset.attrs["long_name"] = signal.description  # as xarray calls it
@@ -97,11 +104,14 @@ def _write_events(group: Any, events: Sequence[BaliseRecord]) -> None:
     text = _h5py().string_dtype()
     rows = [record_row(event) for event in events]
     for name in COLUMNS:
-        group.create_dataset(name, data=[row[name] for row in rows], dtype="f8" if name in NUMBERS else text, shape=(len(rows),))
+        group.create_dataset(
+            name, data=[row[name] for row in rows], dtype="f8" if name in NUMBERS else text, shape=(len(rows),)
+        )
 
 
 def read_hdf5(path: str | Path) -> Result:
-    """Read a file of `write_hdf5`, bit by bit, or of another tool: vectors of numbers, one of them ``time``; groups become names.
+    """Read a file of `write_hdf5`, bit by bit, or of another tool: vectors of numbers, one of them ``time``; groups
+    become names.
 
     Raises:
         OutputError: there is nothing of that kind in it, or h5py is not installed.
@@ -133,9 +143,12 @@ def _ours(file: Any) -> Result:
 def _signal(dataset: Any) -> SignalInfo:
     known = {key: _text(dataset.attrs[key]) for key in dataset.attrs if key not in ("DIMENSION_LIST", "column")}
     return SignalInfo(
-        known.get("name") or dataset.name.removeprefix("/"), known["unit"] or "1", known.get("display_unit"),
-        "discrete" if known["variability"] == "discrete" else "continuous", known["description"] or "",
-    )  # fmt: skip
+        known.get("name") or dataset.name.removeprefix("/"),
+        known["unit"] or "1",
+        known.get("display_unit"),
+        "discrete" if known["variability"] == "discrete" else "continuous",
+        known["description"] or "",
+    )
 
 
 def _text(value: Any) -> str | None:

@@ -15,8 +15,8 @@ _INDEX = re.compile(r"\s*-?\d+\s*(?:[,;]\s*-?\d+\s*)*")
 def split_unit(heading: str) -> tuple[str, str | None]:
     """Name and unit of a heading such as ``speed [m/s]``, ``speed[m/s]`` or ``speed (m/s)``.
 
-    Brackets right behind a name are a unit only if they can be read as one; ``a[1]``, ``a[1,2]`` and ``a[left]`` are elements of
-    arrays. Brackets after a space are a unit whatever they hold.
+    Brackets right behind a name are a unit only if they can be read as one; ``a[1]``, ``a[1,2]`` and ``a[left]`` are
+    elements of arrays. Brackets after a space are a unit whatever they hold.
 
     Returns:
         The name, and the unit or None where the heading names none; ``[-]`` and ``[]`` are pure numbers, ``1``.
@@ -25,7 +25,9 @@ def split_unit(heading: str) -> tuple[str, str | None]:
     if match is None:
         match = _IN_PARENTHESES.fullmatch(heading)
         return (
-            (match["name"], _plain(match["unit"])) if match is not None and _is_unit(_plain(match["unit"])) else (heading, None)
+            (match["name"], _plain(match["unit"]))
+            if match is not None and _is_unit(_plain(match["unit"]))
+            else (heading, None)
         )
     index = _INDEX.fullmatch(match["unit"]) is not None or not match["unit"].strip()
     if match["gap"] or (not index and _is_unit(_plain(match["unit"]))):

@@ -1,7 +1,7 @@
 """Results as a MATLAB file, to the last bit. Touches only the file it is given.
 
-In MATLAB: ``time`` and one column vector for each signal (``locomotive_position``), ``units.locomotive_position``, the struct
-``signals`` of cell arrays (variable, name, unit, ...) in column order, and the struct ``events`` of columns.
+In MATLAB: ``time`` and one column vector for each signal (``locomotive_position``), ``units.locomotive_position``, the
+struct ``signals`` of cell arrays (variable, name, unit, ...) in column order, and the struct ``events`` of columns.
 """
 
 from __future__ import annotations

@@ -6,7 +6,20 @@ import re
 from collections.abc import Iterable
 
 MAX_LENGTH = 63  # namelengthmax of MATLAB
-FLOW_KEYWORDS = ("break", "case", "catch", "continue", "else", "elseif", "end", "for", "if", "otherwise", "parfor", "return")
+FLOW_KEYWORDS = (
+    "break",
+    "case",
+    "catch",
+    "continue",
+    "else",
+    "elseif",
+    "end",
+    "for",
+    "if",
+    "otherwise",
+    "parfor",
+    "return",
+)
 KEYWORDS = frozenset((*FLOW_KEYWORDS, "classdef", "function", "global", "persistent", "spmd", "switch", "try", "while"))
 
 

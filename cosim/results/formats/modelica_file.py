@@ -1,9 +1,10 @@
 """Results as the trajectory file of Dymola and OpenModelica, to the last bit. Touches only the file it is given.
 
-A MATLAB file of version 4 with the matrices ``Aclass``, ``name``, ``description``, ``dataInfo``, ``data_1`` (parameters at the
-start and at the end) and ``data_2`` (time and signals), stored transposed (``binTrans``), so that rows follow each other.
-Units stand in the descriptions as these tools write them, ``speed of the train [m/s|km/h]``. Rows before and after an event have
-the same time, as theirs. A last matrix ``fmu_observer``, which these tools leave alone, holds what has no place in the format.
+A MATLAB file of version 4 with the matrices ``Aclass``, ``name``, ``description``, ``dataInfo``, ``data_1`` (parameters
+at the start and at the end) and ``data_2`` (time and signals), stored transposed (``binTrans``), so that rows follow
+each other. Units stand in the descriptions as these tools write them, ``speed of the train [m/s|km/h]``. Rows before
+and after an event have the same time, as theirs. A last matrix ``fmu_observer``, which these tools leave alone, holds
+what has no place in the format.
 """
 
 from __future__ import annotations
@@ -41,7 +42,9 @@ def write_modelica(path: str | Path, result: Result) -> None:
     """
     names = column_names(result.table)
     if len(result.table) > LARGEST:
-        raise ValueError(f"A Modelica trajectory holds at most {LARGEST} rows, got {len(result.table)}. Use another format.")
+        raise ValueError(
+            f"A Modelica trajectory holds at most {LARGEST} rows, got {len(result.table)}. Use another format."
+        )
     signals = signals_of(result)
     parameters = _parameters(result.summary, names)
     with Path(path).open("wb") as file:
@@ -73,8 +76,14 @@ def _ends(table: np.ndarray) -> list[float]:
 
 
 def _data_info(columns: int, parameters: int) -> np.ndarray:
-    """For each name: matrix (0 for time), row in it, linear interpolation, and what holds outside: nothing, or the value."""
-    rows = [(0, 1, 0, -1), *((2, i + 1, 0, -1) for i in range(1, columns)), *((1, i + 2, 0, 0) for i in range(parameters))]
+    """For each name: matrix (0 for time), row in it, linear interpolation, and what holds outside: nothing, or the
+    value.
+    """
+    rows = [
+        (0, 1, 0, -1),
+        *((2, i + 1, 0, -1) for i in range(1, columns)),
+        *((1, i + 2, 0, 0) for i in range(parameters)),
+    ]
     return np.array(rows, np.int32).T
 
 

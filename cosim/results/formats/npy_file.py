@@ -1,4 +1,5 @@
-"""Tables as they are in memory, in NumPy's own format: for runs whose CSV would be larger and slower than the run itself.
+"""Tables as they are in memory, in NumPy's own format: for runs whose CSV would be larger and slower than the run
+itself.
 
 Touches only the file it is given. ``numpy.load(path, mmap_mode="r")`` opens it without reading it.
 """
@@ -33,7 +34,9 @@ def write_npy(path: str | Path, table: np.ndarray) -> None:
 
 
 def _is_there(path: Path, table: np.ndarray) -> bool:
-    """If the table is the whole of a file in the same folder, or in the one above, which needs no copy: a run streamed it."""
+    """If the table is the whole of a file in the same folder, or in the one above, which needs no copy: a run streamed
+    it.
+    """
     source = getattr(table, "filename", None)
     if (
         source is None

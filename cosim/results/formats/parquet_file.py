@@ -1,8 +1,9 @@
-"""Results as Apache Parquet, to the last bit: for pandas, Polars, MATLAB's ``parquetread``. Touches only the file it is given.
+"""Results as Apache Parquet, to the last bit: for pandas, Polars, MATLAB's ``parquetread``. Touches only the file it is
+given.
 
-A column each for ``time`` and every signal; ``unit``, ``display_unit``, ``variability`` and ``description`` are the metadata of
-its field. The metadata of the file holds telegrams, summary and failure as JSON under ``fmu-observer``, and units by name where
-pandas looks for ``DataFrame.attrs``.
+A column each for ``time`` and every signal; ``unit``, ``display_unit``, ``variability`` and ``description`` are the
+metadata of its field. The metadata of the file holds telegrams, summary and failure as JSON under ``fmu-observer``, and
+units by name where pandas looks for ``DataFrame.attrs``.
 """
 
 from __future__ import annotations
@@ -43,9 +44,14 @@ def write_parquet(path: str | Path, result: Result) -> None:
     fields = [arrow.field("time", arrow.float64(), nullable=False, metadata={"unit": "s", "description": "time"})]
     fields += [arrow.field(s.name, arrow.float64(), nullable=False, metadata=_metadata(s)) for s in signals]
     units = {"units": {"time": "s"} | {s.name: s.unit for s in signals}}
-    schema = arrow.schema(fields, metadata={ABOUT: about_text(result), "PANDAS_ATTRS": json.dumps(units, ensure_ascii=False)})
+    schema = arrow.schema(
+        fields, metadata={ABOUT: about_text(result), "PANDAS_ATTRS": json.dumps(units, ensure_ascii=False)}
+    )
     names = result.table.dtype.names or ()
-    with Path(path).open("wb") as file, parquet.ParquetWriter(file, schema, use_dictionary=False, compression="snappy") as writer:
+    with (
+        Path(path).open("wb") as file,
+        parquet.ParquetWriter(file, schema, use_dictionary=False, compression="snappy") as writer,
+    ):
         for _, rows in blocks(result.table):
             columns = [arrow.array(np.ascontiguousarray(rows[name])) for name in names]
             writer.write_table(arrow.Table.from_arrays(columns, schema=schema))

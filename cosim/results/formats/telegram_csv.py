@@ -19,9 +19,14 @@ from plant_models.hybrid.units import UnitError, conversion, parse_unit
 
 NEEDED = ("stamp", "position")
 UNITS = {
-    "stamp": "s", "delivered_at": "s", "time_bound": "s", "odometer_reading": "m/s",
-    "position": "m", "true_position": "m", "location_accuracy": "m",
-}  # fmt: skip
+    "stamp": "s",
+    "delivered_at": "s",
+    "time_bound": "s",
+    "odometer_reading": "m/s",
+    "position": "m",
+    "true_position": "m",
+    "location_accuracy": "m",
+}
 DEFAULTS = {f.name: f.default for f in fields(BaliseRecord) if f.default is not MISSING} | {"true_position": nan}
 KINDS = ("true", "missed", "false")
 
@@ -36,9 +41,9 @@ def holds_telegrams(path: Path) -> bool:
 def read_telegrams(path: Path) -> list[BaliseRecord]:
     """Read a table of telegrams, one a line.
 
-    What is not given: ``delivered_at`` is the stamp, ``identity`` is ``T1``, ``T2``, ... in the order of the file, ``kind`` is
-    ``true``, the location accuracy is zero, the odometer reading and the true position are unknown. Units in brackets behind
-    the names are converted; without one it is the SI unit.
+    What is not given: ``delivered_at`` is the stamp, ``identity`` is ``T1``, ``T2``, ... in the order of the file,
+    ``kind`` is ``true``, the location accuracy is zero, the odometer reading and the true position are unknown. Units
+    in brackets behind the names are converted; without one it is the SI unit.
 
     Raises:
         ValueError: a column is missing or unknown, or a cell cannot be read; the line is named.

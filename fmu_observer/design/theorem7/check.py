@@ -10,7 +10,8 @@ ROUNDING = 1e-13  # of the largest number in a matrix: an eigenvalue smaller tha
 
 
 def margins(problem: Theorem7Problem, unknowns: Unknowns, performance: bool) -> dict[str, float]:
-    """How far every inequality is from failing, by name: the smallest eigenvalue of what must be positive, less rounding.
+    """How far every inequality is from failing, by name: the smallest eigenvalue of what must be positive, less
+    rounding.
 
     Args:
         problem: the question. unknowns: numbers. performance: as in `inequalities`.

@@ -1,4 +1,6 @@
-"""Theorem 7 as a design tool: gains for a model, a gap and a decay, or the attenuation of given gains, checked in NumPy."""
+"""Theorem 7 as a design tool: gains for a model, a gap and a decay, or the attenuation of given gains, checked in
+NumPy.
+"""
 
 from __future__ import annotations
 
@@ -26,8 +28,8 @@ class Theorem7Design:
 
     Attributes:
         model: name of the model. gap: tau_M [s]. eta: decay of the sampled gain [1/s]. mu: premise mismatch [1/s].
-        gamma: attenuation from noise and disturbance to the error, in the exponentially weighted variables; inf where only the
-            decay was asked for.
+        gamma: attenuation from noise and disturbance to the error, in the exponentially weighted variables; inf where
+            only the decay was asked for.
         sampled_gain: K_i1, shape (N, n, q1). continuous_gain: K_i2, shape (N, n, q2).
         margins: every inequality recomputed in NumPy, by name; all positive.
         options: the further arguments. status: what the solver called its answer, which is not what was relied on.
@@ -63,7 +65,8 @@ class Theorem7Design:
         """One sentence for the user, numbers included."""
         attenuation = "decay only" if self.gamma == inf else f"gamma = {self.gamma:.4g}"
         return (
-            f"Theorem 7 holds for {self.model} with gaps up to {self.gap:g} s and eta = {self.eta:g} 1/s: {attenuation}; "
+            f"Theorem 7 holds for {self.model} with gaps up to {self.gap:g} s and eta = {self.eta:g} 1/s: "
+            f"{attenuation}; "
             f"{len(self.margins)} inequalities recomputed, smallest margin {self.margin:.2g}."
         )
 
@@ -82,9 +85,17 @@ class InfeasibleDesign(ValueError):  # noqa: N818 - what it is, not an "Error" o
 
 
 def design_theorem7(
-    model: str | TakagiSugenoModel, gap: float, eta: float, *, gains: Gains | None = None, performance: bool = True,
-    mu: float = 0.0, disturbance: bool = True, scaling: Sequence[float] | None = None, two_vertex: bool = False,
-) -> Theorem7Design:  # fmt: skip
+    model: str | TakagiSugenoModel,
+    gap: float,
+    eta: float,
+    *,
+    gains: Gains | None = None,
+    performance: bool = True,
+    mu: float = 0.0,
+    disturbance: bool = True,
+    scaling: Sequence[float] | None = None,
+    two_vertex: bool = False,
+) -> Theorem7Design:
     """Gains of the observer (2.6) with the least gamma, or the least gamma of given gains: Bouchama 2024, Theorem 7.
 
     Args:
@@ -95,8 +106,8 @@ def design_theorem7(
         performance: seek the least gamma; False asks for the decay only and seeks the largest margin.
         mu: bound of the premise mismatch [1/s]; the thesis prints none.
         disturbance: with the channel of G and w. Without it the least gamma is met by ignoring the continuous output.
-        scaling: n positive numbers T; errors are measured, and the problem solved, in ``T x``; None for the model's own. Needed
-            where states differ by decades.
+        scaling: n positive numbers T; errors are measured, and the problem solved, in ``T x``; None for the model's
+            own. Needed where states differ by decades.
         two_vertex: the sharper variant that asks at the beginning and the end of a gap separately.
 
     Returns:
@@ -104,7 +115,8 @@ def design_theorem7(
 
     Raises:
         InfeasibleDesign: there is no solution; the message says what was tried and the nearest feasible eta and gap.
-        UnobservableError: there is none because a vertex has a mode that does not decay and is not measured; it is named.
+        UnobservableError: there is none because a vertex has a mode that does not decay and is not measured; it is
+        named.
         ValueError: an argument is not legal, or the gains have another shape.
         ImportError: cvxpy (extra `lmi`) is not installed.
     """
@@ -112,7 +124,9 @@ def design_theorem7(
     options: dict[str, Any] = {"disturbance": disturbance, "scaling": scaling, "two_vertex": two_vertex}
     problem = Theorem7Problem.of(chosen, gap, eta, mu=mu, **options)
     if performance and not (problem.noises or problem.channel):
-        raise ValueError(f"Theorem 7: {chosen.name} has neither noise nor disturbance to attenuate; ask with performance=False.")
+        raise ValueError(
+            f"Theorem 7: {chosen.name} has neither noise nor disturbance to attenuate; ask with performance=False."
+        )
     scaled = None if gains is None else _scaled(chosen, problem, gains)
     found = _checked(problem, performance, scaled)
     if found is None:
@@ -134,7 +148,9 @@ def design_theorem7(
     )
 
 
-def _checked(problem: Theorem7Problem, performance: bool, gains: Gains | None) -> tuple[Candidate, dict[str, float]] | None:
+def _checked(
+    problem: Theorem7Problem, performance: bool, gains: Gains | None
+) -> tuple[Candidate, dict[str, float]] | None:
     """A candidate whose inequalities all hold when recomputed, or None."""
     for candidate in candidates(problem, performance, gains):
         found = margins(problem, candidate.unknowns, performance)
@@ -146,7 +162,9 @@ def _checked(problem: Theorem7Problem, performance: bool, gains: Gains | None) -
 def _scaled(model: TakagiSugenoModel, problem: Theorem7Problem, gains: Gains) -> Gains:
     wanted = [(model.vertices, model.order, len(C)) for C in (model.C_sampled, model.C_continuous)]
     if len(gains) != len(wanted):
-        raise ValueError(f"Theorem 7: gains must be a pair, of the sampled and of the continuous outputs; got {len(gains)}.")
+        raise ValueError(
+            f"Theorem 7: gains must be a pair, of the sampled and of the continuous outputs; got {len(gains)}."
+        )
     arrays = [
         checked_matrix("Theorem 7", f"the {name} gain", K, shape, "vertices, states, measurements")
         for name, K, shape in zip(("sampled", "continuous"), gains, wanted, strict=True)
@@ -158,7 +176,8 @@ def _scaled(model: TakagiSugenoModel, problem: Theorem7Problem, gains: Gains) ->
 
 
 def largest_eta(model: str | TakagiSugenoModel, gap: float, most: float, **options: Any) -> float | None:
-    """Largest decay eta up to `most` [1/s] for which the error can be proven to fall at this gap, by bisection; None if none is.
+    """Largest decay eta up to `most` [1/s] for which the error can be proven to fall at this gap, by bisection; None if
+    none is.
 
     Args:
         model: a model or the name of one. gap: longest gap [s]. options: gains, mu, disturbance, scaling, two_vertex of
@@ -170,7 +189,8 @@ def largest_eta(model: str | TakagiSugenoModel, gap: float, most: float, **optio
 
 
 def largest_gap(model: str | TakagiSugenoModel, eta: float, most: float, **options: Any) -> float | None:
-    """Longest gap up to `most` [s] for which the error can be proven to fall with this eta, by bisection; None if none is.
+    """Longest gap up to `most` [s] for which the error can be proven to fall with this eta, by bisection; None if none
+    is.
 
     Args:
         model: a model or the name of one. eta: decay [1/s]. options: as of `largest_eta`.
@@ -182,7 +202,7 @@ def largest_gap(model: str | TakagiSugenoModel, eta: float, most: float, **optio
 
 def search_eta(
     model: str | TakagiSugenoModel, gap: float, etas: Sequence[float], **options: Any
-) -> dict[float, Theorem7Design | None]:  # fmt: skip
+) -> dict[float, Theorem7Design | None]:
     """A design for each of several decays, the grid search of Remark 8; None where there is none.
 
     Args:
@@ -198,7 +218,9 @@ def search_eta(
 
 
 def _largest(problem: Theorem7Problem, name: str, most: float, gains: Gains | None) -> float | None:
-    """Largest value of a field of the problem at which the decay is feasible, between a thousandth of `most` and `most`."""
+    """Largest value of a field of the problem at which the decay is feasible, between a thousandth of `most` and
+    `most`.
+    """
 
     def feasible(value: float) -> bool:
         return _checked(replace(problem, **{name: value}), False, gains) is not None  # type: ignore[arg-type]
@@ -214,7 +236,9 @@ def _largest(problem: Theorem7Problem, name: str, most: float, gains: Gains | No
     return low
 
 
-def _infeasible(model: TakagiSugenoModel, problem: Theorem7Problem, performance: bool, gains: Gains | None) -> InfeasibleDesign:
+def _infeasible(
+    model: TakagiSugenoModel, problem: Theorem7Problem, performance: bool, gains: Gains | None
+) -> InfeasibleDesign:
     require_detectable_vertices(model, "Theorem 7")
     eta, gap = _largest(problem, "eta", problem.eta, gains), _largest(problem, "gap", problem.gap, gains)
     tried = [f"gaps up to {problem.gap:g} s", f"eta = {problem.eta:g} 1/s", f"mu = {problem.mu:g}"]

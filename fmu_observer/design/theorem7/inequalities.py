@@ -1,4 +1,6 @@
-"""The matrix inequalities of Theorem 7: the same formulas for a solver's unknowns and for numbers. Nothing is solved here."""
+"""The matrix inequalities of Theorem 7: the same formulas for a solver's unknowns and for numbers. Nothing is solved
+here.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,8 @@ class Theorem7Problem:
         A: shape (N, n, n). C1: shape (q1, n). C2: shape (q2, n). D: shape (q2, nv).
         channel: largest eigenvalue of G'G, the strength of the disturbance channel; 0 leaves the channel out.
         gap: tau_M [s]. eta: decay rate of the sampled gain, and the rate at which the error is to fall [1/s].
-        mu: bound of the premise mismatch, ``|sum (h_i(x) - h_i(xh)) (A_i x + B_i u)| <= mu |e|`` [1/s]; 0 for exact premises.
+        mu: bound of the premise mismatch, ``|sum (h_i(x) - h_i(xh)) (A_i x + B_i u)| <= mu |e|`` [1/s]; 0 for exact
+        premises.
         two_vertex: impose the beginning and the end of a gap separately, which is sharper and costs twice.
         T: shape (n,), the scaling of the coordinates.
     """
@@ -40,9 +43,16 @@ class Theorem7Problem:
 
     @classmethod
     def of(
-        cls, model: TakagiSugenoModel, gap: float, eta: float, *, mu: float = 0.0, disturbance: bool = True,
-        scaling: Sequence[float] | None = None, two_vertex: bool = False,
-    ) -> Theorem7Problem:  # fmt: skip
+        cls,
+        model: TakagiSugenoModel,
+        gap: float,
+        eta: float,
+        *,
+        mu: float = 0.0,
+        disturbance: bool = True,
+        scaling: Sequence[float] | None = None,
+        two_vertex: bool = False,
+    ) -> Theorem7Problem:
         """The question for a model.
 
         Raises:
@@ -51,7 +61,8 @@ class Theorem7Problem:
         for name, value, legal in (("gap", gap, gap > 0.0), ("eta", eta, eta >= 0.0), ("mu", mu, mu >= 0.0)):
             if not (legal and np.isfinite(value)):
                 raise ValueError(
-                    f"Theorem 7: {name} must be finite and {'positive' if name == 'gap' else 'not negative'}, got {value}."
+                    f"Theorem 7: {name} must be finite and {'positive' if name == 'gap' else 'not negative'}, got "
+                    f"{value}."
                 )
         T = np.asarray(model.scaling if scaling is None else scaling, dtype=float)
         if T.shape != (model.order,) or not np.all(T > 0.0):
@@ -61,7 +72,16 @@ class Theorem7Problem:
         scaled_G = T[:, None] * model.G
         channel = float(np.linalg.norm(scaled_G, 2)) ** 2 if disturbance and scaled_G.size else 0.0
         return cls(
-            model.A * T[:, None] / T, model.C_sampled / T, model.C_continuous / T, model.D, channel, gap, eta, mu, two_vertex, T
+            model.A * T[:, None] / T,
+            model.C_sampled / T,
+            model.C_continuous / T,
+            model.D,
+            channel,
+            gap,
+            eta,
+            mu,
+            two_vertex,
+            T,
         )
 
     @property
@@ -99,8 +119,8 @@ class Unknowns:
 def inequalities(problem: Theorem7Problem, unknowns: Unknowns, performance: bool) -> dict[str, Rows]:
     """Block rows of every matrix that must be negative definite, by name: Bouchama 2024, (2.13)-(2.14).
 
-    Read as the derivation (2.12), (2.15)-(2.28) has it: ``- w_i2 C2`` in phi21, ``-(1/tau_M) Q``, ``+ N_i4`` in block (4, 3), and
-    ``gamma^2 / lmax(G'G)`` in the last block, scaled coordinates included.
+    Read as the derivation (2.12), (2.15)-(2.28) has it: ``- w_i2 C2`` in phi21, ``-(1/tau_M) Q``, ``+ N_i4`` in block
+    (4, 3), and ``gamma^2 / lmax(G'G)`` in the last block, scaled coordinates included.
 
     Args:
         performance: with the attenuation of noise and disturbance; without it only the decay of the error is asked for.

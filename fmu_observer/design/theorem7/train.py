@@ -16,8 +16,8 @@ def design_train_gains(
 ) -> tuple[dict[str, Any], Theorem7Design]:
     """Gains of the observer `takagi_sugeno_cdo` with the least gamma for balise gaps up to `max_gap`.
 
-    With the disturbance channel the odometer is trusted, so that its slip biases the estimate; without it (``disturbance=False``)
-    the design leaves the odometer out, as the gains (3.48) do.
+    With the disturbance channel the odometer is trusted, so that its slip biases the estimate; without it
+    (``disturbance=False``) the design leaves the odometer out, as the gains (3.48) do.
 
     Args:
         max_gap: longest gap between balises [s]. eta: decay of the balise gain [1/s].

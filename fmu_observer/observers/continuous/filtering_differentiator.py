@@ -15,10 +15,10 @@ from plant_models.hybrid.system import Array
 class FilteringDifferentiator(SignalDifferentiator):
     """Differentiation order n with nf filter states, m = n + nf: Bouchama 2024, (1.16), Theorem 4.
 
-    ``dW_i = -g_{m+1-i} L^(i/(m+1)) |W_1|^((m+1-i)/(m+1)) sgn(W_1) + W_{i+1}``, ``z_0 - f`` in place of ``W_{nf+1}``, and ``dz_j =
-    -g_{n-j} L^((nf+1+j)/(m+1)) |W_1|^((n-j)/(m+1)) sgn(W_1) + z_{j+1}``, g the row m of Table 1.1. Repaired: the exponent nf + 1
-    + j is the general one, the print shows that of j = 0 in two places. It rejects noise with a small integral of order up to nf,
-    however large: a fast oscillation, a spike.
+    ``dW_i = -g_{m+1-i} L^(i/(m+1)) |W_1|^((m+1-i)/(m+1)) sgn(W_1) + W_{i+1}``, ``z_0 - f`` in place of ``W_{nf+1}``,
+    and ``dz_j = -g_{n-j} L^((nf+1+j)/(m+1)) |W_1|^((n-j)/(m+1)) sgn(W_1) + z_{j+1}``, g the row m of Table 1.1.
+    Repaired: the exponent nf + 1 + j is the general one, the print shows that of j = 0 in two places. It rejects noise
+    with a small integral of order up to nf, however large: a fast oscillation, a spike.
 
     Args:
         order: n. filtering_order: nf, at least 1; n + nf at most 5. unit: unit of the signal.
@@ -38,7 +38,8 @@ class FilteringDifferentiator(SignalDifferentiator):
         require_whole(self.name, 0, filtering_order=filtering_order)
         if filtering_order < 1:
             raise ValueError(
-                f"{self.name}: filtering order {filtering_order}, expected at least 1; use levant_differentiator without."
+                f"{self.name}: filtering order {filtering_order}, expected at least 1; use levant_differentiator "
+                f"without."
             )
         super().__init__(order, filtering_order, unit)
 

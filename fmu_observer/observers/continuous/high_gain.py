@@ -25,10 +25,10 @@ from plant_models.hybrid.system import Array
 class HighGain(ModelObserver):
     """High-gain observer ``dzh = A zh + phi(zh, u) - theta inv(Delta) K (C zh - y)``: Bouchama 2024, (1.10)-(1.13).
 
-    With Delta = diag(1, 1/theta, ...). The i-th correction gain is ``theta^i K_i``. The model must be in normal form: A the shift
-    matrix, the first state measured, phi triangular (Theorem 2). `condition` gives the smallest theta that a Lyapunov function
-    proves, from the Lipschitz constant and, sharper, from the slopes of phi. Defaults [ours]: K binomial, all poles of ``A - K
-    C`` at -1; theta = 5 1/s, above the proven smallest one of the pendulum, 4.92.
+    With Delta = diag(1, 1/theta, ...). The i-th correction gain is ``theta^i K_i``. The model must be in normal form: A
+    the shift matrix, the first state measured, phi triangular (Theorem 2). `condition` gives the smallest theta that a
+    Lyapunov function proves, from the Lipschitz constant and, sharper, from the slopes of phi. Defaults [ours]: K
+    binomial, all poles of ``A - K C`` at -1; theta = 5 1/s, above the proven smallest one of the pendulum, 4.92.
     """
 
     name = "high_gain"
@@ -66,6 +66,7 @@ class HighGain(ModelObserver):
                 "abscissa": float(np.linalg.eigvals(chain_error(K)).real.max()),
                 "lyapunov_size": lyapunov_size(K),
             },
-            statement="A - K C is Hurwitz (abscissa < 0) and theta >= smallest_theta, enough by e' P e with Q = I; less may do",
+            statement="A - K C is Hurwitz (abscissa < 0) and theta >= smallest_theta, enough by e' P e with Q = I; "
+            "less may do",
             source="Bouchama 2024, (1.13), Theorem 2, bound ours",
         )

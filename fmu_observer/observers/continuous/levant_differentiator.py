@@ -12,12 +12,14 @@ from plant_models.hybrid.system import Array
 
 
 class LevantDifferentiator(SignalDifferentiator):
-    """Levant's differentiator ``dz_i = -g_i L^((i+1)/(n+1)) |s|^((n-i)/(n+1)) sgn(s) + z_{i+1}``: Bouchama 2024, (1.14).
+    """Levant's differentiator ``dz_i = -g_i L^((i+1)/(n+1)) |s|^((n-i)/(n+1)) sgn(s) + z_{i+1}``: Bouchama 2024,
+    (1.14).
 
-    Theorem 3, with ``s = z_0 - f``. Repaired: the gains are Table 1.1 in the order in which it works, ``g_i = table[n][n - i]``;
-    in the printed order of the indices the estimates are wrong from n = 2 on. Without noise the estimates are exact after a
-    finite time; with noise of size eps derivative i is within a constant of ``L^(i/(n+1)) eps^((n+1-i)/(n+1))``. The
-    equations are discontinuous; at the internal step h they chatter by the order of ``L h^(n+1-i)``.
+    Theorem 3, with ``s = z_0 - f``. Repaired: the gains are Table 1.1 in the order in which it works,
+    ``g_i = table[n][n - i]``; in the printed order of the indices the estimates are wrong from n = 2 on. Without noise
+    the estimates are exact after a finite time; with noise of size eps derivative i is within a constant of
+    ``L^(i/(n+1)) eps^((n+1-i)/(n+1))``. The equations are discontinuous; at the internal step h they chatter by the
+    order of ``L h^(n+1-i)``.
 
     Args:
         order: number n of derivatives, 0 to 5. unit: unit of the signal.

@@ -19,9 +19,9 @@ SPEED = 2.0  # [1/s] of the default poles, at -SPEED, -1.25 SPEED, -1.5 SPEED, .
 class Luenberger(ModelObserver):
     """Luenberger observer ``dxh = A xh + B u + phi(xh, u) - L (C xh - y)``: Bouchama 2024, (1.1)-(1.5).
 
-    For a linear model phi is zero and the error obeys ``de = (A - L C) e`` exactly. For a nonlinear one the linear part is that
-    at the start of the estimates with zero inputs, and the condition holds near it only; `Thau` has the one that holds
-    everywhere. Default L: real poles from -2 1/s on [ours, the thesis prints none].
+    For a linear model phi is zero and the error obeys ``de = (A - L C) e`` exactly. For a nonlinear one the linear part
+    is that at the start of the estimates with zero inputs, and the condition holds near it only; `Thau` has the one
+    that holds everywhere. Default L: real poles from -2 1/s on [ours, the thesis prints none].
     """
 
     name = "luenberger"

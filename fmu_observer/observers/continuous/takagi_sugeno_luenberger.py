@@ -22,16 +22,19 @@ SPEED = 2.0  # [1/s] of the default poles, at -SPEED, -1.25 SPEED, ... [ours]
 
 
 class TakagiSugenoLuenberger(HybridSystem):
-    """Takagi-Sugeno Luenberger observer ``dxh = sum_i h_i [A_i xh + B_i u - K_i (C xh - y)]``: Bouchama 2024, (1.19)-(1.28).
+    """Takagi-Sugeno Luenberger observer ``dxh = sum_i h_i [A_i xh + B_i u - K_i (C xh - y)]``: Bouchama 2024,
+    (1.19)-(1.28).
 
-    All measurements of the model, those it calls sampled too, are continuous inputs here. The premises are read from the state
-    nearest to the estimate that agrees with the measurements (``measured``), or from the estimate as printed in (1.19)
-    (``estimated``). Where the measurements give all premises the error obeys ``de = sum h_i (A_i - K_i C) e``, and the
-    inequalities of (1.26) decide: ``A_i' P + P A_i - L_i C - C' L_i' < 0``, ``K_i = inv(P) L_i``. Repaired: the print has ``L_i'
-    C'``. `condition` seeks P for the gains in use and recomputes the inequalities.
+    All measurements of the model, those it calls sampled too, are continuous inputs here. The premises are read from
+    the state nearest to the estimate that agrees with the measurements (``measured``), or from the estimate as printed
+    in (1.19) (``estimated``). Where the measurements give all premises the error obeys
+    ``de = sum h_i (A_i - K_i C) e``, and the inequalities of (1.26) decide: ``A_i' P + P A_i - L_i C - C' L_i' < 0``,
+    ``K_i = inv(P) L_i``. Repaired: the print has ``L_i' C'``. `condition` seeks P for the gains in use and recomputes
+    the inequalities.
 
-    Default gains [ours]: the same poles at every vertex, from -2 1/s on; `design.takagi_sugeno_luenberger.designed_gains` solves
-    the inequalities instead. Premises outside their bounds use the nearer vertices; `premise_outside_time` says for how long.
+    Default gains [ours]: the same poles at every vertex, from -2 1/s on;
+    `design.takagi_sugeno_luenberger.designed_gains` solves the inequalities instead. Premises outside their bounds use
+    the nearer vertices; `premise_outside_time` says for how long.
 
     Args:
         model: a Takagi-Sugeno model or the name of one. premise: see above.
@@ -48,7 +51,10 @@ class TakagiSugenoLuenberger(HybridSystem):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(TAKAGI_SUGENO_MODELS), "premise": PREMISES}
 
     def __init__(
-        self, model: str | TakagiSugenoModel = "pendulum", premise: Premise = "measured", gains: np.ndarray | None = None
+        self,
+        model: str | TakagiSugenoModel = "pendulum",
+        premise: Premise = "measured",
+        gains: np.ndarray | None = None,
     ) -> None:
         self.model = chosen = find_takagi_sugeno_model(model)
         if premise not in PREMISES:
@@ -96,7 +102,9 @@ class TakagiSugenoLuenberger(HybridSystem):
             ValueError: a parameter is unknown, not finite or of another size, or the preset is unknown.
         """
         p = self.unpack_parameters(parameter_values(self, parameters, preset, "to judge"))
-        found = vertex_decrease(self.model, np.stack([np.asarray(self._gain_of(p, i)) for i in range(self.model.vertices)]))
+        found = vertex_decrease(
+            self.model, np.stack([np.asarray(self._gain_of(p, i)) for i in range(self.model.vertices)])
+        )
         hidden = len(self.model.unmeasured) if self.premise == "measured" else len(self.model.premises)
         return Condition(
             holds=found.margin > 0.0 and not hidden,
@@ -106,7 +114,8 @@ class TakagiSugenoLuenberger(HybridSystem):
                 "margin": found.margin,
                 "premises_not_measured": hidden,
             },
-            statement="one P > 0 makes (A_i - K_i C)' P + P (A_i - K_i C) < 0 at every vertex (margin > 0), premises measured",
+            statement="one P > 0 makes (A_i - K_i C)' P + P (A_i - K_i C) < 0 at every vertex (margin > 0), premises "
+            "measured",
             source="Bouchama 2024, (1.26), repaired",
         )
 

@@ -24,7 +24,8 @@ def corrected(x: Array, P: Array, innovation: Array, C: np.ndarray, RN: Array) -
     The Joseph form ``(I - K C) P (I - K C)' + K RN K'`` stays symmetric and positive for any rounding of the gain.
 
     Args:
-        x: prediction, shape (n,). P: its covariance, shape (n, n). innovation: ``y - C x``, shape (q,). C: shape (q, n).
+        x: prediction, shape (n,). P: its covariance, shape (n, n). innovation: ``y - C x``, shape (q,). C: shape (q,
+        n).
         RN: covariance of the measurements, shape (q, q).
 
     Returns:

@@ -13,9 +13,10 @@ from fmu_observer.observers.discrete.extended_luenberger import ExtendedLuenberg
 class DiscreteLuenberger(ExtendedLuenberger):
     """Discrete Luenberger ``xh+ = A_d xh + B_d u + L (y - C xh)``, ``A_d - L C`` Schur: Bouchama 2024, (1.29)-(1.32).
 
-    A_d, B_d are the exact zero-order-hold discretisation at `sample_period`, computed at every sample, so they follow the
-    parameter; the gain belongs to the period it was designed for. After the sample at t_k the outputs are the estimate of x(t_k)
-    from the measurements up to t_{k-1}, as printed. Default L [ours]: all poles at exp(-2 T) with one measurement.
+    A_d, B_d are the exact zero-order-hold discretisation at `sample_period`, computed at every sample, so they follow
+    the parameter; the gain belongs to the period it was designed for. After the sample at t_k the outputs are the
+    estimate of x(t_k) from the measurements up to t_{k-1}, as printed. Default L [ours]: all poles at exp(-2 T) with
+    one measurement.
 
     Raises:
         ValueError: the model is nonlinear.

@@ -28,13 +28,14 @@ VARIANCE = 1e-4  # of the default measurement noise [y2] [ours]
 class ExtendedKalmanFilter(ModelObserver):
     """First-order extended Kalman filter; Bouchama 2024 names it (section 1.3) and prints no equations.
 
-    At a sample: ``xh(k|k-1)`` is the model over one period from ``xh(k-1|k-1)``, inputs held, ``P(k|k-1) = F P F' + QN`` with F
-    the exact Jacobian of that transition; then ``K = P C' inv(C P C' + RN)``, ``xh(k|k) = xh(k|k-1) + K (y - C xh(k|k-1))`` and
-    P(k|k) in Joseph form. The first sample corrects the start without a prediction. The transition follows `sample_period`; QN
-    belongs to one period and must be given anew with another (`design.discretisation.process_covariance`).
+    At a sample: ``xh(k|k-1)`` is the model over one period from ``xh(k-1|k-1)``, inputs held,
+    ``P(k|k-1) = F P F' + QN`` with F the exact Jacobian of that transition; then ``K = P C' inv(C P C' + RN)``,
+    ``xh(k|k) = xh(k|k-1) + K (y - C xh(k|k-1))`` and P(k|k) in Joseph form. The first sample corrects the start without
+    a prediction. The transition follows `sample_period`; QN belongs to one period and must be given anew with another
+    (`design.discretisation.process_covariance`).
 
-    State: xh(k|k), then P(k|k) row by row; the outputs ``<x>_std`` are the roots of its diagonal. Defaults [ours]: QN of white
-    noise of density 0.01 in every state, RN = 1e-4, P = I at the start.
+    State: xh(k|k), then P(k|k) row by row; the outputs ``<x>_std`` are the roots of its diagonal. Defaults [ours]: QN
+    of white noise of density 0.01 in every state, RN = 1e-4, P = I at the start.
 
     Raises:
         ValueError: the model is unknown, or a mode of it does not decay and is not measured.
@@ -54,13 +55,20 @@ class ExtendedKalmanFilter(ModelObserver):
         n, q = chosen.order, len(chosen.measurements)
         QN = process_covariance(linear_part(chosen), DENSITY * np.eye(n), chosen.sample_period)
         self.gain_parameters = (
-            self.gain_parameter("process_covariance", QN, "Covariance QN of the process noise of one period, row by row"),
-            self.gain_parameter("measurement_covariance", VARIANCE * np.eye(q), "Covariance RN of the measurements, row by row"),
+            self.gain_parameter(
+                "process_covariance", QN, "Covariance QN of the process noise of one period, row by row"
+            ),
+            self.gain_parameter(
+                "measurement_covariance", VARIANCE * np.eye(q), "Covariance RN of the measurements, row by row"
+            ),
         )
         start = tuple(map(float, np.eye(n).ravel()))
-        self.extra_memory = primed_memory(memory("covariance", "1", start, "Covariance P(k|k), row by row, SI units", size=n * n))
+        self.extra_memory = primed_memory(
+            memory("covariance", "1", start, "Covariance P(k|k), row by row, SI units", size=n * n)
+        )
         self.extra_outputs = tuple(
-            output_signal(f"{s.name}_std", s.unit, f"Standard deviation of the estimate: {s.description}") for s in chosen.states
+            output_signal(f"{s.name}_std", s.unit, f"Standard deviation of the estimate: {s.description}")
+            for s in chosen.states
         )
         super().__init__(chosen)
         self._jacobian = transition_jacobian(chosen)
@@ -85,13 +93,18 @@ class ExtendedKalmanFilter(ModelObserver):
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """The estimates and their standard deviations."""
         n = self.model.order
-        spreads = {f"{s.name}_std": np.sqrt(np.maximum(x[n + i * (n + 1)], 0.0)) for i, s in enumerate(self.model.states)}
+        spreads = {
+            f"{s.name}_std": np.sqrt(np.maximum(x[n + i * (n + 1)], 0.0)) for i, s in enumerate(self.model.states)
+        }
         return super().output(t, x, u, p) | spreads
 
     def condition_of(self, p: Any) -> Condition:
         """Whether the filter linearised at the start of the estimates has a stable steady state."""
         n, q, T = self.model.order, len(self.model.measurements), float(p.sample_period)
-        QN, RN = as_matrix(np.asarray(p.process_covariance), n, n), as_matrix(np.asarray(p.measurement_covariance), q, q)
+        QN, RN = (
+            as_matrix(np.asarray(p.process_covariance), n, n),
+            as_matrix(np.asarray(p.measurement_covariance), q, q),
+        )
         F, C = np.asarray(self._jacobian(start_of(self.model), np.zeros(len(self.model.inputs)), T)), self.model.C
         steady, matrix = steady_filter(F, C, QN, RN), observability_matrix(F, C)
         where = "" if self.model.phi is None else ", linearised at the start of the estimates"

@@ -26,14 +26,14 @@ class ExtendedLuenberger(ModelObserver):
     """Extended Luenberger observer ``xh+ = A_d xh + B_d u + f(xh, u) + L (y - C xh)``: Bouchama 2024, (1.34)-(1.35).
 
     The right-hand side without the correction is the model over one sampling period, inputs held
-    (`models.discretisation.transition`), so it follows `sample_period`; the gain does not, it belongs to the period it was
-    designed for. The correction is that of the last sample, as printed: after the sample at t_k the outputs are the estimate of
-    x(t_k) from the measurements up to t_{k-1}.
+    (`models.discretisation.transition`), so it follows `sample_period`; the gain does not, it belongs to the period it
+    was designed for. The correction is that of the last sample, as printed: after the sample at t_k the outputs are the
+    estimate of x(t_k) from the measurements up to t_{k-1}.
 
-    The thesis prints no condition (its LMI is in a reference). Ours is the small-gain theorem: what phi adds to the linear
-    transition over a period has a Lipschitz constant below the distance of ``A_d - L C`` from the unit circle, in the best scaled
-    coordinates. Default L [ours]: poles at exp(-2 T), all of them with one measurement, for the linear model about which phi
-    deviates least.
+    The thesis prints no condition (its LMI is in a reference). Ours is the small-gain theorem: what phi adds to the
+    linear transition over a period has a Lipschitz constant below the distance of ``A_d - L C`` from the unit circle,
+    in the best scaled coordinates. Default L [ours]: poles at exp(-2 T), all of them with one measurement, for the
+    linear model about which phi deviates least.
     """
 
     name = "extended_luenberger"
@@ -68,7 +68,10 @@ class ExtendedLuenberger(ModelObserver):
     def condition_of(self, p: Any) -> Condition:
         """The small-gain condition at the sampling period in use."""
         L, T = as_matrix(np.asarray(p.gain), self.model.order, len(self.model.measurements)), float(p.sample_period)
-        found, matrix = discrete_bound(self.model, L, T), observability_matrix(expm(centre_of(self.model) * T), self.model.C)
+        found, matrix = (
+            discrete_bound(self.model, L, T),
+            observability_matrix(expm(centre_of(self.model) * T), self.model.C),
+        )
         return Condition(
             holds=found.holds,
             values={
@@ -79,7 +82,8 @@ class ExtendedLuenberger(ModelObserver):
                 "bound": found.bound,
                 "scale": found.scale,
             },
-            statement="A_d - L C is Schur (spectral_radius < 1), and lipschitz < bound in coordinates x_i / scale^(i-1)",
+            statement="A_d - L C is Schur (spectral_radius < 1), and lipschitz < bound in coordinates x_i / "
+            "scale^(i-1)",
             source=self.source,
         )
 
@@ -102,5 +106,7 @@ def default_gain(model: ObserverModel) -> np.ndarray:
 
 
 def _innovations(model: ObserverModel) -> tuple[Signal, ...]:
-    return tuple(memory(f"innovation_{s.name}", s.unit, 0.0, f"Measured minus estimated at the last sample: {s.description}")
-                 for s in model.measurements)  # fmt: skip
+    return tuple(
+        memory(f"innovation_{s.name}", s.unit, 0.0, f"Measured minus estimated at the last sample: {s.description}")
+        for s in model.measurements
+    )

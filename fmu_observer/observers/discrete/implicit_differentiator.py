@@ -16,13 +16,14 @@ from plant_models.hybrid.system import Array
 class ImplicitDifferentiator(SignalDifferentiator):
     """Implicit discretisation of the filtering differentiator: Bouchama 2024, (1.36), Theorem 5.
 
-    The sign is taken at the end of the step, from an equation that is solved exactly. What is left is a limit cycle of the order
-    of ``L tau^(n+1-i)``, because z_0 - f is held over the step; for n = 1 less than half of that of an explicit step. Repaired:
-    in the case ``b < -a_0`` of Theorem 5, xi = +1 and ``w_1 = +r^(m+1)``. The root is found by a fixed number of Newton steps
-    that are safe and enough for rounding accuracy.
+    The sign is taken at the end of the step, from an equation that is solved exactly. What is left is a limit cycle of
+    the order of ``L tau^(n+1-i)``, because z_0 - f is held over the step; for n = 1 less than half of that of an
+    explicit step. Repaired:
+    in the case ``b < -a_0`` of Theorem 5, xi = +1 and ``w_1 = +r^(m+1)``. The root is found by a fixed number of Newton
+    steps that are safe and enough for rounding accuracy.
 
-    At a sample the step from the last one is taken with the signal read there; the estimates published then belong to this
-    sample.
+    At a sample the step from the last one is taken with the signal read there; the estimates published then belong to
+    this sample.
 
     Args:
         order: n. filtering_order: nf, at least 1; n + nf at most 5. unit: unit of the signal.

@@ -15,7 +15,9 @@ ITERATIONS = 7  # Newton from at most twice the root: the last two change nothin
 SMALLEST = 1e-200  # stands in for an excess that is not positive, where the root is not used
 
 
-def implicit_step(w: Sequence[Array], z: Sequence[Array], signal: Array, L: Array, tau: Array) -> tuple[list[Array], list[Array]]:
+def implicit_step(
+    w: Sequence[Array], z: Sequence[Array], signal: Array, L: Array, tau: Array
+) -> tuple[list[Array], list[Array]]:
     """The next filter states and estimates: Bouchama 2024, (1.36) with Theorem 5, its third case repaired.
 
     ``w_i+ = tau^(nf-i+1)/(nf-i+1)! (z_0 - f) + sum_{l=i..nf} tau^(l-i)/(l-i)! w_l + sum_{l=i..m+1} tau^(l-i+1)/(l-i+1)!
@@ -43,7 +45,8 @@ def implicit_step(w: Sequence[Array], z: Sequence[Array], signal: Array, L: Arra
         for i in range(nf)
     ]
     z_next = [
-        sum(_taylor(tau, k - j) * z[k] + _taylor(tau, k - j + 1) * v[nf + k] for k in range(j, n + 1)) for j in range(n + 1)
+        sum(_taylor(tau, k - j) * z[k] + _taylor(tau, k - j + 1) * v[nf + k] for k in range(j, n + 1))
+        for j in range(n + 1)
     ]
     return w_next, z_next
 
@@ -56,9 +59,10 @@ def equation_coefficients(m: int, L: Array, tau: Array) -> list[Array]:
 def solve_first_filter_equation(b: Array, a: Sequence[Array]) -> tuple[Array, Array]:
     """Root r and sign xi of Theorem 5; then ``w_1+ = xi r^(m+1)``.
 
-    ``|b| <= a_0``: r = 0, ``xi = -b / a_0``. Else ``xi = -sgn(b)`` and r > 0 solves ``r^(m+1) + a_m r^m + ... + a_1 r = |b| -
-    a_0``. The print has another sign in the case b < -a_0. Newton's method from above, where the polynomial is increasing and
-    convex, cannot fail; it starts from the smallest root that one term alone would give, which is at most twice the true one.
+    ``|b| <= a_0``: r = 0, ``xi = -b / a_0``. Else ``xi = -sgn(b)`` and r > 0 solves
+    ``r^(m+1) + a_m r^m + ... + a_1 r = |b| - a_0``. The print has another sign in the case b < -a_0. Newton's method
+    from above, where the polynomial is increasing and convex, cannot fail; it starts from the smallest root that one
+    term alone would give, which is at most twice the true one.
 
     Args:
         b: the known part of the first filter equation. a: a_0 ... a_m, positive.

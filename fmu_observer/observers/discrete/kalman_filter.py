@@ -11,11 +11,13 @@ from fmu_observer.observers.discrete.extended_kalman_filter import ExtendedKalma
 
 
 class KalmanFilter(ExtendedKalmanFilter):
-    """Kalman filter: Bouchama 2024, (1.33) and figure 1.1, which name x(k|k), x(k|k-1), P(k|k), P(k|k-1) but no equations.
+    """Kalman filter: Bouchama 2024, (1.33) and figure 1.1, which name x(k|k), x(k|k-1), P(k|k), P(k|k-1) but no
+    equations.
 
-    Prediction ``xh(k|k-1) = A_d xh + B_d u``, ``P(k|k-1) = A_d P A_d' + QN`` with the exact zero-order-hold discretisation at
-    `sample_period`; correction with P(k|k) in Joseph form. The signals are those of the extended filter, whose Jacobian is A_d
-    here. Its condition is exact: with a stabilising solution of the Riccati equation P converges to it from any start.
+    Prediction ``xh(k|k-1) = A_d xh + B_d u``, ``P(k|k-1) = A_d P A_d' + QN`` with the exact zero-order-hold
+    discretisation at `sample_period`; correction with P(k|k) in Joseph form. The signals are those of the extended
+    filter, whose Jacobian is A_d here. Its condition is exact: with a stabilising solution of the Riccati equation P
+    converges to it from any start.
 
     Raises:
         ValueError: the model is nonlinear, or a mode of it does not decay and is not measured.

@@ -1,4 +1,5 @@
-"""One sample of an observer that lives at samples only: first the period that has passed, then the measurement. A pure function.
+"""One sample of an observer that lives at samples only: first the period that has passed, then the measurement. A pure
+function.
 
 What such an observer publishes after a sample belongs to that sample, and not to the next one.
 """

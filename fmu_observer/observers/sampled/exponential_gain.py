@@ -14,11 +14,11 @@ from plant_models.hybrid.system import Array
 class ExponentialGain(HighGainSampled):
     """High-gain observer at samples, its gain decaying since the last one: Bouchama 2024, (1.47)-(1.52).
 
-    ``dxh = A xh + phi(xh, u) - theta inv(Delta) K eta``, ``d eta = -theta K_1 eta``, ``eta = C xh - y`` at a sample. The
-    decay is that of the gain ``exp(-theta K_1 (t - t_k))``, with K_1 the first block of K where the thesis prints L^1;
-    where several outputs are measured it is a matrix exponential. Written so it costs one more state a measurement, reset
-    at samples, and no time stamp is stored. The model must be a chain with its first block measured. Default K: all poles
-    of ``A - K C`` at -1, so (2, 1) for two states; default theta 2 1/s [ours].
+    ``dxh = A xh + phi(xh, u) - theta inv(Delta) K eta``, ``d eta = -theta K_1 eta``, ``eta = C xh - y`` at a sample.
+    The decay is that of the gain ``exp(-theta K_1 (t - t_k))``, with K_1 the first block of K where the thesis prints
+    L^1; where several outputs are measured it is a matrix exponential. Written so it costs one more state a
+    measurement, reset at samples, and no time stamp is stored. The model must be a chain with its first block measured.
+    Default K: all poles of ``A - K C`` at -1, so (2, 1) for two states; default theta 2 1/s [ours].
     """
 
     name = "exponential_gain"

@@ -19,7 +19,8 @@ class HeldInnovation(HighGainSampled):
     """High-gain observer that holds the innovation of the last sample: Bouchama 2024, section 1.3, its reference 76.
 
     ``dxh = A xh + phi(xh, u) - theta inv(Delta) K eta``, ``eta = C xh(t_k) - y(t_k)`` on ``[t_k, t_k+1)``:
-    `exponential_gain` without decay. For gaps that are short against 1/theta it converges faster, but its limit is lower:
+    `exponential_gain` without decay. For gaps that are short against 1/theta it converges faster, but its limit is
+    lower:
     with K = (2, 1) and no drag constant gaps must stay below ``1 / theta``, against ``5 / theta``. The model must be a
     chain with its first block measured. Default theta: 1 1/s [ours]..
     """
@@ -47,13 +48,19 @@ class HeldInnovation(HighGainSampled):
         return ImpulsiveError.with_innovation(drift, gain, 0.0 * decay, self.model.C, self.levels())
 
     def condition_of(self, p: Any) -> Condition:
-        """``theta gap`` of the bare chain against its exact limits, constant and aperiodic, at the model's `sample_period`."""
+        """``theta gap`` of the bare chain against its exact limits, constant and aperiodic, at the model's
+        `sample_period`.
+        """
         theta, gap = float(p.theta), self.model.sample_period
         certificate = certify_sampled_error((self.vertex_error(self.model.A, p),), gap, "bare chain")
         return Condition(
             holds=certificate.holds,
-            values={"theta_gap": theta * gap, "constant_limit": theta * certificate.constant_limit,
-                    "aperiodic_limit": theta * certificate.aperiodic_limit},
-            statement="theta_gap <= aperiodic_limit for the model without its nonlinear part; certify() takes that into account",
+            values={
+                "theta_gap": theta * gap,
+                "constant_limit": theta * certificate.constant_limit,
+                "aperiodic_limit": theta * certificate.aperiodic_limit,
+            },
+            statement="theta_gap <= aperiodic_limit for the model without its nonlinear part; certify() takes that "
+            "into account",
             source="exact transition over a gap; the thesis prints no condition",
-        )  # fmt: skip
+        )

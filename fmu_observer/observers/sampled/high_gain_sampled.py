@@ -1,4 +1,6 @@
-"""Base of the high-gain observers at samples: the gain theta and its shape, and the printed bounds they are judged by."""
+"""Base of the high-gain observers at samples: the gain theta and its shape, and the printed bounds they are judged
+by.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +22,9 @@ THETA = 2.0  # [1/s] [ours]; two states: gaps up to 4 / theta = 2 s
 class HighGainSampled(SampledObserver):
     """Base of the observers ``dxh = A xh + phi(xh, u) - theta inv(Delta) K eta``, eta one value a measurement.
 
-    ``Delta = diag(I, I/theta, ..., I/theta^(n/q - 1))``, so the i-th block of the correction carries theta^i. The model must be
-    in chain form. Default K: all poles of ``A - K C`` at -1, so (2, 1) for two states, as in the thesis, (4, 6, 4, 1) for four.
+    ``Delta = diag(I, I/theta, ..., I/theta^(n/q - 1))``, so the i-th block of the correction carries theta^i. The model
+    must be in chain form. Default K: all poles of ``A - K C`` at -1, so (2, 1) for two states, as in the thesis, (4, 6,
+    4, 1) for four.
     """
 
     theta_start: ClassVar[float] = THETA
@@ -31,7 +34,9 @@ class HighGainSampled(SampledObserver):
         width = check_chain(chosen, self.name)
         self.gain_parameters = (
             parameter("theta", "1/s", self.theta_start, "High gain", min=0.0),
-            self.gain_parameter("high_gain", chain_gain(chosen.order // width, width), "Shape K of the gain, row by row"),
+            self.gain_parameter(
+                "high_gain", chain_gain(chosen.order // width, width), "Shape K of the gain, row by row"
+            ),
         )
         self.declare_sampled_part(chosen)
         super().__init__(chosen)
@@ -58,20 +63,32 @@ class HighGainSampled(SampledObserver):
         return powers[:, None] * K, float(p.theta) * K[:q]
 
     def condition_of(self, p: Any) -> Condition:
-        """(1.51) and (1.52) with mu = 1: the smallest theta, and the longest gap, against the model's `sample_period`."""
+        """(1.51) and (1.52) with mu = 1: the smallest theta, and the longest gap, against the model's
+        `sample_period`.
+        """
         model = self.model
         K = as_matrix(np.asarray(p.high_gain, dtype=float), model.order, self.outputs_count)
         bounds = high_gain_bounds(model.A, K, model.C, float(p.theta), model.lipschitz)
         theta, gap = float(p.theta), model.sample_period
         return Condition(
             holds=theta >= bounds.smallest_theta and gap <= bounds.longest_gap,
-            values={"theta": theta, "smallest_theta": bounds.smallest_theta, "gap": gap, "longest_gap": bounds.longest_gap,
-                    "lipschitz": model.lipschitz, "largest_eigenvalue": bounds.largest, "smallest_eigenvalue": bounds.smallest},
-            statement="theta >= smallest_theta [1/s], gap <= longest_gap [s]; sufficient, very conservative; certify() is exact",
+            values={
+                "theta": theta,
+                "smallest_theta": bounds.smallest_theta,
+                "gap": gap,
+                "longest_gap": bounds.longest_gap,
+                "lipschitz": model.lipschitz,
+                "largest_eigenvalue": bounds.largest,
+                "smallest_eigenvalue": bounds.smallest,
+            },
+            statement="theta >= smallest_theta [1/s], gap <= longest_gap [s]; sufficient, very conservative; certify() "
+            "is exact",
             source="Bouchama 2024, (1.51)-(1.52)",
-        )  # fmt: skip
+        )
 
 
 def chain_gain(length: int, width: int = 1) -> np.ndarray:
-    """K with all poles of ``A - K C`` at -1 for a chain of `length` blocks of `width` states, shape (length * width, width)."""
+    """K with all poles of ``A - K C`` at -1 for a chain of `length` blocks of `width` states, shape (length * width,
+    width).
+    """
     return np.kron(np.poly(-np.ones(length))[1:, None], np.eye(width))

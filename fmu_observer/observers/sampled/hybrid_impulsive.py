@@ -20,15 +20,18 @@ JUMP_SHARE = 0.5  # of the correction of a sample that is given at once [ours]
 class HybridImpulsive(SampledObserver):
     """Hybrid observer, which jumps at samples and is corrected between them too: Bouchama 2024, (1.53)-(1.54).
 
-    ``dxh = A xh + phi(xh, u) + L z``, ``dz = H z``; at a sample ``xh+ = xh + F (y - C xh)``, ``z+ = (I - C F)(y - C xh)``.
+    ``dxh = A xh + phi(xh, u) + L z``, ``dz = H z``; at a sample ``xh+ = xh + F (y - C xh)``,
+    ``z+ = (I - C F)(y - C xh)``.
 
-    The thesis prints no gains. Ours, for a model in chain form: ``L = theta inv(Delta) K`` and ``H = -theta K_1`` are those
-    of `exponential_gain`, which this observer is for F = 0, and ``F = s inv(Delta) K inv(K_1)`` gives the share s = 1/2 of
-    what that observer would give until the next sample at once (s = 1 leaves z = 0: a pure jump). All three are parameters.
+    The thesis prints no gains. Ours, for a model in chain form: ``L = theta inv(Delta) K`` and ``H = -theta K_1`` are
+    those of `exponential_gain`, which this observer is for F = 0, and ``F = s inv(Delta) K inv(K_1)`` gives the share s
+    = 1/2 of what that observer would give until the next sample at once (s = 1 leaves z = 0: a pure jump). All three
+    are parameters.
 
-    Its certificate takes the slopes of phi as constant over a gap, as those of the other sampled observers do, but here that
-    matters: close to the limit, at 0.999 of it on the pendulum, slopes that switch within gaps were found to make the error grow.
-    The certificate notes up to which gap it covers such slopes too.
+    Its certificate takes the slopes of phi as constant over a gap, as those of the other sampled observers do, but here
+    that
+    matters: close to the limit, at 0.999 of it on the pendulum, slopes that switch within gaps were found to make the
+    error grow. The certificate notes up to which gap it covers such slopes too.
     """
 
     name = "hybrid_impulsive"
@@ -73,18 +76,26 @@ class HybridImpulsive(SampledObserver):
         return f"gaps shorter than 1/2400 of the longest are left out, and {super().remark()}"
 
     def condition_of(self, p: Any) -> Condition:
-        """H Hurwitz, and the growth from sample to sample at the model's `sample_period`, its nonlinear part left out."""
+        """H Hurwitz, and the growth from sample to sample at the model's `sample_period`, its nonlinear part left
+        out.
+        """
         _, H, _ = self._gains(p)
         abscissa = float(np.linalg.eigvals(np.asarray(H, dtype=float)).real.max())
         error = self.vertex_error(self.model.A, p)
         certificate = certify_sampled_error((error,), self.model.sample_period, "bare chain")
         return Condition(
             holds=abscissa < 0.0 and certificate.spectral_radius < 1.0,
-            values={"abscissa": abscissa, "gap": self.model.sample_period, "spectral_radius": certificate.spectral_radius,
-                    "constant_limit": certificate.constant_limit, "aperiodic_limit": certificate.aperiodic_limit},
-            statement="H is Hurwitz (abscissa < 0), the error of the linear part falls at a constant gap (spectral_radius < 1)",
+            values={
+                "abscissa": abscissa,
+                "gap": self.model.sample_period,
+                "spectral_radius": certificate.spectral_radius,
+                "constant_limit": certificate.constant_limit,
+                "aperiodic_limit": certificate.aperiodic_limit,
+            },
+            statement="H is Hurwitz (abscissa < 0), the error of the linear part falls at a constant gap "
+            "(spectral_radius < 1)",
             source="exact transition over a gap; the thesis prints no condition",
-        )  # fmt: skip
+        )
 
     def _gains(self, p: Any) -> tuple[Array, Array, Array]:
         n, q = self.model.order, self.outputs_count
@@ -95,10 +106,12 @@ def hybrid_gains(K: np.ndarray, theta: float, share: float) -> tuple[np.ndarray,
     """Gains L, H, F from a high gain [ours].
 
     Args:
-        K: shape (n, q), blocks of q rows, the first one invertible. theta: [1/s]. share: of the correction given at once, 0 to 1.
+        K: shape (n, q), blocks of q rows, the first one invertible. theta: [1/s]. share: of the correction given at
+        once, 0 to 1.
 
     Returns:
-        ``theta inv(Delta) K`` of shape (n, q), ``-theta K_1`` of shape (q, q), ``share inv(Delta) K inv(K_1)`` of shape (n, q).
+        ``theta inv(Delta) K`` of shape (n, q), ``-theta K_1`` of shape (q, q), ``share inv(Delta) K inv(K_1)`` of shape
+        (n, q).
     """
     n, q = K.shape
     powers = theta ** (np.arange(n) // q)[:, None]

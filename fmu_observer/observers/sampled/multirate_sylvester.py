@@ -32,10 +32,11 @@ class MultirateSylvester(GapCertified):
     """Observer of ``x = [x_R, x_c, x_d]``: x_c measured always, each component of x_d at its own event.
 
     Bouchama 2024, (1.42)-(1.46):
-    ``dz = A z + B_c y_c + B_d w + T G u``, ``dw = F_31 xh_R + F_32 y_c + F_33 w + G_3 u``, ``w_i = y_i`` at ``<y_i>_sample``,
-    ``xh_R = inv(T_R) (z - T_c y_c - T_d w)``. T solves the Sylvester equation ``T F = A T + [0 B_c B_d]`` (1.46), so that
-    ``e_z = z - T x`` obeys ``de_z = A e_z + B_d e_w``, and the estimate jumps at samples. The matrices A, [B_c B_d] and T are
-    parameters; `condition` says whether those in use still solve the equation.
+    ``dz = A z + B_c y_c + B_d w + T G u``, ``dw = F_31 xh_R + F_32 y_c + F_33 w + G_3 u``, ``w_i = y_i`` at
+    ``<y_i>_sample``, ``xh_R = inv(T_R) (z - T_c y_c - T_d w)``. T solves the Sylvester equation
+    ``T F = A T + [0 B_c B_d]`` (1.46), so that ``e_z = z - T x`` obeys ``de_z = A e_z + B_d e_w``, and the estimate
+    jumps at samples. The matrices A, [B_c B_d] and T are parameters; `condition` says whether those in use still solve
+    the equation.
 
     Args:
         model: linear, its measurements the last states in their order; or the name of one in `MULTIRATE_MODELS`.
@@ -58,7 +59,10 @@ class MultirateSylvester(GapCertified):
         self.hidden = self.model.order - len(self.model.measurements)
         self._check(continuous)
         self.always, self.sampled = self.model.measurements[:continuous], self.model.measurements[continuous:]
-        poles, names = -SPEED * (1.0 + 0.25 * np.arange(self.hidden)), tuple(s.name for s in self.model.states[: self.hidden])
+        poles, names = (
+            -SPEED * (1.0 + 0.25 * np.arange(self.hidden)),
+            tuple(s.name for s in self.model.states[: self.hidden]),
+        )
         design = sylvester_design(self.model.A, self.hidden, poles, names, f"{self.name} of {self.model.name}")
         self.parameters = (
             _matrix("filter_matrix", design.A, "Matrix A of the filter, Hurwitz, row by row [1/s]"),
@@ -68,12 +72,17 @@ class MultirateSylvester(GapCertified):
         starts = np.array([float(s.start_values[0]) for s in self.model.states])
         self.states = (
             state("filter", "1", tuple(map(float, design.T @ starts)), "Filter z, stands for T x", size=self.hidden),
-            *(state(f"predicted_{s.name}", s.unit, s.start, f"Predicted: {s.description}") for s in self._slow_states()),
+            *(
+                state(f"predicted_{s.name}", s.unit, s.start, f"Predicted: {s.description}")
+                for s in self._slow_states()
+            ),
         )
         self.inputs = (*self.model.inputs, *(_payload(s, f"measured_{s.name}", "continuous") for s in self.always))
         self.outputs = tuple(output_signal(s.name, s.unit, f"Estimate: {s.description}") for s in self.model.states)
         self.events = tuple(
-            TriggeredEvent(f"{s.name}_sample", (_payload(s, f"{s.name}_sample_value", "discrete"),), f"Sample: {s.description}")
+            TriggeredEvent(
+                f"{s.name}_sample", (_payload(s, f"{s.name}_sample_value", "discrete"),), f"Sample: {s.description}"
+            )
             for s in self.sampled
         )
         super().__init__(model=self.model.name, continuous=continuous)
@@ -117,7 +126,8 @@ class MultirateSylvester(GapCertified):
         return Condition(
             holds=residual < RESIDUAL and abscissa < 0.0 and spread < 1.0 / RESIDUAL,
             values={"residual": residual, "abscissa": abscissa, "condition_number": spread},
-            statement="T solves the Sylvester equation (residual = rounding), A is Hurwitz (abscissa < 0), T_R is invertible",
+            statement="T solves the Sylvester equation (residual = rounding), A is Hurwitz (abscissa < 0), T_R is "
+            "invertible",
             source="Bouchama 2024, (1.46)",
         )
 
@@ -129,13 +139,18 @@ class MultirateSylvester(GapCertified):
         generator = np.block([[A, B_d], [read, own]])
         reset = np.diag(np.r_[np.ones(r), np.zeros(count)])
         residual = sylvester_residual(self.model.A, A, B, T)
-        model = f"error equations of the model {self.model.name!r}, exact if it is linear; noise and model errors are left out"
+        model = (
+            f"error equations of the model {self.model.name!r}, exact if it is linear; noise and model errors are "
+            f"left out"
+        )
         found = certify_sampled_error((ImpulsiveError.of(generator, reset),), max_gap, model)
         notes = [f"the Sylvester equation holds with the residual {residual:.1e}"]
         holds = found.holds and residual < RESIDUAL
         if count > 1:
             limit = independent_gap_limit(A, B_d, read, own)
-            notes.append(f"samples each at their own instants are covered up to gaps of {limit:.4g} s, by a small-gain condition")
+            notes.append(
+                f"samples each at their own instants are covered up to gaps of {limit:.4g} s, by a small-gain condition"
+            )
             holds = holds and max_gap < limit
         return replace(found, holds=holds, notes=tuple(notes))
 
@@ -158,7 +173,8 @@ class MultirateSylvester(GapCertified):
         model, q = self.model, len(self.model.measurements)
         if model.phi is not None or self.hidden < 1 or not np.array_equal(model.C, np.eye(model.order)[self.hidden :]):
             raise ValueError(
-                f"{self.name} does not suit the model {model.name!r}: it must be linear (no phi) with its last states measured, "
+                f"{self.name} does not suit the model {model.name!r}: it must be linear (no phi) with its last states "
+                f"measured, "
                 f"in their order, and at least one state before them; got C = {model.C.tolist()}."
             )
         require_whole(f"{self.name}, one of {q} measurement(s) at least being sampled", 0, q - 1, continuous=continuous)
@@ -171,7 +187,12 @@ class MultirateSylvester(GapCertified):
 
     def _matrices(self, p: Any) -> tuple[int, Array, Array, Array]:
         r, n = self.hidden, self.model.order
-        return r, as_matrix(p.filter_matrix, r, r), as_matrix(p.filter_gain, r, n - r), as_matrix(p.transformation, r, n)
+        return (
+            r,
+            as_matrix(p.filter_matrix, r, r),
+            as_matrix(p.filter_gain, r, n - r),
+            as_matrix(p.transformation, r, n),
+        )
 
     def _numbers(self, p: Any) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
         r, A, B, T = self._matrices(p)

@@ -16,10 +16,10 @@ from plant_models.hybrid.system import Array
 class OutputPredictor(HighGainSampled):
     """High-gain observer whose output is predicted between samples: Bouchama 2024, figure 1.2.
 
-    ``dxh = A xh + phi(xh, u) - theta inv(Delta) K (C xh - w)``, ``dw = C (A xh + phi(xh, u))``, ``w = y`` at a sample. The
-    thesis prints no equations, these are those of its references. Since ``d(C xh - w) = -theta K_1 (C xh - w)``, it is the
-    observer `exponential_gain` in other coordinates: same estimates, same certificate, same condition. The model must be a
-    chain with its first block measured.
+    ``dxh = A xh + phi(xh, u) - theta inv(Delta) K (C xh - w)``, ``dw = C (A xh + phi(xh, u))``, ``w = y`` at a sample.
+    The thesis prints no equations, these are those of its references. Since ``d(C xh - w) = -theta K_1 (C xh - w)``, it
+    is the observer `exponential_gain` in other coordinates: same estimates, same certificate, same condition. The model
+    must be a chain with its first block measured.
     """
 
     name = "output_predictor"
@@ -41,6 +41,8 @@ class OutputPredictor(HighGainSampled):
         return np.hstack([self.estimates(x), self.measured(u)])
 
     def vertex_error(self, drift: np.ndarray, p: Any) -> ImpulsiveError:
-        """``de = drift e - theta inv(Delta) K c``, ``dc = -theta K_1 c``, ``c = C e`` at a sample, with ``c = C xh - w``."""
+        """``de = drift e - theta inv(Delta) K c``, ``dc = -theta K_1 c``, ``c = C e`` at a sample, with
+        ``c = C xh - w``.
+        """
         gain, decay = self.gain_matrices(p)
         return ImpulsiveError.with_innovation(drift, gain, decay, self.model.C, self.levels())

@@ -27,12 +27,12 @@ class RiccatiHighGain(ModelObserver, GapCertified):
     Between samples ``dxh = f(xh, u)`` and ``dS = -S Q_theta S - F' S - S F`` with F the exact Jacobian of f at xh, and
     ``Q_theta = theta^2 inv(Delta) Q inv(Delta)``, ``Delta = diag(1, 1/theta, ..., 1/theta^(n-1))``; at a sample
     ``S+ = S + T C' C / r``, ``xh+ = xh - T inv(S+) C' (C xh - y) / r`` with T the sampling period.
-    S is symmetric and positive definite from its start on; it is kept as its upper triangle, row by row. ``inv(S)`` obeys
-    the equations of an extended Kalman filter with noise Q_theta.
+    S is symmetric and positive definite from its start on; it is kept as its upper triangle, row by row. ``inv(S)``
+    obeys the equations of an extended Kalman filter with noise Q_theta.
 
-    For a linear model the error dies at any period, since ``e' S e`` falls; the period must be short where the Jacobian at the
-    estimate is not that between estimate and truth. Q is diagonal. Defaults: Q = I, r = 0.2, theta = 1.5 1/s, S = I [ours, the
-    thesis prints none].
+    For a linear model the error dies at any period, since ``e' S e`` falls; the period must be short where the Jacobian
+    at the estimate is not that between estimate and truth. Q is diagonal. Defaults: Q = I, r = 0.2, theta = 1.5 1/s, S
+    = I [ours, the thesis prints none].
 
     Raises:
         UnobservableError: a mode of the model at its start does not show in its measurements; the message says which.
@@ -57,7 +57,9 @@ class RiccatiHighGain(ModelObserver, GapCertified):
             parameter("output_weight", "1", OUTPUT_WEIGHT, "r, the same for every measurement", min=1e-9),
         )
         identity = tuple(float(i == j) for i, j in _upper(n))
-        self.extra_states = (state("information", "1", identity, "Upper triangle of S, row by row", size=len(identity)),)
+        self.extra_states = (
+            state("information", "1", identity, "Upper triangle of S, row by row", size=len(identity)),
+        )
         super().__init__(chosen)
 
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
@@ -77,7 +79,9 @@ class RiccatiHighGain(ModelObserver, GapCertified):
         return np.hstack([self.estimates(x) - weight * step, self._packed(S)])
 
     def condition_of(self, p: Any) -> Condition:
-        """Observability of the sampled linear part at the start, and its closed growth from sample to sample, S settled."""
+        """Observability of the sampled linear part at the start, and its closed growth from sample to sample, S
+        settled.
+        """
         F = np.asarray(linear_part(self.model))
         error = self.vertex_error(F, F, p)
         gap = float(p.sample_period)
@@ -92,12 +96,16 @@ class RiccatiHighGain(ModelObserver, GapCertified):
         )
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
-        """Certificate over every pair of vertices: the slope at the estimate, which S believes, and the slope of the error."""
+        """Certificate over every pair of vertices: the slope at the estimate, which S believes, and the slope of the
+        error.
+        """
         drifts = self.model.drifts
         vertices = tuple(self.vertex_error(drift, believed, p) for drift in drifts for believed in drifts)
         model = (
-            f"error equations of the model {self.model.name!r} with S settled at a constant period, {len(drifts)} slope(s) of "
-            "its nonlinear part for error and S, constant over a gap; the settling of S, noise and model errors are left out"
+            f"error equations of the model {self.model.name!r} with S settled at a constant period, {len(drifts)} "
+            f"slope(s) of "
+            "its nonlinear part for error and S, constant over a gap; the settling of S, noise and model errors are "
+            "left out"
         )
         return certify_sampled_error(vertices, max_gap, model)
 

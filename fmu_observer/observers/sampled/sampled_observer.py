@@ -1,4 +1,5 @@
-"""Base of the observers that a sampled measurement corrects by way of an innovation held or decaying until the next one.
+"""Base of the observers that a sampled measurement corrects by way of an innovation held or decaying until the next
+one.
 
 It knows models and certificates; the chain form that high-gain observers ask for is checked here.
 """
@@ -24,7 +25,8 @@ from plant_models.hybrid.system import Array
 class SampledObserver(ModelObserver, GatedObserver, GapCertified):
     """Base of the observers corrected at the model's own `event`, its payload the measurements, periodic or not.
 
-    A subclass writes `flow`, `update`, `condition_of` and `vertex_error`, the error equations for one Jacobian of the model.
+    A subclass writes `flow`, `update`, `condition_of` and `vertex_error`, the error equations for one Jacobian of the
+    model.
     """
 
     timing = "event"
@@ -46,7 +48,10 @@ class SampledObserver(ModelObserver, GatedObserver, GapCertified):
         if not self.model.slopes:
             return f"{linear}, exact if it is linear; {self.remark()}"
         count = len(self.model.slopes)
-        return f"{linear} at the {count} extreme slope(s) of its nonlinear part, the slope constant over a gap; {self.remark()}"
+        return (
+            f"{linear} at the {count} extreme slope(s) of its nonlinear part, the slope constant over a gap; "
+            f"{self.remark()}"
+        )
 
     def remark(self) -> str:
         """What else the certificate leaves out."""
@@ -68,7 +73,8 @@ class SampledObserver(ModelObserver, GatedObserver, GapCertified):
 
 
 def per_measurement(model: ObserverModel, name: str, description: str, kind: Callable[..., Signal] = state) -> Signal:
-    """A state (or memory, by `kind`) per measurement: a scalar with its unit, or a vector, with the unit if they share one.
+    """A state (or memory, by `kind`) per measurement: a scalar with its unit, or a vector, with the unit if they share
+    one.
 
     Raises:
         ValueError: the model has no measurement.
@@ -95,8 +101,10 @@ def check_chain(model: ObserverModel, who: str) -> int:
         fits = np.array_equal(model.A, shift_matrix(n // q, q)) and np.array_equal(model.C, np.eye(q, n))
     if not fits:
         raise ValueError(
-            f"{who} does not suit the model {model.name!r}: it needs A the block shift matrix and C = [I 0], each state the "
-            f"derivative of the one before and the first block measured; got A = {model.A.tolist()}, C = {model.C.tolist()}. "
+            f"{who} does not suit the model {model.name!r}: it needs A the block shift matrix and C = [I 0], each "
+            f"state the "
+            f"derivative of the one before and the first block measured; got A = {model.A.tolist()}, C = "
+            f"{model.C.tolist()}. "
             "Put the rest into phi."
         )
     return q

@@ -14,12 +14,12 @@ from plant_models.hybrid.system import Array
 class TakagiSugenoAperiodic(TakagiSugenoHeld):
     """Takagi-Sugeno observer at aperiodic samples, innovation and weights held: Bouchama 2024, (1.55).
 
-    ``dxh = sum_i h_i(z(t_k)) [A_i xh + B_i u + L_i (y(t_k) - C xh(t_k))]`` on ``[t_k, t_k+1)``. Weights and innovation are
-    frozen at the sample; the premises are read from the measurements there, and from the estimate where these do not give
-    them. Printed with damaged brackets; repaired.
+    ``dxh = sum_i h_i(z(t_k)) [A_i xh + B_i u + L_i (y(t_k) - C xh(t_k))]`` on ``[t_k, t_k+1)``. Weights and innovation
+    are frozen at the sample; the premises are read from the measurements there, and from the estimate where these do
+    not give them. Printed with damaged brackets; repaired.
 
-    Frozen weights leave an error of the order of what the premises change within a gap: it does not die out while the plant
-    moves.
+    Frozen weights leave an error of the order of what the premises change within a gap: it does not die out while the
+    plant moves.
     """
 
     name = "takagi_sugeno_aperiodic"
@@ -35,7 +35,9 @@ class TakagiSugenoAperiodic(TakagiSugenoHeld):
     def held_weights(self, x: Array, u: Any) -> Array:
         """Weights at the sample, shape (N,)."""
         measured, count = self.measured(u), len(self.model.sampled)
-        best = self.model.informed(x[: self.model.order], measured[:count], measured[count:] if self.model.continuous else None)
+        best = self.model.informed(
+            x[: self.model.order], measured[:count], measured[count:] if self.model.continuous else None
+        )
         return np.hstack(self.model.weights(self.model.premise_values(best, self.known(u))))
 
     def sampling_event(self, payload: tuple[Signal, ...]) -> Event:

@@ -38,38 +38,46 @@ class GeneralTakagiSugenoCdo(GatedObserver):
     """Takagi-Sugeno observer with continuous and aperiodic sampled outputs: Bouchama 2024, (2.6).
 
     ``dxh = sum_i h_i [A_i xh + B_i u - K_i2 (C2 xh - y2) - K_i1 c]``, ``dc = -eta c``, ``c = C1 xh - y1`` at a sample.
-    The decaying gain ``exp(-eta (t - t_k)) K_i1`` is one more state a sampled output, reset at samples. Which output a gain
-    belongs to is told by its shape: K_i1 has a column for each sampled output, K_i2 for each continuous one.
+    The decaying gain ``exp(-eta (t - t_k)) K_i1`` is one more state a sampled output, reset at samples. Which output a
+    gain belongs to is told by its shape: K_i1 has a column for each sampled output, K_i2 for each continuous one.
 
-    The weights h depend on the premises, read from the state nearest to the estimate that agrees with what `premise` lets it see:
-    ``frozen`` at the last sample, as printed in (2.6): the error then does not go to zero on a moving plant; ``live``: y2 of now
-    and y1 of the last sample; ``estimated`` (default): y2 of now, all else estimated, the only one with which the error vanishes.
+    The weights h depend on the premises, read from the state nearest to the estimate that agrees with what `premise`
+    lets it see:
+    ``frozen`` at the last sample, as printed in (2.6): the error then does not go to zero on a moving plant; ``live``:
+    y2 of now and y1 of the last sample; ``estimated`` (default): y2 of now, all else estimated, the only one with which
+    the error vanishes.
 
-    Premises outside their bounds use the nearer vertices. That is counted: `premise_violations` samples at which it was so, and
-    `premise_outside_time` for how long.
+    Premises outside their bounds use the nearer vertices. That is counted: `premise_violations` samples at which it was
+    so, and `premise_outside_time` for how long.
 
     Args:
         model: a Takagi-Sugeno model or the name of one.
         premise: see above.
         gains: gains of the parameters' starts; None for the shipped ones of that model. A model of your own needs them.
 
-    Presets, where the model has them: `as_published` gains of the thesis; `redesigned` by Theorem 7 (see `takagi_sugeno_gains`).
+    Presets, where the model has them: `as_published` gains of the thesis; `redesigned` by Theorem 7 (see
+    `takagi_sugeno_gains`).
 
     Raises:
-        ValueError: model or premise is unknown, gains are missing or of another shape, nothing is sampled, or a vertex has a mode
+        ValueError: model or premise is unknown, gains are missing or of another shape, nothing is sampled, or a vertex
+        has a mode
             that does not decay and is not measured.
     """
 
     name = "general_takagi_sugeno_cdo"
-    description = "Takagi-Sugeno continuous-discrete observer of any such model, continuous and aperiodic sampled outputs"
+    description = (
+        "Takagi-Sugeno continuous-discrete observer of any such model, continuous and aperiodic sampled outputs"
+    )
     source = "Bouchama 2024, (2.6)"
     internal_step = 1e-3
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(TAKAGI_SUGENO_MODELS), "premise": PREMISES}
 
     def __init__(
-        self, model: str | TakagiSugenoModel = "takagi_sugeno_train", premise: Premise = "estimated",
+        self,
+        model: str | TakagiSugenoModel = "takagi_sugeno_train",
+        premise: Premise = "estimated",
         gains: TakagiSugenoGains | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.model = chosen = find_takagi_sugeno_model(model)
         if premise not in PREMISES:
             raise ValueError(f"{self.name}: unknown premise {premise!r}; use {', '.join(map(repr, PREMISES))}.")
@@ -93,7 +101,9 @@ class GeneralTakagiSugenoCdo(GatedObserver):
         self.inputs = (*chosen.inputs, *(_renamed(s, "measured_", "continuous") for s in chosen.continuous))
         self.outputs = (
             *(output_signal(s.name, s.unit, f"Estimate: {s.description}") for s in chosen.states),
-            output_signal("premise_violations", "1", "Samples at which a premise was outside its bounds", variability="discrete"),
+            output_signal(
+                "premise_violations", "1", "Samples at which a premise was outside its bounds", variability="discrete"
+            ),
             output_signal("premise_outside_time", "s", "For how long a premise was outside its bounds"),
         )
         payload = tuple(_renamed(s, f"{chosen.event}_", "discrete") for s in chosen.sampled)
@@ -119,7 +129,9 @@ class GeneralTakagiSugenoCdo(GatedObserver):
         return vector(*(corrected[i] for i in range(n)), *decaying, model.outside(values))
 
     def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """The innovation is set anew and the premises are looked at; the estimates stay, shape (n + q1 + 1 + memory,)."""
+        """The innovation is set anew and the premises are looked at; the estimates stay, shape (n + q1 + 1 +
+        memory,).
+        """
         model = self.model
         n, sampled = model.order, len(model.sampled)
         estimate = x[:n]
@@ -130,8 +142,12 @@ class GeneralTakagiSugenoCdo(GatedObserver):
         kept = {"frozen": values, "live": arrived, "estimated": ()}[self.premise]
         violations = x[n + sampled + 1] + model.outside(values)
         return vector(
-            *(estimate[i] for i in range(n)), *(innovation[i] for i in range(sampled)), x[n + sampled], violations, *kept
-        )  # fmt: skip
+            *(estimate[i] for i in range(n)),
+            *(innovation[i] for i in range(sampled)),
+            x[n + sampled],
+            violations,
+            *kept,
+        )
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """The estimates, and how often and how long premises were outside their bounds."""
@@ -152,7 +168,9 @@ class GeneralTakagiSugenoCdo(GatedObserver):
         p = self.unpack_parameters(parameter_values(self, parameters, preset))
         return tuple(self._error_at(h, p) for h in np.eye(self.model.vertices))
 
-    def certify(self, max_gap: float, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Certificate:
+    def certify(
+        self, max_gap: float, parameters: Mapping[str, Value] | None = None, preset: str | None = None
+    ) -> Certificate:
         """Exact stability check of the gains in use for gaps up to `max_gap` between samples.
 
         Args:
@@ -160,7 +178,8 @@ class GeneralTakagiSugenoCdo(GatedObserver):
             preset: preset to start from.
 
         Raises:
-            ValueError: the gap is not positive and finite, a parameter is unknown, not finite or of another size, or the preset
+            ValueError: the gap is not positive and finite, a parameter is unknown, not finite or of another size, or
+            the preset
                 is unknown.
         """
         if not (isfinite(max_gap) and max_gap > 0.0):
@@ -170,14 +189,17 @@ class GeneralTakagiSugenoCdo(GatedObserver):
         pairs = [0.5 * (np.eye(N)[i] + np.eye(N)[j]) for i, j in combinations(range(N), 2)]
         errors = tuple(self._error_at(h, p) for h in (*np.eye(N), *pairs))
         left_out = (
-            f"error of {self.model.name} at its {N} vertices and halfway between them, weights constant over a gap; the change "
+            f"error of {self.model.name} at its {N} vertices and halfway between them, weights constant over a gap; "
+            f"the change "
             "of the weights and their difference to the plant's, which act as inputs to it, are left out"
         )
         found = certify_sampled_error(errors, float(max_gap), left_out)
         if self.premise != "frozen":
             found = with_switching_noted(found, errors, "weights")
         T = np.asarray(self.model.scaling)
-        P = tuple(tuple(float(v * T[i] * T[j]) for j, v in enumerate(row)) for i, row in enumerate(found.lyapunov_matrix))
+        P = tuple(
+            tuple(float(v * T[i] * T[j]) for j, v in enumerate(row)) for i, row in enumerate(found.lyapunov_matrix)
+        )
         values = tuple((name, float(v)) for s in self.parameters for name, v in self._named(s, p))
         chosen = preset or self.default_preset or ""
         return replace(found, observer=self.name, preset=chosen, parameters=values, lyapunov_matrix=P)
@@ -210,7 +232,9 @@ class GeneralTakagiSugenoCdo(GatedObserver):
         n, q = self.model.order, len(error)
         rows = []
         for i in range(n):
-            entries = [sum(weight * gain[(v * n + i) * q + c] for v, weight in enumerate(h)) * error[c] for c in range(q)]
+            entries = [
+                sum(weight * gain[(v * n + i) * q + c] for v, weight in enumerate(h)) * error[c] for c in range(q)
+            ]
             rows.append(sum(entries[1:], entries[0]))
         return vector(*rows)
 
@@ -236,20 +260,28 @@ class GeneralTakagiSugenoCdo(GatedObserver):
         parts = (("sampled", model.sampled, "K_i1"), ("continuous", model.continuous, "K_i2"))
         gains = (
             parameter(
-                f"{kind}_gain", "1", starts[f"{kind}_gain"], f"{symbol}: by vertex, state, measurement, in SI units",
+                f"{kind}_gain",
+                "1",
+                starts[f"{kind}_gain"],
+                f"{symbol}: by vertex, state, measurement, in SI units",
                 size=model.vertices * model.order * len(measured),
             )
             for kind, measured, symbol in parts
             if measured
-        )  # fmt: skip
-        decay = parameter("innovation_decay", "1/s", starts["innovation_decay"], "Decay rate eta of the sampled gain", min=0.0)
+        )
+        decay = parameter(
+            "innovation_decay", "1/s", starts["innovation_decay"], "Decay rate eta of the sampled gain", min=0.0
+        )
         return (decay, *gains)
 
     def _estimator_states(self) -> tuple[Signal, ...]:
         model = self.model
         return (
             *(state(f"estimated_{s.name}", s.unit, s.start, f"Estimate: {s.description}") for s in model.states),
-            *(state(f"innovation_{s.name}", s.unit, 0.0, f"Error at the last sample, decaying: {s.name}") for s in model.sampled),
+            *(
+                state(f"innovation_{s.name}", s.unit, 0.0, f"Error at the last sample, decaying: {s.name}")
+                for s in model.sampled
+            ),
             state("time_outside", "s", 0.0, "For how long a premise was outside its bounds"),
         )
 
@@ -268,7 +300,10 @@ class GeneralTakagiSugenoCdo(GatedObserver):
             held_y = zip(model.sampled, start, strict=True)
             return (
                 counted,
-                *(memory(f"held_{s.name}", s.unit, float(v), f"At the last sample: {s.description}") for s, v in held_y),
+                *(
+                    memory(f"held_{s.name}", s.unit, float(v), f"At the last sample: {s.description}")
+                    for s, v in held_y
+                ),
             )
         return (counted,)
 
@@ -277,4 +312,6 @@ class GeneralTakagiSugenoCdo(GatedObserver):
 
 
 def _renamed(signal: Signal, prefix: str, variability: Literal["continuous", "discrete"]) -> Signal:
-    return input_signal(f"{prefix}{signal.name}", signal.unit, signal.start, signal.description, variability=variability)
+    return input_signal(
+        f"{prefix}{signal.name}", signal.unit, signal.start, signal.description, variability=variability
+    )

@@ -30,7 +30,8 @@ class TakagiSugenoGains:
         """Parameters of the observer of a model, by name.
 
         Raises:
-            ValueError: a gain has another shape than the model asks for, or eta is no decay rate; the message says which and what
+            ValueError: a gain has another shape than the model asks for, or eta is no decay rate; the message says
+            which and what
                 was expected.
         """
         check_numbers(f"Gains for model {model.name!r}", {}, {"eta": self.eta})
@@ -41,11 +42,16 @@ class TakagiSugenoGains:
         ):
             shape = (model.vertices, model.order, len(measured))
             array = _numbers(given)
-            fits = array.shape == shape or (len(measured) == 1 and array.shape == shape[:2]) or (not measured and array.size == 0)
+            fits = (
+                array.shape == shape
+                or (len(measured) == 1 and array.shape == shape[:2])
+                or (not measured and array.size == 0)
+            )
             if not fits or not np.all(np.isfinite(array)):
                 got = f"shape {array.shape}" if np.all(np.isfinite(array)) else "numbers that are not finite"
                 raise ValueError(
-                    f"{name} of model {model.name!r} has {got}, expected finite numbers of shape {shape}: vertices, states, "
+                    f"{name} of model {model.name!r} has {got}, expected finite numbers of shape {shape}: vertices, "
+                    f"states, "
                     "measurements."
                 )
             if measured:
@@ -92,7 +98,8 @@ E2_PUBLISHED = TakagiSugenoGains(  # section 2.5.2
 )
 
 # Ours, by `design_theorem7` with the arguments beside them, rounded; a test proves them anew.
-E1_DESIGN = {"gap": 0.2, "eta": 1.0, "performance": False}  # the largest margin: with the least gamma K_i2 grows to 1.3e4
+# the largest margin: with the least gamma K_i2 grows to 1.3e4
+E1_DESIGN = {"gap": 0.2, "eta": 1.0, "performance": False}
 E1_REDESIGNED = TakagiSugenoGains(
     eta=1.0,
     sampled=((2.6901, -0.6571, 4.0055, -78.416), (2.6899, -0.6565, 4.0052, -24.749)),

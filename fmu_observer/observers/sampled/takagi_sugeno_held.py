@@ -42,10 +42,11 @@ SUITED = ("pendulum", "takagi_sugeno_train")  # their default gains are certifie
 class TakagiSugenoHeld(GatedObserver, GapCertified):
     """Base of ``dxh = sum_i h_i [A_i xh + B_i u - L_i eta]``, ``eta = C xh - y`` set at samples and held between them.
 
-    All measurements of the model are sampled together. A subclass says when (`sampling_event`), and from what the weights come
-    (`weights`).
+    All measurements of the model are sampled together. A subclass says when (`sampling_event`), and from what the
+    weights come (`weights`).
 
-    Default L_i: poles of ``A_i - L_i C`` the same at every vertex, real from ``-min(2, 0.4 / longest gap)`` 1/s on [ours].
+    Default L_i: poles of ``A_i - L_i C`` the same at every vertex, real from ``-min(2, 0.4 / longest gap)`` 1/s on
+    [ours].
     """
 
     internal_step = 5e-3
@@ -58,10 +59,15 @@ class TakagiSugenoHeld(GatedObserver, GapCertified):
         self.parameters = (self._gain_parameter(), *self.timing_parameters())
         self.states = (
             *(state(f"estimated_{s.name}", s.unit, s.start, f"Estimate: {s.description}") for s in self.model.states),
-            *(memory(f"innovation_{s.name}", s.unit, 0.0, f"Held error: {s.description}") for s in self.model.measurements),
+            *(
+                memory(f"innovation_{s.name}", s.unit, 0.0, f"Held error: {s.description}")
+                for s in self.model.measurements
+            ),
             *self.weight_memory(),
         )
-        measured = tuple(_renamed(s, self.measurement_name(s.name), self.payload_in_event) for s in self.model.measurements)
+        measured = tuple(
+            _renamed(s, self.measurement_name(s.name), self.payload_in_event) for s in self.model.measurements
+        )
         self.inputs = self.model.inputs if self.payload_in_event else (*self.model.inputs, *measured)
         self.outputs = tuple(output_signal(s.name, s.unit, f"Estimate: {s.description}") for s in self.model.states)
         self.events = (self.sampling_event(measured if self.payload_in_event else ()),)
@@ -145,23 +151,32 @@ class TakagiSugenoHeld(GatedObserver, GapCertified):
         largest = np.nan if candidate is None else float(np.linalg.eigvalsh(candidate.P)[-1])
         return Condition(
             holds=margin > 0.0,
-            values={"abscissa": max(float(np.linalg.eigvals(matrix).real.max()) for matrix in closed), "margin": margin,
-                    "tolerated_slope": max(0.0, 0.5 * margin / largest) if margin > 0.0 else 0.0},
-            statement="one P > 0 decreases for all A_i - L_i C (margin > 0) and an unknown f with |f| <= tolerated_slope |e|; "
+            values={
+                "abscissa": max(float(np.linalg.eigvals(matrix).real.max()) for matrix in closed),
+                "margin": margin,
+                "tolerated_slope": max(0.0, 0.5 * margin / largest) if margin > 0.0 else 0.0,
+            },
+            statement="one P > 0 decreases for all A_i - L_i C (margin > 0) and an unknown f with |f| <= "
+            "tolerated_slope |e|; "
             "gaps are judged by certify()",
             source=self.source,
-        )  # fmt: skip
+        )
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
-        """Certificate over the vertices and mixtures of every two: three mixtures if there are two vertices, else one."""
+        """Certificate over the vertices and mixtures of every two: three mixtures if there are two vertices, else
+        one.
+        """
         gains = [np.asarray(L, dtype=float) for L in self.gains(p)]
         shares = SHARES if len(gains) == 2 else (0.5,)
         mixtures = [(i, i, 1.0) for i in range(len(gains))]
         mixtures += [(i, j, s) for i, j in combinations(range(len(gains)), 2) for s in shares]
-        vertices = tuple(self._error(s * self.model.A[i] + (1.0 - s) * self.model.A[j], s * gains[i] + (1.0 - s) * gains[j])
-                         for i, j, s in mixtures)  # fmt: skip
+        vertices = tuple(
+            self._error(s * self.model.A[i] + (1.0 - s) * self.model.A[j], s * gains[i] + (1.0 - s) * gains[j])
+            for i, j, s in mixtures
+        )
         model = (
-            f"error equations of the Takagi-Sugeno model {self.model.name!r} at its vertices and mixtures of every two, weights "
+            f"error equations of the Takagi-Sugeno model {self.model.name!r} at its vertices and mixtures of every "
+            f"two, weights "
             f"constant over a gap; {self.premise_remark()}, disturbances and noise are left out"
         )
         certificate = certify_sampled_error(vertices, max_gap, model)
@@ -186,4 +201,6 @@ class TakagiSugenoHeld(GatedObserver, GapCertified):
 
 
 def _renamed(signal: Signal, name: str, discrete: bool) -> Signal:
-    return input_signal(name, signal.unit, signal.start, signal.description, variability="discrete" if discrete else "continuous")
+    return input_signal(
+        name, signal.unit, signal.start, signal.description, variability="discrete" if discrete else "continuous"
+    )

@@ -12,9 +12,9 @@ from plant_models.hybrid.system import Array
 class TakagiSugenoPeriodic(TakagiSugenoHeld):
     """Takagi-Sugeno observer at periodic samples, innovation held: Bouchama 2024, (1.38)-(1.41).
 
-    ``dxh = sum_i h_i(zh) [A_i xh + B_i u + L_i (y(kT) - C xh(kT))]`` on ``[kT, (k+1) T)``. The printed bracket is damaged;
-    repaired to the held innovation with the sign that corrects. The weights follow the estimate. The unknown f of (1.38)
-    with ``|f| <= alpha |F x|`` is met by `condition`, as the slope it tolerates.
+    ``dxh = sum_i h_i(zh) [A_i xh + B_i u + L_i (y(kT) - C xh(kT))]`` on ``[kT, (k+1) T)``. The printed bracket is
+    damaged; repaired to the held innovation with the sign that corrects. The weights follow the estimate. The unknown f
+    of (1.38) with ``|f| <= alpha |F x|`` is met by `condition`, as the slope it tolerates.
     """
 
     name = "takagi_sugeno_periodic"

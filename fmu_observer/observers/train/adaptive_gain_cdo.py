@@ -1,4 +1,6 @@
-"""High-gain train observer whose gain follows the gap it expects: balises laid by distance, speeds that change. Ours."""
+"""High-gain train observer whose gain follows the gap it expects: balises laid by distance, speeds that change.
+Ours.
+"""
 
 from __future__ import annotations
 
@@ -56,23 +58,27 @@ STAGES = {"effort": EffortStage, **WHEEL_STAGES}
 class AdaptiveGainCdo(HighGainTrainObserver):
     """High-gain observer with ``theta = clip(ratio v / d, theta_min, theta_max)``, set at each balise: ours.
 
-    The equations are those of `HighGainTrainObserver`; v is the speed at the balise, d the spacing that is expected, so that
-    theta times the gap is about `ratio` whatever the speed. Bouchama 2024 has constant gains only: theta = 8 diverges for
-    spacings of 8.7 m and more at 14 m/s. Theta is memory: it is in force, with its own decay of the innovation, until the
-    next balise.
+    The equations are those of `HighGainTrainObserver`; v is the speed at the balise, d the spacing that is expected, so
+    that theta times the gap is about `ratio` whatever the speed. Bouchama 2024 has constant gains only: theta = 8
+    diverges for spacings of 8.7 m and more at 14 m/s. Theta is memory: it is in force, with its own decay of the
+    innovation, until the next balise.
 
-    `certify(max_gap)` assumes what must be assumed of a journey: the speed is never below ``d / max_gap`` (with the tolerance of
-    d), acceleration and deceleration stay within `assumed_acceleration`, v is right within `assumed_speed_error`
-    and each spacing is d within `assumed_spacing_error`. These three act on the certificate only. A smaller ratio leaves
-    more room for changing speeds, a larger one corrects faster; theta_min at most ``4 / longest gap``.
+    `certify(max_gap)` assumes what must be assumed of a journey: the speed is never below ``d / max_gap`` (with the
+    tolerance of d), acceleration and deceleration stay within `assumed_acceleration`, v is right within
+    `assumed_speed_error` and each spacing is d within `assumed_spacing_error`. These three act on the certificate only.
+    A smaller ratio leaves more room for changing speeds, a larger one corrects faster; theta_min at most
+    ``4 / longest gap``.
 
     Args:
-        first_stage: where the adhesion force comes from. ``effort``: the applied effort, blind to slip of the wheels but robust
-            between balises far apart. ``differentiator``: of a fast odometer. ``multirate``: of a sampled one.
-        gain_speed: where v comes from. ``odometer``; or ``estimated``, free of slip but only as good as the estimate: a wrong
-            start then also makes the gain wrong, and the certificate speaks only from the time the estimate is within tolerance.
-        spacing: ``expected``: d is the parameter. ``learnt``: d is the distance between the last two balises, the parameter
-            before there are two; a balise nearer than a quarter of the parameter to the last one does not change d.
+        first_stage: where the adhesion force comes from. ``effort``: the applied effort, blind to slip of the wheels
+            but robust between balises far apart. ``differentiator``: of a fast odometer. ``multirate``: of a sampled
+            one.
+        gain_speed: where v comes from. ``odometer``; or ``estimated``, free of slip but only as good as the estimate: a
+            wrong start then also makes the gain wrong, and the certificate speaks only from the time the estimate is
+            within tolerance.
+        spacing: ``expected``: d is the parameter. ``learnt``: d is the distance between the last two balises, the
+            parameter before there are two; a balise nearer than a quarter of the parameter to the last one does not
+            change d.
     """
 
     name = "adaptive_gain_cdo"
@@ -80,9 +86,15 @@ class AdaptiveGainCdo(HighGainTrainObserver):
     source = "ours, after Bouchama 2024, (3.24)-(3.43)"
     outputs = (*TrainObserver.outputs, output_signal("gain", "1/s", "High gain theta in force"))
     stability_parameters: tuple[str, ...] = (
-        "ratio", "theta_min", "theta_max", "expected_spacing", "high_gain", "assumed_acceleration", "assumed_speed_error",
+        "ratio",
+        "theta_min",
+        "theta_max",
+        "expected_spacing",
+        "high_gain",
+        "assumed_acceleration",
+        "assumed_speed_error",
         "assumed_spacing_error",
-    )  # fmt: skip
+    )
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
         "first_stage": tuple(STAGES),
         "gain_speed": ("odometer", "estimated"),
@@ -90,7 +102,10 @@ class AdaptiveGainCdo(HighGainTrainObserver):
     }
 
     def __init__(
-        self, first_stage: FirstStage = "effort", gain_speed: SpeedSource = "odometer", spacing: SpacingSource = "expected"
+        self,
+        first_stage: FirstStage = "effort",
+        gain_speed: SpeedSource = "odometer",
+        spacing: SpacingSource = "expected",
     ) -> None:
         chosen = {"first_stage": first_stage, "gain_speed": gain_speed, "spacing": spacing}
         for option, value in chosen.items():
@@ -106,7 +121,10 @@ class AdaptiveGainCdo(HighGainTrainObserver):
             self.estimator_memory += (
                 memory("last_balise", "m", 0.0, "Position of the last balise"),
                 memory(
-                    "learnt_spacing", "m", -1.0, "Distance between the last two balises; 0 before the second one, -1 before any"
+                    "learnt_spacing",
+                    "m",
+                    -1.0,
+                    "Distance between the last two balises; 0 before the second one, -1 before any",
                 ),
             )
         super().__init__(**chosen)
@@ -121,10 +139,20 @@ class AdaptiveGainCdo(HighGainTrainObserver):
             parameter("high_gain", "1", HIGH_GAIN_K, "Shape K of the high gain", size=2),
             parameter("assumed_acceleration", "m/s2", 0.7, "Largest acceleration, for the certificate only", min=0.0),
             parameter(
-                "assumed_speed_error", "1", 0.05, "Largest relative error of v, for the certificate only", min=0.0, max=1.0
+                "assumed_speed_error",
+                "1",
+                0.05,
+                "Largest relative error of v, for the certificate only",
+                min=0.0,
+                max=1.0,
             ),
             parameter(
-                "assumed_spacing_error", "1", 0.0, "Largest relative error of d, for the certificate only", min=0.0, max=1.0
+                "assumed_spacing_error",
+                "1",
+                0.0,
+                "Largest relative error of d, for the certificate only",
+                min=0.0,
+                max=1.0,
             ),
         )
 
@@ -161,20 +189,31 @@ class AdaptiveGainCdo(HighGainTrainObserver):
         for share in ADVISED_SHARES:
             rule = {"ratio": ADVISED_RATIO, "theta_min": rounded_down(share / max_gap)}
             if certify(rule).holds:
-                return f"ratio = {ADVISED_RATIO:g} and theta_min = {rule['theta_min']:g} are certified for {max_gap:.3g} s"
+                return (
+                    f"ratio = {ADVISED_RATIO:g} and theta_min = {rule['theta_min']:g} are certified for {max_gap:.3g} s"
+                )
         gains = certified_gains(max_gap, lambda theta: {"theta_min": theta, "theta_max": theta}, certify)
-        return None if gains is None else f"theta_min = theta_max = {gains['theta_min']:g} is certified for {max_gap:.3g} s"
+        return (
+            None
+            if gains is None
+            else f"theta_min = theta_max = {gains['theta_min']:g} is certified for {max_gap:.3g} s"
+        )
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate over all gaps, gains and changes of gain that the assumed journey allows."""
         slowest, fastest = drag_slope_range(p, 0.0, TOP_SPEED)
         adaptation = GainAdaptation(
-            ratio=float(p.ratio), theta_min=float(p.theta_min), theta_max=float(max(p.theta_max, p.theta_min)),
-            spacing=float(p.expected_spacing), high_gain=(float(p.high_gain[0]), float(p.high_gain[1])),
-            drag_slopes=(float(slowest), float(fastest)), acceleration=float(p.assumed_acceleration),
-            speed_tolerance=float(p.assumed_speed_error), spacing_tolerance=float(p.assumed_spacing_error),
+            ratio=float(p.ratio),
+            theta_min=float(p.theta_min),
+            theta_max=float(max(p.theta_max, p.theta_min)),
+            spacing=float(p.expected_spacing),
+            high_gain=(float(p.high_gain[0]), float(p.high_gain[1])),
+            drag_slopes=(float(slowest), float(fastest)),
+            acceleration=float(p.assumed_acceleration),
+            speed_tolerance=float(p.assumed_speed_error),
+            spacing_tolerance=float(p.assumed_spacing_error),
             learnt=self.spacing == "learnt",
-        )  # fmt: skip
+        )
         certificate = certify_adapting_gain(adaptation, max_gap, _error_model(adaptation))
         if not self.stage.events:
             return certificate
@@ -190,7 +229,9 @@ class AdaptiveGainCdo(HighGainTrainObserver):
             return p.expected_spacing, ()
         last, before = x[self.continuous_count + 1], x[self.continuous_count + 2]
         distance = np.abs(u.balise_position - last)
-        usable = np.where(distance >= SHORTEST_LEARNT * p.expected_spacing, 1.0, 0.0) * np.where(before >= 0.0, 1.0, 0.0)
+        usable = np.where(distance >= SHORTEST_LEARNT * p.expected_spacing, 1.0, 0.0) * np.where(
+            before >= 0.0, 1.0, 0.0
+        )
         learnt = np.where(usable > 0.0, distance, np.maximum(before, 0.0))
         return np.where(learnt > 0.0, learnt, p.expected_spacing), (u.balise_position + 0.0 * last, learnt)
 
@@ -202,9 +243,12 @@ def _error_model(adaptation: GainAdaptation) -> str:
     a, far = adaptation, adaptation.slowest_speed(1.0)
     learnt = ", the gain set by a spacing learnt within the same range" if a.learnt else ""
     return (
-        "position and speed error in units of the gain in force, for every change of gain that a train can cause whose speed is "
-        f"never below {far:g} m over the longest gap and whose acceleration stays within {a.acceleration:g} m/s2, with balises "
+        "position and speed error in units of the gain in force, for every change of gain that a train can cause whose "
+        "speed is "
+        f"never below {far:g} m over the longest gap and whose acceleration stays within {a.acceleration:g} m/s2, with "
+        f"balises "
         f"every {a.spacing:g} m within {100.0 * a.spacing_tolerance:g} % and a speed known within "
-        f"{100.0 * a.speed_tolerance:g} %{learnt}; drag slope of 0 to {TOP_SPEED:g} m/s, constant over a gap; standstill and the "
+        f"{100.0 * a.speed_tolerance:g} %{learnt}; drag slope of 0 to {TOP_SPEED:g} m/s, constant over a gap; "
+        f"standstill and the "
         "error of the adhesion force, an input to it, are left out"
     )

@@ -26,25 +26,27 @@ AUGMENTED_K = (4.0, 6.0, 4.0, 1.0)  # all poles of A - K C at -1
 class AugmentedHighGainCdo(AugmentedTrainObserver):
     """Cascade for a locomotive in a train: Bouchama 2024, (4.7)-(4.11).
 
-    First stage: a wheel observer gives the adhesion force F_ad. Second stage: `AugmentedTrainObserver` with ``F = F_ad``, gains
-    ``g_i = theta^i K_i`` and decay ``theta K_1``, theta by sensor.
+    First stage: a wheel observer gives the adhesion force F_ad. Second stage: `AugmentedTrainObserver` with
+    ``F = F_ad``, gains ``g_i = theta^i K_i`` and decay ``theta K_1``, theta by sensor.
 
-    No gains are printed. K = (4, 6, 4, 1) puts all poles at -theta. Without drag, constant gaps below ``1.283 / theta`` are
-    stable and every mixture of gaps up to ``0.978 / theta`` is certified. Repaired: the scaling of F_ad (see `MultirateStage`),
-    and the third state, which is an acceleration.
+    No gains are printed. K = (4, 6, 4, 1) puts all poles at -theta. Without drag, constant gaps below ``1.283 / theta``
+    are stable and every mixture of gaps up to ``0.978 / theta`` is certified. Repaired: the scaling of F_ad (see
+    `MultirateStage`), and the third state, which is an acceleration.
 
     Args:
         first_stage: ``multirate`` for an odometer sampled every `odometer_period`, ``differentiator`` for a fast one.
         fixes: how satellite fixes come: ``event``, or ``sampled`` from the input `fix_position`.
 
-    Presets [ours]: `gps_and_balises` (default): theta 1.5 at balises, certified to 0.65 s between them, and 0.7 at fixes, a
-    compromise between noise, which grows with theta, and coupler oscillations, which a small theta follows late; any mixture of
-    both certified to 0.12 s, enough for 10 Hz. `gps`: fixes only, theta 0.7. `balises`: balises only, theta 1.75,
-    certified to 0.559 s between them.
+    Presets [ours]: `gps_and_balises` (default): theta 1.5 at balises, certified to 0.65 s between them, and 0.7 at
+    fixes, a compromise between noise, which grows with theta, and coupler oscillations, which a small theta follows
+    late; any mixture of both certified to 0.12 s, enough for 10 Hz. `gps`: fixes only, theta 0.7. `balises`: balises
+    only, theta 1.75, certified to 0.559 s between them.
     """
 
     name = "augmented_high_gain_cdo"
-    description = "Wheel observer and augmented high-gain observer: speed, position and coupler force of a locomotive in a train"
+    description = (
+        "Wheel observer and augmented high-gain observer: speed, position and coupler force of a locomotive in a train"
+    )
     source = "Bouchama 2024, (4.7)-(4.11); gains ours"
     presets: Mapping[str, Mapping[str, Any]] = {
         "gps_and_balises": {"theta_balise": 1.5, "theta_gps": 0.7, "high_gain": AUGMENTED_K},
@@ -52,16 +54,26 @@ class AugmentedHighGainCdo(AugmentedTrainObserver):
         "balises": {"theta_balise": 1.75, "theta_gps": 0.0, "high_gain": AUGMENTED_K},
     }
     default_preset = "gps_and_balises"
-    stability_parameters = ("theta_balise", "theta_gps", "high_gain", "fix_period", *MultirateStage.stability_parameters)
+    stability_parameters = (
+        "theta_balise",
+        "theta_gps",
+        "high_gain",
+        "fix_period",
+        *MultirateStage.stability_parameters,
+    )
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"first_stage": tuple(WHEEL_STAGES), "fixes": WAYS_OF_FIXES}
 
     def __init__(self, first_stage: FirstStage = "multirate", fixes: Fixes = "event") -> None:
         if first_stage not in WHEEL_STAGES:
-            raise ValueError(f"{self.name}: unknown first_stage {first_stage!r}; use one of: {', '.join(WHEEL_STAGES)}.")
+            raise ValueError(
+                f"{self.name}: unknown first_stage {first_stage!r}; use one of: {', '.join(WHEEL_STAGES)}."
+            )
         self.stage = WHEEL_STAGES[first_stage]()
         self.own_states = self.stage.states
         self.own_parameters = (
-            parameter("theta_balise", "1/s", 1.5, "High gain at balises, at most 0.978 / longest gap; 0: not used", min=0.0),
+            parameter(
+                "theta_balise", "1/s", 1.5, "High gain at balises, at most 0.978 / longest gap; 0: not used", min=0.0
+            ),
             parameter("theta_gps", "1/s", 0.7, "High gain at satellite fixes; 0: not used", min=0.0),
             parameter("high_gain", "1", AUGMENTED_K, "Shape K of the high gain", size=ORDER),
             *self.stage.parameters,
@@ -97,7 +109,9 @@ class AugmentedHighGainCdo(AugmentedTrainObserver):
         return vector(*parts)
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
-        """Certificate of the second stage, and for sampled odometers the exact check of the first at its constant period."""
+        """Certificate of the second stage, and for sampled odometers the exact check of the first at its constant
+        period.
+        """
         certificate = super().error_certificate(max_gap, p)
         if not self.stage.events:
             return certificate

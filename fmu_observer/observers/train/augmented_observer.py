@@ -1,7 +1,7 @@
 """Base of the augmented observers: the train before them, with the force of its couplers and of the gradient unknown.
 
-Position, speed, and an unknown acceleration with its rate, corrected by positions of two kinds: balises and satellite fixes.
-Where the traction comes from and how the gains are shaped is left to the subclasses.
+Position, speed, and an unknown acceleration with its rate, corrected by positions of two kinds: balises and satellite
+fixes. Where the traction comes from and how the gains are shaped is left to the subclasses.
 """
 
 from __future__ import annotations
@@ -44,7 +44,11 @@ GPS = TriggeredEvent(
 SAMPLED_FIX = PeriodicEvent("fix", "fix_period", description="The held position of the receiver is read")
 FIX_POSITION = input_signal("fix_position", "m", 0.0, "Position of the last satellite fix, held by the receiver")
 FIX_PERIOD = parameter(
-    "fix_period", "s", 0.1, "Time between two fixes: the longest for the certificate, the period where sampled", min=1e-6
+    "fix_period",
+    "s",
+    0.1,
+    "Time between two fixes: the longest for the certificate, the period where sampled",
+    min=1e-6,
 )
 Fixes = Literal["event", "sampled"]
 WAYS_OF_FIXES = ("event", "sampled")
@@ -55,34 +59,39 @@ class AugmentedTrainObserver(TrainObserver):
 
     ``dp = v``, ``dv = (F - a sgn(v) - b v - c v|v|)/M + delta``, ``d delta = delta'``, ``d delta' = 0``, each less
     ``g_i eta`` with the decaying innovation ``d eta = -decay eta``. M is the mass of the locomotive alone, and
-    ``delta = -(Fc + M g i)/M`` with the coupler force Fc (tension positive) and the gradient i: with the printed matrix the third
-    state is this acceleration and not the force d of (4.7). Output `coupler_force` is ``-M delta - M g gradient``: with the
-    input `gradient` left at zero it is coupler and gradient together.
+    ``delta = -(Fc + M g i)/M`` with the coupler force Fc (tension positive) and the gradient i: with the printed matrix
+    the third state is this acceleration and not the force d of (4.7). Output `coupler_force` is
+    ``-M delta - M g gradient``: with the input `gradient` left at zero it is coupler and gradient together.
 
-    Positions come from balises and from satellite fixes, each with gains of its own. Fixes come at the event `gps`, at their own
-    stamps, or, with the option ``fixes="sampled"``, as the input `fix_position`, read every `fix_period` from the start on. A
-    sample sets ``eta = p - y`` and puts the gains of its sensor in force; what was left of the sample before is dropped [ours].
-    A sensor whose gains are zero is not used.
+    Positions come from balises and from satellite fixes, each with gains of its own. Fixes come at the event `gps`, at
+    their own stamps, or, with the option ``fixes="sampled"``, as the input `fix_position`, read every `fix_period` from
+    the start on. A sample sets ``eta = p - y`` and puts the gains of its sensor in force; what was left of the sample
+    before is dropped [ours]. A sensor whose gains are zero is not used.
 
-    The unknown acceleration is extrapolated as a line between samples, so without any sample the position error grows with the
-    cube of the time. While the observed train stands, held by its brake or its friction, the unknown acceleration stays and its
-    rate fades [ours]: positions tell nothing of a force that friction takes, and learnt from them it would wind up until it
-    pushed the train off.
+    The unknown acceleration is extrapolated as a line between samples, so without any sample the position error grows
+    with the cube of the time. While the observed train stands, held by its brake or its friction, the unknown
+    acceleration stays and its rate fades [ours]: positions tell nothing of a force that friction takes, and learnt from
+    them it would wind up until it pushed the train off.
 
-    What is certified: any sequence of balise gaps up to the one asked for while there are no fixes; and where both sensors are
-    used, any sequence of fixes and balises in any order with gaps up to `fix_period`, which is what happens while fixes come. The
-    change from one of the two regimes to the other is taken to be rare.
+    What is certified: any sequence of balise gaps up to the one asked for while there are no fixes; and where both
+    sensors are used, any sequence of fixes and balises in any order with gaps up to `fix_period`, which is what happens
+    while fixes come. The change from one of the two regimes to the other is taken to be rare.
     """
 
     frictions = (SPEED.name,)
     own_states: tuple[Signal, ...] = ()
     own_parameters: tuple[Signal, ...] = ()
     own_events: tuple[PeriodicEvent, ...] = ()
-    inputs = (*TrainObserver.inputs, input_signal("gradient", "1", 0.0, "Sine of the slope angle, uphill positive, where known"))
+    inputs = (
+        *TrainObserver.inputs,
+        input_signal("gradient", "1", 0.0, "Sine of the slope angle, uphill positive, where known"),
+    )
     outputs = (
         *(s for s in TrainObserver.outputs if s.name != "innovation"),
         output_signal("innovation", "m", "Estimated minus measured position at the last balise or fix, as it acts now"),
-        output_signal("coupler_force", "N", "Force of the first coupler, pull positive; with gravity where no gradient is fed"),
+        output_signal(
+            "coupler_force", "N", "Force of the first coupler, pull positive; with gravity where no gradient is fed"
+        ),
         output_signal("disturbance", "m/s2", "Estimated acceleration by coupler and gradient"),
     )
     estimator_memory = (memory("last_sensor", "1", 0.0, "1 when a balise came last, 2 when a fix did, 0 before"),)
@@ -140,7 +149,8 @@ class AugmentedTrainObserver(TrainObserver):
         continuous = self.continuous_correction(x, u, p)
         model = (x[1], acceleration, x[3], 0.0 * x[3])
         corrected = [model[i] - gains[i] * x[INNOVATION] - continuous[i] for i in range(ORDER)]
-        at_rest = x[1] == 0.0  # held by friction: what the position tells now does not come from the unknown acceleration
+        # held by friction: what the position tells now does not come from the unknown acceleration
+        at_rest = x[1] == 0.0
         corrected[2:] = np.where(at_rest, 0.0, corrected[2]), np.where(at_rest, -decay * x[3], corrected[3])
         return (*corrected, -decay * x[INNOVATION], *self.own_flow(x, u, p))
 
@@ -174,11 +184,14 @@ class AugmentedTrainObserver(TrainObserver):
         raise NotImplementedError(f"{type(self).__name__} has no jump for event {event!r}.")
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
-        """Certificate of the sensors in use: of balises, and where fixes are used too, of fixes and of mixtures of both."""
+        """Certificate of the sensors in use: of balises, and where fixes are used too, of fixes and of mixtures of
+        both.
+        """
         used = [sensor for sensor in SENSORS if float(self.gains_of(sensor, p)[0][0]) > 0.0] or ["balise"]
         model = (
             "four-state error of position, speed, unknown acceleration and its rate, drag slopes at their extremes, "
-            "constant over a gap; the second derivative of the unknown acceleration and the error of the traction, inputs to it, "
+            "constant over a gap; the second derivative of the unknown acceleration and the error of the traction, "
+            "inputs to it, "
             "and standstill are left out"
         )
         errors = self._errors_of(used[0], p)
@@ -190,9 +203,12 @@ class AugmentedTrainObserver(TrainObserver):
         alone, mixed = (self._mixture(sensors, gap, p, model) for sensors in (("gps",), SENSORS))
         notes = (
             f"fixes alone {_told(alone)}",
-            f"fixes and balises in any order {_told(mixed)}; the change between times with fixes and without is taken to be rare",
+            f"fixes and balises in any order {_told(mixed)}; the change between times with fixes and without is taken "
+            f"to be rare",
         )
-        return replace(certificate, holds=certificate.holds and alone.holds and mixed.holds, notes=(*certificate.notes, *notes))
+        return replace(
+            certificate, holds=certificate.holds and alone.holds and mixed.holds, notes=(*certificate.notes, *notes)
+        )
 
     # -- internals --------------------------------------------------------------------------------------------------
 

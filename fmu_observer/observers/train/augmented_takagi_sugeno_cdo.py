@@ -1,4 +1,6 @@
-"""S7, Takagi-Sugeno family: augmented observer on the applied effort, with a continuous odometer and sampled positions."""
+"""S7, Takagi-Sugeno family: augmented observer on the applied effort, with a continuous odometer and sampled
+positions.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,8 @@ from plant_models.hybrid import parameter
 from plant_models.hybrid.system import Array
 
 NONE = (0.0,) * ORDER
-# design_for_gap(0.5), and position_gains of UNIT_POLES times 1.5 and 0.7, rounded to six digits; a test recomputes them.
+# design_for_gap(0.5), and position_gains of UNIT_POLES times 1.5 and 0.7, rounded to six digits; a test recomputes
+# them.
 BALISES_ONLY = (8.24228, 23.3807, 27.0470, 10.7682)
 BALISES_BESIDE_FIXES = (6.825, 16.0313, 15.3563, 5.0625)
 FIXES = (3.185, 3.49125, 1.56065, 0.2401)
@@ -22,8 +25,12 @@ ODOMETER = (0.0, 3.0, 3.0, 1.0)  # three poles at -1 for speed, unknown accelera
 
 def _preset(balise: tuple[float, ...], gps: tuple[float, ...], odometer: tuple[float, ...] = NONE) -> dict[str, Any]:
     return {
-        "balise_gain": balise, "balise_decay": balise[0], "gps_gain": gps, "gps_decay": gps[0], "odometer_gain": odometer
-    }  # fmt: skip
+        "balise_gain": balise,
+        "balise_decay": balise[0],
+        "gps_gain": gps,
+        "gps_decay": gps[0],
+        "odometer_gain": odometer,
+    }
 
 
 class AugmentedTakagiSugenoCdo(AugmentedTrainObserver):
@@ -33,20 +40,20 @@ class AugmentedTakagiSugenoCdo(AugmentedTrainObserver):
     ``(b + c v_i) v`` blended between the vertices ``v_1 = premise_min`` and ``v_2 = premise_max`` by the weight
     ``h_1 = (v_2 - y)/(v_2 - v_1)``, limited to [0, 1], of the odometer now.
 
-    Ours, none is printed: all gains, and that they are the same at both vertices, whose drag slopes differ by a thousandth of the
-    slowest pole; the certificate covers both vertices. The thesis interpolates the odometer, which needs the next
-    sample; here it is the input as it stands, held between samples where it is sampled.
+    Ours, none is printed: all gains, and that they are the same at both vertices, whose drag slopes differ by a
+    thousandth of the slowest pole; the certificate covers both vertices. The thesis interpolates the odometer, which
+    needs the next sample; here it is the input as it stands, held between samples where it is sampled.
 
-    The inertia of the wheels is neglected, as in (3.44): ``(J / r^2)`` times the acceleration is taken for coupler force, 1.4 kN
-    at 0.5 m/s2 with four axles. Slip does not disturb position and speed unless `odometer_gain` is set.
+    The inertia of the wheels is neglected, as in (3.44): ``(J / r^2)`` times the acceleration is taken for coupler
+    force, 1.4 kN at 0.5 m/s2 with four axles. Slip does not disturb position and speed unless `odometer_gain` is set.
 
     Args:
         fixes: how satellite fixes come: ``event``, or ``sampled`` from the input `fix_position`.
 
-    Presets [ours]: `gps_and_balises` (default): poles 1.5 and 0.7 times (0.5, 0.8, 1.25, 2), balises certified to 0.66 s and any
-    mixture with fixes to 0.25 s, enough for 10 Hz. `gps`: the same for fixes, no balises. `balises`: designed for 0.5 s,
-    certified to 0.55 s. `odometer_trusted`: speed and coupler force from the odometer, positions correct the position only;
-    certified for gaps of any length, but slip goes into the speed.
+    Presets [ours]: `gps_and_balises` (default): poles 1.5 and 0.7 times (0.5, 0.8, 1.25, 2), balises certified to 0.66
+    s and any mixture with fixes to 0.25 s, enough for 10 Hz. `gps`: the same for fixes, no balises. `balises`: designed
+    for 0.5 s, certified to 0.55 s. `odometer_trusted`: speed and coupler force from the odometer, positions correct the
+    position only; certified for gaps of any length, but slip goes into the speed.
     """
 
     name = "augmented_takagi_sugeno_cdo"
@@ -55,7 +62,9 @@ class AugmentedTakagiSugenoCdo(AugmentedTrainObserver):
     own_parameters = (
         parameter("premise_min", "m/s", 5.0, "Speed of the first vertex", min=0.0),
         parameter("premise_max", "m/s", 50.0, "Speed of the second vertex", min=0.0),
-        parameter("balise_gain", "1", BALISES_BESIDE_FIXES, "Gain of balises, state i per m; all 0: not used", size=ORDER),
+        parameter(
+            "balise_gain", "1", BALISES_BESIDE_FIXES, "Gain of balises, state i per m; all 0: not used", size=ORDER
+        ),
         parameter("balise_decay", "1/s", BALISES_BESIDE_FIXES[0], "Decay rate of the innovation of a balise", min=0.0),
         parameter("gps_gain", "1", FIXES, "Gain of satellite fixes, state i per m; all 0: not used", size=ORDER),
         parameter("gps_decay", "1/s", FIXES[0], "Decay rate of the innovation of a fix", min=0.0),

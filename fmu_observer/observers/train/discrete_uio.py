@@ -13,7 +13,8 @@ from fmu_observer.observers.train.train_observer import POSITION, Estimate, Trai
 from plant_models.hybrid import PeriodicEvent, memory, parameter, state, vector
 from plant_models.hybrid.system import Array
 
-# Start values: uio_gains(UioCovariances(), drag slope of the default train), rounded to five digits; a test recomputes them.
+# Start values: uio_gains(UioCovariances(), drag slope of the default train), rounded to five digits; a test recomputes
+# them.
 ODOMETER_GAIN = (0.0, 0.41889, 0.0, 1.13024, 0.0, 1.52461)
 BALISE_GAIN = (0.94689, 0.0, 1.17481, 0.0, 0.7288, 0.0)
 ORDER = 6
@@ -23,15 +24,17 @@ LAST_INNOVATION = ORDER + 1  # behind the six states and the filtered slip
 class DiscreteUio(TrainObserver):
     """Unknown-input observer of six states at two sampling rates: Bouchama 2024, (3.88)-(3.91).
 
-    ``x = [p, y, d1, d2, d1', d2']``: position, odometer speed, slip speed ``v - y``, acceleration disturbance, and their rates;
-    ``dp = y + d1``, ``dy = -(b + c v_lin) y / M + d2 + u / M``, ``d1'' = d2'' = 0``, ``u = effort - a``; the speed is ``y + d1``.
+    ``x = [p, y, d1, d2, d1', d2']``: position, odometer speed, slip speed ``v - y``, acceleration disturbance, and
+    their rates; ``dp = y + d1``, ``dy = -(b + c v_lin) y / M + d2 + u / M``, ``d1'' = d2'' = 0``, ``u = effort - a``;
+    the speed is ``y + d1``.
     Corrections: ``x -= K_o (y - odometer)`` at every odometer sample, ``x -= K_b (p - balise_position)`` at a balise.
 
-    The model flows continuously between samples, which equals the printed A_d, B_d at each of them, so that a balise acts at its
-    own stamp. The printed matrix has the slip disturbance in the wrong column (see `uio_design`). The gains are not
+    The model flows continuously between samples, which equals the printed A_d, B_d at each of them, so that a balise
+    acts at its own stamp. The printed matrix has the slip disturbance in the wrong column (see `uio_design`). The gains
+    are not
     printed: ours are steady-state Kalman gains with the covariances of `UioCovariances`.
-    It leans on the odometer: while the wheels of a locomotive spin its position is off by metres, and true balises lie outside
-    the gate (1.4 of 1000 on profile B). So its `gate` starts as 1: doubted balises are used and counted.
+    It leans on the odometer: while the wheels of a locomotive spin its position is off by metres, and true balises lie
+    outside the gate (1.4 of 1000 on profile B). So its `gate` starts as 1: doubted balises are used and counted.
 
     The adhesion force [ours] is ``effort - (J / r^2) dy``, the wheelset's balance.
     """
@@ -82,12 +85,18 @@ class DiscreteUio(TrainObserver):
         """Certificate over the products of per-sample updates with and without a balise."""
         A, _ = uio_matrices(float(p.mass), float(_drag_slope(p)))
         error = TwoRateError(
-            tuple(map(tuple, A.tolist())), tuple(map(float, p.odometer_gain)), tuple(map(float, p.balise_gain)), 1, 0,
+            tuple(map(tuple, A.tolist())),
+            tuple(map(float, p.odometer_gain)),
+            tuple(map(float, p.balise_gain)),
+            1,
+            0,
             float(p.odometer_period),
-        )  # fmt: skip
+        )
         model = (
-            f"six-state error of the observer's own linear model (drag slope at {float(p.linearisation_speed):.4g} m/s) with "
-            "odometer samples at their period and the balise at any phase between them; the difference of the true drag, an "
+            f"six-state error of the observer's own linear model (drag slope at {float(p.linearisation_speed):.4g} "
+            f"m/s) with "
+            "odometer samples at their period and the balise at any phase between them; the difference of the true "
+            "drag, an "
             "input to it, and the constant resistance near standstill are left out"
         )
         return certify_two_rate_error(error, max_gap, model)

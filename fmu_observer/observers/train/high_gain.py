@@ -1,14 +1,16 @@
 """The high-gain continuous-discrete correction with its gain decaying since the last sample. Pure functions.
 
-The gain ``exp(-theta K1 (t - t_k))`` times the innovation at ``t_k`` is one scalar state: it decays at the rate theta K1 and is
-reset at every sample. Written so, the observer is identical to the output predictor, and no time stamp is stored.
+The gain ``exp(-theta K1 (t - t_k))`` times the innovation at ``t_k`` is one scalar state: it decays at the rate theta
+K1 and is reset at every sample. Written so, the observer is identical to the output predictor, and no time stamp is
+stored.
 """
 
 from __future__ import annotations
 
 from plant_models.hybrid.system import Array
 
-HIGH_GAIN_K = (2.0, 1.0)  # K = inv(P) C' with P + A'P + P A = C'C, A the shift matrix: Bouchama 2024, (3.29) with A for Abar
+# K = inv(P) C' with P + A'P + P A = C'C, A the shift matrix: Bouchama 2024, (3.29) with A for Abar
+HIGH_GAIN_K = (2.0, 1.0)
 
 
 def correction(theta: Array, K: Array, innovation: Array) -> tuple[Array, Array]:

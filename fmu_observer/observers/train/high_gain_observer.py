@@ -1,4 +1,6 @@
-"""The high-gain train observer at balises, shared by the cascades that differ in where the adhesion force comes from."""
+"""The high-gain train observer at balises, shared by the cascades that differ in where the adhesion force comes
+from.
+"""
 
 from __future__ import annotations
 
@@ -23,8 +25,9 @@ TOP_SPEED = 50.0  # [m/s], the range of speeds over which stability is certified
 class HighGainTrainObserver(TrainObserver):
     """Second stage of a cascade: position and speed from an adhesion force and balises (Bouchama 2024, (3.24)-(3.43)).
 
-    ``dp = v - theta K1 eta``, ``dv = (F_ad - a sgn(v) - b v - c v|v|)/M - theta^2 K2 eta``, ``d eta = -theta K1 eta``, and at a
-    balise ``eta = p - balise_position``. The first stage, which a subclass writes, gives ``F_ad`` as `adhesion`.
+    ``dp = v - theta K1 eta``, ``dv = (F_ad - a sgn(v) - b v - c v|v|)/M - theta^2 K2 eta``, ``d eta = -theta K1 eta``,
+    and at a balise ``eta = p - balise_position``. The first stage, which a subclass writes, gives ``F_ad`` as
+    `adhesion`.
 
     With K = (2, 1) and no drag it is stable for constant gaps below ``5.0 / theta``, and for any mixture of gaps up to
     ``4.0 / theta`` (independently measured): theta must fit the longest gap.
@@ -81,16 +84,23 @@ class HighGainTrainObserver(TrainObserver):
     def alternative(self, max_gap: float, certify: Callable[[Mapping[str, Value]], Certificate]) -> str | None:
         """The largest theta that is certified."""
         gains = certified_gains(max_gap, lambda theta: {self.theta_name: theta}, certify)
-        return None if gains is None else f"{self.theta_name} at most {gains[self.theta_name]:g} is certified for {max_gap:.3g} s"
+        return (
+            None
+            if gains is None
+            else f"{self.theta_name} at most {gains[self.theta_name]:g} is certified for {max_gap:.3g} s"
+        )
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
-        """Certificate of ``de = [[0, 1], [0, -s]] e - theta inv(Delta) K eta`` for all drag slopes s of the speed range."""
+        """Certificate of ``de = [[0, 1], [0, -s]] e - theta inv(Delta) K eta`` for all drag slopes s of the speed
+        range.
+        """
         theta = float(getattr(p, self.theta_name))
         gain = correction(theta, p.high_gain, 1.0)
         slopes = drag_slope_range(p, 0.0, TOP_SPEED)
         vertices = tuple(SampledError.of([[0.0, 1.0], [0.0, -s]], gain, theta * float(p.high_gain[0])) for s in slopes)
         model = (
-            f"position and speed error with the drag slope (b + 2 c v)/M at 0 and {TOP_SPEED:g} m/s, constant over a gap; "
+            f"position and speed error with the drag slope (b + 2 c v)/M at 0 and {TOP_SPEED:g} m/s, constant over a "
+            f"gap; "
             "standstill and the error of the adhesion force, an input to it, are left out"
         )
         return with_switching_noted(certify_sampled_error(vertices, max_gap, model), vertices, "drag slopes")

@@ -38,23 +38,25 @@ LONG_GAPS = {  # ours; as `design_takagi_sugeno(trust="odometer")`
 class TakagiSugenoCdo(TrainObserver):
     """Takagi-Sugeno observer with a continuous odometer and aperiodic balises: Bouchama 2024, (3.44)-(3.48), (2.6).
 
-    ``dx = sum_i h_i [A_i x + B u - K_i2 (v - y) - K_i1 eta]``, ``d eta = -decay eta``, ``eta = p - balise_position`` at a balise,
-    with ``A_i = [[0, 1], [0, -(b + c v_i)/M]]`` at the vertices ``v_1 = premise_min``, ``v_2 = premise_max``,
-    ``u = effort - a``, and ``h_1 = (v_2 - y)/(v_2 - v_1)`` limited to [0, 1], so that speeds outside the range use the nearer
-    vertex. K_i1 belongs to the balise and K_i2 to the odometer; (3.47) copies the wiring of chapter 2, where the two outputs
-    are swapped.
+    ``dx = sum_i h_i [A_i x + B u - K_i2 (v - y) - K_i1 eta]``, ``d eta = -decay eta``, ``eta = p - balise_position`` at
+    a balise, with ``A_i = [[0, 1], [0, -(b + c v_i)/M]]`` at the vertices ``v_1 = premise_min``, ``v_2 = premise_max``,
+    ``u = effort - a``, and ``h_1 = (v_2 - y)/(v_2 - v_1)`` limited to [0, 1], so that speeds outside the range use the
+    nearer vertex. K_i1 belongs to the balise and K_i2 to the odometer; (3.47) copies the wiring of chapter 2, where the
+    two outputs are swapped.
 
-    The applied effort stands for the adhesion force: the inertia of the wheels is neglected, which biases the speed by about half
-    of ``(J / r^2) / M`` times the acceleration.
+    The applied effort stands for the adhesion force: the inertia of the wheels is neglected, which biases the speed by
+    about half of ``(J / r^2) / M`` times the acceleration.
 
     Args:
-        premise: what the weights h depend on: ``frozen`` at the odometer reading of the last balise, as in (2.6); ``live`` on the
-            odometer now; ``estimated`` on the estimated speed.
+        premise: what the weights h depend on: ``frozen`` at the odometer reading of the last balise, as in (2.6);
+            ``live`` on the odometer now; ``estimated`` on the estimated speed.
 
-    Presets: `as_published` with decay 3 1/s, unstable beyond constant gaps of 0.286 s although designed for 0.5 s; `repaired`
-    (default) with decay 9.9 1/s, the value consistent with the printed K_i1, certified to 0.779 s; `long_gaps`, which is ours:
-    the speed follows the odometer and each balise takes the share (2.4 / 3) (1 - exp(-3 gap)) of the position error away, between
-    0 and 1 for every gap, so no gap makes the error grow. Its price: slip of the wheels is taken for speed.
+    Presets: `as_published` with decay 3 1/s, unstable beyond constant gaps of 0.286 s although designed for 0.5 s;
+    `repaired` (default) with decay 9.9 1/s, the value consistent with the printed K_i1, certified to 0.779 s;
+    `long_gaps`, which is ours:
+    the speed follows the odometer and each balise takes the share (2.4 / 3) (1 - exp(-3 gap)) of the position error
+    away, between 0 and 1 for every gap, so no gap makes the error grow. Its price: slip of the wheels is taken for
+    speed.
     """
 
     name = "takagi_sugeno_cdo"
@@ -66,10 +68,22 @@ class TakagiSugenoCdo(TrainObserver):
         parameter("innovation_decay", "1/s", 9.9, "Decay rate eta of the balise gain since the last balise", min=0.0),
         parameter("premise_min", "m/s", 5.0, "Speed of the first vertex", min=0.0),
         parameter("premise_max", "m/s", 50.0, "Speed of the second vertex", min=0.0),
-        parameter("balise_gain_position", "1/s", PRINTED_GAINS["balise_gain_position"], "First entries of K_11, K_21", size=2),
-        parameter("balise_gain_speed", "1/s2", PRINTED_GAINS["balise_gain_speed"], "Second entries of K_11, K_21", size=2),
-        parameter("odometer_gain_position", "1", PRINTED_GAINS["odometer_gain_position"], "First entries of K_12, K_22", size=2),
-        parameter("odometer_gain_speed", "1/s", PRINTED_GAINS["odometer_gain_speed"], "Second entries of K_12, K_22", size=2),
+        parameter(
+            "balise_gain_position", "1/s", PRINTED_GAINS["balise_gain_position"], "First entries of K_11, K_21", size=2
+        ),
+        parameter(
+            "balise_gain_speed", "1/s2", PRINTED_GAINS["balise_gain_speed"], "Second entries of K_11, K_21", size=2
+        ),
+        parameter(
+            "odometer_gain_position",
+            "1",
+            PRINTED_GAINS["odometer_gain_position"],
+            "First entries of K_12, K_22",
+            size=2,
+        ),
+        parameter(
+            "odometer_gain_speed", "1/s", PRINTED_GAINS["odometer_gain_speed"], "Second entries of K_12, K_22", size=2
+        ),
     )
     stability_parameters = ("innovation_decay", "premise_min", "premise_max", *PRINTED_GAINS)
     presets: Mapping[str, Mapping[str, Any]] = {
@@ -85,7 +99,9 @@ class TakagiSugenoCdo(TrainObserver):
             raise ValueError(f"{self.name}: unknown premise {premise!r}; use 'frozen', 'live' or 'estimated'.")
         self.premise = premise
         if premise == "frozen":
-            self.estimator_memory = (memory("vertex_weight", "1", 1.0, "Weight h_1 of the first vertex at the last balise"),)
+            self.estimator_memory = (
+                memory("vertex_weight", "1", 1.0, "Weight h_1 of the first vertex at the last balise"),
+            )
         super().__init__(premise=premise)
 
     def vertex_weight(self, x: Array, u: Any, p: Any) -> Array:
@@ -100,7 +116,9 @@ class TakagiSugenoCdo(TrainObserver):
         h = self.vertex_weight(x, u, p)
         vertex_speed = _blend(h, (p.premise_min, p.premise_max))
         odometer_error = speed - u.odometer
-        on_position = _blend(h, p.balise_gain_position) * innovation + _blend(h, p.odometer_gain_position) * odometer_error
+        on_position = (
+            _blend(h, p.balise_gain_position) * innovation + _blend(h, p.odometer_gain_position) * odometer_error
+        )
         on_speed = _blend(h, p.balise_gain_speed) * innovation + _blend(h, p.odometer_gain_speed) * odometer_error
         traction = np.maximum(u.effort, 0.0)  # a negative effort is a brake: see friction
         acceleration = (traction - (p.davis_b + p.davis_c * vertex_speed) * speed) / p.mass
@@ -116,19 +134,26 @@ class TakagiSugenoCdo(TrainObserver):
         return vector(x[0], x[1], x[0] - u.balise_position, x[3], *weight)
 
     def premise_range(self, p: Any) -> tuple[str, float, float]:
-        """Input or output that the weights depend on, and the speeds of the vertices [m/s], between which they are exact."""
+        """Input or output that the weights depend on, and the speeds of the vertices [m/s], between which they are
+        exact.
+        """
         signal = "speed" if self.premise == "estimated" else "odometer"
         low, high = sorted((float(p.premise_min), float(p.premise_max)))
         return signal, low, high
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
-        """Certificate over the two vertices and three mixtures of them; live and estimated weights may change at any time."""
+        """Certificate over the two vertices and three mixtures of them; live and estimated weights may change at any
+        time.
+        """
         vertices = tuple(self._error_at(h, p) for h in (1.0, 0.75, 0.5, 0.25, 0.0))
         slowest, fastest = float(p.premise_min), float(p.premise_max)
         frozen = self.premise == "frozen"
-        changes = "constant over a gap, as frozen ones are" if frozen else f"changing at any time, {self._span(vertices)}"
+        changes = (
+            "constant over a gap, as frozen ones are" if frozen else f"changing at any time, {self._span(vertices)}"
+        )
         model = (
-            f"position and speed error at both vertices ({slowest:g} and {fastest:g} m/s) and three mixtures, weights {changes}; "
+            f"position and speed error at both vertices ({slowest:g} and {fastest:g} m/s) and three mixtures, weights "
+            f"{changes}; "
             "standstill, slip and the neglected wheel inertia, the latter inputs to it, are left out"
         )
         return certify_sampled_error(vertices, max_gap, model, switching=not frozen)
@@ -143,12 +168,14 @@ class TakagiSugenoCdo(TrainObserver):
             return None
         position, speed = gains["balise_gain_position"], gains["balise_gain_speed"]
         return (
-            f"innovation_decay = balise_gain_position = {position:g}, balise_gain_speed = {speed:g} and odometer gains of 0 are "
+            f"innovation_decay = balise_gain_position = {position:g}, balise_gain_speed = {speed:g} and odometer gains "
+            f"of 0 are "
             f"certified for {max_gap:.3g} s"
         )
 
     def _error_at(self, h: float, p: Any) -> SampledError:
-        # Estimated weights multiply the estimate's own error too: c (v^2 - w^2) has the slope c (v + w), twice the vertex's.
+        # Estimated weights multiply the estimate's own error too: c (v^2 - w^2) has the slope c (v + w), twice the
+        # vertex's.
         doubled = 2.0 if self.premise == "estimated" else 1.0
         slope = (p.davis_b + doubled * p.davis_c * _blend(h, (p.premise_min, p.premise_max))) / p.mass
         drift = [
@@ -164,7 +191,9 @@ class TakagiSugenoCdo(TrainObserver):
         slopes = [vertex.drift[1][1] for vertex in vertices]
         on_position, on_speed = zip(*(vertex.gain for vertex in vertices), strict=True)
         spans = [max(values) - min(values) for values in (slopes, on_position, on_speed)]
-        return "by {:.1e} 1/s in the slope of the speed error, {:.1e} 1/s and {:.1e} 1/s2 in the balise gains".format(*spans)
+        return "by {:.1e} 1/s in the slope of the speed error, {:.1e} 1/s and {:.1e} 1/s2 in the balise gains".format(
+            *spans
+        )
 
     @staticmethod
     def _weight_at(speed: Array, p: Any) -> Array:

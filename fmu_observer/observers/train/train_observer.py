@@ -55,15 +55,18 @@ class Estimate(NamedTuple):
 
 
 class TrainObserver(GatedObserver, GapCertified):
-    """Base of the observers of a train ``dp = v``, ``M dv = F_ad - a sgn(v) - b v - c v|v|`` (Bouchama 2024, (3.1)-(3.3)).
+    """Base of the observers of a train ``dp = v``, ``M dv = F_ad - a sgn(v) - b v - c v|v|`` (Bouchama 2024,
+    (3.1)-(3.3)).
 
     The contract:
 
-    1. A subclass sets `estimator_states` (continuous), `estimator_memory`, `estimator_parameters` and `estimator_events`;
+    1. A subclass sets `estimator_states` (continuous), `estimator_memory`, `estimator_parameters` and
+      `estimator_events`;
        the state is laid out as estimator states, filtered slip, memory, and the memory of the gate (`GatedObserver`).
     2. It writes `estimator_flow` (derivatives of the estimator states), `estimate`, `update` and `error_certificate`.
     3. `certify` answers whether the very gains in use are stable for balise gaps up to a given length.
-    4. Where the speed is a state, the Davis constant and a negative adhesion force (a brake) are dry friction: they stop the
+    4. Where the speed is a state, the Davis constant and a negative adhesion force (a brake) are dry friction: they
+      stop the
        observed train and hold it, and never push it backwards. For a speed above zero that is the thesis's equation.
     5. Estimates start at position 0 and speed 1 m/s, the deliberately wrong start of the thesis.
     """
@@ -92,7 +95,9 @@ class TrainObserver(GatedObserver, GapCertified):
         parameter("davis_c", "N.s2/m2", 1.65287, "Running resistance, quadratic term", min=0.0),
         parameter("wheel_radius", "m", 0.575, "Wheel radius", min=1e-3),
         parameter("wheel_inertia", "kg.m2", 225.0, "Rotating inertia of one axle", min=1e-3),
-        parameter("n_axles", "1", 1.0, "Number of motored axles: 1 as printed in the thesis, 4 on the BB 27000", min=1.0),
+        parameter(
+            "n_axles", "1", 1.0, "Number of motored axles: 1 as printed in the thesis, 4 on the BB 27000", min=1.0
+        ),
     )
 
     def __init__(self, **options: Any) -> None:
@@ -133,20 +138,24 @@ class TrainObserver(GatedObserver, GapCertified):
         return u.odometer
 
     def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Davis constant and brake as dry friction on the speed, ``(a + max(-F_ad, 0)) / M`` [m/s2], shape (len(frictions),)."""
+        """Davis constant and brake as dry friction on the speed, ``(a + max(-F_ad, 0)) / M`` [m/s2], shape
+        (len(frictions),).
+        """
         if not self.frictions:
             return np.zeros(0)
         return vector((p.davis_a + np.maximum(-self.estimate(x, u, p).adhesion_force, 0.0)) / p.mass)
 
-    def advise(self, max_gap: float, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> str | None:
+    def advise(
+        self, max_gap: float, parameters: Mapping[str, Value] | None = None, preset: str | None = None
+    ) -> str | None:
         """What to change where the gains in use are not certified: gains near them that are, by their own certificate.
 
         Args:
             max_gap, parameters, preset: as in `certify`.
 
         Returns:
-            A clause such as ``theta at most 3.91 is certified for 1.02 s``; None where the gains in use are certified, or no
-            other ones are known.
+            A clause such as ``theta at most 3.91 is certified for 1.02 s``; None where the gains in use are certified,
+            or no other ones are known.
 
         Raises:
             ValueError: as in `certify`.

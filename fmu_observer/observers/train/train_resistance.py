@@ -22,7 +22,7 @@ def rolling_drag(speed: Array, p: Any) -> Array:
 def drag_slope_range(p: Any, slowest: float, fastest: float) -> tuple[float, float]:
     """Smallest and largest ``(b + 2 c v) / M`` [1/s] over speeds from `slowest` to `fastest` [m/s].
 
-    Not a linearisation: ``c (w^2 - v^2) = 2 c m (w - v)`` with m the mean of the two speeds, so the range holds for errors
-    of any size as long as that mean stays within the speeds given.
+    Not a linearisation: ``c (w^2 - v^2) = 2 c m (w - v)`` with m the mean of the two speeds, so the range holds for
+    errors of any size as long as that mean stays within the speeds given.
     """
     return (p.davis_b + 2.0 * p.davis_c * slowest) / p.mass, (p.davis_b + 2.0 * p.davis_c * fastest) / p.mass

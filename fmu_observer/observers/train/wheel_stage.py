@@ -1,4 +1,5 @@
-"""First stages of the cascades: the adhesion force from the applied effort and the odometer. They know the wheelset only.
+"""First stages of the cascades: the adhesion force from the applied effort and the odometer. They know the wheelset
+only.
 
 A stage reads its own slice ``z`` of an observer's state, so that any second stage can stand on it.
 """
@@ -37,7 +38,9 @@ class WheelStage(Protocol):
 
 
 class DifferentiatorStage:
-    """Filtering differentiator of ``y / r`` (n = 1, nf = 3), ``F_ad = effort - (J / r) Z1``: Bouchama 2024, (3.18)-(3.22)."""
+    """Filtering differentiator of ``y / r`` (n = 1, nf = 3), ``F_ad = effort - (J / r) Z1``: Bouchama 2024,
+    (3.18)-(3.22).
+    """
 
     states: tuple[Signal, ...] = (
         state("filter_1", "rad.s2", 0.0, "First filter state of the differentiator"),
@@ -59,7 +62,9 @@ class DifferentiatorStage:
     def flow(self, z: Array, u: Any, p: Any) -> tuple[Array, ...]:
         """The filtering differentiator of the wheel rate ``y / r``, (3.18)."""
         filters, rates = [z[0], z[1], z[2]], [z[3], z[4]]
-        dw, dz = filtering_differentiator_flow(filters, rates, u.odometer / p.wheel_radius, p.jerk_bound / p.wheel_radius)
+        dw, dz = filtering_differentiator_flow(
+            filters, rates, u.odometer / p.wheel_radius, p.jerk_bound / p.wheel_radius
+        )
         return (*dw, *dz)
 
     def sampled(self, z: Array, u: Any) -> tuple[Array, ...]:
@@ -70,8 +75,8 @@ class DifferentiatorStage:
 class MultirateStage:
     """High-gain observer of ``r w`` at odometer samples, ``F_ad = -(J / r^2) z2``: Bouchama 2024, (3.50)-(3.67).
 
-    The printed scalings of the second state (``-int F_ad``, later ``-(r / J) F_ad``) are dimensionally wrong; the one here,
-    ``z2 = -(r^2 / J) F_ad``, is re-derived.
+    The printed scalings of the second state (``-int F_ad``, later ``-(r / J) F_ad``) are dimensionally wrong; the one
+    here, ``z2 = -(r^2 / J) F_ad``, is re-derived.
     """
 
     states: tuple[Signal, ...] = (
@@ -84,7 +89,9 @@ class MultirateStage:
         parameter("wheel_high_gain", "1", HIGH_GAIN_K, "Shape K of the wheel observer's gain", size=2),
         parameter("odometer_period", "s", 0.1, "Sampling period of the odometer", min=1e-4),
     )
-    events: tuple[PeriodicEvent, ...] = (PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read"),)
+    events: tuple[PeriodicEvent, ...] = (
+        PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read"),
+    )
     stability_parameters: tuple[str, ...] = ("theta_1", "wheel_high_gain", "odometer_period")
 
     def adhesion(self, z: Array, u: Any, p: Any) -> Array:

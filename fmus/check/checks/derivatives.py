@@ -1,4 +1,6 @@
-"""The check of directional derivatives in co-simulation: outputs along inputs, where the slave stands between two steps."""
+"""The check of directional derivatives in co-simulation: outputs along inputs, where the slave stands between two
+steps.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
-"""Checks of events in co-simulation: triggered input clocks (FMI 3), and counted events, which this package writes into FMUs.
+"""Checks of events in co-simulation: triggered input clocks (FMI 3), and counted events, which this package writes into
+FMUs.
 
-A counted event ``e`` is an integer input ``e_count`` with a real input ``e_time``, the stamp: raising the count before a step
-announces that the event happens at the stamp, inside that step.
+A counted event ``e`` is an integer input ``e_count`` with a real input ``e_time``, the stamp: raising the count before
+a step announces that the event happens at the stamp, inside that step.
 """
 
 from __future__ import annotations
@@ -76,15 +77,17 @@ def _counted(context: Context, names: Sequence[str]) -> Outcome:
     divisible = bench.component.can_vary_step and not divided_steps(bench)
     for name in names:
         start = _warmed_up(bench)
-        whole = _passing(bench, name, (), (bench.h,))
+        whole = _crossing(bench, name, (), (bench.h,))
         bad = not_finite(bench.output_names, whole)
         if bad:
-            return limited(f"not finite after event {name} with the start values of its payload: {listed(bad)}", PAYLOAD)
+            return limited(
+                f"not finite after event {name} with the start values of its payload: {listed(bad)}", PAYLOAD
+            )
         slack = STEP_TOLERANCE * np.abs(whole - start) + RESOLUTION * np.abs(whole)
         until, rest = UNEVEN * bench.h, (1.0 - UNEVEN) * bench.h
         for before, after in (((), (until, rest)), ((until,), (rest,))) if divisible else ():
             _warmed_up(bench)
-            split = _passing(bench, name, before, after)
+            split = _crossing(bench, name, before, after)
             if np.any(np.abs(whole - split) > slack):
                 return failed(f"event {name} inside a step does not happen at its stamp: {worst(bench, whole, split)}")
     exact = "happen at their stamps inside a step" if divisible else "are taken"
@@ -96,8 +99,10 @@ def _warmed_up(bench: Bench) -> np.ndarray:
     return bench.steps((bench.h,) * WARM_UP_STEPS)[-1]
 
 
-def _passing(bench: Bench, name: str, before: Sequence[float], after: Sequence[float]) -> np.ndarray:
-    """Outputs after steps of lengths [s], the event announced between `before` and `after`, always with the same stamp."""
+def _crossing(bench: Bench, name: str, before: Sequence[float], after: Sequence[float]) -> np.ndarray:
+    """Outputs after steps of lengths [s], the event announced between `before` and `after`, always with the same
+    stamp.
+    """
     stamp = bench.now + UNEVEN * bench.h
     bench.steps(before)
     slave = bench.component

@@ -109,7 +109,9 @@ def _unreadable(slave: FmuInstance, variable: ModelVariable) -> str:
 
 
 def stepping(context: Context) -> Outcome:
-    """A run of steps without an error, all outputs finite; where the inputs that excite it break it, under its start values."""
+    """A run of steps without an error, all outputs finite; where the inputs that excite it break it, under its start
+    values.
+    """
     bench = context.bench
     try:
         return _run(context)
@@ -120,7 +122,9 @@ def stepping(context: Context) -> Outcome:
     outcome = _run(context)
     if outcome.verdict is Verdict.DISTRUST:
         return outcome
-    return limited(f"{outcome.detail}; under other inputs: {broken}", "keep its inputs in the range that it was made for")
+    return limited(
+        f"{outcome.detail}; under other inputs: {broken}", "keep its inputs in the range that it was made for"
+    )
 
 
 def _run(context: Context) -> Outcome:
@@ -146,7 +150,9 @@ def _run(context: Context) -> Outcome:
     if not bench.excited:
         return limited(f"{done}; nothing moved in the first {SLOW_STEPS}, what follows is weak", UNSEEN)
     late = f"; {context.steps} were asked for, use a longer --timeout" if len(rows) < context.steps else ""
-    above = f"inputs {bench.amplitude:g} above their start values" if bench.amplitude else "inputs at their start values"
+    above = (
+        f"inputs {bench.amplitude:g} above their start values" if bench.amplitude else "inputs at their start values"
+    )
     return passed(f"{done}, {above}{late}")
 
 
@@ -190,15 +196,22 @@ def time_per_step(context: Context) -> Outcome:
     seconds: list[float] = []
     advance, since = bench.component.advance, perf_counter()
     most = min(TIMED_STEPS, max(context.steps, 1))
-    while len(seconds) < most and not bench.component.terminated and perf_counter() - since < SHARE_OF_BUDGET * context.budget:
+    while (
+        len(seconds) < most
+        and not bench.component.terminated
+        and perf_counter() - since < SHARE_OF_BUDGET * context.budget
+    ):
         t = bench.t0 + len(seconds) * bench.h
         begin = perf_counter()
         advance(t, t + bench.h)
         seconds.append(perf_counter() - begin)
-    return passed(f"median {median(seconds) * 1e6:.3g} microseconds for a step of {bench.h:g} s, the call from Python included")
+    return passed(
+        f"median {median(seconds) * 1e6:.3g} microseconds for a step of {bench.h:g} s, the call from Python included"
+    )
 
 
-# -- helpers ------------------------------------------------------------------------------------------------------------
+# -- helpers
+# ------------------------------------------------------------------------------------------------------------
 
 
 def by(problem: str, good: str) -> Outcome:

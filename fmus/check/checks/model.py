@@ -16,7 +16,9 @@ from fmus.check.model import FmuModel
 
 NO_STATES = "has no continuous states"
 SHIFT = 0.01
-"""States are moved by this share, so that derivatives are not judged at a start at rest, where friction has its kink."""
+"""States are moved by this share, so that derivatives are not judged at a start at rest, where friction has its
+kink.
+"""
 
 
 @contextmanager
@@ -62,7 +64,9 @@ def finite_derivatives(context: Context) -> Outcome:
         values = {
             "outputs": not_finite(outputs, model.read(outputs)),
             "derivatives": not_finite(_numbered(model.state_count), model.derivatives()) if model.state_count else [],
-            "event indicators": not_finite(_numbered(model.indicator_count), model.indicators()) if model.indicator_count else [],
+            "event indicators": not_finite(_numbered(model.indicator_count), model.indicators())
+            if model.indicator_count
+            else [],
         }
     bad = {what: names for what, names in values.items() if names}
     if bad:
@@ -103,7 +107,9 @@ def round_trip(context: Context) -> Outcome:
         finally:
             model.release(state)
     same = np.array_equal(first, second, equal_nan=True)
-    return by("" if same else "after a restored state the same states have other derivatives", "what follows is identical")
+    return by(
+        "" if same else "after a restored state the same states have other derivatives", "what follows is identical"
+    )
 
 
 def reset(context: Context) -> Outcome:
@@ -117,7 +123,9 @@ def reset(context: Context) -> Outcome:
         _start(model, context)
         second = _path(model, context)
     same = np.array_equal(first, second, equal_nan=True)
-    return by("" if same else "after a reset the same states have other derivatives", "the same after a reset is identical")
+    return by(
+        "" if same else "after a reset the same states have other derivatives", "the same after a reset is identical"
+    )
 
 
 def directional(context: Context) -> Outcome:

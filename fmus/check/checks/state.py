@@ -64,7 +64,9 @@ def _through_bytes(context: Context, *, elsewhere: bool) -> Outcome:
     if not problem:
         return passed(f"what follows a state restored {place} is identical")
     told = f"after a state restored {place} {problem}"
-    return limited(f"{told}; within the tolerance of its solver", WITHIN) if near(bench, first, redone) else failed(told)
+    return (
+        limited(f"{told}; within the tolerance of its solver", WITHIN) if near(bench, first, redone) else failed(told)
+    )
 
 
 def _saved(slave: object) -> bytes:

@@ -23,7 +23,9 @@ def validation(archive: Archive) -> Outcome:
     if not problems:
         return passed("the model description is valid against the schema and fmpy's rules")
     more = f"; and {len(problems) - SHOWN} more" if len(problems) > SHOWN else ""
-    return noted(f"{len(problems)} problems, for which strict importers refuse it: " + "; ".join(problems[:SHOWN]) + more)
+    return noted(
+        f"{len(problems)} problems, for which strict importers refuse it: " + "; ".join(problems[:SHOWN]) + more
+    )
 
 
 def platforms(archive: Archive) -> Outcome:

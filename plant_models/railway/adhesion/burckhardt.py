@@ -1,6 +1,7 @@
 """The Burckhardt adhesion curve: adhesion coefficient over wheel slip, with its peak in closed form.
 
-Plain NumPy that evaluates on numbers, on batches and on traced symbols alike; imports nothing of the package but the array type.
+Plain NumPy that evaluates on numbers, on batches and on traced symbols alike; imports nothing of the package but the
+array type.
 """
 
 from __future__ import annotations
@@ -16,10 +17,10 @@ from plant_models.hybrid.system import Array
 class BurckhardtCurve:
     """``mu(lam) = a1 (1 - exp(-a2 lam)) - a3 lam`` for ``lam >= 0``, odd in ``lam``.
 
-    Two departures from the print. The branch for negative slip is printed with the exponent of the positive one and blows
-    up (``mu(-0.1) = +23``); the odd extension ``mu(-lam) = -mu(lam)`` is used. The formula turns negative beyond 140 to 165 %
-    slip, which would let a spinning wheel brake the train; beyond 100 % slip the coefficient therefore stays at ``mu(1)``, the
-    value of a fully sliding wheel.
+    Two departures from the print. The branch for negative slip is printed with the exponent of the positive one and
+    blows up (``mu(-0.1) = +23``); the odd extension ``mu(-lam) = -mu(lam)`` is used. The formula turns negative beyond
+    140 to 165 % slip, which would let a spinning wheel brake the train; beyond 100 % slip the coefficient therefore
+    stays at ``mu(1)``, the value of a fully sliding wheel.
 
     Args:
         a1: height of the exponential part [1].

@@ -49,7 +49,9 @@ class BurckhardtLaw:
     """Burckhardt's curves; the coefficient does not depend on the speed. Source: Bouchama 2024, (3.12), Table 3.2."""
 
     parameters = tuple(
-        parameter(f"burckhardt_{condition}_{key}", "1", getattr(curve, key), f"Burckhardt, {condition}: {text}", min=1e-9)
+        parameter(
+            f"burckhardt_{condition}_{key}", "1", getattr(curve, key), f"Burckhardt, {condition}: {text}", min=1e-9
+        )
         for condition, curve in zip(CONDITIONS, (BURCKHARDT_NOMINAL, BURCKHARDT_DEGRADED), strict=True)
         for key, text in _BURCKHARDT_TEXTS.items()
     )
@@ -75,15 +77,20 @@ class PolachLaw:
     parameters = (
         *(
             parameter(
-                f"polach_{condition}_{key}", "h/km" if key == "decay" else "1", getattr(curve, key),
-                f"Polach, {condition}: {text}", min=0.0 if key in ("ratio", "decay") else 1e-9,
+                f"polach_{condition}_{key}",
+                "h/km" if key == "decay" else "1",
+                getattr(curve, key),
+                f"Polach, {condition}: {text}",
+                min=0.0 if key in ("ratio", "decay") else 1e-9,
                 max=1.0 if key in ("ka", "ks", "ratio") else None,
             )
             for condition, curve in zip(CONDITIONS, (POLACH_DRY, POLACH_WET), strict=True)
             for key, text in _POLACH_TEXTS.items()
         ),
-        parameter("polach_stiffness", "1", CREEP_STIFFNESS, "Polach: creep stiffness k = G pi a b c_jj / (4 Q)", min=1e-9),
-    )  # fmt: skip
+        parameter(
+            "polach_stiffness", "1", CREEP_STIFFNESS, "Polach: creep stiffness k = G pi a b c_jj / (4 Q)", min=1e-9
+        ),
+    )
 
     def coefficient(self, slip: Array, speed: Array, degraded: Array, p: Any) -> Array:
         """Adhesion coefficient [1]."""

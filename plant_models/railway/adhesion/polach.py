@@ -20,13 +20,13 @@ CREEP_STIFFNESS = 25.0
 class PolachCurve:
     """Creep curve of Polach in the slip ``s = v_g / v``, odd in ``s``.
 
-    ``f = (2 mu / pi) (K_A eps / (1 + (K_A eps)^2) + atan(K_S eps))`` with ``eps = k s / mu`` and the friction coefficient
-    ``mu = mu0 ((1 - A) exp(-B v_g) + A)``, which falls with the sliding speed ``v_g``.
+    ``f = (2 mu / pi) (K_A eps / (1 + (K_A eps)^2) + atan(K_S eps))`` with ``eps = k s / mu`` and the friction
+    coefficient ``mu = mu0 ((1 - A) exp(-B v_g) + A)``, which falls with the sliding speed ``v_g``.
 
-    Units. The thesis names none for ``B`` and gives none of the contact patch's numbers. Its Table 4.5 settles both: the
-    table comes out to four digits with ``v_g`` in **km/h** and ``k = G pi a b c_jj / (4 Q) = 25``. With ``v_g`` in m/s the
-    same maxima can be had, but at optimal slips three times those of the table (independently measured). So ``B`` is in
-    h/km here, and the methods take speeds in m/s and convert.
+    Units. The thesis names none for ``B`` and gives none of the contact patch's numbers. Its Table 4.5 settles both:
+    the table comes out to four digits with ``v_g`` in **km/h** and ``k = G pi a b c_jj / (4 Q) = 25``. With ``v_g`` in
+    m/s the same maxima can be had, but at optimal slips three times those of the table (independently measured). So
+    ``B`` is in h/km here, and the methods take speeds in m/s and convert.
     The text orders the reductions ``K_A <= K_S``; its Table 3.1, and Polach, have ``K_S <= K_A <= 1``.
 
     Args:
@@ -67,10 +67,11 @@ class PolachCurve:
         return 2.0 / np.pi * self.stiffness * (self.ka + self.ks)
 
     def peak(self, speed: float) -> tuple[float, float]:
-        """Slip of the first maximum of the coefficient, and the coefficient there [1], at one speed; a search, not traceable.
+        """Slip of the first maximum of the coefficient, and the coefficient there [1], at one speed; a search, not
+        traceable.
 
-        Not the largest value at any slip: above 60 km/h (dry) or 80 km/h (wet) that is the coefficient of a wheel that spins
-        without bound, where the friction has ceased to fall. No controller seeks that, and no slip is near it.
+        Not the largest value at any slip: above 60 km/h (dry) or 80 km/h (wet) that is the coefficient of a wheel that
+        spins without bound, where the friction has ceased to fall. No controller seeks that, and no slip is near it.
 
         Args:
             speed: [m/s].
@@ -83,9 +84,13 @@ class PolachCurve:
         slips = np.geomspace(1e-4, 10.0, 4000)
         falling = np.flatnonzero(np.diff(self.coefficient(slips, speed)) < 0.0)
         if falling.size == 0:
-            raise ValueError(f"The Polach curve has no peak at {speed:.4g} m/s: its coefficient rises at all slips up to 10.")
+            raise ValueError(
+                f"The Polach curve has no peak at {speed:.4g} m/s: its coefficient rises at all slips up to 10."
+            )
         bounds = (slips[max(int(falling[0]) - 1, 0)], slips[int(falling[0]) + 1])
-        found = minimize_scalar(lambda s: -self.coefficient(s, speed), bounds=bounds, method="bounded", options={"xatol": 1e-10})
+        found = minimize_scalar(
+            lambda s: -self.coefficient(s, speed), bounds=bounds, method="bounded", options={"xatol": 1e-10}
+        )
         return float(found.x), float(-found.fun)
 
 

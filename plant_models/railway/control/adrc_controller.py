@@ -23,7 +23,9 @@ DRIVE_EFFORT = 3  # index of the effort of a ramped drive in the state
 
 
 class _Command(NamedTuple):
-    """What is applied: electric effort [N], demand to the air brake [1], and 1 where the train is held at standstill."""
+    """What is applied: electric effort [N], demand to the air brake [1], and 1 where the train is held at
+    standstill.
+    """
 
     effort: Array
     brake_demand: Array
@@ -33,25 +35,28 @@ class _Command(NamedTuple):
 class AdrcController(HybridSystem):
     """Active disturbance rejection control of the odometer speed: ``F = M (wc (v_ref - z1) + a_ref - z2)``.
 
-    An extended state observer of second order with both poles at ``-wo`` estimates from odometer and applied effort the speed
-    ``z1`` and, as one acceleration ``z2``, everything that the model ``M dv = F`` leaves out: resistance, gradient, coupler,
-    a wrong mass. With the right mass the speed follows the reference like ``wc / (s + wc)``, and a constant gradient leaves
-    no error. The observer is fed with the effort behind all limits, so that a limit winds nothing up.
+    An extended state observer of second order with both poles at ``-wo`` estimates from odometer and applied effort the
+    speed ``z1`` and, as one acceleration ``z2``, everything that the model ``M dv = F`` leaves out: resistance,
+    gradient, coupler, a wrong mass. With the right mass the speed follows the reference like ``wc / (s + wc)``, and a
+    constant gradient leaves no error. The observer is fed with the effort behind all limits, so that a limit winds
+    nothing up.
 
-    The controller knows neither slip nor adhesion. When the wheels spin, the odometer shows them and not the train, and the
-    effort is not reduced for it: that is what the published comparison shows (scenario Sc2).
+    The controller knows neither slip nor adhesion. When the wheels spin, the odometer shows them and not the train, and
+    the effort is not reduced for it: that is what the published comparison shows (scenario Sc2).
 
-    Brake: the electric brake follows the force, in service braking (reference below ``-service_deceleration``) the air brake
-    takes it over and the electric brake fills the gap while air builds up. ``full_brake_force = 0`` is a train without air
-    brake. Where the reference is zero, does not rise, and the odometer is below `standstill_speed`, the train is
-    held.
+    Brake: the electric brake follows the force, in service braking (reference below ``-service_deceleration``) the air
+    brake takes it over and the electric brake fills the gap while air builds up. ``full_brake_force = 0`` is a train
+    without air brake. Where the reference is zero, does not rise, and the odometer is below `standstill_speed`, the
+    train is held.
 
-    Gains: none are printed. Rule (ours): ``wc`` a decade below the slowest coupler mode (0.822 Hz = 5.2 rad/s), so that the
-    controller does not excite couplers, 0.5 rad/s; ``wo = 3 wc``. An odometer of 10 Hz is then fast enough (``wo T = 0.15``).
+    Gains: none are printed. Rule (ours): ``wc`` a decade below the slowest coupler mode (0.822 Hz = 5.2 rad/s), so that
+    the controller does not excite couplers, 0.5 rad/s; ``wo = 3 wc``. An odometer of 10 Hz is then fast enough
+    (``wo T = 0.15``).
 
-    Drive: with ``drive="ramped"`` the effort follows the demand with `effort_lag` and moves by `effort_rate` at most (period and
-    rate of the MDPE controller); the observer is fed with the effort that is there. A spinning wheel has a sixtieth of the
-    train's inertia: without the rate the loop over a sampled odometer then swings between traction and brake at some hertz.
+    Drive: with ``drive="ramped"`` the effort follows the demand with `effort_lag` and moves by `effort_rate` at most
+    (period and rate of the MDPE controller); the observer is fed with the effort that is there. A spinning wheel has a
+    sixtieth of the train's inertia: without the rate the loop over a sampled odometer then swings between traction and
+    brake at some hertz.
 
     Args:
         drive: ``immediate`` or ``ramped``.
@@ -61,8 +66,8 @@ class AdrcController(HybridSystem):
 
     Presets: `train` (default; 166 t with air brake), `single_mass` (90 t without air brake: the plant `locomotive`).
 
-    Source: Bouchama 2024, section 4.5 (that ADRC is used, on the odometer), section 4.1 (350 kN, 4.2 MW); law: Gao 2003; gains,
-    blending and hold are ours.
+    Source: Bouchama 2024, section 4.5 (that ADRC is used, on the odometer), section 4.1 (350 kN, 4.2 MW); law: Gao
+    2003; gains, blending and hold are ours.
     """
 
     name = "adrc_controller"
@@ -71,7 +76,9 @@ class AdrcController(HybridSystem):
     internal_step = 1e-2  # the observer's poles are at 1.5 rad/s
     states: tuple[Signal, ...] = (
         state("observed_speed", "m/s", 0.0, "Speed estimate z1 of the extended state observer"),
-        state("disturbance_acceleration", "m/s2", 0.0, "Disturbance estimate z2, against nothing but the model M dv = F"),
+        state(
+            "disturbance_acceleration", "m/s2", 0.0, "Disturbance estimate z2, against nothing but the model M dv = F"
+        ),
         state("built_up_brake", "N", 0.0, "Force that the air brake is believed to have built up"),
     )
     inputs = (
@@ -111,7 +118,9 @@ class AdrcController(HybridSystem):
         super().__init__(drive=drive)
 
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of both estimates, of the air brake's force and of a ramped drive's effort, shape (n,) or (n, members)."""
+        """Derivatives of both estimates, of the air brake's force and of a ramped drive's effort, shape (n,) or (n,
+        members).
+        """
         command = self._command(x, u, p)
         applied = (self._effort(x, command) - x[2]) / p.mass
         speed, disturbance = observer_derivative(u.odometer, x[0], x[1], applied, p.observer_bandwidth)
@@ -142,7 +151,9 @@ class AdrcController(HybridSystem):
     def _command(x: Array, u: Any, p: Any) -> _Command:
         acceleration, air = u.acceleration_reference, holds(p.full_brake_force > 0.0)
         wanted = rejecting_force(u.speed_reference - x[0], acceleration, x[1], p.mass, p.control_bandwidth)
-        brake_limit = electric_brake_limit(u.odometer, p.electric_brake_limit, p.electric_fade_start, p.electric_fade_end)
+        brake_limit = electric_brake_limit(
+            u.odometer, p.electric_brake_limit, p.electric_fade_start, p.electric_fade_end
+        )
         effort = np.where(
             wanted < 0.0,
             electric_part(wanted, x[2], brake_limit),

@@ -28,22 +28,23 @@ class _Finding(NamedTuple):
 class AntiSlipDevice(HybridSystem):
     """Cuts the effort when one axle runs away from the others, and restores it in two slopes with a break point.
 
-    Every control period the four axle speeds are filtered (first order). The reference speed is the lowest of them in traction,
-    the highest in braking: the axle that can be trusted most. An axle slips where it is off the reference by more than
-    `slip_threshold`. At the onset of slip the share of the effort set-point that is let through falls to `cut_share` of what it
-    was, and goes on falling with `further_cut` while an axle slips: on a very slippery rail a spinning axle needs less to come
-    back than any fixed share. Then it rises with `fast_restoring` up to the break point, `break_share` of the
-    share at the onset, and from there with `slow_restoring` to 1.
+    Every control period the four axle speeds are filtered (first order). The reference speed is the lowest of them in
+    traction, the highest in braking: the axle that can be trusted most. An axle slips where it is off the reference by
+    more than `slip_threshold`. At the onset of slip the share of the effort set-point that is let through falls to
+    `cut_share` of what it was, and goes on falling with `further_cut` while an axle slips: on a very slippery rail a
+    spinning axle needs less to come back than any fixed share. Then it rises with `fast_restoring` up to the break
+    point, `break_share` of the share at the onset, and from there with `slow_restoring` to 1.
 
-    Sand is requested where an axle slips below `sanding_speed`, or is off by more than `sanding_deviation` at any speed.
+    Sand is requested where an axle slips below `sanding_speed`, or is off by more than `sanding_deviation` at any
+    speed.
 
-    The device is blind when all four axles slip together: no axle is left to compare with. That is its published weakness
-    (scenario Sc2), kept here on purpose.
+    The device is blind when all four axles slip together: no axle is left to compare with. That is its published
+    weakness (scenario Sc2), kept here on purpose.
 
-    Thresholds: none are printed. `slip_threshold` 2 km/h is the size of the slips reported of real traction and braking data
-    (section 3.2.3); `sanding_speed` and `sanding_deviation`, 10 km/h, are five times that, ours. Cut and slopes are ours: down to
-    30 %, on by 30 % a second, up by 50 % a second to 80 % of the share at the onset, then by 5 % a second: the adhesion limit is
-    approached ten times slower than it was left.
+    Thresholds: none are printed. `slip_threshold` 2 km/h is the size of the slips reported of real traction and braking
+    data (section 3.2.3); `sanding_speed` and `sanding_deviation`, 10 km/h, are five times that, ours. Cut and slopes
+    are ours: down to 30 %, on by 30 % a second, up by 50 % a second to 80 % of the share at the onset, then by 5 % a
+    second: the adhesion limit is approached ten times slower than it was left.
 
     Source: Bouchama 2024, section 4.2.2; all numbers ours.
     """
@@ -77,8 +78,17 @@ class AntiSlipDevice(HybridSystem):
     parameters = (
         parameter("control_period", "s", 0.02, "Time between two looks at the axles", min=1e-4),
         parameter("filter_time", "s", 0.1, "Time constant of the axle speed filters", min=1e-4),
-        parameter("slip_threshold", "m/s", 2.0 / 3.6, "Deviation from the reference that is slip", min=0.0, display_unit="km/h"),
-        parameter("sanding_speed", "m/s", 10.0 / 3.6, "Sand below this speed when an axle slips", min=0.0, display_unit="km/h"),
+        parameter(
+            "slip_threshold",
+            "m/s",
+            2.0 / 3.6,
+            "Deviation from the reference that is slip",
+            min=0.0,
+            display_unit="km/h",
+        ),
+        parameter(
+            "sanding_speed", "m/s", 10.0 / 3.6, "Sand below this speed when an axle slips", min=0.0, display_unit="km/h"
+        ),
         parameter("sanding_deviation", "m/s", 10.0 / 3.6, "Sand beyond this deviation", min=0.0, display_unit="km/h"),
         parameter("cut_share", "1", 0.3, "Share of the effort that is left at the onset of slip", min=0.0, max=1.0),
         parameter("further_cut", "1/s", 0.3, "Fall of the share while the slip lasts", min=0.0),
@@ -125,7 +135,8 @@ class AntiSlipDevice(HybridSystem):
 
 
 def _compared(x: Array, u: Any, p: Any) -> _Finding:
-    fading = either(x[AXLES], np.exp(-p.control_period / p.filter_time), 0.0)  # the first look takes the speeds as they are
+    # the first look takes the speeds as they are
+    fading = either(x[AXLES], np.exp(-p.control_period / p.filter_time), 0.0)
     filtered = [u.axle_speed[i] + fading * (x[i] - u.axle_speed[i]) for i in range(AXLES)]
     lowest, highest = filtered[0], filtered[0]
     for speed in filtered[1:]:

@@ -12,14 +12,22 @@ from plant_models.railway.control.logic import either, some
 
 
 def next_available_effort(
-    available: Array, adhesion_force: Array, sliding: Array, newly_degraded: Array, recovery: Array, *,
-    margin: Array, floor: Array, limit: Array,
-) -> Array:  # fmt: skip
+    available: Array,
+    adhesion_force: Array,
+    sliding: Array,
+    newly_degraded: Array,
+    recovery: Array,
+    *,
+    margin: Array,
+    floor: Array,
+    limit: Array,
+) -> Array:
     """Available effort [N] after one period.
 
-    A wheel that slides turns with ``J dw = r (F - F_ad)``: only an effort below the adhesion force of this moment brings it
-    back. So in slip the available effort falls to `margin` times that force at once. Where the adhesion has just been judged
-    degraded, without slip beyond the limit, it falls to the force itself. Otherwise it rises by `recovery`.
+    A wheel that slides turns with ``J dw = r (F - F_ad)``: only an effort below the adhesion force of this moment
+    brings it back. So in slip the available effort falls to `margin` times that force at once. Where the adhesion has
+    just been judged degraded, without slip beyond the limit, it falls to the force itself. Otherwise it rises by
+    `recovery`.
 
     Args:
         available: before [N]. adhesion_force: estimate [N], any sign. sliding: 1 where the slip is beyond its limit.

@@ -1,4 +1,6 @@
-"""Blending: how a wanted force is shared between the locomotive's drive and the air brake of the train. Pure functions."""
+"""Blending: how a wanted force is shared between the locomotive's drive and the air brake of the train. Pure
+functions.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +13,8 @@ def air_brake_demand(force: Array, capacity: Array, full_brake_force: Array) -> 
     """Demand to the air brake, 0..1, for a wanted force [N] (brake < 0); 0 where the train has no air brake.
 
     Args:
-        force: wanted force [N]. capacity: brake force over which it is shared in proportion [N]: `full_brake_force` where air
-            brakes alone, more where the electric brake takes its part.
+        force: wanted force [N]. capacity: brake force over which it is shared in proportion [N]: `full_brake_force`
+            where air brakes alone, more where the electric brake takes its part.
         full_brake_force: force of the whole train's air brake at demand 1 [N], 0 for none.
     """
     demand = np.clip(-force / np.maximum(capacity, 1.0), 0.0, 1.0)

@@ -8,7 +8,8 @@ from plant_models.hybrid.system import Array
 
 
 def coupler_headroom(load: Array, soft_limit: Array, limit: Array) -> Array:
-    """Share of the effort's rate that may load the coupler further [1]: 1 up to the soft limit, 0 at the limit, then negative.
+    """Share of the effort's rate that may load the coupler further [1]: 1 up to the soft limit, 0 at the limit, then
+    negative.
 
     Beyond the limit the sign is that of a forced step back, -1 at and beyond ``2 limit - soft_limit``.
 
@@ -21,11 +22,12 @@ def coupler_headroom(load: Array, soft_limit: Array, limit: Array) -> Array:
 def effort_steps(
     effort: Array, coupler_force: Array, largest_step: Array, soft_limit: Array, limit: Array
 ) -> tuple[Array, Array]:
-    """Largest steps down and up of the effort in one period [N]; a negative one is a step the other way that must be made.
+    """Largest steps down and up of the effort in one period [N]; a negative one is a step the other way that must be
+    made.
 
-    More traction (or less brake) pulls at the coupler, less traction (or more brake) pushes into it. Traction and brake may
-    always go back to zero at the full rate: else a pressed coupler would keep the traction on under a brake. And what must be
-    made goes to zero at most: a tension that others cause is no reason to brake the locomotive.
+    More traction (or less brake) pulls at the coupler, less traction (or more brake) pushes into it. Traction and brake
+    may always go back to zero at the full rate: else a pressed coupler would keep the traction on under a brake. And
+    what must be made goes to zero at most: a tension that others cause is no reason to brake the locomotive.
 
     Args:
         effort: until now [N]. coupler_force: force in the first coupler, tension > 0 [N].

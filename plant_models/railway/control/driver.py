@@ -29,27 +29,28 @@ _PROFILE_B = (_padded(0.0, 30.0, 60.0, 90.0), _padded(0.0, 50.0, 50.0, 0.0))
 class Driver(HybridSystem):
     """PI controller of the odometer speed along a profile: ``F = sat(Kp e + I)``, ``dI = Ki e + (F - Kp e - I) / T_t``.
 
-    ``e`` is the profile minus the odometer. The demand ``F`` is limited to ``effort_limit`` both ways, and in traction to
-    ``power_limit / |odometer|``; what the limits cut off is fed back into the integral over ``tracking_time`` (anti-windup).
-    The effort follows the demand with the lag of the traction chain, `effort_lag`.
+    ``e`` is the profile minus the odometer. The demand ``F`` is limited to ``effort_limit`` both ways, and in traction
+    to ``power_limit / |odometer|``; what the limits cut off is fed back into the integral over ``tracking_time``
+    (anti-windup). The effort follows the demand with the lag of the traction chain, `effort_lag`.
 
     Feedback must come from the odometer: on the true speed the controller spins the wheel up in a degraded zone
-    (independently measured). On the odometer, the printed gains need the lag: in a degraded zone the wheel itself answers
-    an effort with ``v / (M g mu')``, 1 to 3 times ``1 / Kp``, so a controller without lag that is sampled at 10 ms throws the
-    wheel between spin and lock. With 0.2 s it holds for communication steps and odometers up to 0.1 s.
+    (independently measured). On the odometer, the printed gains need the lag: in a degraded zone the wheel itself
+    answers an effort with ``v / (M g mu')``, 1 to 3 times ``1 / Kp``, so a controller without lag that is sampled at 10
+    ms throws the wheel between spin and lock. With 0.2 s it holds for communication steps and odometers up to 0.1 s.
 
     Where the profile is at zero and the odometer below ``standstill_speed`` the train is held: the demand is the brake
-    ``-holding_effort`` and the integral is let go over ``tracking_time``. The brake is released as soon as the profile rises.
+    ``-holding_effort`` and the integral is let go over ``tracking_time``. The brake is released as soon as the profile
+    rises.
 
     The profile is a broken line through (`profile_time`, `profile_speed`); unused points repeat the last.
 
-    Presets: `profile_d` (default): 50 km/h, up in 0-20 s, brake in 65-85 s, 902.8 m. `profile_b`: 50 m/s, 30 s each up, hold
-    and down, 3000 m; near 50 m/s it needs 7.9 MW, more than the locomotive's 4.2 MW, so this preset raises `power_limit` to
-    10 MW. It also asks for more than the degraded adhesion gives, and slips by 13 to 19 % there.
+    Presets: `profile_d` (default): 50 km/h, up in 0-20 s, brake in 65-85 s, 902.8 m. `profile_b`: 50 m/s, 30 s each up,
+    hold and down, 3000 m; near 50 m/s it needs 7.9 MW, more than the locomotive's 4.2 MW, so this preset raises
+    `power_limit` to 10 MW. It also asks for more than the degraded adhesion gives, and slips by 13 to 19 % there.
 
-    Source: gains Bouchama 2024, section 3.4.3; limits of the BB27000, section 4.1. The printed protocol (3 km at 50 km/h
-    with a brake phase in 70-80 s) contradicts itself: the two profiles are its two consistent readings. Limits, lag,
-    anti-windup and hold are ours.
+    Source: gains Bouchama 2024, section 3.4.3; limits of the BB27000, section 4.1. The printed protocol (3 km at 50
+    km/h with a brake phase in 70-80 s) contradicts itself: the two profiles are its two consistent readings. Limits,
+    lag, anti-windup and hold are ours.
     """
 
     name = "driver"
@@ -83,7 +84,13 @@ class Driver(HybridSystem):
         ),
         parameter("profile_time", "s", _PROFILE_D[0], "Times of the speed profile, ascending", size=PROFILE_POINTS),
         parameter(
-            "profile_speed", "m/s", _PROFILE_D[1], "Speeds of the profile", min=0.0, size=PROFILE_POINTS, display_unit="km/h"
+            "profile_speed",
+            "m/s",
+            _PROFILE_D[1],
+            "Speeds of the profile",
+            min=0.0,
+            size=PROFILE_POINTS,
+            display_unit="km/h",
         ),
     )
     presets: Mapping[str, Mapping[str, Any]] = {
@@ -121,7 +128,8 @@ class Driver(HybridSystem):
 
 def _limited(effort: Array, odometer: Array, p: Any) -> Array:
     """Effort within the brake limit and the traction limits of effort and power [N]."""
-    # Above power_limit / effort_limit the hyperbola of constant power is lower than the effort limit, below it is never reached.
+    # Above power_limit / effort_limit the hyperbola of constant power is lower than the effort limit, below it is never
+    # reached.
     corner = p.power_limit / p.effort_limit
     traction_limit = p.power_limit / np.maximum(np.abs(odometer), corner)
     return np.minimum(np.maximum(effort, -p.effort_limit), traction_limit)

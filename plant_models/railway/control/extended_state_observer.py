@@ -1,4 +1,6 @@
-"""The linear extended state observer of a mass: speed, and everything that disturbs it as one acceleration. Pure functions."""
+"""The linear extended state observer of a mass: speed, and everything that disturbs it as one acceleration. Pure
+functions.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,8 @@ def observer_derivative(
     the effort that is really applied, behind all limits: then a limit is no disturbance and nothing winds up.
 
     Args:
-        measured: speed y [m/s]. speed: its estimate z1 [m/s]. disturbance: estimate z2 of all other accelerations [m/s2].
+        measured: speed y [m/s]. speed: its estimate z1 [m/s]. disturbance: estimate z2 of all other accelerations
+        [m/s2].
         applied_acceleration: applied effort over mass, b0 F [m/s2]. bandwidth: wo [rad/s].
 
     Returns:

@@ -1,7 +1,7 @@
 """The MDPE controller: the observer-based control of the train, one regulator for each mode and adhesion level.
 
-A sampled controller as a hybrid system of its own. It knows estimates by name only, and no observer; regulator, switch, limits,
-blending and coupler protection come from their own files.
+A sampled controller as a hybrid system of its own. It knows estimates by name only, and no observer; regulator, switch,
+limits, blending and coupler protection come from their own files.
 """
 
 from __future__ import annotations
@@ -74,40 +74,49 @@ class _Regulated(NamedTuple):
 class MdpeController(HybridSystem):
     """Speed control with eight regulators, a switch, and limits that follow the estimated adhesion and the coupler.
 
-    Every `control_period`: ``F = M a_ref + M g slope + d_hat + Kp e + I`` with ``e = v_ref - speed``, limited, and shared between
-    the electric drive and the air brake.
+    Every `control_period`: ``F = M a_ref + M g slope + d_hat + Kp e + I`` with ``e = v_ref - speed``, limited, and
+    shared between the electric drive and the air brake.
 
-    - **Regulators**: PI, one for each mode (traction, electric, indirect, combined brake) and adhesion level (nominal, degraded).
-      Both poles of the train's mass under a regulator lie at ``exp(-omega T)``, with ``omega`` from `bandwidth_nominal` or
-      `bandwidth_degraded`. The active one gives back what its limits cut off (anti-windup). The inactive ones hold the integral
-      with which they would have asked for the force of this instant, so a change of mode or level makes no jump.
-    - **Switch**: mode by sign of the force, tracking error, reference, speed, coupler force and adhesion level, with hysteresis
-      (`next_mode`). Degraded adhesion counts at once, nominal after `recovery_time`.
-    - **Pre-saturation**: the electric effort stays within effort limit, power limit and the available adhesion. That is cut to
-      `adhesion_margin` of the estimated adhesion force while ``|slip| > slip_limit``, and to the force itself when
-      the adhesion becomes degraded; then it rises by `recovery_nominal` or `recovery_degraded` a second.
-    - **Coupler protection**: the effort moves by `effort_rate` at most, less as the coupler is loaded beyond its soft limit, and
-      back beyond its limit. Only the cut in slip, and the limits of effort and power, are quicker.
-    - **Blending**: in brake the electric effort is what air has not built up yet. In the combined mode both share by capacity.
-    - **Sand** is requested where slip is beyond its limit and the train is off its reference by more than `sanding_error`:
+    - **Regulators**: PI, one for each mode (traction, electric, indirect, combined brake) and adhesion level (nominal,
+      degraded). Both poles of the train's mass under a regulator lie at ``exp(-omega T)``, with ``omega`` from
+      `bandwidth_nominal` or `bandwidth_degraded`. The active one gives back what its limits cut off (anti-windup). The
+      inactive ones hold the integral with which they would have asked for the force of this instant, so a change of
+      mode or level makes no jump.
+    - **Switch**: mode by sign of the force, tracking error, reference, speed, coupler force and adhesion level, with
+      hysteresis (`next_mode`). Degraded adhesion counts at once, nominal after `recovery_time`.
+    - **Pre-saturation**: the electric effort stays within effort limit, power limit and the available adhesion. That is
+      cut to `adhesion_margin` of the estimated adhesion force while ``|slip| > slip_limit``, and to the force itself
+      when the adhesion becomes degraded; then it rises by `recovery_nominal` or `recovery_degraded` a second.
+    - **Coupler protection**: the effort moves by `effort_rate` at most, less as the coupler is loaded beyond its soft
+      limit, and back beyond its limit. Only the cut in slip, and the limits of effort and power, are quicker.
+    - **Blending**: in brake the electric effort is what air has not built up yet. In the combined mode both share by
+      capacity.
+    - **Sand** is requested where slip is beyond its limit and the train is off its reference by more than
+      `sanding_error`:
       when the estimated adhesion alone does not do.
 
-    The estimates must not hold one thing twice: with a `disturbance_force` that contains the gradient (the augmented observers'),
-    leave `slope` unconnected. Unconnected estimates are harmless (no slip, nominal, no coupler force).
+    The estimates must not hold one thing twice: with a `disturbance_force` that contains the gradient (the augmented
+    observers'), leave `slope` unconnected. Unconnected estimates are harmless (no slip, nominal, no coupler force).
 
-    Numbers: none are printed; all are ours. Bandwidths: where the drive acts, a decade below the slowest coupler mode (0.822 Hz),
-    0.5 rad/s; where air alone acts, well below the reciprocal of its build-up time, 0.2 rad/s; combined, their geometric mean;
-    degraded, half. `effort_rate`: the nominal start, 0.5 m/s2 of 166 t = 83 kN, in one period of the slowest coupler mode.
-    `slip_limit`: the smallest optimal slip of degraded adhesion in Table 4.5 (7.2 % at 50 km/h). Coupler: 150 and 250 kN, far
-    below the 850 kN at which a standard screw coupling may break. Electric brake: 150 kN, usual for freight trains.
+    Numbers: none are printed; all are ours. Bandwidths: where the drive acts, a decade below the slowest coupler mode
+    (0.822 Hz),
+    0.5 rad/s; where air alone acts, well below the reciprocal of its build-up time, 0.2 rad/s; combined, their
+    geometric mean; degraded, half. `effort_rate`: the nominal start, 0.5 m/s2 of 166 t = 83 kN, in one period of the
+    slowest coupler mode.
+    `slip_limit`: the smallest optimal slip of degraded adhesion in Table 4.5 (7.2 % at 50 km/h). Coupler: 150 and 250
+    kN, far below the 850 kN at which a standard screw coupling may break. Electric brake: 150 kN, usual for freight
+    trains.
 
     Presets: `train` (default; 166 t with air brake), `single_mass` (90 t without air brake: the plant `locomotive`).
 
-    Source: Bouchama 2024, section 4.5, Table 4.3, figure 4.16 (the parts), section 4.1 (350 kN, 4.2 MW); laws and numbers ours.
+    Source: Bouchama 2024, section 4.5, Table 4.3, figure 4.16 (the parts), section 4.1 (350 kN, 4.2 MW); laws and
+    numbers ours.
     """
 
     name = "mdpe_controller"
-    description = "Observer-based train control: regulators by mode and adhesion, limits by estimated adhesion and coupler force"
+    description = (
+        "Observer-based train control: regulators by mode and adhesion, limits by estimated adhesion and coupler force"
+    )
     source = "Bouchama 2024, section 4.5 and Table 4.3; gains and thresholds ours"
     internal_step = 1e-2  # nothing flows
     states = (
@@ -152,13 +161,29 @@ class MdpeController(HybridSystem):
         parameter("control_period", "s", 0.1, "Control period T", min=1e-3),
         parameter("mass", "kg", 166e3, "Mass of the train M", min=1.0),
         parameter("gravity", "m/s2", 9.81, "Acceleration of gravity g", min=0.0),
-        parameter("bandwidth_nominal", "rad/s", (0.5, 0.5, 0.2, 0.32), "Bandwidth of the regulators, nominal", min=1e-3, size=4),
-        parameter("bandwidth_degraded", "rad/s", (0.25, 0.25, 0.1, 0.16), "Bandwidth, degraded adhesion", min=1e-3, size=4),
+        parameter(
+            "bandwidth_nominal",
+            "rad/s",
+            (0.5, 0.5, 0.2, 0.32),
+            "Bandwidth of the regulators, nominal",
+            min=1e-3,
+            size=4,
+        ),
+        parameter(
+            "bandwidth_degraded", "rad/s", (0.25, 0.25, 0.1, 0.16), "Bandwidth, degraded adhesion", min=1e-3, size=4
+        ),
         *DRIVE_AND_BRAKES,
-        parameter("adhesion_margin", "1", 0.85, "Share of the estimated adhesion force that is used in slip", min=0.0, max=1.0),
+        parameter(
+            "adhesion_margin", "1", 0.85, "Share of the estimated adhesion force that is used in slip", min=0.0, max=1.0
+        ),
         parameter("slip_limit", "1", 0.072, "Slip beyond which the effort is cut", min=0.0),
         parameter(
-            "slip_min_speed", "m/s", 1.0, "Slip counts only where wheel or train move faster", min=0.0, display_unit="km/h"
+            "slip_min_speed",
+            "m/s",
+            1.0,
+            "Slip counts only where wheel or train move faster",
+            min=0.0,
+            display_unit="km/h",
         ),
         parameter("smallest_effort", "N", 10e3, "Effort to which adhesion may cut at most", min=0.0),
         parameter("recovery_nominal", "N/s", 50e3, "Rise of the available effort, nominal adhesion", min=0.0),
@@ -170,8 +195,12 @@ class MdpeController(HybridSystem):
         parameter("acceleration_band", "m/s2", 0.05, "Reference acceleration that counts as none", min=0.0),
         parameter("error_band", "m/s", 0.1, "Error within which the train coasts", min=0.0, display_unit="km/h"),
         parameter("service_deceleration", "m/s2", 0.2, "Deceleration of the reference from which air is used", min=0.0),
-        parameter("combined_error", "m/s", 0.5, "Excess speed from which both brakes act", min=0.0, display_unit="km/h"),
-        parameter("sanding_error", "m/s", 2.0, "Tracking error in slip from which sand is used", min=0.0, display_unit="km/h"),
+        parameter(
+            "combined_error", "m/s", 0.5, "Excess speed from which both brakes act", min=0.0, display_unit="km/h"
+        ),
+        parameter(
+            "sanding_error", "m/s", 2.0, "Tracking error in slip from which sand is used", min=0.0, display_unit="km/h"
+        ),
         parameter("holding_effort", "N", 60e3, "Brake force that holds the train at standstill", min=0.0),
         parameter("standstill_speed", "m/s", 0.1, "Speed below which the train stands", min=0.0, display_unit="km/h"),
     )
@@ -190,7 +219,9 @@ class MdpeController(HybridSystem):
         available = _available(m, u, p, level, sliding)
         wanted = wanted_force(_gains(m.mode, m.level, p), m.integral, feedforward, error)
         slower = np.minimum(np.abs(u.speed), np.abs(u.odometer))  # a locked wheel has no electric brake
-        mode = next_mode(Situation(m.mode, level, wanted, error, u.acceleration_reference, slower, u.coupler_force, standing), p)
+        mode = next_mode(
+            Situation(m.mode, level, wanted, error, u.acceleration_reference, slower, u.coupler_force, standing), p
+        )
         limits = _limits(m, u, p, available)
         regulated = _regulate(m, mode, level, error, feedforward, limits, p)
         target = either(standing, 0.0, regulated.target)
@@ -199,9 +230,11 @@ class MdpeController(HybridSystem):
         built_up = built_up_after(m.built_up, asked, p.control_period, p.brake_build_up_time, p.brake_release_time)
         sanding = every(sliding, holds(np.abs(error) > p.sanding_error))
         integral = either(standing, 0.0, regulated.integral)
-        return vector(*_Memory(
-            effort, demand, integral, error, feedforward, target, mode, level, quiet, available, built_up, sanding
-        ))  # fmt: skip
+        return vector(
+            *_Memory(
+                effort, demand, integral, error, feedforward, target, mode, level, quiet, available, built_up, sanding
+            )
+        )
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """What was decided at the last control instant."""
@@ -235,9 +268,15 @@ def _available(m: _Memory, u: Any, p: Any, level: Array, sliding: Array) -> Arra
     degraded = holds(level > 1.5)
     recovery = p.control_period * either(degraded, p.recovery_degraded, p.recovery_nominal)
     return next_available_effort(
-        m.available, u.adhesion_force, sliding, every(degraded, holds(m.level < 1.5)), recovery,
-        margin=p.adhesion_margin, floor=p.smallest_effort, limit=np.maximum(p.effort_limit, p.electric_brake_limit),
-    )  # fmt: skip
+        m.available,
+        u.adhesion_force,
+        sliding,
+        every(degraded, holds(m.level < 1.5)),
+        recovery,
+        margin=p.adhesion_margin,
+        floor=p.smallest_effort,
+        limit=np.maximum(p.effort_limit, p.electric_brake_limit),
+    )
 
 
 def _limits(m: _Memory, u: Any, p: Any, available: Array) -> _Limits:
@@ -262,7 +301,7 @@ def _gains(mode: Array, level: Array, p: Any) -> RegulatorGains:
 
 def _regulate(
     m: _Memory, mode: Array, level: Array, error: Array, feedforward: Array, limits: _Limits, p: Any
-) -> _Regulated:  # fmt: skip
+) -> _Regulated:
     gains = _gains(mode, level, p)
     changed = some(holds(mode != m.mode), holds(level != m.level))
     # The new regulator starts from the force of the last instant; a step of the feedforward since then is kept.
@@ -279,7 +318,9 @@ def _range(m: _Memory, mode: Array, limits: _Limits, p: Any) -> tuple[Array, Arr
     more = np.where(limits.up < unloaded, np.maximum(m.effort + limits.up, 0.0), limits.traction)
     less = np.where(limits.down < unloaded, np.maximum(limits.down - m.effort, 0.0), limits.electric)
     traction, electric = np.minimum(limits.traction, more), np.minimum(limits.electric, less)
-    brake = np.where(mode == ELECTRIC, electric, np.where(mode == INDIRECT, p.full_brake_force, p.full_brake_force + electric))
+    brake = np.where(
+        mode == ELECTRIC, electric, np.where(mode == INDIRECT, p.full_brake_force, p.full_brake_force + electric)
+    )
     driving = holds(mode == TRACTION)
     return either(driving, 0.0, -brake), either(driving, traction, 0.0)
 

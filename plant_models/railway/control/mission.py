@@ -21,13 +21,14 @@ ARRIVED = 4.0
 
 
 class Mission(HybridSystem):
-    """Speed and acceleration reference: up with `acceleration`, hold `target_speed`, down with `deceleration` to the stop.
+    """Speed and acceleration reference: up with `acceleration`, hold `target_speed`, down with `deceleration` to the
+    stop.
 
-    With ``braking="time"`` the reference is the trapezoid whose area is `distance`. With ``braking="position"`` the brake begins
-    where the input `position`, measured or estimated, meets the braking curve ``v = sqrt(2 d (distance - s))``, and the
-    reference follows that curve: what was lost in slip is made up for before the stop. It falls to zero `stopping_tolerance`
-    before the stopping point, where the curve is at ``sqrt(2 d tolerance)`` (0.2 m/s): without that a train that stands a
-    millimetre short would be sent on.
+    With ``braking="time"`` the reference is the trapezoid whose area is `distance`. With ``braking="position"`` the
+    brake begins where the input `position`, measured or estimated, meets the braking curve
+    ``v = sqrt(2 d (distance - s))``, and the reference follows that curve: what was lost in slip is made up for before
+    the stop. It falls to zero `stopping_tolerance` before the stopping point, where the curve is at
+    ``sqrt(2 d tolerance)`` (0.2 m/s): without that a train that stands a millimetre short would be sent on.
 
     Where the distance is too short for the target speed, the train turns from acceleration to braking at once.
 
@@ -37,8 +38,8 @@ class Mission(HybridSystem):
     Raises:
         ValueError: an unknown option.
 
-    Presets: `sc1` (35 km/h, soft acceleration 0.35 m/s2; default), `sc2` and `sc3` (35 km/h, nominal 0.5 m/s2), `sc4` (50 km/h,
-    soft). All: 850 m, -0.4 m/s2.
+    Presets: `sc1` (35 km/h, soft acceleration 0.35 m/s2; default), `sc2` and `sc3` (35 km/h, nominal 0.5 m/s2), `sc4`
+    (50 km/h, soft). All: 850 m, -0.4 m/s2.
 
     Source: Bouchama 2024, section 4.5 and Table 4.4; the trapezoid, the curve and the tolerance are ours.
     """
@@ -51,7 +52,9 @@ class Mission(HybridSystem):
         output_signal("speed_reference", "m/s", "Speed to be driven", display_unit="km/h"),
         output_signal("acceleration_reference", "m/s2", "Acceleration to be driven"),
         output_signal("position_reference", "m", "Distance run by the reference in time"),
-        output_signal("phase", "1", "0 waiting, 1 accelerating, 2 holding, 3 braking, 4 arrived", variability="discrete"),
+        output_signal(
+            "phase", "1", "0 waiting, 1 accelerating, 2 holding, 3 braking, 4 arrived", variability="discrete"
+        ),
     )
     parameters = (
         parameter("target_speed", "m/s", _KMH_35, "Speed of the hold phase", min=0.1, display_unit="km/h"),
@@ -83,7 +86,9 @@ class Mission(HybridSystem):
         """References and phase."""
         elapsed = t - p.departure_time
         journey = Trapezoid(p.target_speed, p.acceleration, p.deceleration, p.distance)
-        values = _by_curve(elapsed, u.position - p.start_position, p) if self._by_position else _by_time(elapsed, journey)
+        values = (
+            _by_curve(elapsed, u.position - p.start_position, p) if self._by_position else _by_time(elapsed, journey)
+        )
         return {**values, "position_reference": journey.position(elapsed)}
 
 

@@ -20,7 +20,8 @@ class Situation(NamedTuple):
     """What the switch looks at.
 
     `mode` and `level`: mode until now, adhesion level now. `wanted`: force that the regulator of `mode` asks for [N].
-    `error`: reference minus speed [m/s]. `acceleration`: of the reference [m/s2]. `speed`: of train or wheel, the slower [m/s].
+    `error`: reference minus speed [m/s]. `acceleration`: of the reference [m/s2]. `speed`: of train or wheel, the
+    slower [m/s].
     `coupler_force`: tension > 0 [N]. `standing`: 1 where the train is to stand and does.
     """
 
@@ -34,7 +35,9 @@ class Situation(NamedTuple):
     standing: Array
 
 
-def next_level(level: Array, quiet_time: Array, condition: Array, period: Array, recovery_time: Array) -> tuple[Array, Array]:
+def next_level(
+    level: Array, quiet_time: Array, condition: Array, period: Array, recovery_time: Array
+) -> tuple[Array, Array]:
     """Adhesion level and the time [s] for which the condition has been nominal.
 
     Degraded at once, nominal again only after `recovery_time` [s] of nominal reports.
@@ -48,12 +51,15 @@ def next_level(level: Array, quiet_time: Array, condition: Array, period: Array,
 def next_mode(s: Situation, p: Any) -> Array:
     """Mode for the coming period.
 
-    1. Between traction and brake the sign of the wanted force decides, but only when the reference accelerates that way, or the
+    1. Between traction and brake the sign of the wanted force decides, but only when the reference accelerates that
+      way, or the
        error has left `error_band`; in between the train coasts.
-    2. A brake is electric until the reference decelerates by `service_deceleration`, the speed falls to where the electric
-       brake fades, the coupler is pressed beyond its soft limit, or the adhesion is degraded: then air is used, on all wheels
-       of the train, until the brake ends (an air brake is not released and applied again for small changes).
-    3. Air and electric brake are combined where the train runs faster than the reference by `combined_error`, or more is
+    2. A brake is electric until the reference decelerates by `service_deceleration`, the speed falls to where the
+      electric
+       brake fades, the coupler is pressed beyond its soft limit, or the adhesion is degraded: then air is used, on all
+       wheels of the train, until the brake ends (an air brake is not released and applied again for small changes).
+    3. Air and electric brake are combined where the train runs faster than the reference by `combined_error`, or more
+      is
        wanted than the air brake has; that ends at half the error and 80 % of the force.
     """
     braking = _brakes(s, p)
@@ -65,9 +71,13 @@ def next_mode(s: Situation, p: Any) -> Array:
 
 def _brakes(s: Situation, p: Any) -> Array:
     ends = every(
-        holds(s.wanted > 0.0), some(holds(s.acceleration > p.acceleration_band), holds(s.error > p.error_band)), 1.0 - s.standing
+        holds(s.wanted > 0.0),
+        some(holds(s.acceleration > p.acceleration_band), holds(s.error > p.error_band)),
+        1.0 - s.standing,
     )
-    begins = every(holds(s.wanted < 0.0), some(holds(s.acceleration < -p.acceleration_band), holds(s.error < -p.error_band)))
+    begins = every(
+        holds(s.wanted < 0.0), some(holds(s.acceleration < -p.acceleration_band), holds(s.error < -p.error_band))
+    )
     return either(holds(s.mode > 1.5), 1.0 - ends, some(begins, s.standing))
 
 

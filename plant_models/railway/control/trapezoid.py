@@ -1,4 +1,6 @@
-"""A journey in closed form: up with one acceleration, hold, down with another, over a given distance. Pure functions."""
+"""A journey in closed form: up with one acceleration, hold, down with another, over a given distance. Pure
+functions.
+"""
 
 from __future__ import annotations
 
@@ -58,5 +60,7 @@ class Trapezoid:
 
 
 def braking_curve(remaining: Array, deceleration: Array) -> Array:
-    """Speed from which a constant deceleration stops within the remaining distance, ``sqrt(2 d s)`` [m/s]; 0 beyond the point."""
+    """Speed from which a constant deceleration stops within the remaining distance, ``sqrt(2 d s)`` [m/s]; 0 beyond the
+    point.
+    """
     return np.sqrt(2.0 * deceleration * np.maximum(remaining, 0.0))

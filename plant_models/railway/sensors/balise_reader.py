@@ -31,7 +31,9 @@ _EXAMPLE = (100.0, 350.0, 600.0, 1100.0)  # an example, so that the file in the 
 
 
 class _Stretch(NamedTuple):
-    """A part of a step in which the train does not turn: bracket of s, positions at its ends [m], direction, balises in it."""
+    """A part of a step in which the train does not turn: bracket of s, positions at its ends [m], direction, balises in
+    it.
+    """
 
     low: Array
     high: Array
@@ -45,30 +47,32 @@ class BaliseReader(HybridSystem):
     """Finds the instants at which a train passes balises, inside a communication step, and announces them.
 
     At every communication point the reader takes `position` and `speed`. Between two of them the position is the cubic
-    Hermite polynomial of both; where it crosses a balise, forwards or backwards, is a passing. Its error is of order
-    ``h^4`` in the position, none at all under constant acceleration. A passing belongs to ``(before, after]``: a train that
-    stops on a balise has passed it, and has not passed it again when it moves on, or starts there.
+    Hermite polynomial of both; where it crosses a balise, forwards or backwards, is a crossing. Its error is of order
+    ``h^4`` in the position, none at all under constant acceleration. A crossing belongs to ``(before, after]``: a train
+    that stops on a balise has passed it, and has not passed it again when it moves on, or starts there.
 
-    One passing is announced in each communication step, the oldest first: `balise_count` goes up by one, `balise_time` is the
-    instant, `balise_position` the place. Wired to the inputs of the same names of an observer, that is the event protocol of
-    FMI 2. Others wait, up to `pending_capacity`; what is more is lost and counted in `lost_count`. The stamp makes a late
-    announcement exact: the observer replays.
+    One crossing is announced in each communication step, the oldest first: `balise_count` goes up by one, `balise_time`
+    is the instant, `balise_position` the place. Wired to the inputs of the same names of an observer, that is the event
+    protocol of FMI 2. Others wait, up to `pending_capacity`; what is more is lost and counted in `lost_count`. The
+    stamp makes a late announcement exact: the observer replays.
 
-    What the inputs mean depends on the master. `input_instant` = 1: they belong to the end of the step, as where a sequential
-    (Gauss-Seidel) master steps the plant first and hands its new outputs on before it steps the reader; passings lie in the
-    step just taken. `input_instant` = 0: they belong to the start of the step, as in a parallel (Jacobi) master; passings lie
-    in the step before, and are announced one step later with the same stamps. With the wrong value all stamps are off by one
-    step. At the start the inputs must hold the plant's start position and speed: by an exchange in initialisation mode, or by
-    start values; with 0 the first step brings them all the same. Steps may vary.
+    What the inputs mean depends on the master. `input_instant` = 1: they belong to the end of the step, as where a
+    sequential (Gauss-Seidel) master steps the plant first and hands its new outputs on before it steps the reader;
+    crossings lie in the step just taken. `input_instant` = 0: they belong to the start of the step, as in a parallel
+    (Jacobi) master; crossings lie in the step before, and are announced one step later with the same stamps. With the
+    wrong value all stamps are off by one step. At the start the inputs must hold the plant's start position and speed:
+    by an exchange in initialisation mode, or by start values; with 0 the first step brings them all the same. Steps may
+    vary.
 
-    Two balises at one place are refused where they are given as an option, and taken as one where parameters or the file say so.
+    Two balises at one place are refused where they are given as an option, and taken as one where parameters or the
+    file say so.
 
     Args:
         layout: ``spacing``: balises at equal distances; ``positions``: a list, which an FMU reads from its file
             ``resources/balises.csv`` (column ``position`` [m], increasing) if that is there.
         positions: start values of the list [m], increasing.
         balise_capacity: entries of the list.
-        pending_capacity: passings that can be found in one step, and that can wait.
+        pending_capacity: crossings that can be found in one step, and that can wait.
 
     Raises:
         ValueError: an unknown layout, a capacity below one, or a list of positions that is not one.
@@ -85,10 +89,12 @@ class BaliseReader(HybridSystem):
         input_signal("speed", "m/s", 0.0, "Speed of the train at the same instant", display_unit="km/h"),
     )
     outputs = (
-        output_signal("balise_count", "1", "Goes up by one with every balise announced", variability="discrete", integer=True),
+        output_signal(
+            "balise_count", "1", "Goes up by one with every balise announced", variability="discrete", integer=True
+        ),
         output_signal("balise_time", "s", "Instant at which the balise was passed", variability="discrete"),
         output_signal("balise_position", "m", "Position of the balise passed", variability="discrete"),
-        output_signal("lost_count", "1", "Passings that found no room", variability="discrete", integer=True),
+        output_signal("lost_count", "1", "Crossings that found no room", variability="discrete", integer=True),
     )
     events = (CommunicationEvent("reading", "Position and speed are taken"),)
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
@@ -98,19 +104,28 @@ class BaliseReader(HybridSystem):
     }
 
     def __init__(
-        self, *, layout: LayoutShape = "spacing", positions: Sequence[float] = _EXAMPLE, balise_capacity: int = 64,
+        self,
+        *,
+        layout: LayoutShape = "spacing",
+        positions: Sequence[float] = _EXAMPLE,
+        balise_capacity: int = 64,
         pending_capacity: int = 8,
-    ) -> None:  # fmt: skip
+    ) -> None:
         if layout not in self.option_choices["layout"]:
             raise ValueError(f"Unknown layout {layout!r}; choose one of: spacing, positions.")
         require_whole("balise_reader", pending_capacity=pending_capacity)
         self.pending_capacity = pending_capacity
-        self._layout: BaliseLayout = Spacing() if layout == "spacing" else Positions(balise_capacity, positions, pending_capacity)
+        self._layout: BaliseLayout = (
+            Spacing() if layout == "spacing" else Positions(balise_capacity, positions, pending_capacity)
+        )
         self.resources = (Resource("positions", "balises.csv", "position"),) if layout == "positions" else ()
         self.parameters = (_INPUT_INSTANT, *self._layout.parameters)
         self.states = (*_SAMPLE, *_announcements(pending_capacity))
         super().__init__(
-            layout=layout, positions=tuple(positions), balise_capacity=balise_capacity, pending_capacity=pending_capacity
+            layout=layout,
+            positions=tuple(positions),
+            balise_capacity=balise_capacity,
+            pending_capacity=pending_capacity,
         )
 
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
@@ -122,7 +137,7 @@ class BaliseReader(HybridSystem):
         # A second sample at one instant replaces the first: the train did not move in no time.
         cubic = HermiteCubic.of(h, np.where(h > 0.0, p0, u.position), v0, u.position, u.speed)
         stretches = self._stretches(cubic, u.position, p)
-        places, fractions = self._passings(cubic, stretches, p)
+        places, fractions = self._crossings(cubic, stretches, p)
         found = stretches[0].count + stretches[1].count
         stamps = [np.where(found > j, np.minimum(t0 + s * h, instant), 0.0) for j, s in enumerate(fractions)]
         places = [np.where(found > j, place, 0.0) for j, place in enumerate(places)]
@@ -144,8 +159,10 @@ class BaliseReader(HybridSystem):
             _Stretch(turn, 1.0, place, after, second, self._layout.count(place, after, second, p)),
         )
 
-    def _passings(self, cubic: HermiteCubic, stretches: tuple[_Stretch, _Stretch], p: Any) -> tuple[list[Array], list[Array]]:
-        """Places [m] and fractions of the step of the first passings; what lies beyond their number means nothing."""
+    def _crossings(
+        self, cubic: HermiteCubic, stretches: tuple[_Stretch, _Stretch], p: Any
+    ) -> tuple[list[Array], list[Array]]:
+        """Places [m] and fractions of the step of the first crossings; what lies beyond their number means nothing."""
         one, two = stretches
         places: list[Array] = []
         fractions: list[Array] = []
@@ -160,7 +177,7 @@ class BaliseReader(HybridSystem):
         return places, fractions
 
     def _announce(self, x: Array, found: Array, stamps: list[Array], places: list[Array]) -> list[Array]:
-        """Memory of the announcements after the passings found have joined the queue and its head has left it."""
+        """Memory of the announcements after the crossings found have joined the queue and its head has left it."""
         first, n = len(_SAMPLE), self.pending_capacity
         count, time, position, lost, waiting = (x[first + i] for i in range(5))
         times = _joined([x[first + 5 + i] for i in range(n)], waiting, stamps)
@@ -175,7 +192,11 @@ class BaliseReader(HybridSystem):
             lost + np.maximum(found - room, 0.0),
             waiting - np.where(some, 1.0, 0.0),
         )
-        queues = [np.where(some, queue[i + 1] if i + 1 < n else 0.0, queue[i]) for queue in (times, positions) for i in range(n)]
+        queues = [
+            np.where(some, queue[i + 1] if i + 1 < n else 0.0, queue[i])
+            for queue in (times, positions)
+            for i in range(n)
+        ]
         return [*head, *queues]
 
 
@@ -184,8 +205,8 @@ def _announcements(capacity: int) -> tuple[Any, ...]:
         memory("announced", "1", 0.0, "Balises announced so far"),
         memory("announced_time", "s", 0.0, "Instant of the last one announced"),
         memory("announced_position", "m", 0.0, "Position of the last one announced"),
-        memory("lost", "1", 0.0, "Passings that found no room"),
-        memory("waiting", "1", 0.0, "Passings that wait to be announced"),
+        memory("lost", "1", 0.0, "Crossings that found no room"),
+        memory("waiting", "1", 0.0, "Crossings that wait to be announced"),
         memory("waiting_time", "s", 0.0, "Instants of those that wait, oldest first", size=capacity),
         memory("waiting_position", "m", 0.0, "Positions of those that wait", size=capacity),
     )
@@ -200,9 +221,13 @@ _SAMPLE = (
 )
 
 _INPUT_INSTANT = parameter(
-    "input_instant", "1", 1.0, "Inputs at a step belong to its end (1, sequential master) or to its start (0, parallel master)",
-    min=0.0, max=1.0,
-)  # fmt: skip
+    "input_instant",
+    "1",
+    1.0,
+    "Inputs at a step belong to its end (1, sequential master) or to its start (0, parallel master)",
+    min=0.0,
+    max=1.0,
+)
 
 
 def _direction(before: Array, after: Array) -> Array:

@@ -15,20 +15,23 @@ from plant_models.hybrid.system import Array
 
 
 class Gps(HybridSystem):
-    """Fixes at the instants ``start + sample_offset + k * sample_period``: position plus drift plus white noise, held in between.
+    """Fixes at the instants ``start + sample_offset + k * sample_period``: position plus drift plus white noise, held
+    in between.
 
-    The drift is a first-order Gauss-Markov process, stationary from the first fix on: with ``a = exp(-T / drift_time)`` from fix
-    to fix ``d+ = a d + sqrt(1 - a^2) drift_std n``. The published accuracy of 0.5 m cannot be white noise: with that, no
-    observer of the thesis reaches its published speed errors (independently measured: 0.56 km/h against 0.15). So the preset
-    `half_metre` takes it as drift.
+    The drift is a first-order Gauss-Markov process, stationary from the first fix on: with ``a = exp(-T / drift_time)``
+    from fix to fix ``d+ = a d + sqrt(1 - a^2) drift_std n``. The published accuracy of 0.5 m cannot be white noise:
+    with that, no observer of the thesis reaches its published speed errors (independently measured: 0.56 km/h against
+    0.15). So the preset `half_metre` takes it as drift.
 
-    Fixes are announced like balises: `gps_count` goes up by one, `gps_time` is the instant, `gps_position` the place. Wired to
-    the inputs of the same names of an observer that is the event protocol of FMI 2; an observer with an event ``balise`` takes
-    them at ``balise_count``, ``balise_time``, ``balise_position``. No latency: the fix is known at its instant. Let
-    communication points fall on the fixes (`sample_period` a multiple of the step): between two points the position is a held
-    one, off by what the train moves meanwhile. In a step longer than `sample_period` only the last of its fixes is seen.
+    Fixes are announced like balises: `gps_count` goes up by one, `gps_time` is the instant, `gps_position` the place.
+    Wired to the inputs of the same names of an observer that is the event protocol of FMI 2; an observer with an event
+    ``balise`` takes them at ``balise_count``, ``balise_time``, ``balise_position``. No latency: the fix is known at its
+    instant. Let communication points fall on the fixes (`sample_period` a multiple of the step): between two points the
+    position is a held one, off by what the train moves meanwhile. In a step longer than `sample_period` only the last
+    of its fixes is seen.
 
-    Presets: `half_metre` (default): drift 0.5 m over 60 s and white noise 0.05 m; `ideal`: no error; `white`: white noise of
+    Presets: `half_metre` (default): drift 0.5 m over 60 s and white noise 0.05 m; `ideal`: no error; `white`: white
+    noise of
     0.5 m alone, the literal reading.
 
     Source: Bouchama 2024, section 4.1 (10 Hz, 0.5 m); drift time and the division into drift and noise are ours.
@@ -61,14 +64,18 @@ class Gps(HybridSystem):
     )
     events = (
         PeriodicEvent(
-            "fixing", "sample_period", "sample_offset",
+            "fixing",
+            "sample_period",
+            "sample_offset",
             noises=(
                 input_signal("drift_noise", "1", 0.0, "Standard normal number of the drift", variability="discrete"),
-                input_signal("white_noise", "1", 0.0, "Standard normal number of the white noise", variability="discrete"),
+                input_signal(
+                    "white_noise", "1", 0.0, "Standard normal number of the white noise", variability="discrete"
+                ),
             ),
             description="A fix is taken",
         ),
-    )  # fmt: skip
+    )
     presets: Mapping[str, Mapping[str, Any]] = {
         "half_metre": {},
         "ideal": {"drift_std": 0.0, "white_std": 0.0},

@@ -53,12 +53,12 @@ class HermiteCubic(NamedTuple):
         """Where the position reaches a target: s in ``[low, high]``.
 
         Bisection first, then steps to the zero of the parabola that touches the cubic (Cauchy's method), clipped to the
-        bracket that shrinks with them. Newton's tangents would need 25 steps where a train comes to rest on the target, a
-        double zero; the parabola has it at once, and everything under constant acceleration.
+        bracket that shrinks with them. Newton's tangents would need 25 steps where a train comes to rest on the target,
+        a double zero; the parabola has it at once, and everything under constant acceleration.
 
         Args:
-            target: position [m], reached between the ends of the bracket. direction: 1 where it is reached upwards, -1 downwards.
-            low, high: the bracket.
+            target: position [m], reached between the ends of the bracket. direction: 1 where it is reached upwards, -1
+            downwards. low, high: the bracket.
         """
         distance = target - self.p0
         s = 0.5 * (low + high)

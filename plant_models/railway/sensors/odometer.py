@@ -26,14 +26,14 @@ from plant_models.hybrid.system import Array
 class Odometer(HybridSystem):
     """Reading of the wheel speed at the instants ``start + sample_offset + k * sample_period``, held in between.
 
-    Without noise and teeth the reading is exactly `wheel_speed` at the instant. With `teeth` pulses a revolution it is the number
-    of pulses counted since the last instant, times the length of a pulse, over the period; the first reading, which has no window
-    behind it, is that of a wheel that had turned steadily. `noise_std` times a standard normal number, drawn afresh at every
-    instant, is added to it: the disturbance ``d`` of (3.16).
+    Without noise and teeth the reading is exactly `wheel_speed` at the instant. With `teeth` pulses a revolution it is
+    the number of pulses counted since the last instant, times the length of a pulse, over the period; the first
+    reading, which has no window behind it, is that of a wheel that had turned steadily. `noise_std` times a standard
+    normal number, drawn afresh at every instant, is added to it: the disturbance ``d`` of (3.16).
 
-    One pulse in one period is a speed of ``2 pi r / (teeth sample_period)``: 0.36 m/s for 100 teeth at 10 Hz, ten times that
-    at 100 Hz. The input is held between communication points, so the counted distance is the sum of wheel speed times
-    communication step. In slip, reading and distance are those of the wheel, not of the train.
+    One pulse in one period is a speed of ``2 pi r / (teeth sample_period)``: 0.36 m/s for 100 teeth at 10 Hz, ten times
+    that at 100 Hz. The input is held between communication points, so the counted distance is the sum of wheel speed
+    times communication step. In slip, reading and distance are those of the wheel, not of the train.
 
     Presets: `ideal` (default), `10_hz` (the sampled odometer of (3.50)), `pulses` (100 teeth at 10 Hz).
 
@@ -52,7 +52,9 @@ class Odometer(HybridSystem):
     )
     inputs = (input_signal("wheel_speed", "m/s", 0.0, "Circumferential speed of the wheel", display_unit="km/h"),)
     outputs = (
-        output_signal("reading", "m/s", "Odometer speed, held between instants", variability="discrete", display_unit="km/h"),
+        output_signal(
+            "reading", "m/s", "Odometer speed, held between instants", variability="discrete", display_unit="km/h"
+        ),
         output_signal("distance", "m", "Odometer distance since the start, in whole pulses where there are teeth"),
     )
     parameters = (
@@ -64,11 +66,17 @@ class Odometer(HybridSystem):
     )
     events = (
         PeriodicEvent(
-            "sampling", "sample_period", "sample_offset",
-            noises=(input_signal("reading_noise", "1", 0.0, "Standard normal number of this reading", variability="discrete"),),
+            "sampling",
+            "sample_period",
+            "sample_offset",
+            noises=(
+                input_signal(
+                    "reading_noise", "1", 0.0, "Standard normal number of this reading", variability="discrete"
+                ),
+            ),
             description="The odometer is read",
         ),
-    )  # fmt: skip
+    )
     presets: Mapping[str, Mapping[str, Any]] = {
         "ideal": {},
         "10_hz": {"sample_period": 0.1},
@@ -99,5 +107,7 @@ class Odometer(HybridSystem):
 
 
 def _pulse_length(p: Any) -> Array:
-    """Rim distance of one pulse [m]; of a whole revolution where there are no teeth, so that nothing divides by zero."""
+    """Rim distance of one pulse [m]; of a whole revolution where there are no teeth, so that nothing divides by
+    zero.
+    """
     return 2.0 * np.pi * p.wheel_radius / np.maximum(p.teeth, 1.0)

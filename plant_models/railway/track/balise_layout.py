@@ -20,8 +20,8 @@ UNUSED = 1e30  # [m]; a balise that is not laid lies beyond the end of any track
 
 
 class BaliseLayout(Protocol):
-    """Balises along the track. A direction is 1 (increasing position) or -1; a stretch contains its end and not its start, so
-    that a train that stands on a balise has passed it once.
+    """Balises along the track. A direction is 1 (increasing position) or -1; a stretch contains its end and not its
+    start, so that a train that stands on a balise has passed it once.
 
     Attributes:
         parameters: what the layout needs of the plant's parameters.
@@ -33,11 +33,15 @@ class BaliseLayout(Protocol):
         """Number of balises passed from one position to another [m] in a direction."""
 
     def next(self, position: Array, direction: Array, p: Any) -> Array:
-        """Position of the first balise beyond a position [m] in a direction; `UNUSED` or more, by magnitude, where none is."""
+        """Position of the first balise beyond a position [m] in a direction; `UNUSED` or more, by magnitude, where none
+        is.
+        """
 
 
 class Spacing:
-    """Balises at ``first_balise + k * balise_spacing``, k = 0 ... ``balise_total - 1``; none if the spacing is not positive."""
+    """Balises at ``first_balise + k * balise_spacing``, k = 0 ... ``balise_total - 1``; none if the spacing is not
+    positive.
+    """
 
     parameters: tuple[Signal, ...] = (
         parameter("first_balise", "m", 100.0, "Position of the first balise"),
@@ -58,7 +62,9 @@ class Spacing:
 
     @staticmethod
     def _up_to(position: Array, p: Any) -> Array:
-        """Number of balises at or before a position. The quotient may be off by one through rounding; the places decide."""
+        """Number of balises at or before a position. The quotient may be off by one through rounding; the places
+        decide.
+        """
         k = np.floor((position - p.first_balise) / _spacing(p)) + 1.0
         k = k + np.where(_place(k, p) <= position, 1.0, 0.0)
         k = k - np.where(_place(k - 1.0, p) > position, 1.0, 0.0)
@@ -81,7 +87,8 @@ class Positions:
     Args:
         size: number of entries.
         positions: start values [m], no more than `size`.
-        told_apart: number of passings in a stretch up to which entries at one place are recognised; beyond it each one counts.
+        told_apart: number of crossings in a stretch up to which entries at one place are recognised; beyond it each one
+        counts.
 
     Raises:
         ValueError: there are too many positions, one is not finite, or they do not increase.
@@ -91,7 +98,9 @@ class Positions:
         require_whole("balise_reader", balise_capacity=size)
         places = _places(positions)
         if len(places) > size:
-            raise ValueError(f"balise_reader: {len(places)} positions were given, but balise_capacity is {size}; raise it.")
+            raise ValueError(
+                f"balise_reader: {len(places)} positions were given, but balise_capacity is {size}; raise it."
+            )
         if any(not isfinite(place) for place in places):
             raise ValueError("balise_reader: a balise position is not a finite number.")
         wrong = [i for i, (earlier, later) in enumerate(pairwise(places), start=1) if later <= earlier]

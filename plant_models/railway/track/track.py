@@ -19,17 +19,18 @@ ZoneAxis = Literal["time", "position"]
 GradientShape = Literal["constant", "linear"]
 
 UNUSED_POSITION = 1e9  # [m]; a gradient point that is not laid lies beyond the end of any track
-# Traction [10, 20] s and braking [70, 80] s are printed; the zone in the hold phase comes without times, [40, 50] s is ours.
+# Traction [10, 20] s and braking [70, 80] s are printed; the zone in the hold phase comes without times, [40, 50] s is
+# ours.
 PUBLISHED_ZONES = ((10.0, 20.0), (40.0, 50.0), (70.0, 80.0))
 
 
 class Track:
     """Adhesion zones by time or by position, and a gradient by position.
 
-    A zone is the half-open interval ``[zone_from, zone_to)``; one that is not used has both ends at 0. Its edges are switching
-    functions of the plant, so that they are passed exactly. The gradient is the sine of the slope
-    angle, positive uphill; before its first point and after its last it stays at their values. By default only the first
-    point is on the track, so setting ``gradient[1]`` alone tilts the whole of it.
+    A zone is the half-open interval ``[zone_from, zone_to)``; one that is not used has both ends at 0. Its edges are
+    switching functions of the plant, so that they are passed exactly. The gradient is the sine of the slope
+    angle, positive uphill; before its first point and after its last it stays at their values. By default only the
+    first point is on the track, so setting ``gradient[1]`` alone tilts the whole of it.
 
     Args:
         zones: what the zones are laid along, ``time`` or ``position``.
@@ -47,9 +48,12 @@ class Track:
     """
 
     def __init__(
-        self, zones: ZoneAxis = "time", zone_count: int = 3,
-        gradient_shape: GradientShape = "constant", gradient_count: int = 4,
-    ) -> None:  # fmt: skip
+        self,
+        zones: ZoneAxis = "time",
+        zone_count: int = 3,
+        gradient_shape: GradientShape = "constant",
+        gradient_count: int = 4,
+    ) -> None:
         _check("zones", zones, ("time", "position"))
         _check("gradient_shape", gradient_shape, ("constant", "linear"))
         require_whole("Track", zone_count=zone_count, gradient_count=gradient_count)
@@ -86,11 +90,16 @@ class Track:
         used = [np.where(starts[i] == 0.0, np.where(ends[i] == 0.0, 0.0, 1.0), 1.0) for i in zones]
         needed: dict[str, Array] = {}
         for i in zones:
-            text = f"zone {i + 1} has no length: zone_to[{i + 1}] must lie behind zone_from[{i + 1}]; if unused, both are 0"
+            text = (
+                f"zone {i + 1} has no length: zone_to[{i + 1}] must lie behind zone_from[{i + 1}]; if unused, both "
+                f"are 0"
+            )
             needed[text] = np.where(ends[i] > starts[i], 1.0, 1.0 - used[i])
         for i in zones[1:]:
             text = f"zone {i + 1} overlaps one before it in the list: move zone_from[{i + 1}] or zone_to[{i + 1}]"
-            overlaps = [np.where(starts[i] < ends[j], np.where(starts[j] < ends[i], used[j], 0.0), 0.0) for j in zones[:i]]
+            overlaps = [
+                np.where(starts[i] < ends[j], np.where(starts[j] < ends[i], used[j], 0.0), 0.0) for j in zones[:i]
+            ]
             needed[text] = 1.0 - used[i] * np.where(sum(overlaps) > 0.0, 1.0, 0.0)
         return needed
 
@@ -110,9 +119,17 @@ def _parameters(zones: ZoneAxis, zone_count: int, gradient_count: int) -> tuple[
     return (
         parameter("zone_from", unit, starts, "Start of each zone of degraded adhesion", size=zone_count),
         parameter("zone_to", unit, stops, "End of each zone of degraded adhesion", size=zone_count),
-        parameter("gradient_position", "m", positions, "Positions of the gradient points, ascending", size=gradient_count),
         parameter(
-            "gradient", "1", 0.0, "Sine of the slope angle at each point, uphill positive", min=-1.0, max=1.0, size=gradient_count
+            "gradient_position", "m", positions, "Positions of the gradient points, ascending", size=gradient_count
+        ),
+        parameter(
+            "gradient",
+            "1",
+            0.0,
+            "Sine of the slope angle at each point, uphill positive",
+            min=-1.0,
+            max=1.0,
+            size=gradient_count,
         ),
     )
 

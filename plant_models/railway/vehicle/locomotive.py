@@ -23,20 +23,22 @@ _TABLE_4_1 = {"mass": 166e3, "davis_b": 32.4, "davis_c": 1.6529}
 class Locomotive(HybridSystem):
     """Train as one mass on one wheel: ``J dw = r F - r F_ad(lam)``, ``dp = v``, ``M dv = F_ad - F_r(v) - F_g(p)``.
 
-    The adhesion force is ``F_ad = mu(lam) M g`` with the slip ``lam = (r w - v) / max(|v|, slip_floor)``; the floor keeps
-    the slip finite at standstill. ``J`` is ``n_axles * wheel_inertia``: the thesis prints one wheel's inertia and does not
-    say whether it stands for all axles, so ``n_axles`` is 1 as printed, and 4 in a preset of its own.
+    The adhesion force is ``F_ad = mu(lam) M g`` with the slip ``lam = (r w - v) / max(|v|, slip_floor)``; the floor
+    keeps the slip finite at standstill. ``J`` is ``n_axles * wheel_inertia``: the thesis prints one wheel's inertia and
+    does not say whether it stands for all axles, so ``n_axles`` is 1 as printed, and 4 in a preset of its own.
 
     Everything that resists is resolved as such and cannot drive:
 
-    - A negative `effort` is a brake: dry friction ``r |F| / J`` on the wheel. It can lock the wheel, never turn it backwards.
+    - A negative `effort` is a brake: dry friction ``r |F| / J`` on the wheel. It can lock the wheel, never turn it
+      backwards.
     - The constant Davis term is dry friction ``a / M`` on the train. It can stop the train, never push it.
-    - While a braked wheel stands, the contact holds the train like dry friction, up to the smaller of brake and adhesion
-      limit. A creep curve alone is a damper at standstill and would let a parked train crawl down a gradient. The hold
-      fades between half and full slip: a sliding wheel has the friction of the curve.
+    - While a braked wheel stands, the contact holds the train like dry friction, up to the smaller of brake and
+      adhesion limit. A creep curve alone is a damper at standstill and would let a parked train crawl down a gradient.
+      The hold fades between half and full slip: a sliding wheel has the friction of the curve.
 
     So a train under its brake stops in finite time and stays; without brake it stays where the gradient pulls less than
-    ``davis_a``, and rolls otherwise, backwards too. Traction acts in one direction, `effort` > 0 along increasing position.
+    ``davis_a``, and rolls otherwise, backwards too. Traction acts in one direction, `effort` > 0 along increasing
+    position.
 
     Args:
         adhesion: ``burckhardt`` (3.12) or ``polach`` (3.4)-(3.10).
@@ -48,10 +50,11 @@ class Locomotive(HybridSystem):
     Raises:
         ValueError: an unknown option, or a count below one.
 
-    Presets: `chapter_3` (default), `chapter_3_four_axles`, `table_4_1` (the thesis applies the adhesion of the whole 166 t
-    train, although only its 90 t locomotive is motored), `table_4_1_motored_axles` (adhesion of the 90 t only).
+    Presets: `chapter_3` (default), `chapter_3_four_axles`, `table_4_1` (the thesis applies the adhesion of the whole
+    166 t train, although only its 90 t locomotive is motored), `table_4_1_motored_axles` (adhesion of the 90 t only).
 
-    Source: Bouchama 2024, (3.1)-(3.3), (3.11)-(3.15), Table 4.1; the set-valued friction, the hold and the floor are ours.
+    Source: Bouchama 2024, (3.1)-(3.3), (3.11)-(3.15), Table 4.1; the set-valued friction, the hold and the floor are
+    ours.
     """
 
     name = "locomotive"
@@ -62,7 +65,9 @@ class Locomotive(HybridSystem):
     states = (
         state("train_position", "m", 0.0, "Position of the train at start"),
         state("train_speed", "m/s", 0.0, "Speed of the train at start"),
-        state("wheel_rate", "rad/s", 0.0, "Angular speed of the wheel at start; speed / wheel_radius for a rolling wheel"),
+        state(
+            "wheel_rate", "rad/s", 0.0, "Angular speed of the wheel at start; speed / wheel_radius for a rolling wheel"
+        ),
     )
     frictions = ("train_speed", "wheel_rate")
     inputs = (input_signal("effort", "N", 0.0, "Effort at the wheel rim: traction > 0, brake < 0"),)
@@ -93,9 +98,14 @@ class Locomotive(HybridSystem):
     }
 
     def __init__(
-        self, *, adhesion: Literal["burckhardt", "polach"] = "burckhardt", zones: ZoneAxis = "time", zone_count: int = 3,
-        gradient_shape: GradientShape = "constant", gradient_count: int = 4,
-    ) -> None:  # fmt: skip
+        self,
+        *,
+        adhesion: Literal["burckhardt", "polach"] = "burckhardt",
+        zones: ZoneAxis = "time",
+        zone_count: int = 3,
+        gradient_shape: GradientShape = "constant",
+        gradient_count: int = 4,
+    ) -> None:
         if adhesion not in ADHESION_LAWS:
             raise ValueError(f"Unknown adhesion {adhesion!r}; choose one of: {', '.join(ADHESION_LAWS)}.")
         self._law = ADHESION_LAWS[adhesion]()
@@ -103,7 +113,11 @@ class Locomotive(HybridSystem):
         self.switchings = self._track.edges
         self.parameters = (*_VEHICLE, *self._law.parameters, *self._track.parameters)
         super().__init__(
-            adhesion=adhesion, zones=zones, zone_count=zone_count, gradient_shape=gradient_shape, gradient_count=gradient_count
+            adhesion=adhesion,
+            zones=zones,
+            zone_count=zone_count,
+            gradient_shape=gradient_shape,
+            gradient_count=gradient_count,
         )
 
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:

@@ -16,28 +16,39 @@ from plant_models.hybrid.system import Array
 BAR = 1e5  # [Pa]
 
 BRAKE_PARAMETERS: tuple[Signal, ...] = (
-    parameter("pipe_pressure_released", "Pa", 5.0 * BAR, "Brake pipe with released brakes", min=0.0, display_unit="bar"),
-    parameter("pipe_depression_full", "Pa", 1.5 * BAR, "Depression of the full service brake", min=1.0, display_unit="bar"),
+    parameter(
+        "pipe_pressure_released", "Pa", 5.0 * BAR, "Brake pipe with released brakes", min=0.0, display_unit="bar"
+    ),
+    parameter(
+        "pipe_depression_full", "Pa", 1.5 * BAR, "Depression of the full service brake", min=1.0, display_unit="bar"
+    ),
     parameter("cylinder_pressure_full", "Pa", 3.5 * BAR, "Brake cylinder at full service", min=1.0, display_unit="bar"),
     parameter("cylinder_pressure_idle", "Pa", 0.3 * BAR, "Taken up by the return spring", min=0.0, display_unit="bar"),
     parameter("filling_time", "s", 1.3, "Time constant of a filling cylinder; 95 % after three of them", min=1e-3),
     parameter("venting_time", "s", 8.0, "Time constant of a venting cylinder", min=1e-3),
     parameter("brake_ratio", "m/s2", 1.0, "Brake force on a braked mass under the full service brake", min=0.0),
-    parameter("brake_sample_period", "s", 0.01, "Time between two readings of the demand; the wave takes delay_samples of them "
-              "from vehicle to vehicle", min=1e-6),
-)  # fmt: skip
+    parameter(
+        "brake_sample_period",
+        "s",
+        0.01,
+        "Time between two readings of the demand; the wave takes delay_samples of them from vehicle to vehicle",
+        min=1e-6,
+    ),
+)
 
 
 def filling(cylinder: Array, pipe: Array, p: Any) -> Array:
     """Derivative of a cylinder's pressure [Pa/s], a lag of first order behind what the distributor asks for.
 
-    The distributor asks for `cylinder_pressure_full` at a depression of `pipe_depression_full`, and proportionally for less.
+    The distributor asks for `cylinder_pressure_full` at a depression of `pipe_depression_full`, and proportionally for
+    less.
 
     Args:
-        cylinder: pressure in the cylinder [Pa]. pipe: pressure in the pipe at the vehicle [Pa]. p: with `BRAKE_PARAMETERS`.
+        cylinder: pressure in the cylinder [Pa]. pipe: pressure in the pipe at the vehicle [Pa]. p: with
+        `BRAKE_PARAMETERS`.
 
-    Source: limits Bouchama 2024, section 4.1; the time constants are ours: 95 % after 4 s, empty but for 0.4 bar after 17 s,
-    inside the 3-5 s and 15-20 s that the passenger setting of the UIC brake allows.
+    Source: limits Bouchama 2024, section 4.1; the time constants are ours: 95 % after 4 s, empty but for 0.4 bar after
+    17 s, inside the 3-5 s and 15-20 s that the passenger setting of the UIC brake allows.
     """
     asked = np.clip((p.pipe_pressure_released - pipe) / p.pipe_depression_full, 0.0, 1.0) * p.cylinder_pressure_full
     return (asked - cylinder) / np.where(asked > cylinder, p.filling_time, p.venting_time)
@@ -46,9 +57,10 @@ def filling(cylinder: Array, pipe: Array, p: Any) -> Array:
 def brake_force(cylinder: Array, braked_mass: Array, p: Any) -> Array:
     """Braking force at the rims of a vehicle [N], zero or positive; dry friction against the motion.
 
-    ``braked_mass * brake_ratio`` at full cylinder pressure, proportional to the pressure above `cylinder_pressure_idle`.
-    The braked mass is what the vehicle carries on its side; that 1 kg of it stands for 1 N at full service, 0.31 N per bar
-    above idle, is ours: a train of 100 % braked mass then slows down by 1 m/s2, the size of what such trains reach.
+    ``braked_mass * brake_ratio`` at full cylinder pressure, proportional to the pressure above
+    `cylinder_pressure_idle`. The braked mass is what the vehicle carries on its side; that 1 kg of it stands for 1 N at
+    full service, 0.31 N per bar above idle, is ours: a train of 100 % braked mass then slows down by 1 m/s2, the size
+    of what such trains reach.
 
     Args:
         cylinder: pressure in the cylinder [Pa]. braked_mass: [kg]. p: with `BRAKE_PARAMETERS`.
@@ -60,17 +72,19 @@ def brake_force(cylinder: Array, braked_mass: Array, p: Any) -> Array:
 class BrakePipe:
     """The delay of the brake pipe: the first vehicle feels the demand at once, vehicle i ``(i - 1) tau`` later.
 
-    A shift register of readings, one every `brake_sample_period`, with ``delay_samples`` places from vehicle to vehicle:
-    ``tau = delay_samples * brake_sample_period``. A reading is the mean demand of the period that ends with it, so it holds what
-    acted in that period, whether the input changes just before or just after the instant of reading: co-simulation changes it
-    after, an importer of model exchange before. For a demand that changes at these instants, as that of a controller with this
-    period or a multiple of it, the delay is exact, since they are hit exactly inside steps. A change within a period reaches
-    the vehicles behind as the mean of that period.
+    A shift register of readings, one every `brake_sample_period`, with ``delay_samples`` places from vehicle to
+    vehicle:
+    ``tau = delay_samples * brake_sample_period``. A reading is the mean demand of the period that ends with it, so it
+    holds what acted in that period, whether the input changes just before or just after the instant of reading:
+    co-simulation changes it after, an importer of model exchange before. For a demand that changes at these instants,
+    as that of a controller with this period or a multiple of it, the delay is exact, since they are hit exactly inside
+    steps. A change within a period reaches the vehicles behind as the mean of that period.
 
     Args:
         vehicles: number of vehicles. delay_samples: readings from vehicle to vehicle, one at least.
 
-    Source: the delay ``F_b(t - (i-1) tau)`` of Bouchama 2024, (4.3)-(4.5); tau is not printed. By default it is 5 times 10 ms,
+    Source: the delay ``F_b(t - (i-1) tau)`` of Bouchama 2024, (4.3)-(4.5); tau is not printed. By default it is 5 times
+    10 ms,
     ours: 281 m/s over 14.06 m, the speed of the wave with modern distributors.
     """
 

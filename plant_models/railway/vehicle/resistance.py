@@ -51,20 +51,27 @@ class DavisCoefficients:
 
 
 def davis_from_vehicle(
-    mass: float, axle_mass: float, cross_section: float, perimeter: float, length: float, *,
-    gamma: float = 1.5, k1: float = 9e-4, k2: float = 30e-6,
-) -> DavisCoefficients:  # fmt: skip
+    mass: float,
+    axle_mass: float,
+    cross_section: float,
+    perimeter: float,
+    length: float,
+    *,
+    gamma: float = 1.5,
+    k1: float = 9e-4,
+    k2: float = 30e-6,
+) -> DavisCoefficients:
     """Davis coefficients from the dimensions of a vehicle.
 
-    ``a = 1e-5 gamma M sqrt(1e4 / m)``, ``b = 3.6e-7 M``, ``c = 0.1296 (k1 S + k2 P L)``. The thesis does not name the units
-    of the result: they are kN, kN.s/m and kN.s2/m2 (independently derived); this function returns newtons.
+    ``a = 1e-5 gamma M sqrt(1e4 / m)``, ``b = 3.6e-7 M``, ``c = 0.1296 (k1 S + k2 P L)``. The thesis does not name the
+    units of the result: they are kN, kN.s/m and kN.s2/m2 (independently derived); this function returns newtons.
 
     Args:
         mass: mass of the vehicle M [kg].
         axle_mass: mass on one axle m [kg].
         cross_section: frontal area S [m2].
-        perimeter: partial perimeter down to the rail P [m]. The 2.857 m tabulated for the BB27000 is its width; it is the value
-            that gives the tabulated coefficients.
+        perimeter: partial perimeter down to the rail P [m]. The 2.857 m tabulated for the BB27000 is its width; it is
+            the value that gives the tabulated coefficients.
         length: length of the vehicle L [m].
         gamma: quality of the bearings and the track, 0.9 to 1.5 [1].
         k1: front and rear shape, 9e-4 (high-speed) to 20e-4 (conventional).

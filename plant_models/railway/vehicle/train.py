@@ -1,6 +1,7 @@
 """The multi-vehicle train: a locomotive on its wheelsets, wagons on couplers, a brake pipe through all of them.
 
-Declares the hybrid system and puts its forces together; wheelset, coupler, brake, resistance and track come from their own files.
+Declares the hybrid system and puts its forces together; wheelset, coupler, brake, resistance and track come from their
+own files.
 """
 
 from __future__ import annotations
@@ -24,25 +25,29 @@ ONE_WHEEL = 225.0  # [kg.m2], the inertia printed in Table 4.2
 
 
 class Train(HybridSystem):
-    """One locomotive and n wagons: ``J dw_k = r F_k - r F_ad,k``, ``M_i dv_i = F_ad - F_r,i - F_b,i - F_g,i + Fc_{i-1} - Fc_i``.
+    """One locomotive and n wagons: ``J dw_k = r F_k - r F_ad,k``,
+    ``M_i dv_i = F_ad - F_r,i - F_b,i - F_g,i + Fc_{i-1} - Fc_i``.
 
-    Vehicle 1 is the locomotive, vehicle ``i + 1`` wagon i. The states are the position of the locomotive's front, the speeds of
-    all vehicles, the elongations ``e_i = p_i - p_{i+1}`` of the couplers beyond their neutral places (so vehicle lengths do not
-    appear in them), the rates of the locomotive's wheelsets and the pressures in the brake cylinders.
+    Vehicle 1 is the locomotive, vehicle ``i + 1`` wagon i. The states are the position of the locomotive's front, the
+    speeds of all vehicles, the elongations ``e_i = p_i - p_{i+1}`` of the couplers beyond their neutral places (so
+    vehicle lengths do not appear in them), the rates of the locomotive's wheelsets and the pressures in the brake
+    cylinders.
 
-    **Locomotive.** Each of its axles carries the same share of its weight and has its own wheelset and adhesion; wagons roll
-    without slip. `effort` is the sum over the axles and shared equally, or one value per axle. A negative effort is the electric
-    brake. `brake_demand` is the indirect brake of the whole train, the locomotive's too; both may act at once. Axle k passes a
-    zone at ``position - axle_position[k]``, and finds there ``axle_degraded[k]`` of the degradation: below 1 for axles whose
-    rail those before them have cleaned. The odometer's `wheel_speed` is that of the first axle, the one on the worst rail.
+    **Locomotive.** Each of its axles carries the same share of its weight and has its own wheelset and adhesion; wagons
+    roll without slip. `effort` is the sum over the axles and shared equally, or one value per axle. A negative effort
+    is the electric brake. `brake_demand` is the indirect brake of the whole train, the locomotive's too; both may act
+    at once. Axle k passes a zone at ``position - axle_position[k]``, and finds there ``axle_degraded[k]`` of the
+    degradation: below 1 for axles whose rail those before them have cleaned. The odometer's `wheel_speed` is that of
+    the first axle, the one on the worst rail.
 
-    **Wheel inertia.** The thesis prints one wheel's J = 225 kg.m2 and one rotating mass. Here every axle has 225, which makes
+    **Wheel inertia.** The thesis prints one wheel's J = 225 kg.m2 and one rotating mass. Here every axle has 225, which
+    makes
     3.0 % of the locomotive's mass, a usual figure; `table_4_2_one_axle` has 225 in all, 0.76 %.
 
-    **Wagon brakes.** `brake_demand` 0 .. 1 is the depression in the brake pipe over that of the full service brake. It runs
-    down the pipe as a wave, `BrakePipe`; each vehicle's cylinder fills, `filling`; the shoes are dry friction, `brake_force`.
-    What is dry friction (brakes, the constant Davis terms, the hold of standing braked wheels) can stop a vehicle and
-    hold it, never push it.
+    **Wagon brakes.** `brake_demand` 0 .. 1 is the depression in the brake pipe over that of the full service brake. It
+    runs down the pipe as a wave, `BrakePipe`; each vehicle's cylinder fills, `filling`; the shoes are dry friction,
+    `brake_force`. What is dry friction (brakes, the constant Davis terms, the hold of standing braked wheels) can stop
+    a vehicle and hold it, never push it.
 
     **Track.** The gradient acts on each vehicle at its middle, the lengths of those before it behind the front. Zones
     lie along the track by default; by time they reach all axles at once.
@@ -61,11 +66,12 @@ class Train(HybridSystem):
     Raises:
         ValueError: an unknown option, or a number out of its range.
 
-    Presets: `table_4_2` (default; damping sign repaired), `table_4_2_one_axle` (total wheel inertia as printed), `as_published`
-    (printed damping sign of (4.6): every coupler mode grows, to 400 m/s between vehicles after 3 s).
+    Presets: `table_4_2` (default; damping sign repaired), `table_4_2_one_axle` (total wheel inertia as printed),
+    `as_published` (printed damping sign of (4.6): every coupler mode grows, to 400 m/s between vehicles after 3 s).
 
-    Source: Bouchama 2024, (4.1)-(4.6), Table 4.2, section 4.1. Ours: adhesion on the locomotive's own weight (the thesis does
-    not say), brake force, brake delay, cylinder times, axle positions, set-valued friction, free play and pre-load.
+    Source: Bouchama 2024, (4.1)-(4.6), Table 4.2, section 4.1. Ours: adhesion on the locomotive's own weight (the
+    thesis does not say), brake force, brake delay, cylinder times, axle positions, set-valued friction, free play and
+    pre-load.
     """
 
     name = "train"
@@ -73,7 +79,8 @@ class Train(HybridSystem):
     source = "Bouchama 2024, (4.1)-(4.6), Table 4.2 and section 4.1"
     method = "rosenbrock"  # the wheels' time constants are far below the step near standstill
     stiff = ("train_speed", "wagon_velocity", "axle_rate")  # with all momenta among them; the couplers are slow: 3.4 Hz
-    internal_step = 1e-3  # to 4e-6 m/s in smooth motion, 5e-4 where a vehicle starts or stops, 2e-3 at the knocks of free play
+    # to 4e-6 m/s in smooth motion, 5e-4 where a vehicle starts or stops, 2e-3 at the knocks of free play
+    internal_step = 1e-3
     presets: Mapping[str, Mapping[str, Any]] = {}
     default_preset = "table_4_2"
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
@@ -89,18 +96,29 @@ class Train(HybridSystem):
     }
 
     def __init__(
-        self, *, wagons: int = 4, axles: Literal[1, 4] = 4, effort_per_axle: bool = False,
-        adhesion: Literal["burckhardt", "polach"] = "burckhardt", zones: ZoneAxis = "position", zone_count: int = 3,
-        gradient_shape: GradientShape = "constant", gradient_count: int = 4, delay_samples: int = 5,
-    ) -> None:  # fmt: skip
+        self,
+        *,
+        wagons: int = 4,
+        axles: Literal[1, 4] = 4,
+        effort_per_axle: bool = False,
+        adhesion: Literal["burckhardt", "polach"] = "burckhardt",
+        zones: ZoneAxis = "position",
+        zone_count: int = 3,
+        gradient_shape: GradientShape = "constant",
+        gradient_count: int = 4,
+        delay_samples: int = 5,
+    ) -> None:
         _check(wagons, axles, effort_per_axle, adhesion, delay_samples)
         self.wagons, self.axles, self.effort_per_axle = wagons, axles, effort_per_axle
         self._law = ADHESION_LAWS[adhesion]()
         self._track = Track(zones, zone_count, gradient_shape, gradient_count)
         self._pipe = BrakePipe(wagons + 1, delay_samples)
         self.states = (*_states(wagons, axles), self._pipe.state, self._pipe.memory)
-        self.frictions = ("train_speed", *(f"wagon_velocity[{i + 1}]" for i in range(wagons)),
-                          *(f"axle_rate[{k + 1}]" for k in range(axles)))  # fmt: skip
+        self.frictions = (
+            "train_speed",
+            *(f"wagon_velocity[{i + 1}]" for i in range(wagons)),
+            *(f"axle_rate[{k + 1}]" for k in range(axles)),
+        )
         self.inputs = _inputs(axles if effort_per_axle else None)
         self.outputs = _outputs(wagons, axles)
         self.parameters = (*_parameters(wagons, axles), *self._law.parameters, *self._track.parameters)
@@ -113,9 +131,16 @@ class Train(HybridSystem):
             "as_published": {"coupler_damping": -5e4},
         }
         super().__init__(
-            wagons=wagons, axles=axles, effort_per_axle=effort_per_axle, adhesion=adhesion, zones=zones, zone_count=zone_count,
-            gradient_shape=gradient_shape, gradient_count=gradient_count, delay_samples=delay_samples,
-        )  # fmt: skip
+            wagons=wagons,
+            axles=axles,
+            effort_per_axle=effort_per_axle,
+            adhesion=adhesion,
+            zones=zones,
+            zone_count=zone_count,
+            gradient_shape=gradient_shape,
+            gradient_count=gradient_count,
+            delay_samples=delay_samples,
+        )
 
     def rolling(self, speed: float, wheel_radius: float = 0.575) -> dict[str, float]:
         """Start values by name of a train that rolls as one at `speed` [m/s], its wheels without slip [m]."""
@@ -162,7 +187,9 @@ class Train(HybridSystem):
         pushes = self._pushes(now, wheelsets, p)
         limits = self._dry_limits(now, wheelsets, p)
         dry = [_resolved(push, limit[0], v) for push, limit, v in zip(pushes, limits, now.speeds, strict=True)]
-        other = [_resolved(push - d, limit[1], v) for push, d, limit, v in zip(pushes, dry, limits, now.speeds, strict=True)]
+        other = [
+            _resolved(push - d, limit[1], v) for push, d, limit, v in zip(pushes, dry, limits, now.speeds, strict=True)
+        ]
         creeps = [w.creep_force(p) for w in wheelsets]
         slips = [w.slip(p) for w in wheelsets]
         rims = [p.wheel_radius * rate for rate in now.rates]
@@ -282,8 +309,16 @@ def _states(wagons: int, axles: int) -> tuple[Any, ...]:
         state("elongation", "m", 0.0, "Elongation of each coupler beyond its neutral place at start", size=wagons),
         state("train_speed", "m/s", 0.0, "Speed of the locomotive at start"),
         state("wagon_velocity", "m/s", 0.0, "Speed of each wagon at start", size=wagons),
-        state("axle_rate", "rad/s", 0.0, "Angular speed of each axle at start; speed / wheel_radius where it rolls", size=axles),
-        state("cylinder", "Pa", 0.0, "Pressure in the brake cylinders at start, the locomotive's first", size=wagons + 1),
+        state(
+            "axle_rate",
+            "rad/s",
+            0.0,
+            "Angular speed of each axle at start; speed / wheel_radius where it rolls",
+            size=axles,
+        ),
+        state(
+            "cylinder", "Pa", 0.0, "Pressure in the brake cylinders at start, the locomotive's first", size=wagons + 1
+        ),
     )
 
 
@@ -292,7 +327,9 @@ def _inputs(size: int | None) -> tuple[Any, ...]:
     each = "Effort at the rims of each axle: traction > 0, electric brake < 0"
     return (
         input_signal("effort", "N", 0.0, whole if size is None else each, size=size),
-        input_signal("brake_demand", "1", 0.0, "Indirect brake: depression of the pipe over that of the full service brake"),
+        input_signal(
+            "brake_demand", "1", 0.0, "Indirect brake: depression of the pipe over that of the full service brake"
+        ),
     )
 
 
@@ -331,8 +368,18 @@ def _parameters(wagons: int, axles: int) -> tuple[Any, ...]:
         parameter("davis_b", "N.s/m", 32.4, "Running resistance of the locomotive, viscous part", min=0.0),
         parameter("davis_c", "N.s2/m2", 1.6529, "Running resistance of the locomotive, aerodynamic part", min=0.0),
         parameter("slip_floor", "m/s", 0.5, "Smallest speed the slip refers to", min=1e-3, display_unit="km/h"),
-        parameter("axle_position", "m", AXLE_POSITIONS[axles], "Distance of each axle from the front", min=0.0, size=axles),
-        parameter("axle_degraded", "1", 1.0, "Share of a zone's degradation that each axle finds", min=0.0, max=1.0, size=axles),
+        parameter(
+            "axle_position", "m", AXLE_POSITIONS[axles], "Distance of each axle from the front", min=0.0, size=axles
+        ),
+        parameter(
+            "axle_degraded",
+            "1",
+            1.0,
+            "Share of a zone's degradation that each axle finds",
+            min=0.0,
+            max=1.0,
+            size=axles,
+        ),
         parameter("wagon_mass", "kg", 19e3, "Mass of each wagon M_i", min=1.0, size=wagons),
         parameter("wagon_length", "m", 14.06, "Length of a wagon", min=0.0),
         parameter("wagon_braked_mass", "kg", 21e3, "Braked mass of each wagon", min=0.0, size=wagons),
@@ -341,7 +388,7 @@ def _parameters(wagons: int, axles: int) -> tuple[Any, ...]:
         parameter("wagon_davis_c", "N.s2/m2", 2.3, "Running resistance of a wagon, aerodynamic part", min=0.0),
         *COUPLER_PARAMETERS,
         *BRAKE_PARAMETERS,
-    )  # fmt: skip
+    )
 
 
 def _check(wagons: int, axles: int, effort_per_axle: bool, adhesion: str, delay_samples: int) -> None:

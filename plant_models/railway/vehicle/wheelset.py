@@ -16,7 +16,8 @@ from plant_models.railway.adhesion import AdhesionLaw
 class Wheelset(NamedTuple):
     """A wheelset in its present state; ``J dw = r (F_t - F_ad)`` with dry friction ``r B`` where it is braked.
 
-    The slip is ``(r w - v) / max(|v|, slip_floor)``, (3.13); the floor keeps it finite at standstill. Parameters read of ``p``:
+    The slip is ``(r w - v) / max(|v|, slip_floor)``, (3.13); the floor keeps it finite at standstill. Parameters read
+    of ``p``:
     `wheel_radius` [m], `wheel_inertia` [kg.m2], `slip_floor` [m/s] and those of the law.
 
     Args:
@@ -53,9 +54,9 @@ class Wheelset(NamedTuple):
     def hold(self, p: Any) -> Array:
         """Force [N] by which the standing, braked wheelset holds the vehicle beyond what the creep curve does already.
 
-        A creep curve alone is a damper at standstill; a parked train would crawl. Up to the smaller of brake and adhesion
-        limit the contact holds like dry friction. The hold fades between half and full slip: a sliding wheel has the friction
-        of the curve. As in the single-mass locomotive.
+        A creep curve alone is a damper at standstill; a parked train would crawl. Up to the smaller of brake and
+        adhesion limit the contact holds like dry friction. The hold fades between half and full slip: a sliding wheel
+        has the friction of the curve. As in the single-mass locomotive.
         """
         limit = self.law.limit(self.degraded, p) * self.weight
         missing = np.maximum(np.minimum(self.brake, limit) - np.abs(self.creep_force(p)), 0.0)

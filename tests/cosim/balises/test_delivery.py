@@ -1,4 +1,6 @@
-"""Delivery of telegrams to receivers of every kind, on time, late, out of order, and to receivers that cannot be stopped."""
+"""Delivery of telegrams to receivers of every kind, on time, late, out of order, and to receivers that cannot be
+stopped.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,9 @@ def observer(version: Any = 3, **arguments: Any) -> Component:
     return block(fmu_observer.OBSERVERS["takagi_sugeno_cdo"](), "observer", version, **arguments)
 
 
-def driven(receiver: Component, instants: Sequence[float], channel: Channel = PERFECT, h: float = H, seconds: float = 3.0) -> Ran:
+def driven(
+    receiver: Component, instants: Sequence[float], channel: Channel = PERFECT, h: float = H, seconds: float = 3.0
+) -> Ran:
     parts = [block(Staircase(), "steps"), block(Pushed(), "plant"), receiver]
     pairs = [("steps.push", "plant.push"), ("steps.effort", "observer.effort"), ("steps.odometer", "observer.odometer")]
     layout = InstantLayout(np.array(instants))
@@ -69,9 +73,13 @@ def milliseconds(most: int) -> st.SearchStrategy[float]:
 
 
 @given(
-    latency=milliseconds(900), jitter=milliseconds(600), seed=st.integers(0, 50),
-    h=st.sampled_from([0.01, 0.05, 0.1]), version=st.sampled_from([2, 3]), stoppable=st.booleans(),
-)  # fmt: skip
+    latency=milliseconds(900),
+    jitter=milliseconds(600),
+    seed=st.integers(0, 50),
+    h=st.sampled_from([0.01, 0.05, 0.1]),
+    version=st.sampled_from([2, 3]),
+    stoppable=st.booleans(),
+)
 @settings(max_examples=40, deadline=None)
 def test_replay_makes_order_and_latency_irrelevant(
     on_time: np.ndarray, latency: float, jitter: float, seed: int, h: float, version: int, stoppable: bool
@@ -89,7 +97,9 @@ def test_replay_makes_order_and_latency_irrelevant(
 
 def test_late_telegrams_are_replayed_rejected_or_used_late() -> None:
     channel = Channel(latency=0.25)
-    replayed, rejected, late = (driven(observer(late_policy=p), INSTANTS, channel) for p in ("replay", "reject", "late"))
+    replayed, rejected, late = (
+        driven(observer(late_policy=p), INSTANTS, channel) for p in ("replay", "reject", "late")
+    )
     assert set(outcomes(replayed)) == {"replayed"}
     assert set(outcomes(rejected)) == {"rejected"}
     assert set(outcomes(late)) == {"late"}
@@ -160,7 +170,10 @@ class Logging(EventMode):
 
     def more_variables(self) -> list[Any]:
         payload = {"position": 71, "location_accuracy": 72, "odometer_reading": 73, "delivered_at": 74}
-        fields = [variable(f"balise_{n}", "input", r, "Float64", clocks=[70], variability="discrete") for n, r in payload.items()]
+        fields = [
+            variable(f"balise_{n}", "input", r, "Float64", clocks=[70], variability="discrete")
+            for n, r in payload.items()
+        ]
         if self.stamped:
             fields.append(variable("balise_time", "input", 75, "Float64", clocks=[70], variability="discrete"))
         identity = variable("balise_identity", "input", 76, "String", clocks=[70])
@@ -191,8 +204,13 @@ class StampedLogging(Logging):
 
 def logged(slave: Mock, channel: Channel = PERFECT, places: tuple[float, ...] = (5.0, 6.0)) -> Ran:
     made = component(slave, "observer")
-    return run([block(Motion(), "plant"), made], [], H, 10, Balises(positions(*places), receivers=["observer"], channel=channel,
-               odometer="plant.speed"))  # fmt: skip
+    return run(
+        [block(Motion(), "plant"), made],
+        [],
+        H,
+        10,
+        Balises(positions(*places), receivers=["observer"], channel=channel, odometer="plant.speed"),
+    )
 
 
 def test_an_fmi3_receiver_gets_all_the_fields_it_declares() -> None:
@@ -226,7 +244,9 @@ def test_no_receiver_is_asked_for_a_step_of_less_than_a_nanosecond(off: float) -
 
 def test_a_receiver_that_can_neither_be_stopped_nor_stamped_is_told_late_never_early() -> None:
     class Rigid(Logging):
-        capabilities: ClassVar[dict[str, Any]] = Logging.capabilities | {"canHandleVariableCommunicationStepSize": False}
+        capabilities: ClassVar[dict[str, Any]] = Logging.capabilities | {
+            "canHandleVariableCommunicationStepSize": False
+        }
 
         def move(self, t: float, h: float) -> None:
             assert abs(h - H) < 1e-12
@@ -239,7 +259,9 @@ def test_a_receiver_that_can_neither_be_stopped_nor_stamped_is_told_late_never_e
 
 def test_a_receiver_that_cannot_be_stopped_is_told_the_stamp_beforehand() -> None:
     class Rigid(StampedLogging):
-        capabilities: ClassVar[dict[str, Any]] = Logging.capabilities | {"canHandleVariableCommunicationStepSize": False}
+        capabilities: ClassVar[dict[str, Any]] = Logging.capabilities | {
+            "canHandleVariableCommunicationStepSize": False
+        }
 
     slave = Rigid()
     logged(slave)
@@ -286,11 +308,17 @@ def test_a_plain_fmi2_receiver_is_told_by_count_time_and_payload(abilities: tupl
     assert [entry[0] for entry in slave.log] == pytest.approx(ends, abs=1e-9)
 
 
-def test_stale_never_tells_before_the_passing() -> None:
+def test_stale_never_tells_before_the_crossing() -> None:
     """Also where the receiver cannot be stopped: it is told at the end of the step, stamped with that instant."""
     slave = StampedLogging()
     made = without(component(slave, "observer"), "canHandleVariableCommunicationStepSize")
-    run([block(Motion(), "plant"), made], [], H, 10, Balises(positions(5.0, 6.0), receivers=["observer"], timing="stale"))
+    run(
+        [block(Motion(), "plant"), made],
+        [],
+        H,
+        10,
+        Balises(positions(5.0, 6.0), receivers=["observer"], timing="stale"),
+    )
     assert [entry["at"] for entry in slave.log] == pytest.approx([0.4, 0.5], abs=1e-12)
     assert [entry["time"] for entry in slave.log] == pytest.approx([0.4, 0.5], abs=1e-12)
 
@@ -298,7 +326,11 @@ def test_stale_never_tells_before_the_passing() -> None:
 def test_of_several_stale_telegrams_an_fmi2_receiver_knows_the_last() -> None:
     receiver = block(Listener(), "observer", 2)
     ran = run(
-        [block(Motion(), "plant"), receiver], [], H, 10, Balises(positions(5.0, 5.2), receivers=["observer"], timing="stale")
+        [block(Motion(), "plant"), receiver],
+        [],
+        H,
+        10,
+        Balises(positions(5.0, 5.2), receivers=["observer"], timing="stale"),
     )
     assert ran["observer.last"][-1] == 5.2
     assert ran["observer.heard"][-1] == 1.0

@@ -1,7 +1,8 @@
 """The promise of the package: a balise inside a communication step acts at its own instant, whatever the step.
 
-The plant's effort and the odometer are constant over multiples of 100 ms, so that holding them over a step of 1, 10, 50 or
-100 ms is exact; everything that then differs between the steps is a timing fault. Tolerance 1e-9 of the largest value a state
+The plant's effort and the odometer are constant over multiples of 100 ms, so that holding them over a step of 1, 10, 50
+or 100 ms is exact; everything that then differs between the steps is a timing fault. Tolerance 1e-9 of the largest
+value a state
 takes: stamps are found to 1e-11 s, at 15 m/s.
 """
 
@@ -21,8 +22,13 @@ from cosim.components.loading import load_fmu
 STEPS = (0.001, 0.01, 0.05, 0.1)
 DURATION = 3.0
 OBSERVERS = ("takagi_sugeno_cdo", "differentiator_cdo", "multirate_cdo")
-PLACES = positions(0.7, 3.0, 5.6, 5.9, 8.1, 11.3, 11.31, 14.0, 17.77, 20.0, 23.456, 26.0, 28.9)  # two of them in one step
-CONNECTIONS = [("steps.push", "plant.push"), ("steps.effort", "observer.effort"), ("steps.odometer", "observer.odometer")]
+# two of them in one step
+PLACES = positions(0.7, 3.0, 5.6, 5.9, 8.1, 11.3, 11.31, 14.0, 17.77, 20.0, 23.456, 26.0, 28.9)
+CONNECTIONS = [
+    ("steps.push", "plant.push"),
+    ("steps.effort", "observer.effort"),
+    ("steps.odometer", "observer.odometer"),
+]
 
 
 def states_after_balises(ran: Ran, names: list[str]) -> np.ndarray:
@@ -32,7 +38,9 @@ def states_after_balises(ran: Ran, names: list[str]) -> np.ndarray:
 def run_observer(observer: Any, h: float, layout: Any, method: str, names: list[str] | None = None) -> Ran:
     parts = [block(Staircase(), "steps"), block(Pushed(), "plant"), observer]
     extra = {} if names is None else {"observer": names}
-    return run(parts, CONNECTIONS, h, round(DURATION / h), Balises(layout, method=method, receivers=["observer"]), extra=extra)
+    return run(
+        parts, CONNECTIONS, h, round(DURATION / h), Balises(layout, method=method, receivers=["observer"]), extra=extra
+    )
 
 
 def assert_agree(reference: np.ndarray, other: np.ndarray) -> None:
@@ -59,7 +67,9 @@ def test_state_after_every_balise_does_not_depend_on_the_step(name: str, version
 
 @pytest.mark.parametrize("method", ["rollback", "predict", "interpolate"])
 def test_every_method_that_is_exact_for_this_motion(method: str) -> None:
-    """Under an effort that is constant over a step the position is a parabola, and the cubic through its ends is exact."""
+    """Under an effort that is constant over a step the position is a parabola, and the cubic through its ends is
+    exact.
+    """
     system = fmu_observer.OBSERVERS["takagi_sugeno_cdo"]()
     names = [n for s in system.states for n in s.scalar_names]
     reference = states_after_balises(run_observer(block(system, "observer"), 0.001, PLACES, "rollback", names), names)
@@ -86,7 +96,12 @@ def test_a_balise_at_a_communication_point_is_used_in_the_row_of_that_point() ->
         still = [("plant.speed", "observer.odometer")]
         motion = {"plant": {"v0": 10.0}}
         ran = run(
-            [block(Motion(), "plant"), observer], still, 0.1, 10, Balises(positions(5.0), receivers=["observer"]), starts=motion
+            [block(Motion(), "plant"), observer],
+            still,
+            0.1,
+            10,
+            Balises(positions(5.0), receivers=["observer"]),
+            starts=motion,
         )
         at = np.flatnonzero(np.isclose(ran.time, 0.5, atol=1e-9))
         assert len(at) == 2

@@ -21,9 +21,13 @@ SETTLED = 5.0
 SEEDS = range(5)
 
 LOSSES = {
-    (2.0, 0.01): 0.028, (2.0, 0.05): 0.148, (2.0, 0.1): 0.270,
-    (8.0, 0.01): 0.20, (8.0, 0.05): 1.21, (8.0, 0.1): 2.08,
-}  # fmt: skip
+    (2.0, 0.01): 0.028,
+    (2.0, 0.05): 0.148,
+    (2.0, 0.1): 0.270,
+    (8.0, 0.01): 0.20,
+    (8.0, 0.05): 1.21,
+    (8.0, 0.1): 2.08,
+}
 """rms speed error [m/s] by (theta, communication step), independently measured."""
 
 
@@ -54,7 +58,8 @@ def rms_speed_error(theta: float, h: float, seed: int, timing: str, duration: fl
 
 def rms_between_rows(ran: Ran, theta: float) -> float:
     """rms over time, not over rows: between rows the speed error follows the decaying innovation,
-    ``e(s) = e(0) - theta^2 K2 eta(0) (1 - exp(-2 theta s)) / (2 theta)``, K2 = 1; the drag's slope, 1e-3 1/s, is left out."""
+    ``e(s) = e(0) - theta^2 K2 eta(0) (1 - exp(-2 theta s)) / (2 theta)``, K2 = 1; the drag's slope, 1e-3 1/s, is left
+    out."""
     rows = np.flatnonzero((ran.time > SETTLED) & np.append(np.diff(ran.time) > 0.0, False))
     length = np.diff(ran.time)[rows]
     error, innovation = ran["observer.speed"][rows] - SPEED, ran["observer.innovation"][rows]
@@ -66,7 +71,9 @@ def rms_between_rows(ran: Ran, theta: float) -> float:
 
 @pytest.mark.parametrize(("theta", "h"), LOSSES)
 def test_stale_use_loses_what_was_measured_independently(theta: float, h: float) -> None:
-    """Within 20 %, median over balise patterns: the pattern is random, its seed in the other measurement is not known."""
+    """Within 20 %, median over balise patterns: the pattern is random, its seed in the other measurement is not
+    known.
+    """
     losses = [rms_speed_error(theta, h, seed, "stale") for seed in SEEDS]
     assert np.median(losses) == pytest.approx(LOSSES[theta, h], rel=0.2)
 
@@ -79,7 +86,9 @@ def test_exact_use_loses_nothing(theta: float, h: float) -> None:
 
 @pytest.mark.parametrize("h", [0.05, 0.1])
 def test_fmi2_receivers_are_stale_in_the_same_way(h: float) -> None:
-    """FMI 2 acts at the start of the step that follows, which is the same instant: equal speeds at all communication points."""
+    """FMI 2 acts at the start of the step that follows, which is the same instant: equal speeds at all communication
+    points.
+    """
     first, second = (stale_run(2.0, h, 1, "stale", 20.0, version) for version in (3, 2))
     assert np.max(np.abs(first["observer.speed"] - SPEED)) > 0.1
     np.testing.assert_allclose(first["observer.speed"], second["observer.speed"], rtol=1e-12)

@@ -45,7 +45,9 @@ def test_crossing_is_found_to_the_last_bit() -> None:
 
 @given(st.floats(0.2, 20.0), st.floats(-8.0, 8.0), st.floats(-8.0, 8.0), st.floats(0.02, 0.98), st.floats(0.05, 0.95))
 def test_bound_holds_for_a_jump_of_the_acceleration(v0: float, a0: float, a1: float, when: float, share: float) -> None:
-    """Acceleration a0, then a1: the error of the cubic's crossing time stays below the bound for the spread that there was."""
+    """Acceleration a0, then a1: the error of the cubic's crossing time stays below the bound for the spread that there
+    was.
+    """
     h, switch = 0.1, 0.1 * when
     v_mid = v0 + a0 * switch
     p_mid = v0 * switch + 0.5 * a0 * switch**2
@@ -70,7 +72,9 @@ def test_bound_is_the_step_where_the_train_may_stand() -> None:
 
 
 @given(st.floats(1e-6, 100.0), st.floats(-30.0, 30.0), st.floats(0.1, 10.0))
-def test_least_time_to_reach_is_exact_under_full_acceleration(distance: float, speed: float, acceleration: float) -> None:
+def test_least_time_to_reach_is_exact_under_full_acceleration(
+    distance: float, speed: float, acceleration: float
+) -> None:
     t = time_to_reach(distance, speed, acceleration)
     assert speed * t + 0.5 * acceleration * t * t == pytest.approx(distance, rel=1e-9, abs=1e-12 * (1 + speed * speed))
 

@@ -18,7 +18,9 @@ motions = st.lists(st.integers(-60, 60), min_size=2, max_size=15)
 
 
 @given(places, st.lists(st.integers(-60, 60), min_size=2, max_size=30).map(sorted), st.booleans())
-def test_any_partition_of_a_motion_one_way_passes_each_balise_once(where: list[int], stops: list[int], back: bool) -> None:
+def test_any_partition_of_a_motion_one_way_passes_each_balise_once(
+    where: list[int], stops: list[int], back: bool
+) -> None:
     """Stops may lie exactly on balises. A balise at the very start of the motion is not passed."""
     layout = by_positions(where)
     path = stops[::-1] if back else stops
@@ -131,7 +133,9 @@ def test_a_list_that_is_not_there_or_not_text(tmp_path: Path) -> None:
 
 @given(st.integers(0, 1000))
 def test_aperiodic_gaps(seed: int) -> None:
-    """Uniform gaps first, some stretched ones later; the same seed gives the same pattern, a longer run a longer one."""
+    """Uniform gaps first, some stretched ones later; the same seed gives the same pattern, a longer run a longer
+    one.
+    """
     layout = aperiodic(30.0, seed)
     gaps = np.diff([0.0, *layout.instants])
     early = np.append(0.0, layout.instants[:-1]) <= 7.9

@@ -24,7 +24,9 @@ METHODS = ("rollback", "predict", "interpolate")
 
 
 class Slippery(HybridSystem):
-    """A train whose traction falls while it is on degraded rails, from 20 m to 40 m; the acceleration jumps at their ends."""
+    """A train whose traction falls while it is on degraded rails, from 20 m to 40 m; the acceleration jumps at their
+    ends.
+    """
 
     name = "slippery"
     states = (state("p", "m"), state("v", "m/s", 5.0))
@@ -39,8 +41,12 @@ class Slippery(HybridSystem):
         return {"position": x[0], "speed": x[1]}
 
 
-def watched(plant: Any, layout: Any, method: str, seconds: float, starts: dict[str, float] | None = None, **more: Any) -> Ran:
-    return run([plant], [], H, round(seconds / H), Balises(layout, method=method, **more), starts={"plant": starts or {}})
+def watched(
+    plant: Any, layout: Any, method: str, seconds: float, starts: dict[str, float] | None = None, **more: Any
+) -> Ran:
+    return run(
+        [plant], [], H, round(seconds / H), Balises(layout, method=method, **more), starts={"plant": starts or {}}
+    )
 
 
 def errors(ran: Ran, true_times: dict[str, float]) -> np.ndarray:
@@ -63,7 +69,7 @@ def line(count: int, first: float, spacing: float) -> TrackLayout:
 
 
 def closed_form(parameters: dict[str, float], layout: TrackLayout, seconds: float) -> dict[str, float]:
-    """Passing times by bisection on the closed form of `Motion`, for a motion that never turns."""
+    """Crossing times by bisection on the closed form of `Motion`, for a motion that never turns."""
     full = {"p0": 0.0, "v0": 13.9, "a": 0.0, "A": 0.0, "w": 1.0} | parameters
 
     def place(t: float) -> float:
@@ -71,7 +77,8 @@ def closed_form(parameters: dict[str, float], layout: TrackLayout, seconds: floa
         return float(full["p0"] + full["v0"] * t + 0.5 * full["a"] * t * t + swing)
 
     return {
-        b.identity: brentq(lambda t, p=b.position: place(t) - p, 0.0, seconds, xtol=1e-13, rtol=1e-15) for b in layout.balises
+        b.identity: brentq(lambda t, p=b.position: place(t) - p, 0.0, seconds, xtol=1e-13, rtol=1e-15)
+        for b in layout.balises
     }
 
 
@@ -99,7 +106,8 @@ def test_crossing_times_of_closed_form_motions(name: str, method: str) -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_crossing_times_over_changes_of_adhesion(method: str) -> None:
     """The truth is a dense run of the same plant at 1 ms, inverted between its own points by their parabola."""
-    near_the_changes = [19.6, 19.9, 20.05, 20.2, 20.5, 39.5, 39.9, 40.06, 40.4]  # in the very steps in which they happen
+    # in the very steps in which they happen
+    near_the_changes = [19.6, 19.9, 20.05, 20.2, 20.5, 39.5, 39.9, 40.06, 40.4]
     layout = positions(*sorted([*near_the_changes, *(3.3 + 3.17 * i for i in range(20))]))
     truth = run([block(Slippery(), "plant")], [], 1e-3, 9000)
     p, v, t = truth["plant.position"], truth["plant.speed"], truth.time
@@ -155,7 +163,9 @@ def test_reversing_over_balises(method: str, turn: float) -> None:
     places = (0.2, 0.4, top - 1e-4, top + 1e-4)
     ran = watched(block(Motion(), "plant"), positions(*places), method, 2.0 * turn, {"v0": turn, "a": -1.0})
     assert [e.identity for e in ran.events] == ["B1", "B2", "B3", "B3", "B2", "B1"]
-    expected = [turn + sign * np.sqrt(2.0 * (top - p)) for sign, order in ((-1, 1), (1, -1)) for p in places[:3][::order]]
+    expected = [
+        turn + sign * np.sqrt(2.0 * (top - p)) for sign, order in ((-1, 1), (1, -1)) for p in places[:3][::order]
+    ]
     off = np.abs(np.array([e.stamp for e in ran.events]) - expected)
     bounds = np.array([e.time_bound for e in ran.events])
     promised = {"rollback": 1e-9, "predict": 1e-6}.get(method, np.inf)
@@ -189,7 +199,9 @@ def test_standstill_takes_no_time_of_the_prediction() -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_jump_beyond_all_trains_is_still_found(method: str) -> None:
-    """A plant that accelerates with 200 m/s2: no method stays silent about the balise, and each says how little it knows."""
+    """A plant that accelerates with 200 m/s2: no method stays silent about the balise, and each says how little it
+    knows.
+    """
     ran = watched(block(Motion(), "plant"), positions(0.9), method, 0.3, {"v0": 0.0, "a": 200.0})
     assert [e.identity for e in ran.events] == ["B1"]
     assert abs(ran.events[0].stamp - np.sqrt(2 * 0.9 / 200.0)) <= max(ran.events[0].time_bound, 1e-9)
@@ -289,7 +301,7 @@ class Reporting(EventMode):
 
 
 def test_early_return_takes_the_plants_own_report() -> None:
-    """Four ticks of the balise clock; a tick of another clock in between (at 3.3 m) is handled and is no passing."""
+    """Four ticks of the balise clock; a tick of another clock in between (at 3.3 m) is handled and is no crossing."""
     plant = component(Reporting(), "plant")
     layout = positions(*Reporting.places)
     seen = run([plant], [], H, 6, Balises(layout, method="early-return", clock="passed"))
@@ -306,7 +318,9 @@ def test_early_return_needs_a_clock_and_event_mode() -> None:
     with pytest.raises(CouplingError, match=r"needs balises\.clock"):
         prepare([component(Reporting(), "plant")], [], H, 1, Balises(positions(1.0), method="early-return"))
     with pytest.raises(CouplingError, match="no variable 'pased'; did you mean 'passed'"):
-        prepare([component(Reporting(), "plant")], [], H, 1, Balises(positions(1.0), method="early-return", clock="pased"))
+        prepare(
+            [component(Reporting(), "plant")], [], H, 1, Balises(positions(1.0), method="early-return", clock="pased")
+        )
 
 
 def test_choice_of_the_method() -> None:

@@ -1,4 +1,6 @@
-"""The told bound of a balise's instant holds what the plant's own solver adds; where nothing is known it is not a number."""
+"""The told bound of a balise's instant holds what the plant's own solver adds; where nothing is known it is not a
+number.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from zoo.adaptive import adaptive_fmu, crossings
+from test_fmus.adaptive import adaptive_fmu, crossings
 
 from cosim import Scenario
 from cosim.balises.plant_error import PlantError
@@ -23,7 +25,9 @@ pytestmark = pytest.mark.compiler
 
 def ran(fmu: Path, method: str, step: float = 0.1, **more: Any) -> Outcome:
     one = Scenario(stop=STOP, step=step).add("plant", fmu=str(fmu), **more)
-    one.balises(layout="positions", positions=list(PLACES), position="plant.position", speed="plant.speed", method=method)
+    one.balises(
+        layout="positions", positions=list(PLACES), position="plant.position", speed="plant.speed", method=method
+    )
     outcome = one.run()
     assert outcome.failure is None
     return outcome
@@ -48,7 +52,8 @@ def test_a_plant_with_a_solver_is_off_by_less_than_told(fmu: Path, tolerance: fl
     outcome = ran(fmu, method, tolerance=tolerance)
     off, told = off_and_told(outcome)
     assert np.all(off <= told)
-    assert np.median(told) <= 200.0 * tolerance + 1e-2 * (method == "interpolate")  # and it is no bound that says nothing
+    # and it is no bound that says nothing
+    assert np.median(told) <= 200.0 * tolerance + 1e-2 * (method == "interpolate")
     probe = outcome.result.summary["probe"]
     assert probe["restores"] == "within_tolerance" or tolerance == 1e-3  # with which it takes whole steps
     if method == "auto" and tolerance < 1e-3:

@@ -24,10 +24,17 @@ def scenario(**parameters: float) -> Scenario:
     s.add("train", model="locomotive", preset="chapter_3_four_axles")
     s.add("driver", model="driver")
     s.add("observer", observer=OBSERVER, parameters={"n_axles": 4, "davis_b": 32.0, "davis_c": 1.7, **parameters})
-    s.connect("driver.effort -> train.effort, observer.effort", "train.wheel_speed -> driver.odometer, observer.odometer")
+    s.connect(
+        "driver.effort -> train.effort, observer.effort", "train.wheel_speed -> driver.odometer, observer.odometer"
+    )
     false: Any = [{"time": 10.0, "offset": 100.0}]
     s.balises(
-        position="train.position", speed="train.speed", layout="spacing", spacing=5.0, track_end=500.0, false_telegrams=false
+        position="train.position",
+        speed="train.speed",
+        layout="spacing",
+        spacing=5.0,
+        track_end=500.0,
+        false_telegrams=false,
     )
     return s
 
@@ -35,7 +42,8 @@ def scenario(**parameters: float) -> Scenario:
 @pytest.mark.parametrize(("gate", "outcome"), [(2.0, "ignored"), (1.0, "doubted"), (0.0, "accepted")])
 def test_a_false_telegram_is_told_by_its_outcome(gate: float, outcome: str) -> None:
     run, clean = (
-        s.run(warn=lambda _text: None) for s in (scenario(gate=gate), scenario(gate=gate).set("balises.false_telegrams", []))
+        s.run(warn=lambda _text: None)
+        for s in (scenario(gate=gate), scenario(gate=gate).set("balises.false_telegrams", []))
     )
     (false,) = [e for e in run.result.events if e.kind == "false"]
     assert false.outcomes == {"observer": outcome}

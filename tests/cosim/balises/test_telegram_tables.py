@@ -1,4 +1,6 @@
-"""Telegrams in a table from elsewhere: what it must hold, what is assumed, and a run that has no true position at all."""
+"""Telegrams in a table from elsewhere: what it must hold, what is assumed, and a run that has no true position at
+all.
+"""
 
 from __future__ import annotations
 
@@ -35,14 +37,23 @@ def quietly(_: str) -> None: ...
 
 def test_stamp_and_position_are_enough(tmp_path: Path) -> None:
     first, second = read_layout(table(tmp_path, "position [km];stamp\n0,02;2,0\n0,01;0,5\n")).records
-    assert (first.stamp, first.delivered_at, first.position, first.identity, first.kind) == (0.5, 0.5, 10.0, "T2", "true")
+    assert (first.stamp, first.delivered_at, first.position, first.identity, first.kind) == (
+        0.5,
+        0.5,
+        10.0,
+        "T2",
+        "true",
+    )
     assert (second.stamp, second.position, second.identity) == (2.0, 20.0, "T1")
     assert isnan(first.odometer_reading)
     assert isnan(first.true_position)
 
 
 def test_what_is_given_is_taken(tmp_path: Path) -> None:
-    text = "stamp,delivered_at [ms],identity,position,kind,odometer_reading [km/h]\n0.5,700,B1,5,false,36\n0.6,,B2,6,missed,\n"
+    text = (
+        "stamp,delivered_at [ms],identity,position,kind,odometer_reading "
+        "[km/h]\n0.5,700,B1,5,false,36\n0.6,,B2,6,missed,\n"
+    )
     one, missed = read_layout(table(tmp_path, text)).records
     assert (one.identity, one.kind) == ("B1", "false")
     assert one.delivered_at == pytest.approx(0.7, rel=1e-15)
@@ -51,12 +62,19 @@ def test_what_is_given_is_taken(tmp_path: Path) -> None:
 
 
 def test_an_observer_listens_to_a_log_without_a_true_position(tmp_path: Path) -> None:
-    """At 10 m/s the balises told are where the train is, so the estimate ends at the last one plus 10 m/s times the rest."""
-    events = "stamp,delivered_at,position\n" + "".join(f"{0.25 * k},{0.25 * k + 0.055},{2.5 * k}\n" for k in range(1, 8))
+    """At 10 m/s the balises told are where the train is, so the estimate ends at the last one plus 10 m/s times the
+    rest.
+    """
+    events = "stamp,delivered_at,position\n" + "".join(
+        f"{0.25 * k},{0.25 * k + 0.055},{2.5 * k}\n" for k in range(1, 8)
+    )
     outcome = without_position(tmp_path, events).run(warn=quietly)
-    assert [(e.stamp, e.delivered_at) for e in outcome.result.events] == [(0.25 * k, 0.25 * k + 0.055) for k in range(1, 8)]
+    assert [(e.stamp, e.delivered_at) for e in outcome.result.events] == [
+        (0.25 * k, 0.25 * k + 0.055) for k in range(1, 8)
+    ]
     assert {e.outcomes["observer"] for e in outcome.result.events} == {"replayed"}
-    assert outcome["observer.position"][-1] == pytest.approx(20.0, abs=0.05)  # drag, which the log's effort does not balance
+    # drag, which the log's effort does not balance
+    assert outcome["observer.position"][-1] == pytest.approx(20.0, abs=0.05)
 
 
 @pytest.mark.parametrize(
@@ -68,7 +86,10 @@ def test_an_observer_listens_to_a_log_without_a_true_position(tmp_path: Path) ->
         ("stamp,position\n,2\n", r"line 2: stamp is empty"),
         ("stamp [m],position\n1,2\n", r"'stamp \[m\]': different dimensions"),
         ("stamp,position,kind\n1,2,true\n1,2,lost\n", r"line 3: kind 'lost': expected one of true, missed, false"),
-        ("time,position\n1,2\n", r"a table of signals; expected a results folder, or a CSV with columns 'stamp' and 'position'"),
+        (
+            "time,position\n1,2\n",
+            r"a table of signals; expected a results folder, or a CSV with columns 'stamp' and 'position'",
+        ),
     ],
 )
 def test_a_table_that_cannot_be_told_is_refused_in_words(text: str, words: str, tmp_path: Path) -> None:
@@ -80,7 +101,9 @@ def test_position_and_speed_are_left_out_only_beside_a_recording_and_together(tm
     table(tmp_path, "stamp,position\n1,2\n")
     alone = Scenario(folder=tmp_path, stop=1.0, step=0.1).add("plant", model="locomotive", **{"as": "block3"})
     recorded = {"layout": "recorded", "file": "telegrams.csv"}
-    with pytest.raises(ScenarioError, match="no component is a recording; say with 'position' and 'speed' what the plant is"):
+    with pytest.raises(
+        ScenarioError, match="no component is a recording; say with 'position' and 'speed' what the plant is"
+    ):
         alone.copy().balises(**recorded).run()
     with pytest.raises(ScenarioError, match="'speed' is missing"):
         alone.copy().balises(position="plant.position", **recorded).run()

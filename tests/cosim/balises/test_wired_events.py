@@ -13,20 +13,30 @@ from cosim.errors import CosimError
 from cosim.scenario.outcome import Outcome
 
 FIELDS = ("count", "time", "position")
-LAYOUT = {"position": "locomotive.position", "speed": "locomotive.speed", "layout": "positions", "positions": [1.0, 2.5, 4.0]}
+LAYOUT = {
+    "position": "locomotive.position",
+    "speed": "locomotive.speed",
+    "layout": "positions",
+    "positions": [1.0, 2.5, 4.0],
+}
 CAPACITY = 4
 
 
 def wired(fields: tuple[str, ...] = FIELDS, **balises: Any) -> Scenario:
-    """The small scenario with a balise reader, wired to the observer; told by the master as well where `balises` are given."""
+    """The small scenario with a balise reader, wired to the observer; told by the master as well where `balises` are
+    given.
+    """
     scenario = Scenario(stop=0.5, step=0.01)
     for name, part in small().table().components.items():
         table = part.model_dump(by_alias=True, exclude_unset=True)
         scenario.add(name, **(table | ({"as": "block2"} if name == "observer" else {})))
     scenario.add(
-        "reader", model="balise_reader", **{"as": "block2"}, options={"layout": "positions", "balise_capacity": CAPACITY},
+        "reader",
+        model="balise_reader",
+        **{"as": "block2"},
+        options={"layout": "positions", "balise_capacity": CAPACITY},
         parameters={"positions": [*LAYOUT["positions"], 1e30]},
-    )  # fmt: skip
+    )
     scenario.connect(
         "driver.effort -> locomotive.effort, observer.effort",
         "locomotive.wheel_speed -> odometer.wheel_speed",
@@ -49,7 +59,7 @@ def test_the_wiring_that_other_masters_need_runs_here() -> None:
     assert theirs["reader.balise_count"][-1] == 3.0
     stamps = [event.stamp for event in ours.result.events]
     np.testing.assert_allclose(np.unique(theirs["reader.balise_time"])[1:], stamps, rtol=0.0, atol=1e-12)
-    # A row of ours before and one after each passing; the last of each instant is the one to compare.
+    # A row of ours before and one after each crossing; the last of each instant is the one to compare.
     rows = np.searchsorted(np.asarray(ours["time"]), np.asarray(theirs["time"]) + 1e-6) - 1
     for name in ("position", "speed"):
         np.testing.assert_allclose(theirs[f"observer.{name}"], ours[f"observer.{name}"][rows], rtol=0.0, atol=1e-9)

@@ -62,7 +62,8 @@ def test_a_run_passes_against_its_own_baseline_from_disk(run: Result, tmp_path: 
     assert (comparison.events.matched, comparison.events.compared, list(comparison.notes)) == (3, True, [])
     assert {signal.name for signal in comparison.signals} == {info.name for info in run.signals}
     assert list(baseline.result.signals) == sorted(run.signals, key=lambda info: info.name)
-    for info in run.signals:  # the tolerance as H: absolute plus share of the range, of which rounding takes a thousandth
+    # the tolerance as H: absolute plus share of the range, of which rounding takes a thousandth
+    for info in run.signals:
         values = run[info.name]
         scale = float(np.ptp(values)) or float(np.abs(values).max())
         assert np.abs(baseline.result[info.name] - values).max() <= 1e-3 * (1e-9 + 1e-4 * scale)
@@ -81,13 +82,17 @@ def test_tolerance_of_zero_keeps_every_bit(run: Result, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("tight", [Tolerance(time=0.0), Tolerance(absolute=0.0, relative=1e-14)], ids=["time", "value"])
-def test_telegrams_pass_against_their_own_baseline_under_tight_tolerances(tight: Tolerance, run: Result, tmp_path: Path) -> None:
+def test_telegrams_pass_against_their_own_baseline_under_tight_tolerances(
+    tight: Tolerance, run: Result, tmp_path: Path
+) -> None:
     """Twelve digits of a stamp, or of an odometer reading, are then not enough."""
     events = [replace(e, odometer_reading=e.odometer_reading + np.pi * 1e-13 * k) for k, e in enumerate(run.events)]
     result = replace(run, events=events)
     write_baseline(result, tmp_path / "run.json", tolerances=Tolerances(tight))
     assert check(result, read_baseline(tmp_path / "run.json")).equal
-    late = replace(result, events=[replace(e, stamp=e.stamp + 1e-5, delivered_at=e.delivered_at + 1e-5) for e in events])
+    late = replace(
+        result, events=[replace(e, stamp=e.stamp + 1e-5, delivered_at=e.delivered_at + 1e-5) for e in events]
+    )
     assert not check(late, read_baseline(tmp_path / "run.json")).equal
 
 
@@ -237,7 +242,9 @@ def test_a_damaged_header_is_refused_in_words(change: Any, says: str, tmp_path: 
 
 def test_what_is_missing_is_said_with_what_is_there(tmp_path: Path) -> None:
     write_baseline(hand_made(), tmp_path / "braking.json")
-    with pytest.raises(BaselineError, match=r"There is no baseline .*braknig\.json.*'braking\.json'.*fmu-baseline=update"):
+    with pytest.raises(
+        BaselineError, match=r"There is no baseline .*braknig\.json.*'braking\.json'.*fmu-baseline=update"
+    ):
         read_baseline(tmp_path / "braknig.json")
     (tmp_path / "braking.csv").unlink()
     with pytest.raises(BaselineError, match=r"braking\.csv is missing"):

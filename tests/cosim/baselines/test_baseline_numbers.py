@@ -17,7 +17,8 @@ ALLOWED = st.floats(1e-12, 1e6)
 @given(VALUES, ALLOWED)
 def test_rounding_takes_less_than_a_thousandth_of_the_tolerance(value: float, allowed: float) -> None:
     text = number_text(value, decimals_for(allowed))
-    assert abs(float(text) - value) <= 0.5e-3 * allowed * (1.0 + 1e-9) + 2.0 * math.ulp(value)  # two roundings of float64
+    # two roundings of float64
+    assert abs(float(text) - value) <= 0.5e-3 * allowed * (1.0 + 1e-9) + 2.0 * math.ulp(value)
 
 
 @given(VALUES, ALLOWED)

@@ -1,4 +1,6 @@
-"""Updating: what is within tolerance stays as it stands, what is not is replaced, and a baseline always passes its own run."""
+"""Updating: what is within tolerance stays as it stands, what is not is replaced, and a baseline always passes its own
+run.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,8 @@ def test_last_digits_of_another_machine_change_no_file(tmp_path: Path) -> None:
 def test_within_tolerance_the_baseline_does_not_creep(tmp_path: Path) -> None:
     path = tmp_path / "run.json"
     updated(hand_made(), path)
-    changes = [updated(shifted(2e-5 * step), path) for step in range(1, 7)]  # each is within tolerance of the one before
+    # each is within tolerance of the one before
+    changes = [updated(shifted(2e-5 * step), path) for step in range(1, 7)]
     assert changes[:4] == ["unchanged"] * 4  # up to 8e-5 m/s
     assert "changed" in changes[4:]  # 1e-4 and 1.2e-4 m/s are not
 
@@ -91,7 +94,11 @@ def test_a_run_passes_against_its_own_baseline_however_thin(shape: str, every: f
     run = hand_made(10_001)
     time = run.time
     noise = np.random.default_rng(1).normal(size=len(time))
-    run.table["train.speed"] = {"spike": np.abs(time - 500.0) < 0.25, "steps": np.sign(np.sin(0.7 * time)), "noise": noise}[shape]
+    run.table["train.speed"] = {
+        "spike": np.abs(time - 500.0) < 0.25,
+        "steps": np.sign(np.sin(0.7 * time)),
+        "noise": noise,
+    }[shape]
     update = plan_update(run, path, every=every)
     write_texts(dict(update.texts), path)
     assert check(run, read_baseline(path)).equal

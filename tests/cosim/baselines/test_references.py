@@ -1,4 +1,6 @@
-"""Reference results inside an FMU (FMI-LS-REF): written into a copy, read back, run again; and those that others put there."""
+"""Reference results inside an FMU (FMI-LS-REF): written into a copy, read back, run again; and those that others put
+there.
+"""
 
 from __future__ import annotations
 
@@ -62,7 +64,9 @@ def with_files(vendor: Path, target: Path, files: dict[str, str]) -> Path:
     return target
 
 
-def test_what_was_in_the_fmu_stays_as_it_was_and_the_copy_is_valid(vendor: Path, embedded: Path, tmp_path: Path) -> None:
+def test_what_was_in_the_fmu_stays_as_it_was_and_the_copy_is_valid(
+    vendor: Path, embedded: Path, tmp_path: Path
+) -> None:
     before, after = content(vendor), content(embedded)
     assert {name: after[name] for name in before} == before
     assert {name.rpartition("/")[0] for name in set(after) - set(before)} == {FOLDER}
@@ -92,10 +96,15 @@ def test_another_tool_finds_the_stimuli_and_outputs_it_needs(embedded: Path, tmp
     files = content(embedded)
     for name in ("ramp_in.csv", "ramp_out.csv"):
         (tmp_path / name).write_bytes(files[f"{FOLDER}/{name}"])
-    stimuli, outputs = (np.genfromtxt(tmp_path / f"ramp_{what}.csv", delimiter=",", names=True) for what in ("in", "out"))
+    stimuli, outputs = (
+        np.genfromtxt(tmp_path / f"ramp_{what}.csv", delimiter=",", names=True) for what in ("in", "out")
+    )
     assert outputs.dtype.names[0] == "time"
-    result = simulate_fmu(str(embedded), stop_time=1.0, output_interval=0.01, step_size=0.01, input=stimuli, output=["speed"])
-    # fmpy feeds the inputs of the end of a step where this master holds those of its beginning: half a step of a ramp of
+    result = simulate_fmu(
+        str(embedded), stop_time=1.0, output_interval=0.01, step_size=0.01, input=stimuli, output=["speed"]
+    )
+    # fmpy feeds the inputs of the end of a step where this master holds those of its beginning: half a step of a ramp
+    # of
     # 2e5 N/s on 80 t, 1.25 mm/s for each of the steps so far at most; measured 1.3e-2 m/s
     assert np.abs(np.interp(outputs["time"], result["time"], result["speed"]) - outputs["speed"]).max() < 0.02
     assert outputs["speed"][-1] > 0.5
@@ -115,7 +124,9 @@ def test_references_run_again_and_come_out_as_baselines(name: str, embedded: Pat
 
 
 def test_results_of_others_need_no_experiment(vendor: Path, tmp_path: Path) -> None:
-    """As the Reference FMUs of the Modelica Association ship theirs: a manifest, one table of outputs, no description."""
+    """As the Reference FMUs of the Modelica Association ship theirs: a manifest, one table of outputs, no
+    description.
+    """
     manifest = """<?xml version="1.0" encoding="UTF-8"?>
     <fmiReferences xmlns:fmi-ls="http://fmi-standard.org/fmi-ls-manifest" fmi-ls:fmi-ls-version="1.0.0-alpha.1"
         fmi-ls:fmi-ls-name="org.fmi-standard.fmi-ls-ref">
@@ -124,7 +135,9 @@ def test_results_of_others_need_no_experiment(vendor: Path, tmp_path: Path) -> N
       <Related type="text/html" source="https://example.org/a.html" role="document"/>
     </fmiReferences>"""
     outcome = make_subject("vendor.fmu", vendor.parent, stop=1.0, step=0.001, inputs={"effort": 1e5}).result
-    rows = [f"{t!r},{v!r}" for t, v in zip(outcome.time.tolist()[::50], outcome["fmu.speed"].tolist()[::50], strict=True)]
+    rows = [
+        f"{t!r},{v!r}" for t, v in zip(outcome.time.tolist()[::50], outcome["fmu.speed"].tolist()[::50], strict=True)
+    ]
     table = "\r\n".join(['"time","speed"', *rows]) + "\r\n"
     files = {"fmi-ls-manifest.xml": manifest, "Loco_out.csv": table, "Loco_in.csv": "time,effort\n0,1e5\n1,1e5\n"}
     fmu = with_files(vendor, tmp_path / "loco.fmu", files)
@@ -146,14 +159,16 @@ def test_results_of_others_need_no_experiment(vendor: Path, tmp_path: Path) -> N
         (
             {
                 "fmi-ls-manifest.xml": '<fmiReferences><Related role="experiment" source="a.exp"/></fmiReferences>',
-                "a.exp": '<Experiments><Experiment name="a"><References source="../../../x.csv"/></Experiment></Experiments>',
+                "a.exp": '<Experiments><Experiment name="a"><References '
+                'source="../../../x.csv"/></Experiment></Experiments>',
             },
             "holds no reference results",
         ),
         (
             {
                 "fmi-ls-manifest.xml": '<fmiReferences><Related role="experiment" source="a.exp"/></fmiReferences>',
-                "a.exp": '<Experiments name="a"><Experiment name="a"><References source="x.csv"/></Experiment></Experiments>',
+                "a.exp": '<Experiments name="a"><Experiment name="a"><References '
+                'source="x.csv"/></Experiment></Experiments>',
             },
             "x.csv, which is not in the FMU",
         ),

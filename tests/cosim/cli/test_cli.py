@@ -56,7 +56,9 @@ def test_seeds_add_quartiles_to_print_and_report(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def load(_cls: type, _name: str, **_: bool) -> Scenario:
-        scenario = small().report(phases=[{"name": "all", "start": 0.0, "end": 0.5}], published={"observer": {"all": 0.5}})
+        scenario = small().report(
+            phases=[{"name": "all", "start": 0.0, "end": 0.5}], published={"observer": {"all": 0.5}}
+        )
         return scenario.set("balises.layout", "aperiodic").set("balises.max_gap", 0.2)
 
     monkeypatch.setattr(Scenario, "load", classmethod(load))

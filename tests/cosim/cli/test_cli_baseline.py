@@ -1,4 +1,6 @@
-"""``cosim baseline``: make, check, show, update, with exit codes and JSON; embed and extract are tested with the references."""
+"""``cosim baseline``: make, check, show, update, with exit codes and JSON; embed and extract are tested with the
+references.
+"""
 
 from __future__ import annotations
 
@@ -53,7 +55,8 @@ def test_a_baseline_from_making_to_accepting(capsys: pytest.CaptureFixture[str])
     data = told(capsys)
     assert data["equal"] is False
     assert {s["name"] for s in data["signals"] if s["status"] == "differs"} >= {"loco.speed", "loco.position"}
-    assert main(["baseline", "check", "kept/run.json", "--rtol", "1", "--atol", "1e6", "--json"]) == 0  # whatever differs
+    # whatever differs
+    assert main(["baseline", "check", "kept/run.json", "--rtol", "1", "--atol", "1e6", "--json"]) == 0
     capsys.readouterr()
     assert main(["baseline", "update", "kept/run.json", "--json"]) == 0
     assert told(capsys)["change"] == "changed"
@@ -63,7 +66,10 @@ def test_a_baseline_from_making_to_accepting(capsys: pytest.CaptureFixture[str])
 def test_a_given_result_is_checked_without_a_run(capsys: pytest.CaptureFixture[str]) -> None:
     main(["baseline", "make", "run.toml", "run.json", "--quiet"])
     for name, speed in (("same", "10.0"), ("other", "10.2")):
-        assert main(["run", "run.toml", "--set", f"loco.train_speed={speed}", "--out", name, "--no-report", "--quiet"]) == 0
+        assert (
+            main(["run", "run.toml", "--set", f"loco.train_speed={speed}", "--out", name, "--no-report", "--quiet"])
+            == 0
+        )
     Path("run.toml").unlink()
     assert main(["baseline", "check", "run.json", "--against", "same"]) == 0
     capsys.readouterr()

@@ -20,7 +20,9 @@ def test_table_files_and_a_recording_that_is_played_back(
     scenario: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out, run = tmp_path / "out", tmp_path / "run"
-    assert main(["benchmark-observers", scenario, "--observers", "observer", "--record", str(run), "--out", str(out)]) == 0
+    assert (
+        main(["benchmark-observers", scenario, "--observers", "observer", "--record", str(run), "--out", str(out)]) == 0
+    )
     table = capsys.readouterr().out
     assert "rms v [m/s]" in table
     assert "cost [us/step]" in table

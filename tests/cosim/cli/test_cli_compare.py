@@ -1,4 +1,6 @@
-"""``cosim compare``: exit codes, tolerances from the command line and from files, what is printed and written, and mistakes."""
+"""``cosim compare``: exit codes, tolerances from the command line and from files, what is printed and written, and
+mistakes.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ TELEGRAM = BaliseRecord(2.5, 2.5, "B1", 2.5, 2.5, outcomes={"observer": "accepte
 
 
 def result(offset: float = 0.0, events: tuple[BaliseRecord, ...] = (TELEGRAM,), **more: np.ndarray) -> Result:
-    """A position from 0 to 10 m and a speed that is `offset` too high; more columns by name of the signal of the train."""
+    """A position from 0 to 10 m and a speed that is `offset` too high; more columns by name of the signal of the
+    train.
+    """
     columns = {"train.position": TIME, "train.speed": 0.5 * TIME + offset, **{f"train.{k}": v for k, v in more.items()}}
     table = np.empty(len(TIME), [("time", "f8"), *((name, "f8") for name in columns)])
     table["time"] = TIME
@@ -34,7 +38,9 @@ def result(offset: float = 0.0, events: tuple[BaliseRecord, ...] = (TELEGRAM,), 
 def run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> Callable[..., tuple[int, str, str]]:
-    """Runs the command among ``a``, the same again ``same``, and ``b`` with a speed 0.1 m/s too high, in a range of 5 m/s."""
+    """Runs the command among ``a``, the same again ``same``, and ``b`` with a speed 0.1 m/s too high, in a range of 5
+    m/s.
+    """
     monkeypatch.chdir(tmp_path)
     for name, made in {"a": result(), "same": result(), "b": result(0.1)}.items():
         write_results(made, name, ("csv",))

@@ -43,13 +43,16 @@ def test_numpy_says_that_it_drops_the_units(tmp_path: Path, capsys: pytest.Captu
     assert "keeps no units" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(("source", "target", "more", "message"), [
-    ("a.h5", "a.xlsx", [], "the format is told by the ending"),
-    ("a.h5", "a.h5", [], "is the source itself"),
-    ("b.h5", "a.csv", [], "did you mean 'a.h5'"),
-    ("a.h5", "none/a.csv", [], "cannot be written: No such file or directory"),
-    ("a.h5", "a.csv", ["--signals", "trian.*"], "No signal 'trian.*' in the result"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("source", "target", "more", "message"),
+    [
+        ("a.h5", "a.xlsx", [], "the format is told by the ending"),
+        ("a.h5", "a.h5", [], "is the source itself"),
+        ("b.h5", "a.csv", [], "did you mean 'a.h5'"),
+        ("a.h5", "none/a.csv", [], "cannot be written: No such file or directory"),
+        ("a.h5", "a.csv", ["--signals", "trian.*"], "No signal 'trian.*' in the result"),
+    ],
+)
 def test_mistakes_are_told_in_a_line(
     source: str, target: str, more: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from zoo.build import linear_fmu
+from test_fmus.build import linear_fmu
 
 from cosim.cli import main
 from cosim.results.folder import read_results
@@ -27,7 +27,9 @@ def test_what_is_written_runs_from_the_command_line(
     assert main(["run", "point.toml", "--set", "stop=20.0", "--out", "out", "--no-report", "--quiet"]) == 0
     assert len(read_results("out").events) >= 1
     assert main(["new", "point.fmu"]) == 2
-    assert "point.toml exists already; choose another name with -o, or replace it with --force" in capsys.readouterr().err
+    assert (
+        "point.toml exists already; choose another name with -o, or replace it with --force" in capsys.readouterr().err
+    )
     assert main(["new", "point.fmu", "--force", "--observer", "discrete_uio"]) == 0
     assert 'observer = "discrete_uio"' in Path("point.toml").read_text()
 

@@ -28,7 +28,9 @@ def test_equal_differs_and_error(made: Path, capsys: pytest.CaptureFixture[str])
     assert (manifest["scenario"]["name"], manifest["scenario"]["from"]) == ("mine", str(made / "mine.toml"))
     capsys.readouterr()
     assert main(["rerun", str(out)]) == 0
-    assert capsys.readouterr().out == f"{out}: bit-identical (6 rows, 1 signals, 0 telegrams).\nNothing changed since.\n"
+    assert (
+        capsys.readouterr().out == f"{out}: bit-identical (6 rows, 1 signals, 0 telegrams).\nNothing changed since.\n"
+    )
     assert main(["rerun", str(out), "--set", "train.x0[1]=36.001"]) == 0  # 2.8e-5 of 36, 7e-5 of the range
     assert "within tolerance" in capsys.readouterr().out
     assert main(["rerun", str(out), "--set", "train.x0[1]=36.001", "--tolerance", "1e-6"]) == 1
@@ -69,7 +71,15 @@ def test_a_tolerance_that_cannot_be(made: Path, share: str) -> None:
 def test_a_streamed_run_from_the_command_line(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = made / "out"
     assert main(["run", str(made / "mine.toml"), "--out", str(out), "--no-report", "--quiet", "--stream"]) == 0
-    assert sorted(p.name for p in out.iterdir()) == ["events.csv", "made_from", "messages.csv", "summary.json", "table.npy"]
-    np.testing.assert_allclose(np.load(out / "table.npy")["train.y1"], 36.0 * np.exp(-np.linspace(0.0, 1.0, 11)), rtol=1e-13)
+    assert sorted(p.name for p in out.iterdir()) == [
+        "events.csv",
+        "made_from",
+        "messages.csv",
+        "summary.json",
+        "table.npy",
+    ]
+    np.testing.assert_allclose(
+        np.load(out / "table.npy")["train.y1"], 36.0 * np.exp(-np.linspace(0.0, 1.0, 11)), rtol=1e-13
+    )
     assert main(["rerun", str(out)]) == 0
     assert "bit-identical" in capsys.readouterr().out

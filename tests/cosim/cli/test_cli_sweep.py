@@ -49,14 +49,21 @@ def test_a_range_of_nothing_is_refused() -> None:
         parse_values("3:1")
 
 
-def test_a_sweep_prints_the_table_and_writes_every_run(file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_sweep_prints_the_table_and_writes_every_run(
+    file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out = tmp_path / "out"
-    assert main(["sweep", str(file), "--vary", "train.mass=70e3,80e3", "--vary", "stop=0.1,0.2", "--out", str(out)]) == 0
+    assert (
+        main(["sweep", str(file), "--vary", "train.mass=70e3,80e3", "--vary", "stop=0.1,0.2", "--out", str(out)]) == 0
+    )
     said = capsys.readouterr().out
     assert said.splitlines()[0].split() == ["run", "train.mass", "stop"]
     assert [line.split() for line in said.splitlines()[1:5]] == [
-        ["0", "70000", "0.1"], ["1", "70000", "0.2"], ["2", "80000", "0.1"], ["3", "80000", "0.2"],
-    ]  # fmt: skip
+        ["0", "70000", "0.1"],
+        ["1", "70000", "0.2"],
+        ["2", "80000", "0.1"],
+        ["3", "80000", "0.2"],
+    ]
     assert "4 of 4 runs done" in said
     assert [read_results(out / f"run_{n:03d}").time[-1] for n in range(4)] == [0.1, 0.2, 0.1, 0.2]
     assert read_results(out / "run_002").summary["sweep_settings"] == {"train.mass": 80e3, "stop": 0.1}
@@ -74,7 +81,17 @@ def test_one_run_that_fails_is_exit_code_1_and_the_others_are_there(
 
 
 def test_samples_are_those_of_the_seed(file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    common = ["sweep", str(file), "--vary", "train.mass=70e3..90e3", "--samples", "2", "--json", "--out", str(tmp_path / "out")]
+    common = [
+        "sweep",
+        str(file),
+        "--vary",
+        "train.mass=70e3..90e3",
+        "--samples",
+        "2",
+        "--json",
+        "--out",
+        str(tmp_path / "out"),
+    ]
     assert main([*common, "--seed", "5", "--set", "stop=0.05"]) == 0
     found = [run["settings"]["train.mass"] for run in json.loads(capsys.readouterr().out)["runs"]]
     points = Scenario.load(file).vary({"train.mass": uniform(70e3, 90e3)}, "latin", count=2, seed=5).variations

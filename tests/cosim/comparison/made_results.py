@@ -16,9 +16,14 @@ STRICT = Tolerance(absolute=1e-3, relative=0.0, time=1e-6)
 
 
 def made(
-    time: Any, *, units: Mapping[str, str] | None = None, discrete: Iterable[str] = (), events: Iterable[BaliseRecord] = (),
-    summary: Mapping[str, Any] | None = None, **signals: Any,
-) -> Result:  # fmt: skip
+    time: Any,
+    *,
+    units: Mapping[str, str] | None = None,
+    discrete: Iterable[str] = (),
+    events: Iterable[BaliseRecord] = (),
+    summary: Mapping[str, Any] | None = None,
+    **signals: Any,
+) -> Result:
     """A result of some signals; ``plant__speed`` becomes ``plant.speed``."""
     columns = {name.replace("__", "."): np.asarray(values, dtype=float) for name, values in signals.items()}
     table = np.zeros(len(time), dtype=[("time", float), *((name, float) for name in columns)])

@@ -28,7 +28,11 @@ def with_(values: np.ndarray, rows: slice, value: float) -> np.ndarray:
 def test_no_number_is_equal_to_the_same_and_to_nothing_else(value: float) -> None:
     holed = with_(LINE, slice(40, 50), value)
     assert signal(TIME, holed, holed + 1e-4).status == "within"
-    for one, two in [(LINE, holed), (holed, LINE), (with_(LINE, slice(40, 50), 7.0 if np.isinf(value) else np.inf), holed)]:
+    for one, two in [
+        (LINE, holed),
+        (holed, LINE),
+        (with_(LINE, slice(40, 50), 7.0 if np.isinf(value) else np.inf), holed),
+    ]:
         found = [f for f in signal(TIME, one, two).findings if f.kind == "nan"]
         assert [(f.time, f.end, f.size) for f in found] == [(0.4, 0.49, 10.0)]
 
@@ -68,7 +72,7 @@ def test_values_after_a_hole_are_judged() -> None:
         (slice(1, 101), "starts_late", 0.01),
         (slice(0, 50), "ends_early", 0.49),
     ],
-)  # fmt: skip
+)
 def test_a_dropped_sample_at_an_end_is_found(rows: slice, kind: str, at: float) -> None:
     full, part = made(TIME, y=LINE), made(TIME[rows], y=LINE[rows])
     (found,) = compared(full, part)["y"].findings
@@ -106,8 +110,11 @@ def test_missing_extra_and_ignored_signals() -> None:
     result = made(TIME, train__speed=LINE, plant__force=LINE, plant__note=LINE + 1.0)
     comparison = compare_results(reference, result, Tolerances(ignore=("*.note",)))
     assert [(s.name, s.status) for s in comparison.signals] == [
-        ("plant.speed", "missing"), ("plant.force", "equal"), ("plant.note", "ignored"), ("train.speed", "extra"),
-    ]  # fmt: skip
+        ("plant.speed", "missing"),
+        ("plant.force", "equal"),
+        ("plant.note", "ignored"),
+        ("train.speed", "extra"),
+    ]
     assert comparison["plant.speed"].nearest[0] == "train.speed"
     assert [signal.name for signal in comparison.failed] == ["plant.speed"]
     assert not comparison.equal

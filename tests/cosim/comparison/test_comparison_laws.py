@@ -37,7 +37,9 @@ def test_a_result_is_equal_to_itself_whatever_it_holds(values: np.ndarray, held:
 def test_any_numbers_can_be_compared(one: np.ndarray, two: np.ndarray, held: bool) -> None:
     """Infinities, NaN and numbers whose differences are infinite; warnings are errors here."""
     for every in (1, 3):
-        comparison = compared(made(TIME, y=one, **held_or_not(held)), made(TIME[::every], y=two[::every], **held_or_not(held)))
+        comparison = compared(
+            made(TIME, y=one, **held_or_not(held)), made(TIME[::every], y=two[::every], **held_or_not(held))
+        )
         assert comparison["y"].passed == (not comparison["y"].findings)
 
 
@@ -72,7 +74,9 @@ def test_an_offset_passes_up_to_the_tolerance(values: np.ndarray, offset: float,
 @settings(max_examples=40)
 @given(ANY_VALUES, ANY_VALUES, st.sampled_from([0.125, 4.0, 1024.0]), HELD)
 def test_scaling_a_signal_scales_error_and_tolerance(one: np.ndarray, two: np.ndarray, by: float, held: bool) -> None:
-    """By powers of two, so that nothing is rounded; 0.3 more, so that no signal of whole numbers is taken for an indicator."""
+    """By powers of two, so that nothing is rounded; 0.3 more, so that no signal of whole numbers is taken for an
+    indicator.
+    """
     relative = Tolerance(absolute=0.0, relative=0.1, time=0.05)
     small, large = (signal(TIME, f * (one + 0.3), f * (two + 0.3), relative, **held_or_not(held)) for f in (1.0, by))
     assert (large.status, kinds(large)) == (small.status, kinds(small))

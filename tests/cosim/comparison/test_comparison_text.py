@@ -26,9 +26,11 @@ def test_a_finding_says_where_how_much_and_what_is_allowed() -> None:
     other = made(TIME, train__speed=SPEED + bump, units=UNITS)
     one = compared(made(TIME, train__speed=SPEED, units=UNITS), other, Tolerance(0.002, 0.0))["train.speed"]
     assert [finding.text for finding in one.findings] == [
-        "train.speed: from 0.31 to 0.49 s 19 points outside the tube, at worst 0.12 m/s too high at 0.4 s (allowed 0.002 m/s)"
+        "train.speed: from 0.31 to 0.49 s 19 points outside the tube, at worst 0.12 m/s too high at 0.4 s (allowed "
+        "0.002 m/s)"
     ]
-    assert one.worst[0] == pytest.approx((0.4, 4.0, 4.12, 0.12), abs=2e-5)  # the allowed time is a millionth of a second
+    # the allowed time is a millionth of a second
+    assert one.worst[0] == pytest.approx((0.4, 4.0, 4.12, 0.12), abs=2e-5)
 
 
 def test_text_shows_what_differs_and_verbose_all() -> None:
@@ -70,7 +72,10 @@ def test_an_agreement_is_one_line() -> None:
 
 def test_telegrams_are_listed() -> None:
     record = BaliseRecord(0.5, 0.6, "b1", 5.0, 5.0)
-    one, two = made(TIME, y=TIME, events=[record]), made(TIME, y=TIME, events=[replace(record, identity="b2", stamp=0.9)])
+    one, two = (
+        made(TIME, y=TIME, events=[record]),
+        made(TIME, y=TIME, events=[replace(record, identity="b2", stamp=0.9)]),
+    )
     text = comparison_text(compared(one, two))
     assert "telegram 'b1' (true) of 0.5 s is missing" in text
     assert "telegram 'b2' (true) of 0.9 s is only in the result" in text

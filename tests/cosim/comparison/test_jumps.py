@@ -117,7 +117,13 @@ def test_ten_thousand_noisy_samples_one_late() -> None:
 def test_shift_of_a_jump_between_samples_is_not_overstated() -> None:
     a = jumps_at([0.0], [0.0], [1.0])
     one = Jumps(a.row, np.array([0.10]), np.array([0.11]), a.before, a.after, a.after_event)
-    for begin, end, expected in [(0.11, 0.12, 0.01), (0.10, 0.20, 0.0), (0.0, 0.20, 0.0), (0.2, 0.4, 0.1), (0.0, 0.08, -0.03)]:
+    for begin, end, expected in [
+        (0.11, 0.12, 0.01),
+        (0.10, 0.20, 0.0),
+        (0.0, 0.20, 0.0),
+        (0.2, 0.4, 0.1),
+        (0.0, 0.08, -0.03),
+    ]:
         two = Jumps(a.row, np.array([begin]), np.array([end]), a.before, a.after, a.after_event)
         assert shifts(one, two)[0] == pytest.approx(expected, abs=1e-12)
         assert shifts(two, one)[0] == pytest.approx(-expected, abs=1e-12)
@@ -155,7 +161,9 @@ def test_event_row_late_and_values_after_it_are_judged() -> None:
         after = np.arange(len(time)) > np.searchsorted(time, at)
         return time, np.where(after, 1.0 + more + 0.1 * time, 0.0)
 
-    reference, late, high = (made(time, y=values) for time, values in (run(0.503, 0.0), run(0.506, 0.0), run(0.506, 0.01)))
+    reference, late, high = (
+        made(time, y=values) for time, values in (run(0.503, 0.0), run(0.506, 0.0), run(0.506, 0.01))
+    )
     one = compared(reference, late)["y"]
     assert kinds(one) == ["jump_time"]
     assert one.findings[0].size == pytest.approx(0.003, abs=1e-12)
@@ -197,11 +205,15 @@ EVENT_TIME = np.sort(np.append(TIME, TIME[100]))
 
 @pytest.mark.parametrize("discrete", [[], ["y"]])
 def test_a_jump_at_an_event_that_comes_with_the_next_sample_is_late(discrete: list[str]) -> None:
-    """After the event the late side still has the old value, so the jump is not merely somewhere between two samples."""
+    """After the event the late side still has the old value, so the jump is not merely somewhere between two
+    samples.
+    """
     rows = np.arange(202)
     at_event, late = np.where(rows > 100, 5.0, 0.0), np.where(rows > 101, 5.0, 0.0)
-    for one, sign in ((signal(EVENT_TIME, at_event, late, discrete=discrete), "late"),
-                      (signal(EVENT_TIME, late, at_event, discrete=discrete), "early")):  # fmt: skip
+    for one, sign in (
+        (signal(EVENT_TIME, at_event, late, discrete=discrete), "late"),
+        (signal(EVENT_TIME, late, at_event, discrete=discrete), "early"),
+    ):
         assert kinds(one) == ["jump_time"]
         assert one.findings[0].size == pytest.approx(0.01, abs=1e-12)
         assert sign in one.findings[0].text
@@ -236,7 +248,9 @@ def test_a_sampled_ramp_with_one_percent_more_is_a_value_error_not_a_time_error(
 
 
 def test_jumps_seen_by_one_grid_only_are_not_taken_for_one_that_is_late() -> None:
-    """The fine grid shows a jump at 1 s, which a ramp follows; the coarse one takes a steep ramp at 2 s for its only jump."""
+    """The fine grid shows a jump at 1 s, which a ramp follows; the coarse one takes a steep ramp at 2 s for its only
+    jump.
+    """
     time = np.arange(301) * 0.01
     values = np.interp(time, [0.0, 0.995, 0.9951, 1.2, 2.0, 2.05, 3.0], [0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0])
     full, thin = made(time, y=values), made(time[::10], y=values[::10])
@@ -247,7 +261,9 @@ def test_jumps_seen_by_one_grid_only_are_not_taken_for_one_that_is_late() -> Non
 
 @pytest.mark.parametrize("every", [2, 5, 10])
 def test_thinned_signals_with_jumps_pass(every: int) -> None:
-    """Samples held, steps, and events in their own rows, each compared with every n-th row of itself, both ways round."""
+    """Samples held, steps, and events in their own rows, each compared with every n-th row of itself, both ways
+    round.
+    """
     time = np.sort(np.append(TIME, [0.503, 0.503, 1.207, 1.207]))
     rows = np.arange(len(time))
     event = np.isin(time, [0.503, 1.207])

@@ -1,6 +1,7 @@
 """The mutation study stands on its page as it comes out now: what is caught, what is not, and no false alarm.
 
-A part of the changes is made again, each kind among them; new deliveries as blocks, whose numbers are those of the FMUs.
+A part of the changes is made again, each kind among them; new deliveries as blocks, whose numbers are those of the
+FMUs.
 """
 
 from __future__ import annotations
@@ -73,7 +74,7 @@ def test_the_unchanged_run_gives_no_alarm(study: Any, judge: Any) -> None:
     conditions, repetition = study.manoeuvre.Conditions, study.repetitions.Repetition
     ways = [
         repetition("Python", 1, conditions(stepper="python", order=study.manoeuvre.ORDER[::-1]).run),
-        repetition("block", 1, conditions(realisation="block", fmi_version=2).run),
+        repetition("block", 1, conditions(backend="block", fmi_version=2).run),
         repetition("new process", 1, study.repetitions.in_new_process),
         *study.repetitions.other_steps(),
     ]

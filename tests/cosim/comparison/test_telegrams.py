@@ -15,10 +15,17 @@ from cosim.comparison.verdict import EventComparison
 from cosim.results.result import BaliseRecord
 
 RECORDS = [
-    BaliseRecord(stamp=1.0 + k, delivered_at=1.1 + k, identity=f"b{k % 3}", position=100.0 * k, true_position=100.0 * k,
-                 odometer_reading=10.0, outcomes={"observer": "accepted", "other": "late"})
+    BaliseRecord(
+        stamp=1.0 + k,
+        delivered_at=1.1 + k,
+        identity=f"b{k % 3}",
+        position=100.0 * k,
+        true_position=100.0 * k,
+        odometer_reading=10.0,
+        outcomes={"observer": "accepted", "other": "late"},
+    )
     for k in range(9)
-]  # fmt: skip
+]
 RUN: dict[str, object] = {"components": []}
 
 
@@ -26,7 +33,7 @@ def verdict(reference: list[BaliseRecord], result: list[BaliseRecord]) -> EventC
     time = [0.0, 10.0]
     return compare_telegrams(
         made(time, y=time, events=reference, summary=RUN), made(time, y=time, events=result, summary=RUN), STRICT, 10.0
-    )  # fmt: skip
+    )
 
 
 def changed(which: int, **changes: object) -> list[BaliseRecord]:
@@ -41,7 +48,7 @@ def test_order_in_the_list_is_irrelevant(shuffled: list[BaliseRecord]) -> None:
 
 @given(st.sets(st.integers(0, 8), max_size=8))
 def test_missing_and_extra_ones_are_those_left_out(gone: set[int]) -> None:
-    """Although names repeat: three passings of each of three balises."""
+    """Although names repeat: three crossings of each of three balises."""
     rest = [record for k, record in enumerate(RECORDS) if k not in gone]
     there, back = verdict(RECORDS, rest), verdict(rest, RECORDS)
     assert there.matched == back.matched == 9 - len(gone)

@@ -31,7 +31,9 @@ def lines(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray]:
 
 
 @given(lines(), st.lists(st.floats(0.0, 5.0), min_size=1, max_size=20), st.floats(0.0, 3.0))
-def test_band_is_that_of_the_naive_computation(line: tuple[np.ndarray, np.ndarray], at: list[float], tolerance: float) -> None:
+def test_band_is_that_of_the_naive_computation(
+    line: tuple[np.ndarray, np.ndarray], at: list[float], tolerance: float
+) -> None:
     time, values = line
     inside = np.array([t for t in at if t <= time[-1]] or [0.0])
     band = band_of(Curve(time, values), inside, tolerance)

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from compiled_runs import assert_same, both, steps_compiled
-from zoo.build import linear_fmu
+from test_fmus.build import linear_fmu
 
 from cosim import Scenario
 
@@ -15,7 +15,9 @@ OBSERVERS = ("differentiator_cdo", "takagi_sugeno_cdo", "multirate_cdo", "discre
 VARIANTS: dict[str, dict[str, Any]] = {
     "as shipped": {"stop": 90.0},
     "late, missed and false": {
-        "balises.latency": 0.0731, "balises.latency_jitter": 0.04, "balises.missed_fraction": 0.2,
+        "balises.latency": 0.0731,
+        "balises.latency_jitter": 0.04,
+        "balises.missed_fraction": 0.2,
         "balises.false_telegrams": [{"time": 7.003, "offset": 3.0}, {"time": 12.0, "offset": -2.0}],
     },
     "on the track": {"balises.layout": "spacing", "balises.spacing": 17.3, "balises.track_end": 400.0},
@@ -23,12 +25,14 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "stale": {"balises.timing": "stale"},
     "thinned": {"master.record_every": 3, "stop": 10.0},
     "FMI 2": {f"{name}.as": "fmu2" for name in (*OBSERVERS, "locomotive", "driver")},
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_the_default_scenario(variant: str) -> None:
-    overrides = {"certificates": "ignore", "stop": 30.0} | {f"{name}.as": "fmu3" for name in OBSERVERS} | VARIANTS[variant]
+    overrides = (
+        {"certificates": "ignore", "stop": 30.0} | {f"{name}.as": "fmu3" for name in OBSERVERS} | VARIANTS[variant]
+    )
     python, compiled = both(Scenario.load("freight_profile_d"), **overrides)
     assert python.failure is None
     assert len(python.result.events) > 4
@@ -37,18 +41,31 @@ def test_the_default_scenario(variant: str) -> None:
 
 
 def test_a_plant_that_leaps_over_a_balise(tmp_path: Path) -> None:
-    """Its speed output says that it stands: no step seems to be near a balise, and the passing is found afterwards."""
+    """Its speed output says that it stands: no step seems to be near a balise, and the crossing is found afterwards."""
     fmu = linear_fmu(
-        tmp_path, "liar", [[0.0]], [[1.0]], [[1.0], [0.0]], [[0.0], [0.0]], version=3, inputs=["u"],
-        outputs=["position", "speed"], u0=[20.0], units={"position": "m", "speed": "m/s"},
-    )  # fmt: skip
+        tmp_path,
+        "liar",
+        [[0.0]],
+        [[1.0]],
+        [[1.0], [0.0]],
+        [[0.0], [0.0]],
+        version=3,
+        inputs=["u"],
+        outputs=["position", "speed"],
+        u0=[20.0],
+        units={"position": "m", "speed": "m/s"},
+    )
     scenario = Scenario(folder=tmp_path, stop=20.0, step=0.1).add("plant", fmu=str(fmu))
     scenario.add("after", fmu=str(linear_fmu(tmp_path, "after", [[0.0]], [[1.0]], [[1.0]], [[0.0]], version=2)))
     scenario.connect("plant.position -> after.u1")
     scenario.balises(
-        position="plant.position", speed="plant.speed", layout="positions", positions=[51.3, 101.0, 300.1], method="rollback",
+        position="plant.position",
+        speed="plant.speed",
+        layout="positions",
+        positions=[51.3, 101.0, 300.1],
+        method="rollback",
         receivers=[],
-    )  # fmt: skip
+    )
     python, compiled = both(scenario)
     assert len(python.result.events) == 3
     assert_same(python, compiled)
@@ -57,8 +74,14 @@ def test_a_plant_that_leaps_over_a_balise(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("method", ["interpolate", "predict"])
 def test_other_ways_to_localise_stay_with_python(method: str) -> None:
-    overrides = {"certificates": "ignore", "stop": 2.0, "balises.method": method} | {f"{name}.as": "fmu3" for name in OBSERVERS}
-    stepper = Scenario.load("freight_profile_d").run(overrides=overrides, warn=lambda _: None).result.summary["master"]["stepper"]
+    overrides = {"certificates": "ignore", "stop": 2.0, "balises.method": method} | {
+        f"{name}.as": "fmu3" for name in OBSERVERS
+    }
+    stepper = (
+        Scenario.load("freight_profile_d")
+        .run(overrides=overrides, warn=lambda _: None)
+        .result.summary["master"]["stepper"]
+    )
     assert stepper["name"] == "python"
     assert method in stepper["reason"]
 

@@ -1,4 +1,6 @@
-"""The compiled stepper makes the calls that the Python stepper makes, and whichever of them fails, the run ends the same way."""
+"""The compiled stepper makes the calls that the Python stepper makes, and whichever of them fails, the run ends the
+same way.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +17,17 @@ from cosim import Scenario
 
 RECEIVER, PLANT = "takagi_sugeno_cdo", "locomotive"
 FUNCTIONS = (
-    "fmi3SetFloat64", "fmi3DoStep", "fmi3GetFloat64", "fmi3EnterEventMode", "fmi3SetClock", "fmi3UpdateDiscreteStates",
-    "fmi3EnterStepMode", "fmi3SetFMUState", "fmi3GetFMUState", "fmi3FreeFMUState",
-)  # fmt: skip
+    "fmi3SetFloat64",
+    "fmi3DoStep",
+    "fmi3GetFloat64",
+    "fmi3EnterEventMode",
+    "fmi3SetClock",
+    "fmi3UpdateDiscreteStates",
+    "fmi3EnterStepMode",
+    "fmi3SetFMUState",
+    "fmi3GetFMUState",
+    "fmi3FreeFMUState",
+)
 INSTANT = 0.213
 ERROR = 3
 
@@ -38,7 +48,9 @@ Wrap = Callable[[Call], int | None]
 
 @pytest.fixture
 def spied(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[Wrap], None]]:
-    """Puts a function of the test in front of those of plant and receiver, wherever the call comes from; it may answer itself."""
+    """Puts a function of the test in front of those of plant and receiver, wherever the call comes from; it may answer
+    itself.
+    """
     kept: list[Any] = []
     real = dialect.quicken
 
@@ -79,9 +91,14 @@ def scenario(latency: float) -> Scenario:
     made.add("odometer", model="odometer").add(RECEIVER, observer=RECEIVER, **{"as": "fmu3"})
     made.connect("locomotive.wheel_speed -> odometer.wheel_speed", f"odometer.reading -> {RECEIVER}.odometer")
     return made.balises(
-        position="locomotive.position", speed="locomotive.speed", odometer="odometer.reading", layout="instants",
-        instants=[INSTANT, 0.3, 0.304], latency=latency, method="rollback",
-    )  # fmt: skip
+        position="locomotive.position",
+        speed="locomotive.speed",
+        odometer="odometer.reading",
+        layout="instants",
+        instants=[INSTANT, 0.3, 0.304],
+        latency=latency,
+        method="rollback",
+    )
 
 
 @pytest.mark.parametrize("latency", [0.0, 0.013, 0.007])
@@ -105,7 +122,9 @@ def test_the_same_calls_in_the_same_order(spied: Callable[[Wrap], None], latency
 
 
 def _places() -> list[tuple[str, str, int, int]]:
-    """Component, function, steps done, and which call since then: in an ordinary step, and all around the first telegram."""
+    """Component, function, steps done, and which call since then: in an ordinary step, and all around the first
+    telegram.
+    """
     around = 21  # steps before the one with the telegram
     plain = [(RECEIVER, f, 9, 1) for f in FUNCTIONS[:3]]
     plant = [(PLANT, f, around + 1, 1) for f in ("fmi3DoStep", "fmi3GetFloat64", "fmi3SetFMUState", "fmi3FreeFMUState")]

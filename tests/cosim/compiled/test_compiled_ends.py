@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 from compiled_runs import assert_same, both, chain, random_linear, steps_compiled
-from zoo.build import linear_fmu
-from zoo.events import awkward_fmu, periodic_fmu, timed_fmu, triggered_fmu
+from test_fmus.build import linear_fmu
+from test_fmus.events import awkward_fmu, periodic_fmu, timed_fmu, triggered_fmu
 
 from cosim import Scenario
 from cosim.compiled import library, stretch
@@ -17,10 +17,27 @@ from cosim.errors import CouplingError
 from fmus.toolchain.compile import CompilerMissing
 
 ENDS = [
-    ("quit", 1), ("quit", 2), ("quit", 3), ("quit-in-event", 3), ("discard", 1), ("discard", 2), ("discard", 3),
-    ("discard-silently", 2), ("short", 3), ("own-steps", 3), ("warns", 2), ("warns", 3), ("fails", 1), ("fails", 2),
-    ("fails", 3), ("dies", 2), ("dies", 3), ("waits", 2), ("chatty", 2), ("chatty", 3),
-]  # fmt: skip
+    ("quit", 1),
+    ("quit", 2),
+    ("quit", 3),
+    ("quit-in-event", 3),
+    ("discard", 1),
+    ("discard", 2),
+    ("discard", 3),
+    ("discard-silently", 2),
+    ("short", 3),
+    ("own-steps", 3),
+    ("warns", 2),
+    ("warns", 3),
+    ("fails", 1),
+    ("fails", 2),
+    ("fails", 3),
+    ("dies", 2),
+    ("dies", 3),
+    ("waits", 2),
+    ("chatty", 2),
+    ("chatty", 3),
+]
 
 
 def around(folder: Path, fmu: Path, **tables: Any) -> Scenario:
@@ -70,7 +87,9 @@ def test_events_propagated_stay_with_python(tmp_path: Path) -> None:
 def test_values_that_are_not_finite(tmp_path: Path, version: Any) -> None:
     """It grows by e^100 in each step until it overflows; the row with the infinity is kept."""
     grows = linear_fmu(tmp_path, "grows", [[100.0]], [[0.0]], [[1.0]], [[0.0]], version=version, x0=[1.0])
-    scenario = chain(tmp_path, [grows, random_linear(tmp_path, "next", np.random.default_rng(1), 3)], stop=20.0, step=1.0)
+    scenario = chain(
+        tmp_path, [grows, random_linear(tmp_path, "next", np.random.default_rng(1), 3)], stop=20.0, step=1.0
+    )
     python, compiled = both(scenario)
     assert python.failure is not None
     assert "grows" not in python.failure  # by the names of the components
@@ -149,7 +168,9 @@ def test_progress_is_told_up_to_the_end(tmp_path: Path) -> None:
 def test_the_loop_of_the_master_may_stop_inside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Steps done in Python between stretches do not disturb them: every 13th step is taken away from the stepper."""
     rng = np.random.default_rng(5)
-    scenario = chain(tmp_path, [random_linear(tmp_path, f"m{i}", rng, v) for i, v in enumerate((2, 3, 2))], stop=5.0, step=0.01)
+    scenario = chain(
+        tmp_path, [random_linear(tmp_path, f"m{i}", rng, v) for i, v in enumerate((2, 3, 2))], stop=5.0, step=0.01
+    )
     reference = scenario.run(overrides={"master.stepper": "python"}, warn=lambda _: None)
     real = stretch.CompiledStepper._free_steps
     monkeypatch.setattr(stretch.CompiledStepper, "_free_steps", lambda self, k: min(real(self, k), (-k) % 13))
@@ -159,7 +180,9 @@ def test_the_loop_of_the_master_may_stop_inside(tmp_path: Path, monkeypatch: pyt
 
 
 def test_a_stretch_ends_when_its_time_is_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With no time at all the routine comes back as soon as it looks at the clock, and does single steps from then on."""
+    """With no time at all the routine comes back as soon as it looks at the clock, and does single steps from then
+    on.
+    """
     scenario = chain(tmp_path, [random_linear(tmp_path, "a", np.random.default_rng(1), 3)], stop=5.0, step=0.01)
     real = stretch.CompiledStepper.__init__
 

@@ -10,18 +10,21 @@ import pytest
 from compiled_runs import assert_same, both, chain, random_linear, steps_compiled
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from zoo.events import triggered_fmu
-from zoo.typed import typed_fmu
+from test_fmus.events import triggered_fmu
+from test_fmus.typed import typed_fmu
 
 from cosim import Scenario
 
 
 @settings(max_examples=6)
 @given(
-    versions=st.lists(st.sampled_from([1, 2, 3]), min_size=2, max_size=5), start=st.floats(-3.0, 3.0),
-    step=st.sampled_from([0.01, 0.1, 1.0 / 3.0]), algorithm=st.sampled_from(["gauss-seidel", "jacobi"]),
-    count=st.integers(1, 700), offset=st.sampled_from([0.0, 0.3]),
-)  # fmt: skip
+    versions=st.lists(st.sampled_from([1, 2, 3]), min_size=2, max_size=5),
+    start=st.floats(-3.0, 3.0),
+    step=st.sampled_from([0.01, 0.1, 1.0 / 3.0]),
+    algorithm=st.sampled_from(["gauss-seidel", "jacobi"]),
+    count=st.integers(1, 700),
+    offset=st.sampled_from([0.0, 0.3]),
+)
 def test_rings_of_linear_fmus(
     tmp_path_factory: pytest.TempPathFactory,
     versions: list[int],
@@ -37,8 +40,9 @@ def test_rings_of_linear_fmus(
     scenario = chain(folder, fmus, start=start, stop=start + count * step, step=step, master={"algorithm": algorithm})
     scenario.add("watcher", fmu=str(fmus[0]))
     scenario._data["connections"] = [
-        *scenario._data["connections"], {"from": "c1.y1", "to": "watcher.u1", "factor": 0.7, "offset": offset},
-    ]  # fmt: skip
+        *scenario._data["connections"],
+        {"from": "c1.y1", "to": "watcher.u1", "factor": 0.7, "offset": offset},
+    ]
     python, compiled = both(scenario)
     assert python.failure is None
     assert steps_compiled(compiled) == count
@@ -48,7 +52,7 @@ def test_rings_of_linear_fmus(
 NUMBERS = {
     2: ("float64", "int32", "boolean", "enumeration"),
     3: ("float64", "float32", "int8", "uint8", "int16", "uint16", "int32", "uint32", "boolean"),
-}  # fmt: skip
+}
 WITH_VECTOR = ("vector[1]", "vector[2]", "vector[3]")
 
 
@@ -57,7 +61,9 @@ def test_every_numeric_type(tmp_path: Path, version: Literal[2, 3]) -> None:
     """FMUs whose outputs are their inputs with a twist, in a row."""
     scenario = Scenario(folder=tmp_path, stop=3.0, step=0.01)
     kinds = [*NUMBERS[version], *(WITH_VECTOR if version == 3 else ())]
-    starts = {f"u_{kind}": 2.0 if kind == "enumeration" else float(kind == "boolean") or 100.0 for kind in NUMBERS[version]}
+    starts = {
+        f"u_{kind}": 2.0 if kind == "enumeration" else float(kind == "boolean") or 100.0 for kind in NUMBERS[version]
+    }
     for name, values in (("a", starts), ("b", {}), ("c", {})):
         scenario.add(name, fmu=str(typed_fmu(tmp_path, version=version)), parameters=values)
     scenario.connect(*(f"{x}.y_{k} -> {y}.u_{k}" for x, y in ("ab", "bc") for k in kinds))
@@ -70,7 +76,9 @@ def test_every_numeric_type(tmp_path: Path, version: Literal[2, 3]) -> None:
 
 def test_a_value_that_does_not_fit_its_type(tmp_path: Path) -> None:
     scenario = Scenario(folder=tmp_path, stop=3.0, step=0.01)
-    scenario.add("ramp", fmu=str(triggered_fmu(tmp_path, event_mode=False))).add("typed", fmu=str(typed_fmu(tmp_path, version=2)))
+    scenario.add("ramp", fmu=str(triggered_fmu(tmp_path, event_mode=False))).add(
+        "typed", fmu=str(typed_fmu(tmp_path, version=2))
+    )
     scenario._data["connections"] = [{"from": "ramp.count", "to": "typed.u_int32", "factor": 1e9}]
     python, compiled = both(scenario)
     assert python.failure is not None
@@ -82,7 +90,9 @@ def test_a_value_that_does_not_fit_its_type(tmp_path: Path) -> None:
 def test_whole_numbers_are_rounded_to_even(tmp_path: Path) -> None:
     """Half a count is 0.5, 1.5, 2.5, ...: rounded to 0, 2, 2, ..."""
     scenario = Scenario(folder=tmp_path, stop=3.0, step=0.01)
-    scenario.add("ramp", fmu=str(triggered_fmu(tmp_path, event_mode=False))).add("typed", fmu=str(typed_fmu(tmp_path, version=2)))
+    scenario.add("ramp", fmu=str(triggered_fmu(tmp_path, event_mode=False))).add(
+        "typed", fmu=str(typed_fmu(tmp_path, version=2))
+    )
     scenario._data["connections"] = [{"from": "ramp.count", "to": "typed.u_int32", "factor": 0.5}]
     python, compiled = both(scenario)
     assert python.failure is None

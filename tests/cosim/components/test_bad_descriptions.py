@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from zoo.build import linear_fmu
-from zoo.events import periodic_fmu
-from zoo.typed import typed_fmu
+from test_fmus.build import linear_fmu
+from test_fmus.events import periodic_fmu
+from test_fmus.typed import typed_fmu
 
 from cosim.cli import main
 from cosim.components.loading import load_fmu
@@ -36,13 +36,17 @@ def changed(fmu: Path, old: str, new: str, member: str = "modelDescription.xml")
 
 def mass(folder: Path, version: Any = 2) -> Path:
     """A mass, force in, position out."""
-    return linear_fmu(folder, "mass", [[0, 1], [0, 0]], [[0], [1]], [[1, 0]], [[0]], version=version, inputs=["f"], outputs=["x"])
+    return linear_fmu(
+        folder, "mass", [[0, 1], [0, 0]], [[0], [1]], [[1, 0]], [[0]], version=version, inputs=["f"], outputs=["x"]
+    )
 
 
 def refused(folder: Path, capsys: pytest.CaptureFixture[str], text: str = SCENARIO, command: str = "run") -> str:
     """What the command line says of the scenario; it ends with 2."""
     (folder / "s.toml").write_text(text)
-    more = {"run": ["--out", str(folder / "out"), "--no-report"], "export": [str(folder / "s.ssp")], "show": []}[command]
+    more = {"run": ["--out", str(folder / "out"), "--no-report"], "export": [str(folder / "s.ssp")], "show": []}[
+        command
+    ]
     assert main([command, str(folder / "s.toml"), *more]) == 2
     return capsys.readouterr().err
 
@@ -52,16 +56,41 @@ N, TWO = 'Dimension valueReference="1"', 'Dimension start="2"'
 TICK = 'intervalVariability="constant"'
 CASES = {
     "two of a name": (mass, 'name="x0[1]"', 'name="x"', r"two variables are named 'x', value references 2 and 3"),
-    "reference too large": (mass, 'valueReference="1"', 'valueReference="4294967296"', "reference 4294967296, expected 0 to"),
+    "reference too large": (
+        mass,
+        'valueReference="1"',
+        'valueReference="4294967296"',
+        "reference 4294967296, expected 0 to",
+    ),
     "reference negative": (mass, 'valueReference="1"', 'valueReference="-1"', "value reference -1, expected 0 to"),
     "reference missing": (mass, ' valueReference="1"', "", "attribute 'valueReference' is required but missing"),
     "version missing": (mass, ' fmiVersion="2.0"', "", "an attribute is missing, or a reference leads nowhere"),
-    "item without value": (typed_fmu, MOOD, '<Item name="calm"/>', "item 'calm' of enumeration 'Mood' has the value None"),
-    "item with a text": (typed_fmu, MOOD, '<Item name="calm" value="one"/>', "item 'calm' .* has the value 'one', expected"),
+    "item without value": (
+        typed_fmu,
+        MOOD,
+        '<Item name="calm"/>',
+        "item 'calm' of enumeration 'Mood' has the value None",
+    ),
+    "item with a text": (
+        typed_fmu,
+        MOOD,
+        '<Item name="calm" value="one"/>',
+        "item 'calm' .* has the value 'one', expected",
+    ),
     "dimension unknown": (typed_fmu, f"<{N}/>", '<Dimension valueReference="77"/>', "leads nowhere: .*77"),
-    "dimension negative": (typed_fmu, f"<{TWO}/>", '<Dimension start="-2"/>', r"shape \(-2, 3\); no dimension may be neg"),
+    "dimension negative": (
+        typed_fmu,
+        f"<{TWO}/>",
+        '<Dimension start="-2"/>',
+        r"shape \(-2, 3\); no dimension may be neg",
+    ),
     "dimension huge": (typed_fmu, f"<{TWO}/>", '<Dimension start="1000000000"/>', "too large: an input has at most"),
-    "clock unknown": (periodic_fmu, TICK, 'intervalVariability="weekly"', "clock 'tick' has the intervalVariability 'weekly'"),
+    "clock unknown": (
+        periodic_fmu,
+        TICK,
+        'intervalVariability="weekly"',
+        "clock 'tick' has the intervalVariability 'weekly'",
+    ),
 }
 
 
@@ -95,7 +124,9 @@ def test_a_structural_parameter_cannot_make_an_array_without_end(
 
 @pytest.mark.compiler
 @pytest.mark.parametrize(("version", "function"), [(2, "fmi2CancelStep"), (3, "fmi3GetClock")])
-def test_a_missing_function_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str], version: Any, function: str) -> None:
+def test_a_missing_function_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], version: Any, function: str
+) -> None:
     changed(mass(tmp_path, version), f"\0{function}\0", f"\0X{function[1:]}\0", "binaries")
     error = refused(tmp_path, capsys)
     assert "its library lacks a function that FMI demands of every FMU: " in error

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import pytest
 from fmpy.fmi1 import FMICallException
 from mock_slaves import FMI2, Mock, Train, component, started, variable
-from zoo.build import linear_fmu
+from test_fmus.build import linear_fmu
 
 import cosim
 from cosim.components.capabilities import Capabilities, read_capabilities, tool_warning
@@ -20,10 +20,14 @@ from fmus.check.probe import probe
 
 LAG: dict[str, Any] = {"A": [[-1.0]], "B": [[1.0]], "C": [[1.0]], "D": [[0.5]], "inputs": ["u"], "outputs": ["y"]}
 
-FLAGS_1 = "canHandleVariableCommunicationStepSize canInterpolateInputs canRunAsynchronuously canBeInstantiatedOnlyOncePerProcess"
+FLAGS_1 = (
+    "canHandleVariableCommunicationStepSize canInterpolateInputs canRunAsynchronuously "
+    "canBeInstantiatedOnlyOncePerProcess"
+)
 FLAGS_2 = f"{FLAGS_1} needsExecutionTool canNotUseMemoryManagementFunctions canGetAndSetFMUstate canSerializeFMUstate"
 FLAGS_3 = (
-    "canHandleVariableCommunicationStepSize canBeInstantiatedOnlyOncePerProcess needsExecutionTool canGetAndSetFMUState "
+    "canHandleVariableCommunicationStepSize canBeInstantiatedOnlyOncePerProcess needsExecutionTool "
+    "canGetAndSetFMUState "
     "canSerializeFMUState providesDirectionalDerivatives providesAdjointDerivatives providesPerElementDependencies "
     "providesIntermediateUpdate mightReturnEarlyFromDoStep canReturnEarlyAfterIntermediateUpdate hasEventMode "
     "providesEvaluateDiscreteStates"
@@ -34,9 +38,10 @@ CASES = (
     *((3, flag) for flag in FLAGS_3.split()),
 )
 RENAMED = {
-    "canGetAndSetFMUstate": "canGetAndSetFMUState", "canSerializeFMUstate": "canSerializeFMUState",
+    "canGetAndSetFMUstate": "canGetAndSetFMUState",
+    "canSerializeFMUstate": "canSerializeFMUState",
     "providesDirectionalDerivative": "providesDirectionalDerivatives",
-}  # fmt: skip
+}
 
 
 def described(folder: Path, version: int, attributes: str) -> Capabilities:
@@ -46,7 +51,10 @@ def described(folder: Path, version: int, attributes: str) -> Capabilities:
     more = ""
     if version == 1:
         interface = ""
-        more = f"<Implementation><CoSimulation_StandAlone><Capabilities {attributes}/></CoSimulation_StandAlone></Implementation>"
+        more = (
+            f"<Implementation><CoSimulation_StandAlone><Capabilities "
+            f"{attributes}/></CoSimulation_StandAlone></Implementation>"
+        )
     head = f'fmiVersion="{version}.0" modelName="toy" {token}="t"'
     if version == 1:
         head += ' modelIdentifier="toy" numberOfContinuousStates="0" numberOfEventIndicators="0"'
@@ -66,11 +74,15 @@ def test_each_flag_is_read_where_the_version_has_it(tmp_path: Path, version: int
 
 def test_numbers_are_numbers(tmp_path: Path) -> None:
     three = described(
-        tmp_path, 3, 'fixedInternalStepSize="0.01" maxOutputDerivativeOrder="2" recommendedIntermediateInputSmoothness="-1"'
+        tmp_path,
+        3,
+        'fixedInternalStepSize="0.01" maxOutputDerivativeOrder="2" recommendedIntermediateInputSmoothness="-1"',
     )
     assert three.declared() == {
-        "fixedInternalStepSize": 0.01, "maxOutputDerivativeOrder": 2, "recommendedIntermediateInputSmoothness": -1,
-    }  # fmt: skip
+        "fixedInternalStepSize": 0.01,
+        "maxOutputDerivativeOrder": 2,
+        "recommendedIntermediateInputSmoothness": -1,
+    }
     assert described(tmp_path, 1, 'maxOutputDerivativeOrder="1"').declared() == {"maxOutputDerivativeOrder": 1}
 
 
@@ -94,11 +106,14 @@ def test_every_flag_has_a_default_and_none_is_declared_by_silence() -> None:
     assert read_capabilities(description) == Capabilities()
 
 
-# -- one instance in a process ----------------------------------------------------------------------------------------------
+# -- one instance in a process
+# ----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.compiler
-def test_a_second_instance_is_refused_before_anything_is_loaded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_second_instance_is_refused_before_anything_is_loaded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Also where the second one is a copy under another name."""
     alone = linear_fmu(tmp_path, "alone", **LAG, once_per_process=True)
     copy = tmp_path / "copy.fmu"
@@ -137,7 +152,8 @@ def test_the_probe_makes_no_second_instance(tmp_path: Path) -> None:
     assert "one instance per process only" in report.remarks[0]
 
 
-# -- another program ----------------------------------------------------------------------------------------------------------
+# -- another program
+# ----------------------------------------------------------------------------------------------------------
 
 
 class Remote(Train):
@@ -177,11 +193,13 @@ def test_the_user_is_told_before_the_run(tmp_path: Path) -> None:
     outcome = cosim.Scenario(stop=0.1, step=0.1).add("remote", fmu=str(path)).run()
     told = [w for w in outcome.result.summary["warnings"] if "needsExecutionTool" in w]
     assert told == [
-        "remote: the FMU needs another program to be installed (needsExecutionTool); its description does not say which."
+        "remote: the FMU needs another program to be installed (needsExecutionTool); its description does not say "
+        "which."
     ]
 
 
-# -- what a step returns --------------------------------------------------------------------------------------------------------
+# -- what a step returns
+# --------------------------------------------------------------------------------------------------------
 
 
 class Waiting(FMI2, Mock):
@@ -191,15 +209,20 @@ class Waiting(FMI2, Mock):
         raise FMICallException("fmi2DoStep", 5)
 
 
-@pytest.mark.parametrize(("declared", "words"), [(True, "as canRunAsynchronuously allows"), (False, "against its description")])
+@pytest.mark.parametrize(
+    ("declared", "words"), [(True, "as canRunAsynchronuously allows"), (False, "against its description")]
+)
 def test_a_pending_step_is_refused_clearly(declared: bool, words: str) -> None:
     slave = type("Asynchronous", (Waiting,), {"capabilities": {"canRunAsynchronuously": declared}})()
     made = started(slave)
-    with pytest.raises(RunError, match=rf"t = 0 s: doStep returned before it was done \(status pending\), {words}; slaves that"):
+    with pytest.raises(
+        RunError, match=rf"t = 0 s: doStep returned before it was done \(status pending\), {words}; slaves that"
+    ):
         made.advance(0.0, 0.1)
 
 
-# -- derivatives ----------------------------------------------------------------------------------------------------------
+# -- derivatives
+# ----------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.compiler
@@ -231,7 +254,9 @@ def test_input_derivatives_make_the_input_a_line(tmp_path: Path, version: Any) -
 @pytest.mark.compiler
 def test_who_takes_no_derivatives_says_so(tmp_path: Path) -> None:
     plain = load_fmu(linear_fmu(tmp_path, "plain", **LAG, version=2), "plain")
-    with pytest.raises(CouplingError, match="plain takes no derivatives of inputs: it does not declare canInterpolateInputs"):
+    with pytest.raises(
+        CouplingError, match="plain takes no derivatives of inputs: it does not declare canInterpolateInputs"
+    ):
         plain.make_derivative_writer(["u"])
     plain.free()
     with pytest.raises(CouplingError, match="mock takes no derivatives of inputs: FMI 3 has no input derivatives"):
@@ -243,9 +268,17 @@ def test_who_takes_no_derivatives_says_so(tmp_path: Path) -> None:
 def test_directional_derivatives_are_those_of_the_matrices(tmp_path: Path, version: Any) -> None:
     d = [[0.5, -2.0], [0.0, 3.0]]
     path = linear_fmu(
-        tmp_path, "pair", [[-1.0]], [[1.0, 0.0]], [[1.0], [2.0]], d, version=version, inputs=["a", "b"], outputs=["p", "q"],
+        tmp_path,
+        "pair",
+        [[-1.0]],
+        [[1.0, 0.0]],
+        [[1.0], [2.0]],
+        d,
+        version=version,
+        inputs=["a", "b"],
+        outputs=["p", "q"],
         directional=True,
-    )  # fmt: skip
+    )
     made = load_fmu(path, "pair")
     made.instantiate()
     made.enter_initialization(0.0, 1.0)
@@ -273,7 +306,9 @@ def test_who_gives_no_directional_derivatives_says_so() -> None:
 
 
 def test_elements_of_arrays_have_derivatives_too() -> None:
-    """The slave is asked for whole arrays: y = 2 u reversed, so dy[2] by du[2] along 5 is 10, and dy[1] follows u[3]."""
+    """The slave is asked for whole arrays: y = 2 u reversed, so dy[2] by du[2] along 5 is 10, and dy[1] follows
+    u[3].
+    """
 
     class Reversing(Mock):
         capabilities: ClassVar[dict[str, Any]] = {"providesDirectionalDerivative": True}

@@ -141,7 +141,9 @@ def test_reset_leads_back_to_the_start(slave: type[Mock]) -> None:
 def test_the_end_comes_once_and_frees_everything() -> None:
     released: list[str] = []
     slave = Train()
-    made = type(component(slave))("mock", slave, slave.model_description, release_files=lambda: released.append("files"))
+    made = type(component(slave))(
+        "mock", slave, slave.model_description, release_files=lambda: released.append("files")
+    )
     made.instantiate()
     made.enter_initialization(0.0, 1.0)
     made.exit_initialization()

@@ -10,9 +10,9 @@ import pytest
 from coupled_runs import prepare, run
 from fmpy.fmi1 import FMICallException
 from mock_slaves import Mock, read
-from zoo.build import linear_fmu
-from zoo.events import awkward_fmu
-from zoo.typed import typed_fmu
+from test_fmus.build import linear_fmu
+from test_fmus.events import awkward_fmu
+from test_fmus.typed import typed_fmu
 
 from cosim.components.component import Component
 from cosim.components.described import EventPort
@@ -39,7 +39,8 @@ def test_a_whole_life_follows_the_closed_form(tmp_path: Path) -> None:
     write, u = made.writer(["u"])
     u[0] = 1.0
     write()
-    assert read(made, ["u", "x0[1]", "y"]) == [1.0, 3.0, 0.0]  # as set, and the output's declared start: nothing can be read yet
+    # as set, and the output's declared start: nothing can be read yet
+    assert read(made, ["u", "x0[1]", "y"]) == [1.0, 3.0, 0.0]
     made.exit_initialization()
     assert read(made, ["y"]) == [3.5]
     made.advance(1.0, 1.4)
@@ -60,12 +61,16 @@ def test_a_whole_life_follows_the_closed_form(tmp_path: Path) -> None:
 
 @pytest.mark.compiler
 def test_coupled_with_fmi_2_and_3_the_order_of_versions_changes_nothing(tmp_path: Path) -> None:
-    """A chain of three equal lags; the states of the first of them are all that the versions could treat differently."""
+    """A chain of three equal lags; the states of the first of them are all that the versions could treat
+    differently.
+    """
     results = []
     for k, versions in enumerate([(1, 2, 3), (3, 2, 1), (1, 1, 1), (3, 3, 3)]):
         parts = [
             load_fmu(
-                linear_fmu(tmp_path, f"c{k}_{i}", **LAG | {"D": [[0.0]]}, version=v, x0=[1.0], inputs=["u"], outputs=["y"]),
+                linear_fmu(
+                    tmp_path, f"c{k}_{i}", **LAG | {"D": [[0.0]]}, version=v, x0=[1.0], inputs=["u"], outputs=["y"]
+                ),
                 f"c{i}",
             )
             for i, v in enumerate(versions)
@@ -98,9 +103,13 @@ def test_a_negated_start_value_and_a_negated_source(tmp_path: Path) -> None:
     path = typed_fmu(tmp_path, version=1)
     parts = [load_fmu(path, "one"), load_fmu(path, "two")]
     ran = run(
-        parts, [("one.y_negated", "two.u_float64")], 0.1, 2,
-        starts={"one": {"u_float64": 4.0, "u_negated": 3.0}}, extra={"one": ["w"]},
-    )  # fmt: skip
+        parts,
+        [("one.y_negated", "two.u_float64")],
+        0.1,
+        2,
+        starts={"one": {"u_float64": 4.0, "u_negated": 3.0}},
+        extra={"one": ["w"]},
+    )
     np.testing.assert_array_equal(ran["two.y_float64"], -4.0)  # -(4 + 1) + 1
     np.testing.assert_array_equal(ran["one.w"], -3.0)
 
@@ -109,7 +118,10 @@ def test_a_negated_start_value_and_a_negated_source(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("behaviour", "message"),
     [
-        ("discard", r"t = 0.2 s: doStep was discarded: asked for 0.3 s, it came to 0.25 s; try a smaller communication step"),
+        (
+            "discard",
+            r"t = 0.2 s: doStep was discarded: asked for 0.3 s, it came to 0.25 s; try a smaller communication step",
+        ),
         ("discard-silently", r"t = 0.2 s: doStep was discarded: asked for 0.3 s, it does not say how far it came"),
         ("waits", r"t = 0.2 s: doStep returned before it was done \(status pending\), as canRunAsynchronuously allows"),
         ("fails", r"t = 0.2 s: doStep failed: .*status 3 \(error\)"),
@@ -126,7 +138,9 @@ def test_refused_steps_say_what_happened_and_keep_the_results(tmp_path: Path, be
 
 @pytest.mark.compiler
 def test_a_warning_passes(tmp_path: Path) -> None:
-    ran = run([load_fmu(awkward_fmu(tmp_path, "warns", version=1), "awkward")], [], 0.1, 5, starts={"awkward": {"u": 2.0}})
+    ran = run(
+        [load_fmu(awkward_fmu(tmp_path, "warns", version=1), "awkward")], [], 0.1, 5, starts={"awkward": {"u": 2.0}}
+    )
     np.testing.assert_allclose(ran["awkward.y"], 2.0 * ran["time"], rtol=1e-14)
 
 
@@ -139,7 +153,8 @@ def test_declared_dependencies_are_read(tmp_path: Path) -> None:
     )
     silent = describe_fmu(linear_fmu(tmp_path, "silent", **LAG, version=1, declare_dependencies=False), "silent")
     dependencies = [
-        None if (d := c.description.outputs[0].dependencies) is None else [v.name for v in d] for c in (through, held, silent)
+        None if (d := c.description.outputs[0].dependencies) is None else [v.name for v in d]
+        for c in (through, held, silent)
     ]
     assert dependencies == [["u"], [], None]
     through.free()
@@ -175,7 +190,11 @@ def test_what_fmi_1_does_not_have_is_said() -> None:
         made.tell(event, 0.0, 0.0, {})
 
     event = EventPort("balise", 1, None, {})
-    calls = {"save its state": made.save, "restore a state": lambda: made.restore(None), "takes no events": lambda: tell(event)}
+    calls = {
+        "save its state": made.save,
+        "restore a state": lambda: made.restore(None),
+        "takes no events": lambda: tell(event),
+    }
     for words, call in calls.items():
         with pytest.raises(RunError, match=f"Component 'old' at t = 0 s: an FMI 1.0 slave .*{words}"):
             call()

@@ -79,16 +79,25 @@ def test_what_is_no_archive(tmp_path: Path) -> None:
     [
         ({"readme.txt": "no description"}, "is not a readable FMU"),
         ({"modelDescription.xml": "<fmiModelDescription"}, "is not a readable FMU"),
-        ({"modelDescription.xml": xml(interface='<ModelExchange modelIdentifier="toy"/>')}, "offers no co-simulation interface"),
+        (
+            {"modelDescription.xml": xml(interface='<ModelExchange modelIdentifier="toy"/>')},
+            "offers no co-simulation interface",
+        ),
         ({"modelDescription.xml": xml("1.0")}, "offers no co-simulation interface"),
         ({"modelDescription.xml": xml("1.0", "<Implementation/>")}, f"no library .*{fmpy.platform} is needed"),
-        ({"modelDescription.xml": xml("1.0", "<Implementation/>"), library("1.0"): b"x"}, "cannot load .*Failed to load"),
+        (
+            {"modelDescription.xml": xml("1.0", "<Implementation/>"), library("1.0"): b"x"},
+            "cannot load .*Failed to load",
+        ),
         ({"modelDescription.xml": xml("4.0")}, "Unsupported FMI version: 4.0"),
         ({"modelDescription.xml": xml()}, f"no library for this platform .*{fmpy.platform_tuple}.* it offers: none"),
         ({"modelDescription.xml": xml(), "binaries/riscv-vms/toy.so": b""}, "no library for this platform"),
         ({"modelDescription.xml": xml("2.0"), "binaries/vms/toy.so": b""}, "no library for this platform"),
         ({"modelDescription.xml": xml(), library(): b"not a library"}, "cannot load .*Failed to load shared library"),
-        ({"modelDescription.xml": xml("2.0"), library("2.0"): b"not a library"}, "cannot load .*Failed to load shared library"),
+        (
+            {"modelDescription.xml": xml("2.0"), library("2.0"): b"not a library"},
+            "cannot load .*Failed to load shared library",
+        ),
     ],
 )
 def test_archives_that_are_no_usable_fmu(tmp_path: Path, files: dict[str, str | bytes], match: str) -> None:

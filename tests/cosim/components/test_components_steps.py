@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from coupled_runs import prepare, run
 from mock_slaves import Counter, started
-from zoo.events import awkward_fmu
+from test_fmus.events import awkward_fmu
 
 from cosim.components.loading import load_fmu
 from cosim.errors import RunError
@@ -59,7 +59,11 @@ def test_without_an_early_return_a_slave_may_say_any_last_time(said: float) -> N
     ("version", "behaviour", "message"),
     [
         (2, "discard", r"doStep was discarded: asked for 0.3 s, it came to 0.25 s; try a smaller communication step"),
-        (2, "discard-silently", r"doStep was discarded: asked for 0.3 s, it does not say how far it came; try a smaller"),
+        (
+            2,
+            "discard-silently",
+            r"doStep was discarded: asked for 0.3 s, it does not say how far it came; try a smaller",
+        ),
         (3, "discard", r"doStep was discarded: asked for 0.3 s; try a smaller communication step"),
         (2, "waits", r"doStep returned before it was done \(status pending\), as canRunAsynchronuously allows"),
         (2, "fails", r"doStep failed: .*status 3 \(error\)"),
@@ -68,7 +72,7 @@ def test_without_an_early_return_a_slave_may_say_any_last_time(said: float) -> N
 )
 def test_refused_steps_say_what_happened_and_keep_the_results(
     tmp_path: Path, version: Any, behaviour: Any, message: str
-) -> None:  # fmt: skip
+) -> None:
     master = prepare([load_fmu(awkward_fmu(tmp_path, behaviour, version=version), "awkward")], [], 0.1, 10)
     with pytest.raises(RunError, match=f"Component 'awkward' at t = 0.2 s: {message}"):
         master.run()

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from mock_slaves import FMI2, Mock, component, read, variable
-from zoo.typed import ARRAYS, LONGEST, MOODS, expected, typed_fmu
+from test_fmus.typed import ARRAYS, LONGEST, MOODS, expected, typed_fmu
 
 from cosim.components.component import Component
 from cosim.components.elements import elements_of, layout
@@ -62,16 +62,21 @@ def exact(made: Component, name: str) -> Any:
     return list(values) if made.variables[name].shape else values[0]
 
 
-# -- scalars ------------------------------------------------------------------------------------------------------------
+# -- scalars
+# ------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.compiler
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("float64", 0.1), ("boolean", True), ("string", "Zürich, Straße, 渋谷"), ("string", ""), ("enumeration", 3),
+        ("float64", 0.1),
+        ("boolean", True),
+        ("string", "Zürich, Straße, 渋谷"),
+        ("string", ""),
+        ("enumeration", 3),
     ],
-)  # fmt: skip
+)
 def test_a_start_value_of_each_type_arrives_in_each_version(typed: Component, name: str, value: Any) -> None:
     made = typed
     made.set_start(f"u_{name}", value)
@@ -138,7 +143,8 @@ def test_numbers_of_all_types_are_read_and_written_as_doubles(typed3: Component)
 
 @pytest.mark.compiler
 @pytest.mark.parametrize(
-    ("name", "value"), [("int8", 128.0), ("uint8", -1.0), ("uint32", 2.0**32), ("int32", float("nan")), ("int64", float("inf"))]
+    ("name", "value"),
+    [("int8", 128.0), ("uint8", -1.0), ("uint32", 2.0**32), ("int32", float("nan")), ("int64", float("inf"))],
 )
 def test_a_number_that_a_type_cannot_hold_is_refused_not_wrapped(typed3: Component, name: str, value: float) -> None:
     begin(typed3)
@@ -176,7 +182,8 @@ def test_a_slave_may_say_truth_with_any_number() -> None:
     assert make_exact_reader(Sloppy(), 2, flags[0])() == (False,)
 
 
-# -- arrays -------------------------------------------------------------------------------------------------------------
+# -- arrays
+# -------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.compiler
@@ -219,10 +226,14 @@ def test_a_single_element_leaves_the_others_as_they_are(typed3: Component) -> No
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("pair_int64", [2**63 - 1, -(2**63)]), ("pair_uint64", [2**64 - 1, 2**53 + 1]), ("pair_boolean", [True, False]),
-        ("pair_string", ["ü", ""]), ("pair_binary", [b"\0\xff", b""]), ("pair_float32", [0.5, -2.0]),
+        ("pair_int64", [2**63 - 1, -(2**63)]),
+        ("pair_uint64", [2**64 - 1, 2**53 + 1]),
+        ("pair_boolean", [True, False]),
+        ("pair_string", ["ü", ""]),
+        ("pair_binary", [b"\0\xff", b""]),
+        ("pair_float32", [0.5, -2.0]),
     ],
-)  # fmt: skip
+)
 def test_arrays_of_every_type_take_start_values(typed3: Component, name: str, value: Any) -> None:
     assert name in ARRAYS
     typed3.set_start(f"u_{name}", value)
@@ -261,12 +272,16 @@ def test_a_shape_the_slave_refuses_is_an_error(typed3: Component) -> None:
 
 @given(shape=st.lists(st.integers(1, 4), min_size=1, max_size=3), data=st.data())
 def test_a_layout_finds_every_element_again(shape: list[int], data: st.DataObject) -> None:
-    """Whatever is picked, in whatever order, from several variables: the positions are those of NumPy's row-major arrays."""
+    """Whatever is picked, in whatever order, from several variables: the positions are those of NumPy's row-major
+    arrays.
+    """
     array, scalar = variable("a", "input", 1, "Float64", shape=tuple(shape)), variable("s", "input", 2, "Float64")
     everything = [*elements_of(array), *elements_of(scalar)]
     picked = data.draw(st.lists(st.sampled_from(everything), min_size=1, unique=True))
     spread = layout(picked)
-    flat = np.concatenate([np.arange((v.shape and np.prod(v.shape)) or 1) + 100 * (v is scalar) for v in spread.variables])
+    flat = np.concatenate(
+        [np.arange((v.shape and np.prod(v.shape)) or 1) + 100 * (v is scalar) for v in spread.variables]
+    )
     numbers = np.arange(np.prod(shape)).reshape(shape)
     for element, position in zip(picked, spread.positions, strict=True):
         indices = [int(i) - 1 for i in element.name[2:-1].split(",")] if element.index is not None else []
@@ -275,14 +290,17 @@ def test_a_layout_finds_every_element_again(shape: list[int], data: st.DataObjec
     assert spread.is_whole == (spread.positions.tolist() == list(range(spread.total)))
 
 
-# -- what is refused ----------------------------------------------------------------------------------------------------
+# -- what is refused
+# ----------------------------------------------------------------------------------------------------
 
 
 class Kinds(Mock):
     inputs: ClassVar[dict[str, Any]] = {"x": 0.0}
 
     def more_variables(self) -> list[Any]:
-        kinds = ["Int32", "Boolean", "String", "Binary", "UInt8"] if self.version == 3 else ["Integer", "Boolean", "String"]
+        kinds = (
+            ["Int32", "Boolean", "String", "Binary", "UInt8"] if self.version == 3 else ["Integer", "Boolean", "String"]
+        )
         return [variable(kind.lower(), "parameter", 20 + i, kind) for i, kind in enumerate(kinds)] + [
             variable("table", "parameter", 40, "Float64" if self.version == 3 else "Real", shape=(2, 2))
         ]
@@ -300,7 +318,11 @@ class Kinds2(FMI2, Kinds):
         ("boolean", 2, r"expected true or false for a Boolean \(got 2\)"),
         ("string", 1.0, r"expected a text for a String \(got 1.0\)"),
         ("binary", "0g", r"expected bytes or a hexadecimal text such as '00ff' for a Binary \(got '0g'\)"),
-        ("table", [1.0, 2.0, 3.0], r"expected 4 values for a Float64 array of shape \(2, 2\) \(got 3 in shape \(3,\)\)"),
+        (
+            "table",
+            [1.0, 2.0, 3.0],
+            r"expected 4 values for a Float64 array of shape \(2, 2\) \(got 3 in shape \(3,\)\)",
+        ),
         ("table", [[1.0, 2.0, 3.0, 4.0]], r"expected 4 values .* \(got 4 in shape \(1, 4\)\)"),
         ("table", [[1.0], [2.0, 3.0, 4.0]], "expected rows of equal length"),
     ],
@@ -323,7 +345,9 @@ def test_an_item_goes_by_its_name_or_its_number(typed3: Component) -> None:
     for value in (MOODS[1], 2, 2.0):
         typed3.set_start("u_enumeration", value)
         assert exact(typed3, "u_enumeration") == 2
-    with pytest.raises(CouplingError, match=r"typed.u_enumeration cannot be set: no item 'cam'; did you mean 'calm'\?$"):
+    with pytest.raises(
+        CouplingError, match=r"typed.u_enumeration cannot be set: no item 'cam'; did you mean 'calm'\?$"
+    ):
         typed3.set_start("u_enumeration", "cam")
 
 

@@ -168,7 +168,9 @@ def test_honest_blocks_pass() -> None:
     for system in (Motion(), Pushed()):
         for version in (2, 3):
             report = probe(lambda s=system, v=version: block(s, "plant", v), {}, 0.0, 0.1)
-            assert (report.honest_step, report.exact_state, report.repeatable, report.excited) == (True,) * 4, report.remarks
+            assert (report.honest_step, report.exact_state, report.repeatable, report.excited) == (True,) * 4, (
+                report.remarks
+            )
 
 
 @pytest.mark.parametrize("h", [0.01, 0.02, 0.1])
@@ -271,7 +273,10 @@ def test_a_slave_that_cannot_start_is_reported_not_raised() -> None:
 
 def test_what_is_not_declared_is_not_tried() -> None:
     class Modest(Train):
-        capabilities: ClassVar[dict[str, Any]] = {"canGetAndSetFMUstate": False, "canHandleVariableCommunicationStepSize": False}
+        capabilities: ClassVar[dict[str, Any]] = {
+            "canGetAndSetFMUstate": False,
+            "canHandleVariableCommunicationStepSize": False,
+        }
 
         def getFMUstate(self) -> Any:
             raise AssertionError("not declared")
@@ -281,7 +286,9 @@ def test_what_is_not_declared_is_not_tried() -> None:
             super().move(t, h)
 
     report = probed(Modest)
-    assert (report.declares_state, report.declares_variable_step, report.exact_state, report.honest_step) == (False,) * 4
+    assert (report.declares_state, report.declares_variable_step, report.exact_state, report.honest_step) == (
+        False,
+    ) * 4
     assert report.repeatable
 
 

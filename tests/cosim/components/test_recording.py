@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from zoo.events import INSTANTS, integrator_fmu, timed_fmu, triggered_fmu
+from test_fmus.events import INSTANTS, integrator_fmu, timed_fmu, triggered_fmu
 
 from cosim import Scenario
 from cosim.components.component import NEVER
@@ -22,7 +22,9 @@ from fmus.check.probe import probe
 
 
 def result_of(time: Any, **columns: Any) -> Result:
-    """A result of columns; a name that ends in ``_held`` is discrete. Points in names are written as two underscores."""
+    """A result of columns; a name that ends in ``_held`` is discrete. Points in names are written as two
+    underscores.
+    """
     names = {key: key.replace("__", ".") for key in columns}
     table = np.empty(len(time), dtype=[("time", float), *((name, float) for name in names.values())])
     table["time"] = time
@@ -47,7 +49,8 @@ def listening(folder: Path, path: Path, stop: float = 1.0, step: float = 0.05, *
     return Scenario(folder=folder, stop=stop, step=step).add("rec", recording=str(path), **table)
 
 
-# -- values ---------------------------------------------------------------------------------------------------------------
+# -- values
+# ---------------------------------------------------------------------------------------------------------------
 
 ROWS = st.lists(st.tuples(st.integers(0, 12), st.integers(-9, 9)), min_size=1, max_size=20)
 
@@ -68,13 +71,16 @@ def test_values_are_those_of_a_naive_look_up(rows: list[tuple[int, int]], share:
             earlier = [v for at, v in rows if at < t][-1]
             last, first = np.flatnonzero(time < t)[-1], np.flatnonzero(time > t)[0]
             line = np.interp(t, time[[last, first]], values[[last, first]])
-            np.testing.assert_allclose(after, [line, earlier], rtol=1e-12, atol=1e-12)  # a few roundings of numbers below 10
+            # a few roundings of numbers below 10
+            np.testing.assert_allclose(after, [line, earlier], rtol=1e-12, atol=1e-12)
     assert recording.events.tolist() == [t for t in sorted(set(time.tolist())) if time.tolist().count(t) > 1]
 
 
 def test_the_next_event_is_the_next_jump_and_then_none() -> None:
     result = result_of([0.0, 0.2, 0.2, 0.5, 0.5, 1.0], v=[1, 1, 2, 2, 2, 2])
-    told = replace(result, events=[BaliseRecord(stamp=0.4, delivered_at=0.5, identity="B1", position=1.0, true_position=1.0)])
+    told = replace(
+        result, events=[BaliseRecord(stamp=0.4, delivered_at=0.5, identity="B1", position=1.0, true_position=1.0)]
+    )
     recording = make_recording(told, "run.csv", None, "rec", "linear", None)
     assert recording.events.tolist() == [0.2]  # at 0.5 a telegram was told to somebody, and nothing jumped here
     assert recording.next_event(0.0) == 0.2
@@ -100,12 +106,18 @@ def test_it_goes_to_any_time_and_back() -> None:
 
 def test_modes_are_integers_so_that_they_fit_integer_inputs() -> None:
     table = result_of([0.0, 1.0], mode_held=[1.0, 2.0], speed_held=[1.0, 2.0])
-    signals = [SignalInfo("mode_held", "1", variability="discrete"), SignalInfo("speed_held", "m/s", variability="discrete")]
-    component = RecordingComponent("rec", make_recording(Result(table.table, signals), "run.csv", None, "rec", "linear", None))
+    signals = [
+        SignalInfo("mode_held", "1", variability="discrete"),
+        SignalInfo("speed_held", "m/s", variability="discrete"),
+    ]
+    component = RecordingComponent(
+        "rec", make_recording(Result(table.table, signals), "run.csv", None, "rec", "linear", None)
+    )
     assert [component.variables[n].type for n in ("mode_held", "speed_held")] == ["Int32", "Float64"]
 
 
-# -- jumps ----------------------------------------------------------------------------------------------------------------
+# -- jumps
+# ----------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("step", [0.1, 0.04])
@@ -131,11 +143,14 @@ def test_a_jump_in_a_log_reaches_an_integral_at_its_instant(tmp_path: Path) -> N
     write(tmp_path, "time,u\n0,1\n0.25,1\n0.25,5\n1,5\n")
     scenario = Scenario(folder=tmp_path, stop=1.0, step=0.1).add("log", recording="log.csv")
     outcome = scenario.add("sum", fmu=str(integrator_fmu(tmp_path))).connect("log.u -> sum.u").run()
-    integral = next(name for name in outcome.result.table.dtype.names or () if name.startswith("sum.") and name != "sum.u")
+    integral = next(
+        name for name in outcome.result.table.dtype.names or () if name.startswith("sum.") and name != "sum.u"
+    )
     assert outcome[integral][-1] == pytest.approx(4.0, abs=1e-12)
 
 
-# -- measured data --------------------------------------------------------------------------------------------------------
+# -- measured data
+# --------------------------------------------------------------------------------------------------------
 
 
 def test_a_log_of_50_ms_drives_steps_of_10_ms(tmp_path: Path) -> None:
@@ -155,7 +170,9 @@ def test_a_gap_is_refused_with_time_and_column_only_where_it_is_used(tmp_path: P
     assert "rec.temperature" not in (outcome.result.table.dtype.names or ())
     assert any("temperature" in note and "0.5 s" in note for note in outcome.result.summary["notes"])
     wanted = listening(tmp_path, path, step=0.25).report(true_speed="rec.temperature")
-    with pytest.raises(CouplingError, match=r"rec\.temperature cannot be played back: its value at 0\.5 s is nan .*'hold'"):
+    with pytest.raises(
+        CouplingError, match=r"rec\.temperature cannot be played back: its value at 0\.5 s is nan .*'hold'"
+    ):
         wanted.run()
 
 
@@ -198,7 +215,8 @@ def test_a_missing_file_is_named_with_its_place(tmp_path: Path) -> None:
         listening(tmp_path, tmp_path / "nowhere.csv").run()
 
 
-# -- whose columns --------------------------------------------------------------------------------------------------------
+# -- whose columns
+# --------------------------------------------------------------------------------------------------------
 
 
 def test_a_component_is_taken_by_name_by_its_own_name_or_with_all_others() -> None:
@@ -221,7 +239,8 @@ def test_all_columns_of_a_run_can_be_connected_by_their_full_names(tmp_path: Pat
     assert outcome.failure is None
 
 
-# -- the rest of the house ------------------------------------------------------------------------------------------------
+# -- the rest of the house
+# ------------------------------------------------------------------------------------------------
 
 
 def test_it_is_shown_and_not_exported(tmp_path: Path) -> None:

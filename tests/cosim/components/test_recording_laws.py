@@ -16,8 +16,11 @@ from cosim.results.result import BaliseRecord
 from cosim.scenario import Outcome
 
 FAULTS: dict[str, Any] = {
-    "latency": 0.03, "latency_jitter": 0.05, "missed": ["B2"], "false_telegrams": [{"time": 0.333, "offset": 3.0}],
-}  # fmt: skip
+    "latency": 0.03,
+    "latency_jitter": 0.05,
+    "missed": ["B2"],
+    "false_telegrams": [{"time": 0.333, "offset": 3.0}],
+}
 BLOCK2: dict[str, Any] = {"as": "block2"}
 CASES: dict[str, dict[str, Any]] = {
     "in time": {},
@@ -46,7 +49,9 @@ def playback(folder: Path, case: dict[str, Any]) -> Scenario:
     scenario.add("observer", observer="takagi_sugeno_cdo", **{"as": "block3"}, parameters={"estimated_speed": 10.0})
     scenario.connect("driver.effort -> observer.effort", "odometer.reading -> observer.odometer")
     timing = {key: value for key, value in case.get("balises", {}).items() if key == "timing"}
-    scenario.balises(position="locomotive.position", speed="locomotive.speed", layout="recorded", file=str(folder), **timing)
+    scenario.balises(
+        position="locomotive.position", speed="locomotive.speed", layout="recorded", file=str(folder), **timing
+    )
     for key, value in case.get("observer", {}).items():
         scenario.set(f"observer.{key}", value)
     return scenario.master(**case.get("master", {}))
@@ -88,23 +93,31 @@ def test_half_of_a_run_is_told_its_own_telegrams_only(tmp_path: Path) -> None:
     assert outcome.result.time[0] == 0.3
 
 
-# -- a recording as the watched plant ---------------------------------------------------------------------------------------
+# -- a recording as the watched plant
+# ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("method", "bound"), [("auto", 1e-9), ("rollback", 1e-9), ("predict", 1e-8), ("interpolate", 1e-9)])
+@pytest.mark.parametrize(
+    ("method", "bound"), [("auto", 1e-9), ("rollback", 1e-9), ("predict", 1e-8), ("interpolate", 1e-9)]
+)
 def test_balises_are_found_in_a_recording(method: str, bound: float, tmp_path: Path) -> None:
-    """At 12.5 m/s a balise at p is passed at p / 12.5; the bounds are those of docs/events.md, the cubic is exact on a line."""
+    """At 12.5 m/s a balise at p is passed at p / 12.5; the bounds are those of docs/events.md, the cubic is exact on a
+    line.
+    """
     time = 0.05 * np.arange(41)
     rows = "\n".join(f"{t!r},{12.5 * t!r},12.5" for t in time.tolist())
     (tmp_path / "log.csv").write_text(f"time,position [m],speed [m/s]\n{rows}\n", encoding="utf-8")
     scenario = Scenario(folder=tmp_path, stop=2.0, step=0.02).add("log", recording="log.csv")
-    scenario.balises(position="log.position", speed="log.speed", layout="positions", positions=[3.21, 10.0, 17.77], method=method)
+    scenario.balises(
+        position="log.position", speed="log.speed", layout="positions", positions=[3.21, 10.0, 17.77], method=method
+    )
     events = quietly(scenario).result.events
     np.testing.assert_allclose([e.stamp for e in events], np.array([3.21, 10.0, 17.77]) / 12.5, atol=bound, rtol=0.0)
     assert {e.method for e in events} == {"rollback" if method == "auto" else method}
 
 
-# -- bad input ----------------------------------------------------------------------------------------------------------------
+# -- bad input
+# ----------------------------------------------------------------------------------------------------------------
 
 
 def telegram(**changes: Any) -> BaliseRecord:
@@ -118,7 +131,11 @@ def telegram(**changes: Any) -> BaliseRecord:
     [
         ([telegram(delivered_at=0.05)], {}, r"telegram 1 \(B1\) was delivered at 0\.05 s, before its stamp, 0\.1 s"),
         ([telegram(stamp=float("nan"))], {}, r"telegram 1 \(B1\): its stamp is not a finite number"),
-        ([telegram()], {"latency": 0.1, "missed": ["B1"]}, r"tells the telegrams as they were told; leave out latency, missed"),
+        (
+            [telegram()],
+            {"latency": 0.1, "missed": ["B1"]},
+            r"tells the telegrams as they were told; leave out latency, missed",
+        ),
         ([telegram()], {"method": "rollback"}, r"leave out method"),
         (None, {}, r"holds no telegrams.*no such file"),
     ],

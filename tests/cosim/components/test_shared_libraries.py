@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from zoo.events import hostile_fmu
+from test_fmus.events import hostile_fmu
 
 from cosim import Scenario
 from cosim.components.elf import read_linkage
@@ -24,7 +24,15 @@ def helper(folder: Path, value: int, soname: str) -> Path:
     folder.mkdir()
     (folder / "helper.c").write_text(f"int helper_value(void) {{ return {value}; }}\n")
     path = folder / soname
-    command = [*find_compiler().command, "-shared", "-fPIC", f"-Wl,-soname,{soname}", str(folder / "helper.c"), "-o", str(path)]
+    command = [
+        *find_compiler().command,
+        "-shared",
+        "-fPIC",
+        f"-Wl,-soname,{soname}",
+        str(folder / "helper.c"),
+        "-o",
+        str(path),
+    ]
     subprocess.run(command, check=True, capture_output=True)
     return path
 
@@ -48,7 +56,9 @@ def test_the_names_are_read_from_the_file(tmp_path: Path) -> None:
 
 
 def test_different_libraries_of_one_name_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(CosimError, match=r"part1: .*bringer1\.fmu and .*bringer0\.fmu each bring a library libtwo_kinds\.so"):
+    with pytest.raises(
+        CosimError, match=r"part1: .*bringer1\.fmu and .*bringer0\.fmu each bring a library libtwo_kinds\.so"
+    ):
         pair(tmp_path, "libtwo_kinds.so", 1, 2).run()
 
 

@@ -70,7 +70,9 @@ def test_a_converted_value_arrives() -> None:
 
 
 def test_a_unit_is_what_the_fmu_itself_says_it_is() -> None:
-    """Two FMUs name their unit 'v'; one means knots, the other metres a second. A library of unit names cannot know that."""
+    """Two FMUs name their unit 'v'; one means knots, the other metres a second. A library of unit names cannot know
+    that.
+    """
 
     class Ship(Speedometer):
         outputs: ClassVar[dict[str, Any]] = {"speed": (10.0, "v")}
@@ -80,7 +82,9 @@ def test_a_unit_is_what_the_fmu_itself_says_it_is() -> None:
         inputs: ClassVar[dict[str, Any]] = {"speed": (0.0, "v")}
         units: ClassVar[dict[str, Any]] = {"v": BaseUnit(m=1, s=-1)}
 
-    assert connected("meter.speed", "reader.speed", source=Ship(), target=Shore()).factor == pytest.approx(0.514444, rel=1e-5)
+    assert connected("meter.speed", "reader.speed", source=Ship(), target=Shore()).factor == pytest.approx(
+        0.514444, rel=1e-5
+    )
 
 
 def test_a_unit_may_come_from_the_declared_type() -> None:
@@ -116,7 +120,9 @@ def test_a_temperature_difference_has_no_offset() -> None:
 
 def test_units_that_nobody_explains_fit_only_their_own_name() -> None:
     assert connected("meter.text_like", "reader.length").factor == 1.0
-    with pytest.raises(CouplingError, match=r"meter.text_like -> reader.speed: units 'furlong' and 'm/s' do not fit: .*furlong"):
+    with pytest.raises(
+        CouplingError, match=r"meter.text_like -> reader.speed: units 'furlong' and 'm/s' do not fit: .*furlong"
+    ):
         connected("meter.text_like", "reader.speed")
 
 
@@ -131,12 +137,28 @@ def test_no_unit_on_one_side_is_taken_as_it_is() -> None:
         ("meter.sped", "reader.speed", r"meter: no variable 'sped'; did you mean 'speed'\?"),
         ("metre.speed", "reader.speed", r"Connection source 'metre.speed'.*did you mean 'meter'\?"),
         ("meter.speed", "reader", r"Connection target 'reader': expected 'component.signal'; which signal of reader\?"),
-        ("meter.speed", "reader.heard", r"reader.heard has causality 'output', expected input; such variables: speed, force"),
+        (
+            "meter.speed",
+            "reader.heard",
+            r"reader.heard has causality 'output', expected input; such variables: speed, force",
+        ),
         ("reader.speed", "meter.speed", r"reader.speed has causality 'input', expected output"),
         ("meter.speed", "reader.gain", r"reader.gain has causality 'parameter', expected input"),
-        ("meter.label", "reader.speed", r"meter.label is a String, reader.speed is a Float64; only equal types fit here"),
-        ("meter.table", "reader.speed", r"meter.table is an array of shape \(3,\), reader.speed is a scalar; connect arrays of"),
-        ("meter.table[0]", "reader.speed", r"meter: no element 'table\[0\]' in a Float64 array of shape \(3,\); the first is 1"),
+        (
+            "meter.label",
+            "reader.speed",
+            r"meter.label is a String, reader.speed is a Float64; only equal types fit here",
+        ),
+        (
+            "meter.table",
+            "reader.speed",
+            r"meter.table is an array of shape \(3,\), reader.speed is a scalar; connect arrays of",
+        ),
+        (
+            "meter.table[0]",
+            "reader.speed",
+            r"meter: no element 'table\[0\]' in a Float64 array of shape \(3,\); the first is 1",
+        ),
         ("meter.table[4]", "reader.speed", r"meter: no element 'table\[4\]' in a Float64 array of shape \(3,\)"),
     ],
 )
@@ -161,14 +183,18 @@ def test_the_variables_of_an_event_belong_to_the_master(version: Any) -> None:
 def test_an_array_without_any_source_is_named_once() -> None:
     class Table(Reader):
         def more_variables(self) -> list[Any]:
-            arrays = [variable(n, "input", 60 + i, "Float64", shape=(3,)) for i, n in enumerate(("one", "some", "whole"))]
+            arrays = [
+                variable(n, "input", 60 + i, "Float64", shape=(3,)) for i, n in enumerate(("one", "some", "whole"))
+            ]
             return [*arrays, variable("text", "input", 70, "String")]
 
     pairs = [("meter.table[2]", "reader.some[1]"), ("meter.table", "reader.whole"), ("meter.speed", "reader.speed")]
     parts = pair(target=Table())
     free = unconnected_inputs(connect(pairs, parts), [parts["reader"]])
     assert free[-4:] == ["reader.one", "reader.some[2]", "reader.some[3]", "reader.text"]
-    with pytest.raises(CouplingError, match=r"Input reader.some\[1\] has two sources, meter.table\[2\] and meter.table"):
+    with pytest.raises(
+        CouplingError, match=r"Input reader.some\[1\] has two sources, meter.table\[2\] and meter.table"
+    ):
         connect([*pairs, ("meter.table", "reader.some")], parts)
 
 

@@ -46,7 +46,9 @@ def test_in_a_loop_direct_inputs_are_fresh_whatever_the_listing() -> None:
 
 
 def test_further_pairs_hold_even_where_they_contradict_feedthrough() -> None:
-    """Plant before observer, although the observer's output acts directly on an output of the plant that is passed on."""
+    """Plant before observer, although the observer's output acts directly on an output of the plant that is passed
+    on.
+    """
     slaves = {"observer": State(), "plant": Direct()}
     pairs = [("observer", "plant"), ("plant", "observer")]
     assert order(slaves, pairs) == ["observer", "plant"]
@@ -82,7 +84,11 @@ def test_declared_feedthrough_and_silence() -> None:
     assert undeclared([direct, silent]) == ["silent"]
 
 
-@given(st.integers(1, 7).flatmap(lambda n: st.tuples(st.just(n), st.permutations(range(n)), st.sets(st.integers(0, n * n - 1)))))
+@given(
+    st.integers(1, 7).flatmap(
+        lambda n: st.tuples(st.just(n), st.permutations(range(n)), st.sets(st.integers(0, n * n - 1)))
+    )
+)
 def test_acyclic_graphs_are_ordered_whatever_the_listing(case: tuple[int, list[int], set[int]]) -> None:
     n, listing, chosen = case
 
@@ -99,7 +105,8 @@ def test_acyclic_graphs_are_ordered_whatever_the_listing(case: tuple[int, list[i
     assert all(found.index(f"c{a}") < found.index(f"c{b}") for a, b in edges)
 
 
-# -- groups -------------------------------------------------------------------------------------------------------------
+# -- groups
+# -------------------------------------------------------------------------------------------------------------
 
 
 class Silent(State):
@@ -129,14 +136,25 @@ def test_groups_are_what_hangs_together() -> None:
     slaves: dict[str, Mock] = {n: State() for n in "acdef"} | {"b": TwoWays()}
     pairs = [("f", "a"), ("a", "b.u1"), ("b.y1", "c"), ("c", "d"), ("d", "b.u2"), ("e", "e")]
     found = groups(slaves, pairs)
-    assert [(g.names, g.loop) for g in found] == [(("e",), True), (("f",), False), (("a",), False), (("b", "c", "d"), True)]
+    assert [(g.names, g.loop) for g in found] == [
+        (("e",), True),
+        (("f",), False),
+        (("a",), False),
+        (("b", "c", "d"), True),
+    ]
     assert all(g.algebraic == g.knots == g.possible == () for g in found)
 
 
 def test_the_components_of_an_algebraic_loop_stand_together_in_their_group() -> None:
     """plant -> (first <-> second) -> actor -> plant: one group, in it one knot, found although listed apart."""
     slaves = {"plant": State(), "first": TwoWays(), "actor": Direct(), "second": Direct()}
-    pairs = [("plant", "first.u1"), ("first.y2", "second"), ("second", "first.u2"), ("first.y1", "actor"), ("actor", "plant")]
+    pairs = [
+        ("plant", "first.u1"),
+        ("first.y2", "second"),
+        ("second", "first.u2"),
+        ("first.y1", "actor"),
+        ("actor", "plant"),
+    ]
     (group,) = groups(slaves, pairs)
     assert group.names == ("plant", "first", "second", "actor")
     assert group.knots == (("first", "second"),)
@@ -158,7 +176,9 @@ def test_loops_that_share_a_component_are_one_knot() -> None:
 
 
 def test_what_is_not_declared_decides_the_order_and_makes_a_possible_loop_only() -> None:
-    """By the standard a silent output may depend on every input; a declared state in between would be no loop at all."""
+    """By the standard a silent output may depend on every input; a declared state in between would be no loop at
+    all.
+    """
     (group,) = groups({"silent": Silent(), "direct": Direct()}, [("silent", "direct"), ("direct", "silent")])
     assert group.algebraic == ()
     assert [str(loop) for loop in group.possible] == ["direct.u -> direct.y -> silent.u -> silent.y -> direct.u"]
@@ -211,7 +231,8 @@ def test_a_thousand_components_are_ordered_while_one_waits() -> None:
     assert ring.algebraic == ()
 
 
-# -- graph work on plain nodes ------------------------------------------------------------------------------------------
+# -- graph work on plain nodes
+# ------------------------------------------------------------------------------------------
 
 GRAPHS = st.integers(1, 8).flatmap(
     lambda n: st.tuples(st.permutations(range(n)), st.sets(st.tuples(st.integers(0, n - 1), st.integers(0, n - 1))))
@@ -243,7 +264,9 @@ def test_strong_groups_are_those_of_the_transitive_closure(case: tuple[list[int]
 
 
 @given(GRAPHS)
-def test_a_topological_order_exists_unless_something_reaches_itself(case: tuple[list[int], set[tuple[int, int]]]) -> None:
+def test_a_topological_order_exists_unless_something_reaches_itself(
+    case: tuple[list[int], set[tuple[int, int]]],
+) -> None:
     nodes, edges = case
     reach = reaches(edges, len(nodes))
     cyclic = any(a in reach[b] for a, b in edges)
@@ -265,7 +288,7 @@ def earliest_listed_first(nodes: list[int], edges: set[tuple[int, int]]) -> list
 @given(GRAPHS, st.data())
 def test_ordering_keeps_the_last_level_and_whatever_has_no_cycle(
     case: tuple[list[int], set[tuple[int, int]]], data: st.DataObject
-) -> None:  # fmt: skip
+) -> None:
     nodes, edges = case
     must = {(a, b) for a, b in edges if a < b and (a + b) % 2}
     kept = satisfied(nodes, [edges, must])

@@ -27,7 +27,8 @@ def test_outputs_lie_in_one_array_in_the_order_of_stepping() -> None:
     made = plan({"listener": ["integral", "last"]})
     names = [s.name for s in made.signals]
     own = ["integrated", "last", "at", "heard", "integral"]
-    assert names == ["plant.position", "plant.speed", *(f"listener.{n}" for n in own)]  # an output asked for again comes once
+    # an output asked for again comes once
+    assert names == ["plant.position", "plant.speed", *(f"listener.{n}" for n in own)]
     listener = made.find("listener")
     assert listener.outputs.base is made.values.base
     assert (listener.columns.start, listener.columns.stop) == (2, 7)
@@ -40,7 +41,10 @@ def test_outputs_lie_in_one_array_in_the_order_of_stepping() -> None:
 @pytest.mark.parametrize(
     ("call", "match"),
     [
-        (lambda: plan().column("listener.integral"), "'listener.integral' is neither an output nor recorded; did you mean"),
+        (
+            lambda: plan().column("listener.integral"),
+            "'listener.integral' is neither an output nor recorded; did you mean",
+        ),
         (lambda: plan().find("plent"), "No component 'plent' in this run; did you mean 'plant'"),
         (lambda: plan({"listener": ["integrl"]}), "listener: no variable 'integrl'; did you mean 'integral'"),
         (lambda: plan({"listener": ["balise"]}), "listener.balise cannot be recorded: it is a Clock"),

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from ssp_files import ramp_fmu, sum_fmu
-from zoo.build import linear_fmu
+from test_fmus.build import linear_fmu
 
 from cosim import Scenario
 from cosim.coupling.inputs import Inputs
@@ -38,7 +38,8 @@ def scenario(folder: Path, **table: object) -> Scenario:
 @pytest.mark.compiler
 def test_a_linear_transformation_in_a_run(tmp_path: Path) -> None:
     outcome = scenario(tmp_path, factor=0.5, offset=-3.0).run(warn=lambda _text: None)
-    assert np.array_equal(outcome["sum.y"], 2.0 * (0.5 * outcome["ramp.speed"] - 3.0))  # powers of two and small integers: exact
+    # powers of two and small integers: exact
+    assert np.array_equal(outcome["sum.y"], 2.0 * (0.5 * outcome["ramp.speed"] - 3.0))
     assert outcome.result.summary["connections"] == ["0.5 * ramp.speed + -3 -> sum.u"]
 
 
@@ -74,9 +75,16 @@ def test_a_table_of_values_passes_what_it_does_not_name() -> None:
     values, buffer, sent = np.array([1.0, 2.0, 3.0] * 2), np.zeros(2), []
     sources = [("c", "x"), ("c", "y")]
     inputs = Inputs(
-        ["a", "b"], np.array([0, 2]), sources, np.array([1.0, 2.0]), np.zeros(2), values, buffer,
-        lambda: sent.append(buffer.copy()), {0: {1.0: 7.0, 7.0: 9.0}},
-    )  # fmt: skip
+        ["a", "b"],
+        np.array([0, 2]),
+        sources,
+        np.array([1.0, 2.0]),
+        np.zeros(2),
+        values,
+        buffer,
+        lambda: sent.append(buffer.copy()),
+        {0: {1.0: 7.0, 7.0: 9.0}},
+    )
     for value, expected in ((1.0, 7.0), (7.0, 9.0), (5.0, 5.0)):
         values[0] = value
         inputs.gather()
@@ -85,7 +93,9 @@ def test_a_table_of_values_passes_what_it_does_not_name() -> None:
 
 
 @given(st.dictionaries(NUMBERS, NUMBERS, max_size=4), st.frozensets(NUMBERS, min_size=1, max_size=4))
-def test_a_table_is_linear_only_where_a_line_does_exactly_the_same(table: dict[float, float], domain: frozenset[float]) -> None:
+def test_a_table_is_linear_only_where_a_line_does_exactly_the_same(
+    table: dict[float, float], domain: frozenset[float]
+) -> None:
     found = as_affine(table, domain)
     mapped = {x: table.get(x, x) for x in domain}
     if found is not None:

@@ -14,24 +14,25 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mock_slaves import FMI2, Counter, Mock, component
 from small_scenarios import small
-from zoo.build import linear_fmu
-from zoo.events import awkward_fmu
-from zoo.typed import typed_fmu
+from test_fmus.build import linear_fmu
+from test_fmus.events import awkward_fmu
+from test_fmus.typed import typed_fmu
 
 from cosim import Scenario
 from cosim.cli import main
 from cosim.components.loading import load_fmu
 from cosim.diagnostics.call_log import HEADER, CallLog
+from cosim.diagnostics.call_statistics import EARLY, EVERY, CallStatistics
 from cosim.diagnostics.call_text import Described
 from cosim.diagnostics.logged_slave import log_calls
-from cosim.diagnostics.tally import EARLY, EVERY, Tally
 from cosim.errors import OutputError
 from cosim.master.master import close
 from cosim.report.page.cost import cost_rows, cost_text
 from cosim.report.page.report import report_page
 
 LINE = re.compile(
-    r"(?P<time>\S+) (?P<who>\S+) (?P<what>\w+)\((?P<arguments>.*)\) -> (?P<status>[\w ]+), (?P<us>[\d.]+) us(, (?P<out>.*))?"
+    r"(?P<time>\S+) (?P<who>\S+) (?P<what>\w+)\((?P<arguments>.*)\) -> (?P<status>[\w ]+), (?P<us>[\d.]+) us(, "
+    r"(?P<out>.*))?"
 )
 TESTS = Path(__file__).parents[2]
 INTEGRATOR: Any = {"A": [[0.0]], "B": [[1.0]], "C": [[1.0]], "D": [[0.0]], "inputs": ["u"], "outputs": ["y"]}
@@ -116,10 +117,12 @@ def test_a_run_of_blocks_is_logged_call_by_call(kind: type[Mock], tmp_path: Path
     for k, (t, until) in enumerate((("0", "0.5"), ("0.5", "1"))):
         total, second = ("0.5", "0.25") if k == 0 else ("1", "0.75")
         expected += [
-            (t, "a", "doStep", f"{t}, 0.5{further}", results[k]), (until, "a", f"get{real}", "total", f"[{total}]"),
-            (t, "b", f"set{real}", f"rate={total}", None), (t, "b", "doStep", f"{t}, 0.5{further}", results[k]),
+            (t, "a", "doStep", f"{t}, 0.5{further}", results[k]),
+            (until, "a", f"get{real}", "total", f"[{total}]"),
+            (t, "b", f"set{real}", f"rate={total}", None),
+            (t, "b", "doStep", f"{t}, 0.5{further}", results[k]),
             (until, "b", f"get{real}", "total", f"[{second}]"),
-        ]  # fmt: skip
+        ]
     assert steps == expected
     assert [c["what"] for c in calls[-4:]] == ["terminate", "freeInstance"] * 2
 
@@ -146,7 +149,10 @@ def test_each_name_stands_with_its_value_and_long_lists_are_cut(version: Any, tm
 @pytest.mark.compiler
 def test_logging_changes_no_number(tmp_path: Path) -> None:
     for scenario in (pair(tmp_path, 2), small()):
-        plain, logged = scenario.run(warn=lambda _: None), scenario.run(call_log=tmp_path / "calls.log", warn=lambda _: None)
+        plain, logged = (
+            scenario.run(warn=lambda _: None),
+            scenario.run(call_log=tmp_path / "calls.log", warn=lambda _: None),
+        )
         assert (plain.result.table == logged.result.table).all()
         assert (
             logged.result.summary["components"][0]["cost"]["doStep"]["calls"]
@@ -172,7 +178,9 @@ def test_values_of_every_type_can_be_logged(tmp_path: Path) -> None:
     )
     assert scenario.run(call_log=tmp_path / "calls.log", warn=lambda _: None).failure is None
     functions = {c["what"] for c in calls_in(tmp_path / "calls.log")}
-    assert {f"fmi3{verb}{kind}" for verb in ("Get", "Set") for kind in ("String", "Binary", "Float64", "UInt64")} <= functions
+    assert {
+        f"fmi3{verb}{kind}" for verb in ("Get", "Set") for kind in ("String", "Binary", "Float64", "UInt64")
+    } <= functions
 
 
 KILLED = """
@@ -184,7 +192,7 @@ from cosim.components.component import Component
 Component.note = lambda *_: os.kill(os.getpid(), signal.SIGKILL)  # while the FMU is inside doStep
 scenario = Scenario(stop=1.0, step=0.1, folder=FOLDER).add("talker", fmu="chatty.fmu", log="all").add("other", fmu="chatty.fmu")
 scenario.run(call_log=Path(FOLDER) / "calls.log", warn=lambda _: None)
-"""
+"""  # noqa: E501
 
 
 @pytest.mark.compiler
@@ -246,7 +254,9 @@ def test_a_log_that_breaks_later_is_told(tmp_path: Path, monkeypatch: pytest.Mon
     assert len(written) == 51
 
 
-def test_the_command_line_logs_calls_beside_the_results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+def test_the_command_line_logs_calls_beside_the_results(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "own.toml").write_text(
         'stop = 0.2\nstep = 0.1\n[components.driver]\nmodel = "driver"\nas = "block3"\n', encoding="utf-8"
@@ -262,7 +272,8 @@ def test_the_command_line_logs_calls_beside_the_results(tmp_path: Path, monkeypa
     assert len(calls_in(Path("elsewhere.log"))) == len(calls_in(Path("results/own/calls.log")))
 
 
-# -- counts -------------------------------------------------------------------------------------------------------------
+# -- counts
+# -------------------------------------------------------------------------------------------------------------
 
 
 @given(
@@ -270,20 +281,24 @@ def test_the_command_line_logs_calls_beside_the_results(tmp_path: Path, monkeypa
     st.lists(st.tuples(st.integers(0, 9), st.floats(0, 9)), max_size=3),
 )
 def test_a_tally_counts_every_call_of_every_port(ports: list[int], added: list[tuple[int, float]]) -> None:
-    tally, made = Tally(), []
+    call_statistics, made = CallStatistics(), []
     for number, count in enumerate(ports):
-        call = tally.counting(lambda number=number: made.append(number), ValueError)  # type: ignore[misc]
+        call = call_statistics.counting(lambda number=number: made.append(number), ValueError)  # type: ignore[misc]
         for _ in range(count):
             call()
     for count, seconds in added:
-        tally.add(seconds, count)
-    assert tally.count == len(made) + sum(count for count, _ in added) == sum(ports) + sum(count for count, _ in added)
+        call_statistics.add(seconds, count)
+    assert (
+        call_statistics.count
+        == len(made) + sum(count for count, _ in added)
+        == sum(ports) + sum(count for count, _ in added)
+    )
     assert [made.count(number) for number in range(len(ports))] == ports
-    assert tally.seconds >= 0.0
+    assert call_statistics.seconds >= 0.0
 
 
 def test_time_is_extrapolated_from_the_calls_that_were_timed(monkeypatch: pytest.MonkeyPatch) -> None:
-    import cosim.diagnostics.tally as module
+    import cosim.diagnostics.call_statistics as module
 
     now = [0.0]
     monkeypatch.setattr(module, "perf_counter", lambda: now[0])
@@ -291,24 +306,24 @@ def test_time_is_extrapolated_from_the_calls_that_were_timed(monkeypatch: pytest
     def slow() -> None:
         now[0] += 2.0
 
-    tally = Tally()
-    call = tally.counting(slow, ValueError)
+    call_statistics = CallStatistics()
+    call = call_statistics.counting(slow, ValueError)
     for _ in range(EARLY + EVERY + 5):
         call()
-    assert tally.seconds == pytest.approx(2.0 * (EARLY + EVERY + 5))
+    assert call_statistics.seconds == pytest.approx(2.0 * (EARLY + EVERY + 5))
 
 
 def test_a_call_that_fails_is_explained_and_counted() -> None:
-    tally = Tally()
+    call_statistics = CallStatistics()
 
     def fail() -> None:
         raise KeyError("x")
 
-    call = tally.counting(fail, lambda error: ValueError(f"explained: {error}"))
+    call = call_statistics.counting(fail, lambda error: ValueError(f"explained: {error}"))
     for _ in range(EARLY + 2):
         with pytest.raises(ValueError, match="explained: 'x'"):
             call()
-    assert tally.count == EARLY + 2
+    assert call_statistics.count == EARLY + 2
 
 
 def counted(scenario: Scenario, tmp_path: Path) -> tuple[dict[str, Any], dict[str, dict[str, int]]]:
@@ -374,4 +389,6 @@ def test_the_closing_table_and_the_report_show_them() -> None:
 def test_seconds_of_a_component_are_those_of_its_calls() -> None:
     summary = small().run(warn=lambda _: None).result.summary
     for entry in summary["components"]:
-        assert summary["seconds"][entry["name"]] == pytest.approx(sum(kind["seconds"] for kind in entry["cost"].values()))
+        assert summary["seconds"][entry["name"]] == pytest.approx(
+            sum(kind["seconds"] for kind in entry["cost"].values())
+        )

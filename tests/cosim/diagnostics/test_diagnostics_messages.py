@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from small_scenarios import small
-from zoo.events import awkward_fmu, chatter
+from test_fmus.events import awkward_fmu, chatter
 
 from cosim import Scenario
 from cosim.components.loading import load_fmu
@@ -68,7 +68,9 @@ def test_how_much_is_logged(log: Any, tmp_path: Path) -> None:
 
 @pytest.mark.compiler
 def test_an_unknown_category_is_refused_with_those_there_are(tmp_path: Path) -> None:
-    with pytest.raises(CouplingError, match=r"talker: log: there is no log category 'logEvent'; did you mean 'logEvents'"):
+    with pytest.raises(
+        CouplingError, match=r"talker: log: there is no log category 'logEvent'; did you mean 'logEvents'"
+    ):
         chatty(tmp_path, 3, ["logEvent"]).run()
     with pytest.raises(CouplingError, match="declares none; use log = 'all'"):
         chatty(tmp_path, 1, ["logEvents"]).run()
@@ -111,7 +113,11 @@ def test_what_went_wrong_is_part_of_the_failure_and_not_what_was_said_after(tmp_
     assert outcome.failure is not None
     assert "The FMU says: the solver gave up at 0.25 s" in outcome.failure
     (message,) = (m for m in outcome.result.messages if m.status == "error")
-    assert (message.component, message.category, message.text) == ("plant", "logStatusError", "the solver gave up at 0.25 s")
+    assert (message.component, message.category, message.text) == (
+        "plant",
+        "logStatusError",
+        "the solver gave up at 0.25 s",
+    )
     assert message.time == pytest.approx(0.2, abs=1e-12)
     assert any("plant logged 1 of status error" in warning for warning in outcome.warnings)
 
@@ -127,10 +133,10 @@ def test_a_freed_component_is_forgotten(tmp_path: Path) -> None:
     assert len(_listeners) == before
 
 
-@pytest.mark.parametrize("realisation", ["block2", "block3"])
-def test_blocks_log_like_fmus(realisation: str, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+@pytest.mark.parametrize("backend", ["block2", "block3"])
+def test_blocks_log_like_fmus(backend: str, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     scenario = small()
-    scenario.balises(latency=0.05).set("observer.as", realisation).set("observer.late_policy", "reject")
+    scenario.balises(latency=0.05).set("observer.as", backend).set("observer.late_policy", "reject")
     outcome = scenario.run()
     rejected = outcome.result.summary["components"][-1]["events"]["rejected"]
     assert rejected > 0
@@ -155,7 +161,9 @@ def test_the_first_and_last_are_kept_and_all_are_counted(first: int, last: int, 
     told = [f"message {i}" for i in range(count)]
     assert kept == (told if count <= first + last else told[:first] + told[-last:])
     omitted = [m.text for m in log.kept() if m.status == OMITTED]
-    assert omitted == ([f"{count - first - last} messages here were counted and not kept"] if count > first + last else [])
+    assert omitted == (
+        [f"{count - first - last} messages here were counted and not kept"] if count > first + last else []
+    )
     assert log.total == count == sum(log.counts.values())
 
 

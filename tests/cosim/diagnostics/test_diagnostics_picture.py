@@ -54,7 +54,9 @@ def apart(a: tuple[float, float, float, float], b: tuple[float, float, float, fl
 def points_of(wire: Wire) -> np.ndarray:
     """Points along a wire, close to one another."""
     if not wire.back:
-        return np.concatenate([piece.interpolated(1).to_polygons(closed_only=False)[0] for piece in forward_curves(wire.points)])
+        return np.concatenate(
+            [piece.interpolated(1).to_polygons(closed_only=False)[0] for piece in forward_curves(wire.points)]
+        )
     return np.concatenate([np.linspace(a, b, 40) for a, b in pairwise(wire.points)])
 
 
@@ -140,9 +142,12 @@ def test_no_text_lies_on_another_or_beyond_the_picture(structure: Structure) -> 
 
 def loop() -> Structure:
     links = [
-        Link(("a", "y"), ("b", "u"), in_loop=True), Link(("b", "y"), ("a", "u"), held=True, in_loop=True),
-        Link(("b", "z"), ("c", "u")), Link(("c", "y"), ("c", "v"), held=True), Link(("c", "y"), ("d", "u"), iterated=True),
-    ]  # fmt: skip
+        Link(("a", "y"), ("b", "u"), in_loop=True),
+        Link(("b", "y"), ("a", "u"), held=True, in_loop=True),
+        Link(("b", "z"), ("c", "u")),
+        Link(("c", "y"), ("c", "v"), held=True),
+        Link(("c", "y"), ("d", "u"), iterated=True),
+    ]
     path = (("a", "u"), ("a", "y"), ("b", "u"), ("b", "y"), ("a", "u"))
     through = [("a", "u", "y"), ("b", "u", "y"), ("b", "u", "z")]
     balises = Balises("a", "p", "v", ("d",), "auto", "exact")

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from hand_made_structures import coupled
 from small_scenarios import small
-from zoo.build import linear_fmu
-from zoo.events import countdown_fmu, periodic_fmu, receiver_fmu, triggered_fmu
-from zoo.typed import typed_fmu
+from test_fmus.build import linear_fmu
+from test_fmus.events import countdown_fmu, periodic_fmu, receiver_fmu, triggered_fmu
+from test_fmus.typed import typed_fmu
 
 from cosim import Scenario
 from cosim.errors import CouplingError, FmuLoadError
@@ -29,7 +29,9 @@ def loops(tmp_path: Path) -> Scenario:
     scenario = Scenario(stop=1.0, step=0.1, folder=tmp_path)
     scenario.add("left", fmu="direct.fmu").add("right", fmu="direct.fmu")
     scenario.add("plant", fmu="holding.fmu").add("controller", fmu="direct.fmu", every=2)
-    return scenario.connect("plant.y -> controller.u", "controller.y -> plant.u", "left.y -> right.u", "right.y -> left.u")
+    return scenario.connect(
+        "plant.y -> controller.u", "controller.y -> plant.u", "left.y -> right.u", "right.y -> left.u"
+    )
 
 
 @pytest.mark.compiler
@@ -42,9 +44,11 @@ def test_order_groups_loops_and_what_is_held(loops: Scenario) -> None:
     assert last == path[0]
     assert set(path) == {("left", "u"), ("left", "y"), ("right", "u"), ("right", "y")}
     assert {str(k): (k.in_loop, k.iterated) for k in structure.links} == {
-        "plant.y -> controller.u": (False, False), "controller.y -> plant.u": (False, False),
-        "left.y -> right.u": (True, True), "right.y -> left.u": (True, True),
-    }  # fmt: skip
+        "plant.y -> controller.u": (False, False),
+        "controller.y -> plant.u": (False, False),
+        "left.y -> right.u": (True, True),
+        "right.y -> left.u": (True, True),
+    }
     assert structure.algorithm == "iterate"
     assert "algebraic loop" in structure.reason
     plant, controller = structure.part("plant"), structure.part("controller")
@@ -107,10 +111,15 @@ def test_clocks_and_arrays(tmp_path: Path) -> None:
     scenario = Scenario(stop=1.0, step=0.1, folder=tmp_path)
     for name, fmu in {"alarm": "alarm", "listener": "listener", "a": "typed", "b": "typed"}.items():
         scenario.add(name, fmu=f"{fmu}.fmu")
-    scenario.connect("alarm.crossing -> listener.tick", "alarm.crossing_value -> listener.tick_value", "a.y_matrix -> b.u_matrix")
+    scenario.connect(
+        "alarm.crossing -> listener.tick", "alarm.crossing_value -> listener.tick_value", "a.y_matrix -> b.u_matrix"
+    )
     structure = scenario.structure()
     assert [str(clock) for clock in structure.clocks] == ["alarm.crossing -> listener.tick"]
-    assert [str(k) for k in structure.links] == ["alarm.crossing_value -> listener.tick_value", "a.y_matrix -> b.u_matrix"]
+    assert [str(k) for k in structure.links] == [
+        "alarm.crossing_value -> listener.tick_value",
+        "a.y_matrix -> b.u_matrix",
+    ]
     kinds = {p.name: p.kind for p in structure.part("a").outputs}
     assert (kinds["y_matrix"], kinds["y_string"]) == ("Float64[2x3]", "String")
     assert {p.name for p in structure.part("b").inputs if p.connected} == {"u_matrix"}
@@ -136,7 +145,8 @@ def test_mistakes_are_named_as_a_run_names_them(tmp_path: Path) -> None:
         small().connect("driver.effrot -> odometer.wheel_speed").structure()
 
 
-# -- text ---------------------------------------------------------------------------------------------------------------
+# -- text
+# ---------------------------------------------------------------------------------------------------------------
 
 
 def section(text: str, title: str) -> list[str]:
@@ -148,7 +158,9 @@ def test_every_component_signal_and_connection_is_in_the_text() -> None:
     text = structure.text()
     for link in structure.links:
         (line,) = (
-            row for row in section(text, "Connections") if row.split()[0:3:2] == [".".join(s) for s in (link.source, link.target)]
+            row
+            for row in section(text, "Connections")
+            if row.split()[0:3:2] == [".".join(s) for s in (link.source, link.target)]
         )
         assert ("held, of the start of the step" in line) == link.held
         assert ("fresh, of the end of the step" in line) == (not link.held)
@@ -166,7 +178,9 @@ def test_every_component_signal_and_connection_is_in_the_text() -> None:
 def test_columns_are_aligned() -> None:
     rows = section(small().structure().text(), "Connections")
     (place,) = {row.index("->") for row in rows[1:]}
-    assert rows[0].index("value used") == max(row.index("held") if "held" in row else row.index("fresh") for row in rows[1:])
+    assert rows[0].index("value used") == max(
+        row.index("held") if "held" in row else row.index("fresh") for row in rows[1:]
+    )
     assert place > 0
 
 

@@ -53,7 +53,10 @@ class Limited(HybridSystem):
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         effort = 100.0 * np.tanh(u.odometer)
-        return {"effort": effort + 1e-305 * np.exp(p.power * np.log(np.abs(u.odometer) + 1.0)), "demand": 0.01 * effort + 0.5}
+        return {
+            "effort": effort + 1e-305 * np.exp(p.power * np.log(np.abs(u.odometer) + 1.0)),
+            "demand": 0.01 * effort + 0.5,
+        }
 
 
 @pytest.fixture
@@ -70,10 +73,13 @@ def coupled(plant: str = "runaway", **changes: Any) -> Scenario:
 
 
 @pytest.mark.usefixtures("models")
-@pytest.mark.parametrize(("plant", "why", "when"), [
-    ("runaway", "grew beyond anything plausible (1000)", np.log(1e6)),
-    ("ranged", "left its declared range (-100 to 100)", np.log(1e5)),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("plant", "why", "when"),
+    [
+        ("runaway", "grew beyond anything plausible (1000)", np.log(1e6)),
+        ("ranged", "left its declared range (-100 to 100)", np.log(1e5)),
+    ],
+)
 def test_the_plant_is_blamed_and_not_the_driver_that_overflows_later(plant: str, why: str, when: float) -> None:
     outcome = coupled(plant).run()
     first, _, end = (outcome.failure or "").partition(" In the end: ")
@@ -86,7 +92,9 @@ def test_the_plant_is_blamed_and_not_the_driver_that_overflows_later(plant: str,
 
 @pytest.mark.usefixtures("models")
 def test_who_is_fed_by_nobody_went_by_itself() -> None:
-    scenario = Scenario(stop=60.0, step=0.1).add("train", model="runaway", **{"as": "block3"}, parameters={"growth": 30.0})
+    scenario = Scenario(stop=60.0, step=0.1).add(
+        "train", model="runaway", **{"as": "block3"}, parameters={"growth": 30.0}
+    )
     assert "Nothing is connected to 'train', so it went by itself." in (scenario.run().failure or "")
 
 

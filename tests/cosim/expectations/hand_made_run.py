@@ -22,7 +22,9 @@ UNITS = {"speed": "m/s", "position": "m", "slip": "1", "adhesion_force": "N", "i
 
 
 def columns() -> dict[str, np.ndarray]:
-    """The train stands still at 10 m/s; the observer is 0.5 m/s too fast before the event and 0.1 m/s too slow after it."""
+    """The train stands still at 10 m/s; the observer is 0.5 m/s too fast before the event and 0.1 m/s too slow after
+    it.
+    """
     return {
         "train.speed": np.full(12, 10.0),
         "train.position": 10.0 * TIME,
@@ -39,10 +41,14 @@ def columns() -> dict[str, np.ndarray]:
 
 
 def telegrams() -> list[BaliseRecord]:
-    """Five: one missed at 1 s, one false and rejected at 2 s, one late at 3 s, one used at 6 s, one not yet delivered at 9 s."""
+    """Five: one missed at 1 s, one false and rejected at 2 s, one late at 3 s, one used at 6 s, one not yet delivered
+    at 9 s.
+    """
 
     def told(stamp: float, name: str, first: str, second: str, **more: Any) -> BaliseRecord:
-        return BaliseRecord(stamp, stamp, name, 10.0 * stamp, 10.0 * stamp, outcomes={"observer": first, "other": second}, **more)
+        return BaliseRecord(
+            stamp, stamp, name, 10.0 * stamp, 10.0 * stamp, outcomes={"observer": first, "other": second}, **more
+        )
 
     return [
         BaliseRecord(1.0, math.nan, "A", 10.0, 10.0, kind="missed"),
@@ -65,7 +71,9 @@ def summary() -> dict[str, Any]:
     }
 
 
-def hand_made(until: float = 10.0, failure: str | None = None, changes: Mapping[str, np.ndarray] | None = None) -> Result:
+def hand_made(
+    until: float = 10.0, failure: str | None = None, changes: Mapping[str, np.ndarray] | None = None
+) -> Result:
     """The run, as far as `until` [s], with some columns changed."""
     rows = until >= TIME
     all_columns = {**columns(), **(changes or {})}
@@ -78,9 +86,12 @@ def hand_made(until: float = 10.0, failure: str | None = None, changes: Mapping[
 
 
 SPEC = ReportSpec(
-    true_speed="train.speed", true_position="train.position", true_slip="train.slip", true_adhesion_force="train.adhesion_force",
+    true_speed="train.speed",
+    true_position="train.position",
+    true_slip="train.slip",
+    true_adhesion_force="train.adhesion_force",
     observers=("observer",),
-)  # fmt: skip
+)
 
 
 def judged(result: Result, *items: Mapping[str, Any], spec: ReportSpec = SPEC) -> list[Judged]:

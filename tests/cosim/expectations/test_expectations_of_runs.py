@@ -1,4 +1,6 @@
-"""Expectations of scenarios: what cannot be is refused before the run; real runs are judged; exit codes of the command."""
+"""Expectations of scenarios: what cannot be is refused before the run; real runs are judged; exit codes of the
+command.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +53,10 @@ WRONG = [
     ({"check": "off", "signal": "lokomotive.speed", "threshold": 1.0}, "did you mean 'locomotive'"),
     ({"check": "off", "signal": "speed", "threshold": 1.0}, "component.signal"),
     ({"check": "signal", "signal": "locomotive.effort", "max": 1.0}, "causality 'input'"),
-    ({"check": "difference", "signal": "locomotive.speed", "reference": "locomotive.position", "max": 1.0}, "dimensions"),
+    (
+        {"check": "difference", "signal": "locomotive.speed", "reference": "locomotive.position", "max": 1.0},
+        "dimensions",
+    ),
     ({"check": "telegrams", "missed": 0, "of": "driver"}, "is told of no telegrams"),
     ({"check": "certificate", "of": "locomotive"}, "is told of no telegrams"),
     ({"check": "certificate", "of": "lok"}, "no observer 'lok'"),
@@ -123,7 +128,8 @@ def test_what_is_no_expectation_is_refused(item: dict[str, Any], text: str) -> N
     assert str(caught.value).startswith("script: expect, number 1")
 
 
-# -- real runs ----------------------------------------------------------------------------------------------------------
+# -- real runs
+# ----------------------------------------------------------------------------------------------------------
 
 
 def test_a_run_is_judged_by_its_own_numbers() -> None:
@@ -171,7 +177,7 @@ at_most = 1
 )
 def test_the_command_ends_with_1_where_something_is_unmet(
     limit: float, code: int, head: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:  # fmt: skip
+) -> None:
     assert main(["run", write(tmp_path, limit), "--out", str(tmp_path / "out"), "--quiet"]) == code
     printed = capsys.readouterr().out
     assert head in printed

@@ -1,4 +1,6 @@
-"""Every kind of expectation against a run whose numbers are known, met and not met, and against runs that went wrong."""
+"""Every kind of expectation against a run whose numbers are known, met and not met, and against runs that went
+wrong.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,9 @@ ERRORS = [
 
 
 @pytest.mark.parametrize(("item", "what", "measured", "when", "limits"), ERRORS)
-def test_sizes_of_errors(item: dict[str, Any], what: str, measured: float, when: float, limits: tuple[float, float]) -> None:
+def test_sizes_of_errors(
+    item: dict[str, Any], what: str, measured: float, when: float, limits: tuple[float, float]
+) -> None:
     met, unmet = (judged(hand_made(), item | {what: limit})[0] for limit in limits)
     assert (met.passed, unmet.passed) == (True, False)
     assert met.measured == pytest.approx(measured, rel=1e-12)  # rounding of sums of ten numbers
@@ -59,7 +63,7 @@ SIGNALS = [
 @pytest.mark.parametrize(("item", "met", "unmet", "measured", "when"), SIGNALS)
 def test_bounds_of_signals(
     item: dict[str, Any], met: dict[str, Any], unmet: dict[str, Any], measured: float, when: float
-) -> None:  # fmt: skip
+) -> None:
     good, bad = (judged(hand_made(), {"check": "signal"} | item | bounds)[0] for bounds in (met, unmet))
     assert (good.passed, bad.passed) == (True, False)
     assert bad.measured == pytest.approx(measured)
@@ -70,13 +74,16 @@ def test_bounds_of_signals(
 INDICATORS = [
     ({"check": "on", "signal": "observer.indicator", "threshold": 0.5, "before": 6.0}, True, 6.0),
     ({"check": "on", "signal": "observer.indicator", "threshold": 0.5, "before": 5.9}, False, 6.0),
-    ({"check": "on", "signal": "observer.indicator", "threshold": 0.5, "from": 6.5, "before": 7.0}, True, 6.5),  # on already
+    # on already
+    ({"check": "on", "signal": "observer.indicator", "threshold": 0.5, "from": 6.5, "before": 7.0}, True, 6.5),
     ({"check": "on", "signal": "observer.indicator", "threshold": 0.5, "from": 8.0, "before": 9.0}, False, math.nan),
-    ({"check": "on", "signal": "observer.indicator", "threshold": 1.0, "before": 9.0}, False, math.nan),  # above, not at
+    # above, not at
+    ({"check": "on", "signal": "observer.indicator", "threshold": 1.0, "before": 9.0}, False, math.nan),
     ({"check": "on", "signal": "alarm.indicator", "threshold": 1.5, "before": 5.0}, True, 5.0),
     ({"check": "off", "signal": "observer.indicator", "threshold": 0.5, "to": 5.0}, True, 0.0),
     ({"check": "off", "signal": "observer.indicator", "threshold": 0.5}, False, 2.0),
-    ({"check": "off", "signal": "observer.indicator", "threshold": 0.5, "from": 7.5}, False, 0.5),  # still on at its start
+    # still on at its start
+    ({"check": "off", "signal": "observer.indicator", "threshold": 0.5, "from": 7.5}, False, 0.5),
     ({"check": "off", "signal": "observer.indicator", "threshold": 0.5, "from": 8.0}, True, 0.0),
     ({"check": "off", "signal": "alarm.indicator", "threshold": 1.5}, False, 3.0),
 ]
@@ -127,7 +134,9 @@ def test_a_longer_gap_than_certified_is_found() -> None:
     run = hand_made()
     certificates = run.summary["certificates"]
     longer = {**certificates, "observer": {**certificates["observer"], "largest_gap_seen": 3.75}}
-    (found,) = judged(replace(run, summary={**run.summary, "certificates": longer}), {"check": "certificate", "of": "observer"})
+    (found,) = judged(
+        replace(run, summary={**run.summary, "certificates": longer}), {"check": "certificate", "of": "observer"}
+    )
     assert (found.passed, found.measured, found.limit) == (False, 3.75, 3.5)
 
 
@@ -156,7 +165,8 @@ def test_several_observers_are_judged_one_by_one() -> None:
     assert all(j.name.startswith("fast (") for j in found)
 
 
-# -- runs that went wrong -----------------------------------------------------------------------------------------------
+# -- runs that went wrong
+# -----------------------------------------------------------------------------------------------
 
 REACHED_AND_OPEN = [
     ({"check": "speed_error", "max": 1.0}, False, "not reached"),
@@ -198,10 +208,14 @@ def test_a_run_that_ended_as_a_component_asked_is_judged_by_what_there_is() -> N
 def test_a_run_without_rows() -> None:
     empty = hand_made(until=-1.0, failure="nothing worked")
     found = judged(
-        empty, {"check": "speed_error", "max": 1.0}, {"check": "signal", "signal": "train.speed", "min": 0.0},
-        {"check": "on", "signal": "observer.indicator", "before": 3.0}, {"check": "off", "signal": "observer.indicator"},
-        {"check": "telegrams", "missed": 0, "used": 1}, {"check": "warnings", "at_most": 9},
-    )  # fmt: skip
+        empty,
+        {"check": "speed_error", "max": 1.0},
+        {"check": "signal", "signal": "train.speed", "min": 0.0},
+        {"check": "on", "signal": "observer.indicator", "before": 3.0},
+        {"check": "off", "signal": "observer.indicator"},
+        {"check": "telegrams", "missed": 0, "used": 1},
+        {"check": "warnings", "at_most": 9},
+    )
     assert not any(j.passed for j in found)
     assert all(j.text for j in found)
 
@@ -252,7 +266,8 @@ def test_without_a_true_value_nothing_is_measured() -> None:
     assert "true_speed" in found.text
 
 
-# -- laws ---------------------------------------------------------------------------------------------------------------
+# -- laws
+# ---------------------------------------------------------------------------------------------------------------
 
 times = st.lists(st.integers(0, 40), min_size=2, max_size=25).map(sorted)
 
@@ -264,16 +279,27 @@ def test_the_largest_error_is_that_of_a_plain_loop(ticks: Sequence[int], data: s
     start, end = sorted(data.draw(st.tuples(st.integers(0, 39), st.integers(0, 39)).filter(lambda p: p[0] != p[1])))
     limit = data.draw(st.integers(0, 8))
     sizes = [abs(e) for t, e in zip(time, errors, strict=True) if start <= 4.0 * t <= end]
-    table = np.array(list(zip(time, errors, [0.0] * len(time), strict=True)), [("time", "f8"), ("a.b", "f8"), ("a.c", "f8")])
+    table = np.array(
+        list(zip(time, errors, [0.0] * len(time), strict=True)), [("time", "f8"), ("a.b", "f8"), ("a.c", "f8")]
+    )
     run = Result(table, [SignalInfo("a.b"), SignalInfo("a.c")])
-    item = {"check": "difference", "signal": "a.b", "reference": "a.c", "max": limit, "from": start / 4.0, "to": end / 4.0}
+    item = {
+        "check": "difference",
+        "signal": "a.b",
+        "reference": "a.c",
+        "max": limit,
+        "from": start / 4.0,
+        "to": end / 4.0,
+    }
     (found,) = judged(run, item)
     assert found.passed is (bool(sizes) and max(sizes) <= limit and 4.0 * time[-1] >= end)
 
 
 @given(times, st.data())
 def test_first_on_is_that_of_a_fine_walk(ticks: Sequence[int], data: st.DataObject) -> None:
-    """Walks in quarters of a tick and looks up the row that holds there; what is seen for no time does not count in a walk."""
+    """Walks in quarters of a tick and looks up the row that holds there; what is seen for no time does not count in a
+    walk.
+    """
     unique = sorted(set(ticks))
     values = data.draw(st.lists(st.sampled_from([0.0, 1.0]), min_size=len(unique), max_size=len(unique)))
     start = data.draw(st.integers(unique[0], unique[-1] * 4 + 3)) / 4.0
@@ -285,7 +311,8 @@ def test_first_on_is_that_of_a_fine_walk(ticks: Sequence[int], data: st.DataObje
         assert first == expected
 
 
-# -- the outcome --------------------------------------------------------------------------------------------------------
+# -- the outcome
+# --------------------------------------------------------------------------------------------------------
 
 
 def outcome(*items: dict[str, Any], failure: str | None = None) -> Outcome:
@@ -321,9 +348,10 @@ def test_a_run_that_failed_does_not_pass_the_check() -> None:
 
 def test_expectations_survive_the_results_folder(tmp_path: Any) -> None:
     before = outcome(
-        {"check": "speed_error", "max": 1.0, "rms": 0.1}, {"check": "certificate"},
+        {"check": "speed_error", "max": 1.0, "rms": 0.1},
+        {"check": "certificate"},
         {"check": "on", "signal": "observer.indicator", "threshold": 9.0, "before": 3.0},
-    )  # fmt: skip
+    )
     write_results(before.result, tmp_path)
     after = Outcome(read_results(tmp_path), SPEC)
     same = [replace(a, measured=0.0, when=0.0) == replace(b, measured=0.0, when=0.0) for a, b in zip_all(before, after)]

@@ -14,8 +14,16 @@ from coupled_runs import Balises, Listener, Motion, _service, block, positions, 
 from event_runs import parts
 from fmpy.fmi1 import FMICallException
 from mock_slaves import DISCARD, FATAL, Counter, component
-from zoo.events import countdown_fmu, integrator_fmu, periodic_fmu, periodic_ticks, receiver_fmu, timed_fmu, triggered_fmu
-from zoo.masses import Chain, cuts
+from test_fmus.events import (
+    countdown_fmu,
+    integrator_fmu,
+    periodic_fmu,
+    periodic_ticks,
+    receiver_fmu,
+    timed_fmu,
+    triggered_fmu,
+)
+from test_fmus.masses import Chain, cuts
 
 from cosim import CosimError, Scenario
 from cosim.balises.telegram import Channel, FalseTelegram
@@ -33,7 +41,7 @@ from cosim.master.control.doubling import DoublingStep
 from cosim.master.control.fixed import FixedStep
 from cosim.master.control.multirate import set_rates
 from cosim.master.initialisation import initialise
-from cosim.master.lines.draw import draw_lines
+from cosim.master.interpolation.draw import draw_lines
 from cosim.master.master import Master, close
 from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, output_signal, parameter, state, vector
 
@@ -113,13 +121,16 @@ class Driven(Adder):
         return {"position": x[0], "speed": x[1]}
 
 
-# -- lines and jumps ----------------------------------------------------------------------------------------------------
+# -- lines and jumps
+# ----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("inputs", ["hold", "interpolate", "extrapolate"])
 @pytest.mark.parametrize("version", [2, 3])
 def test_no_line_leads_over_the_jump_of_a_balise(inputs: str, version: int) -> None:
-    """Told at 0.5 s, a communication point, the estimate is 5 from there on: held inputs are exact, and so is every line."""
+    """Told at 0.5 s, a communication point, the estimate is 5 from there on: held inputs are exact, and so is every
+    line.
+    """
     components = [block(Adder(), "plant"), block(Jumper(), "r", version)]
     pairs = [("r.estimate", "plant.u"), ("plant.speed", "r.speed")]
     seen = run(components, pairs, 0.1, 12, Balises(positions(5.0), receivers=["r"]), inputs=inputs)
@@ -127,7 +138,9 @@ def test_no_line_leads_over_the_jump_of_a_balise(inputs: str, version: int) -> N
 
 
 def test_lines_begin_anew_with_the_values_after_an_event() -> None:
-    """A sine that jumps at two instants between points, interpolated and integrated: of second order, without a stray term."""
+    """A sine that jumps at two instants between points, interpolated and integrated: of second order, without a stray
+    term.
+    """
 
     class Saw(Planned):
         outputs: ClassVar[dict[str, Any]] = {"events": 0.0, "y": 0.0}
@@ -141,22 +154,26 @@ def test_lines_begin_anew_with_the_values_after_an_event() -> None:
 
     exact = (1.0 - math.cos(3.0)) / 3.0 + 5.0 * (1.0 - 0.234) + 5.0 * (1.0 - 0.567)
     errors = [
-        run([component(Saw(), "s"), component(Counter(), "i")], [("s.y", "i.rate")], 1.0 / n, n, inputs="interpolate")["i.total"][
-            -1
-        ]
+        run([component(Saw(), "s"), component(Counter(), "i")], [("s.y", "i.rate")], 1.0 / n, n, inputs="interpolate")[
+            "i.total"
+        ][-1]
         - exact
         for n in (20, 40, 80, 160)
     ]
     orders = np.log2(np.divide(errors[:-1], errors[1:]))
-    np.testing.assert_allclose(orders, 2.0, atol=0.1)  # the trapezoidal rule over pieces; the partial steps differ in length
+    # the trapezoidal rule over pieces; the partial steps differ in length
+    np.testing.assert_allclose(orders, 2.0, atol=0.1)
 
 
-# -- balises in loops ---------------------------------------------------------------------------------------------------
+# -- balises in loops
+# ---------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("version", [2, 3])
 def test_an_algebraic_loop_through_a_receiver_holds_in_the_row_after_a_balise(version: Any) -> None:
-    """``y = 2 e``, ``e = held - y / 2``: ``e = held / 2`` at every communication point, also in the step of the balise."""
+    """``y = 2 e``, ``e = held - y / 2``: ``e = held / 2`` at every communication point, also in the step of the
+    balise.
+    """
     components = {n: block(s, n, version) for n, s in (("plant", Motion()), ("r", Looped()), ("g", Gain()))}
     pairs = connect([("g.y", "r.fed"), ("r.estimate", "g.u")], components)
     groups = execution_groups(components, pairs, [("plant", "r")])
@@ -193,7 +210,8 @@ def test_a_plant_that_feels_in_an_iterated_loop_what_its_balises_did(version: in
         assert event.stamp == pytest.approx(k * 0.1 + s, abs=1e-9)  # promised for 'rollback'
 
 
-# -- step doubling ------------------------------------------------------------------------------------------------------
+# -- step doubling
+# ------------------------------------------------------------------------------------------------------
 
 
 def doubling(system: Any) -> DoublingStep:
@@ -219,10 +237,10 @@ class Particular(Counter):
 def test_a_trial_step_that_fails_or_gives_no_number_is_divided(refusal: bool) -> None:
     seen = run([component(Particular(refusal), "c")], [], 0.1, 5, control=doubling)
     np.testing.assert_allclose(seen["c.total"], seen.time, rtol=0.0, atol=1e-14)
-    tally = seen.master.control.tally
-    assert tally.rejected >= 1
-    assert math.isfinite(tally.worst)
-    assert tally.worst <= 1.0
+    statistics = seen.master.control.statistics
+    assert statistics.rejected >= 1
+    assert math.isfinite(statistics.worst)
+    assert statistics.worst <= 1.0
 
 
 def test_a_step_that_fails_however_short_it_is_fails_with_its_own_reason() -> None:
@@ -250,14 +268,16 @@ def test_components_that_cannot_vary_their_step_are_refused() -> None:
 def test_events_at_the_end_of_a_part_of_a_step_have_both_rows_and_count_once(
     interval: float, pieces: int, tmp_path: Path
 ) -> None:
-    """Ticks at middles of steps, and at ends of the pieces of 25 ms that the error asks for: rows as with fixed steps."""
+    """Ticks at middles of steps, and at ends of the pieces of 25 ms that the error asks for: rows as with fixed
+    steps.
+    """
     tables, counts = [], []
     for control in (FixedStep, lambda system: DoublingStep(system, 2e-3)):
         components = [*parts(p=periodic_fmu(tmp_path, interval=interval, shift=interval)), block(Adder(), "plant")]
         seen = run(components, [("plant.i", "p.u"), ("plant.position", "plant.u")], 0.1, 4, control=control)
         tables.append(seen.table)
         counts.append(seen.master.system.events.iteration.count)  # type: ignore[union-attr]
-    assert seen.master.control.tally.shortest == pytest.approx(0.1 / pieces)
+    assert seen.master.control.statistics.shortest == pytest.approx(0.1 / pieces)
     assert counts == [len(periodic_ticks(0.4, interval, interval))] * 2
     np.testing.assert_allclose(tables[0]["time"], tables[1]["time"], rtol=0.0, atol=1e-15)
     np.testing.assert_array_equal(tables[0]["p.count"], tables[1]["p.count"])
@@ -278,7 +298,11 @@ def test_nothing_is_called_after_a_fatal_error(how: dict[str, Any]) -> None:
     frees: list[bool] = []
     slave.freeFMUState = lambda _state: frees.append(slave.dead)  # type: ignore[method-assign]
     master = prepare(
-        [component(slave, "a"), component(Counter(), "b")], [("a.total", "b.rate"), ("b.total", "a.rate")], 0.1, 5, **how
+        [component(slave, "a"), component(Counter(), "b")],
+        [("a.total", "b.rate"), ("b.total", "a.rate")],
+        0.1,
+        5,
+        **how,
     )
     with pytest.raises(RunError, match=r"'a' at t = 0.2 s: doStep failed: .*fatal"):
         master.run()
@@ -287,7 +311,8 @@ def test_nothing_is_called_after_a_fatal_error(how: dict[str, Any]) -> None:
     assert not any(frees)
 
 
-# -- rates --------------------------------------------------------------------------------------------------------------
+# -- rates
+# --------------------------------------------------------------------------------------------------------------
 
 
 def test_a_component_that_asks_for_the_end_takes_no_more_substeps() -> None:
@@ -334,12 +359,14 @@ def test_clocks_that_are_connected_tick_at_every_point(tmp_path: Path) -> None:
         s.run(warn=lambda _text: None)
 
 
-# -- save, restore, redo: everything at once ----------------------------------------------------------------------------
+# -- save, restore, redo: everything at once
+# ----------------------------------------------------------------------------
 
 ALGORITHMS: dict[str, Any] = {
-    "gauss-seidel": GaussSeidel, "threads": lambda plan: Jacobi(plan, 2),
+    "gauss-seidel": GaussSeidel,
+    "threads": lambda plan: Jacobi(plan, 2),
     "iterate": lambda plan: Iterate(plan, [["plant", "listener"], ["mass1", "mass2"]]),
-}  # fmt: skip
+}
 
 
 @pytest.fixture(scope="module")
@@ -347,13 +374,20 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("combinations")
 
 
-def everything(folder: Path, algorithm: str, control: Any, inputs: Any, version: Any, rates: dict[str, int]) -> Iterator[Master]:
+def everything(
+    folder: Path, algorithm: str, control: Any, inputs: Any, version: Any, rates: dict[str, int]
+) -> Iterator[Master]:
     """Two coupled masses, a train whose observer feeds it back, late and false telegrams, clocks and time events."""
     cut = cuts(Chain.two(damping=0.1))["displacement-displacement"]
     made = {"s": triggered_fmu(folder), "r": receiver_fmu(folder), "t": timed_fmu(folder), "i": integrator_fmu(folder)}
     made |= {"c": countdown_fmu(folder), **cut.fmus(folder, 2, input_derivatives=True)}
     components: list[Component] = [block(Driven(), "plant"), block(Listener(), "listener", version), *parts(**made)]
-    wires = ["plant.speed -> listener.speed", "listener.integrated -> plant.u", "s.crossing -> r.tick", *cut.connections]
+    wires = [
+        "plant.speed -> listener.speed",
+        "listener.integrated -> plant.u",
+        "s.crossing -> r.tick",
+        *cut.connections,
+    ]
     wires += ["s.crossing_value -> r.tick_value", "t.level -> i.u", "s.crossing -> c.start"]
     by_name = {c.name: c for c in components}
     clocks, pairs = connect_clocks([tuple(w.split(" -> ")) for w in wires], by_name)  # type: ignore[misc]
@@ -364,9 +398,13 @@ def everything(folder: Path, algorithm: str, control: Any, inputs: Any, version:
     plan = make_plan(by_name, connected, order, None, clocks)
     if inputs != "hold":
         draw_lines(plan, inputs)
-    channel = Channel(latency=0.12, latency_jitter=0.1, missed_fraction=0.2, seed=3, false_telegrams=(FalseTelegram(0.35, 2.0),))
+    channel = Channel(
+        latency=0.12, latency_jitter=0.1, missed_fraction=0.2, seed=3, false_telegrams=(FalseTelegram(0.35, 2.0),)
+    )
     balises = Balises(positions(*(0.7 * k for k in range(1, 28))), receivers=["listener"], channel=channel)
-    master = Master(plan, TimeAxis(0.0, 0.1, 6), _service(plan, balises), algorithm=ALGORITHMS[algorithm], control=control)
+    master = Master(
+        plan, TimeAxis(0.0, 0.1, 6), _service(plan, balises), algorithm=ALGORITHMS[algorithm], control=control
+    )
     set_rates(plan, master.axis, rates, {"mass1": 3}, {})
     initialise(plan, 0.0, 1.0)
     master.system.start(0.0)

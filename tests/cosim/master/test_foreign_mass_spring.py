@@ -10,7 +10,7 @@ import pytest
 from fmpy import read_model_description
 from linear_runs import run_cut
 from scipy.linalg import expm
-from zoo.masses import Chain, Cut, cuts
+from test_fmus.masses import Chain, Cut, cuts
 
 from cosim import Scenario
 from cosim.master.algorithms.jacobi import Jacobi
@@ -51,7 +51,9 @@ def libcosim(cut: Cut, folder: Path) -> dict[str, np.ndarray]:
 
 @pytest.mark.parametrize("name", ["displacement-displacement", "force-displacement"])
 def test_the_trajectory_is_that_of_libcosim(name: str, tmp_path: Path) -> None:
-    """Exchange at initialisation, Jacobi, held inputs: both do the same sums, so nothing but their rounding may differ."""
+    """Exchange at initialisation, Jacobi, held inputs: both do the same sums, so nothing but their rounding may
+    differ.
+    """
     cut = cuts(CHAIN)[name]
     foreign = libcosim(cut, tmp_path)
     ours = run_cut(cut, CHAIN, tmp_path, STEP, STEPS, algorithm=Jacobi)
@@ -68,7 +70,8 @@ def by_hand(cut: Cut, steps: int, exchange: bool) -> dict[str, float]:
     seen = {n: dict.fromkeys(p.outputs, 0.0) for n, p in cut.parts.items()}
     for k in range(steps):
         if k or exchange:
-            seen = {n: dict(zip(p.outputs, p.C @ states[n], strict=True)) for n, p in cut.parts.items()}  # no direct feedthrough
+            # no direct feedthrough
+            seen = {n: dict(zip(p.outputs, p.C @ states[n], strict=True)) for n, p in cut.parts.items()}
         for n, p in cut.parts.items():
             u = np.array([next(seen[a][y] for (a, y), (b, i) in links if (b, i) == (n, name)) for name in p.inputs])
             size = len(p.x0)

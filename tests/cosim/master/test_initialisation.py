@@ -12,7 +12,16 @@ from scipy.optimize import brentq
 
 from cosim.errors import RunError
 from cosim.master.initialisation import MAX_ROUNDS
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, state, vector
+from plant_models.hybrid import (
+    HybridSystem,
+    PeriodicEvent,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+    state,
+    vector,
+)
 
 STIFFNESS, DAMPING, MASS = 3.0, 0.5, 2.0
 
@@ -84,7 +93,9 @@ def test_without_the_exchange_the_first_step_would_be_wrong() -> None:
 
 
 def test_what_is_sampled_at_the_start_time_is_in_the_first_row() -> None:
-    """The sample is taken when initialisation ends, after the mass, which comes first in the loop, has ended its own."""
+    """The sample is taken when initialisation ends, after the mass, which comes first in the loop, has ended its
+    own.
+    """
     parts = [block(Mass(), "mass"), block(Sampler(), "sampler"), block(Spring(), "spring")]
     pairs = [("mass.position", "sampler.signal"), ("sampler.sample", "spring.position"), ("spring.force", "mass.force")]
     ran = run(parts, pairs, 0.1, 2)
@@ -95,7 +106,9 @@ def test_what_is_sampled_at_the_start_time_is_in_the_first_row() -> None:
 
 
 class Gain(Mock):
-    """``y = gain u + 1``: with ``u = y`` it settles on ``1 / (1 - gain)``, by plain exchange where the gain is below 1."""
+    """``y = gain u + 1``: with ``u = y`` it settles on ``1 / (1 - gain)``, by plain exchange where the gain is below
+    1.
+    """
 
     inputs: ClassVar[dict[str, Any]] = {"u": 0.0}
     outputs: ClassVar[dict[str, Any]] = {"y": 0.0, "steady": 5.0}
@@ -107,9 +120,12 @@ class Gain(Mock):
 
 @pytest.mark.parametrize("gain", [1e-3, 0.5, -1.0, -4.0, 7.0])
 def test_a_loop_with_a_solution_settles_on_it(gain: float) -> None:
-    """Undeclared feedthrough; the plain exchange alone would need 40 rounds for a gain of 1/2 and diverges from 1 on."""
+    """Undeclared feedthrough; the plain exchange alone would need 40 rounds for a gain of 1/2 and diverges from 1
+    on.
+    """
     ran = run([component(Gain(), "a")], [("a.y", "a.u")], 0.1, 1, starts={"a": {"gain": gain}})
-    assert ran["a.y"][0] == pytest.approx(1.0 / (1.0 - gain), rel=1e-11)  # settled within 1e-12, and once more passed on
+    # settled within 1e-12, and once more passed on
+    assert ran["a.y"][0] == pytest.approx(1.0 / (1.0 - gain), rel=1e-11)
     assert ran.master.exchange_rounds < 20
 
 
@@ -156,7 +172,9 @@ def test_an_exchange_that_does_not_settle_names_the_signals() -> None:
     """``y = u + 1`` with ``u = y`` has no solution."""
     calm = component(Counter(), "calm")
     master = prepare([component(Gain(), "a"), calm], [("a.y", "a.u")], 0.1, 3, start=2.0, starts={"a": {"gain": 1.0}})
-    with pytest.raises(RunError, match=rf"t = 2 s does not settle after {MAX_ROUNDS} exchanges; still changing: a\.y\.") as error:
+    with pytest.raises(
+        RunError, match=rf"t = 2 s does not settle after {MAX_ROUNDS} exchanges; still changing: a\.y\."
+    ) as error:
         master.run()
     assert "Relative changes of what is fed back: " in str(error.value)
     assert error.value.time == 2.0

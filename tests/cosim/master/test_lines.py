@@ -1,4 +1,6 @@
-"""Inputs between communication points: orders of accuracy against the closed form of the whole, and how slaves are told."""
+"""Inputs between communication points: orders of accuracy against the closed form of the whole, and how slaves are
+told.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +15,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from linear_runs import LinearRun, load, prepare, run_cut
 from mock_slaves import Counter, component
-from zoo.masses import Chain, cuts
+from test_fmus.masses import Chain, cuts
 
 from cosim.errors import RunError
 from cosim.master.algorithms.gauss_seidel import GaussSeidel
 from cosim.master.algorithms.jacobi import Jacobi
-from cosim.master.lines.line import Line
+from cosim.master.interpolation.line import Line
 from cosim.master.master import close
 
 CHAIN = Chain.two(damping=0.1)
@@ -45,12 +47,13 @@ def order(runs: list[LinearRun]) -> float:
 @pytest.mark.parametrize("telling", TELLINGS)
 @pytest.mark.parametrize("algorithm", [GaussSeidel, Jacobi])
 def test_lines_raise_the_order_from_one_to_two(telling: str, algorithm: Any, tmp_path: Path) -> None:
-    version, capabilities, carrier = TELLINGS[telling]
+    version, capabilities, interpolator = TELLINGS[telling]
     how = {"version": version, "capabilities": capabilities, "algorithm": algorithm}
     held = halved(tmp_path, "displacement-displacement", **how)
     lines = halved(tmp_path, "displacement-displacement", inputs="extrapolate", **how)
-    assert set(lines[0].carriers.values()) == {carrier}
-    assert order(held) == pytest.approx(1.0, abs=0.1)  # the next term of the expansion is a share of about h of the first
+    assert set(lines[0].interpolators.values()) == {interpolator}
+    # the next term of the expansion is a share of about h of the first
+    assert order(held) == pytest.approx(1.0, abs=0.1)
     assert order(lines) == pytest.approx(2.0, abs=0.15)
     assert lines[-1].error < 0.05 * held[-1].error
 
@@ -81,10 +84,14 @@ def test_a_mean_is_not_told_where_the_output_follows_the_input_at_once(tmp_path:
 
 def test_substeps_follow_the_line(tmp_path: Path) -> None:
     """Held means over n substeps come nearer to the line itself: their difference falls with n squared."""
-    line = halved(tmp_path, "displacement-displacement", (50,), inputs="extrapolate", capabilities={"input_derivatives": True})[0]
+    line = halved(
+        tmp_path, "displacement-displacement", (50,), inputs="extrapolate", capabilities={"input_derivatives": True}
+    )[0]
     distances = []
     for n in (1, 2, 4):
-        means = halved(tmp_path, "displacement-displacement", (50,), inputs="extrapolate", substeps={"mass1": n, "mass2": n})[0]
+        means = halved(
+            tmp_path, "displacement-displacement", (50,), inputs="extrapolate", substeps={"mass1": n, "mass2": n}
+        )[0]
         distances.append(max(np.abs(means.table[s] - line.table[s]).max() for s in line.cut.signals.values()))
     assert distances[0] / distances[1] == pytest.approx(4.0, rel=0.1)
     assert distances[1] / distances[2] == pytest.approx(4.0, rel=0.1)
@@ -100,7 +107,9 @@ def test_a_slave_that_refuses_a_slope_ends_the_run_in_words(version: int, tmp_pa
 
     setattr(parts["mass2"].slave, f"fmi{version}SetRealInputDerivatives", refuse)
     master, _ = prepare(parts, cut.connections, 0.1, 5, inputs="extrapolate")
-    with pytest.raises(RunError, match=r"Component 'mass2' at t = 0 s: derivatives of p_left, v_left failed: fmi.SetReal"):
+    with pytest.raises(
+        RunError, match=r"Component 'mass2' at t = 0 s: derivatives of p_left, v_left failed: fmi.SetReal"
+    ):
         master.run()
     close(master.plan)
 
@@ -110,7 +119,8 @@ def test_without_connected_inputs_lines_change_nothing() -> None:
     np.testing.assert_array_equal(*seen)
 
 
-# -- the line itself ------------------------------------------------------------------------------------------------------
+# -- the line itself
+# ------------------------------------------------------------------------------------------------------
 
 
 @given(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.lists(st.floats(0.01, 1.0), min_size=2, max_size=6))
@@ -177,7 +187,9 @@ def test_a_value_that_is_corrected_replaces_the_last_one() -> None:
 
 
 def test_balises_are_heard_at_their_own_instants_with_lines_too() -> None:
-    """The receiver follows the line in each part of its step: a speed that grows linearly integrates to the distance exactly."""
+    """The receiver follows the line in each part of its step: a speed that grows linearly integrates to the distance
+    exactly.
+    """
     parts = [block(Motion(), "plant"), block(Listener(), "listener")]
     balises = Balises(positions(3.3, 7.1, 11.0), receivers=["listener"])
     starts = {"plant": {"v0": 5.0, "a": 2.0}}
@@ -185,4 +197,5 @@ def test_balises_are_heard_at_their_own_instants_with_lines_too() -> None:
     assert seen["listener.heard"][-1] == 3.0
     at_balises = np.isin(seen.time, [e.stamp for e in seen.events])
     assert at_balises.sum() == 6
-    np.testing.assert_allclose(seen["listener.integrated"], seen["plant.position"], atol=1e-9)  # stamps are exact to 1e-11 s
+    # stamps are exact to 1e-11 s
+    np.testing.assert_allclose(seen["listener.integrated"], seen["plant.position"], atol=1e-9)

@@ -19,7 +19,8 @@ from cosim.errors import CouplingError, RunError
 from cosim.master.axis import TimeAxis
 from cosim.master.master import Master, close
 
-# -- time and rows ------------------------------------------------------------------------------------------------------
+# -- time and rows
+# ------------------------------------------------------------------------------------------------------
 
 
 @given(st.floats(-1e3, 1e5), st.floats(1e-3, 1.0), st.integers(1, 60))
@@ -82,7 +83,8 @@ def test_progress_is_told_up_to_the_end() -> None:
     assert master.timing.stepping > 0.0
 
 
-# -- failures -----------------------------------------------------------------------------------------------------------
+# -- failures
+# -----------------------------------------------------------------------------------------------------------
 
 
 class Failing(Train):
@@ -233,7 +235,9 @@ def test_a_component_that_chokes_on_nan_is_not_the_one_that_is_blamed() -> None:
                 raise ValueError("rate is not a number")
             super().move(t, h)
 
-    master = prepare([component(TurnsNan(), "train"), component(Picky(), "picky")], [("train.speed", "picky.rate")], 0.1, 20)
+    master = prepare(
+        [component(TurnsNan(), "train"), component(Picky(), "picky")], [("train.speed", "picky.rate")], 0.1, 20
+    )
     with pytest.raises(RunError, match=r"Component 'train' at t = 0.5 s: output train.speed is nan"):
         master.run()
     assert ran(master).time[-1] == 0.4
@@ -252,7 +256,8 @@ def test_infinities_of_opposite_sign_are_seen() -> None:
     assert ran(master).time[-1] == 0.1 * 3
 
 
-# -- FMI 3 events of the components themselves --------------------------------------------------------------------------
+# -- FMI 3 events of the components themselves
+# --------------------------------------------------------------------------
 
 
 class Clockwork(EventMode):
@@ -335,7 +340,8 @@ def test_discrete_states_that_do_not_settle_are_refused() -> None:
         master.run()
 
 
-# -- balises ------------------------------------------------------------------------------------------------------------
+# -- balises
+# ------------------------------------------------------------------------------------------------------------
 
 
 def test_the_plant_is_no_receiver_and_receivers_come_after_it() -> None:
@@ -350,7 +356,9 @@ def test_the_plant_is_no_receiver_and_receivers_come_after_it() -> None:
         prepare([plant, listener], [], 0.1, 2, Balises(positions(1.0), receivers=["plant"]))
     master = prepare([plant, listener], [], 0.1, 2, Balises(positions(1.0), receivers=["listener"]))
     master.plan.steps.reverse()
-    with pytest.raises(CouplingError, match="listener is told of balises, so it must be stepped after the plant 'plant'"):
+    with pytest.raises(
+        CouplingError, match="listener is told of balises, so it must be stepped after the plant 'plant'"
+    ):
         Master(master.plan, TimeAxis(0.0, 0.1, 2), master.balises)
 
 
@@ -394,7 +402,7 @@ def test_false_telegrams_claim_a_position_off_the_true_one() -> None:
     assert seen["listener.heard"][-1] == 2.0
 
 
-def test_the_telegram_carries_the_odometer_reading_of_the_passing() -> None:
+def test_the_telegram_carries_the_odometer_reading_of_the_crossing() -> None:
     parts = [block(Motion(), "plant"), block(Listener(), "listener")]
     balises = Balises(positions(5.0), receivers=["listener"], odometer="plant.speed")
     seen = run(parts, [], 0.1, 10, balises, starts={"plant": {"v0": 10.0, "a": 2.0}})

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from linear_runs import load, prepare, run_cut
 from mock_slaves import Counter, component
-from zoo.masses import Chain, cuts
+from test_fmus.masses import Chain, cuts
 
 from cosim.errors import CouplingError
 from cosim.master.control.multirate import set_rates
@@ -43,11 +43,20 @@ def test_a_slow_component_sees_what_is_there_when_its_step_ends(tmp_path: Path) 
 
 @pytest.mark.parametrize(("inputs", "order"), [("hold", 1.0), ("extrapolate", 2.0)])
 def test_the_order_is_that_of_the_lines(inputs: str, order: float, tmp_path: Path) -> None:
-    """At the points at which all have been stepped; in between the slow one is held, which is of first order by itself."""
+    """At the points at which all have been stepped; in between the slow one is held, which is of first order by
+    itself.
+    """
     errors = []
     for n in (100, 200, 400):
         seen = run_cut(
-            CUT, CHAIN, tmp_path, 1.0 / n, n, inputs=inputs, every={"mass2": 2}, capabilities={"input_derivatives": True}
+            CUT,
+            CHAIN,
+            tmp_path,
+            1.0 / n,
+            n,
+            inputs=inputs,
+            every={"mass2": 2},
+            capabilities={"input_derivatives": True},
         )
         common = seen.table[::2]
         exact = CHAIN.reference(common["time"])
@@ -57,7 +66,7 @@ def test_the_order_is_that_of_the_lines(inputs: str, order: float, tmp_path: Pat
 
 def test_the_line_of_a_slow_component_spans_its_own_step(tmp_path: Path) -> None:
     seen = run_cut(CUT, CHAIN, tmp_path, 0.01, 20, inputs="interpolate", every={"mass2": 4})
-    history = seen.master.plan.find("mass2").carrier.save()
+    history = seen.master.plan.find("mass2").interpolator.save()
     np.testing.assert_allclose(history.later_at, 0.2)
     np.testing.assert_allclose(history.earlier_at, 0.16)
 
@@ -91,6 +100,8 @@ def test_rates_that_cannot_be_are_refused() -> None:
         rates({"c": 2}, {"c": 2})
     with pytest.raises(CouplingError, match=r"c: every = 2 is not possible: it is watched for balises"):
         rates({"c": 2}, taken={"c": "it is watched for balises"})
-    with pytest.raises(CouplingError, match=r"every = 3 does not divide the 10 steps of the run, and the component cannot vary"):
+    with pytest.raises(
+        CouplingError, match=r"every = 3 does not divide the 10 steps of the run, and the component cannot vary"
+    ):
         rates({"c": 3}, vary=False)
     rates({"c": 5}, vary=False)

@@ -1,4 +1,6 @@
-"""Laws of signals: one instant in all targets, and numbers that do not depend on the order of listing, on random graphs."""
+"""Laws of signals: one instant in all targets, and numbers that do not depend on the order of listing, on random
+graphs.
+"""
 
 from __future__ import annotations
 
@@ -87,7 +89,9 @@ def nets(draw: st.DrawFn) -> Net:
     return Net(kinds, tuple(links))
 
 
-def run(net: Net, names: Sequence[str], links: Sequence[str], how: str, table: dict[str, Any]) -> tuple[Any, dict[str, Part]]:
+def run(
+    net: Net, names: Sequence[str], links: Sequence[str], how: str, table: dict[str, Any]
+) -> tuple[Any, dict[str, Part]]:
     """The table, or the refusal of the coupling, and the parts; `how` adds rates or step control."""
     slaves = {name: KINDS[net.kinds[name]]() for name in names}
     components = {name: component(slave, name) for name, slave in slaves.items()}
@@ -116,7 +120,7 @@ TABLES = st.fixed_dictionaries(
 @settings(max_examples=25)
 def test_numbers_do_not_depend_on_the_order_of_listing(
     net: Net, table: dict[str, Any], how: str, names: list[str], data: st.DataObject
-) -> None:  # fmt: skip
+) -> None:
     """Components and connections in any order: the same table to the last bit, and the same columns."""
     how = "" if how == "rates" and table["algorithm"] in ("auto", "iterate") else how
     reference, _ = run(net, NAMES, net.links, how, table)
@@ -131,7 +135,9 @@ def test_numbers_do_not_depend_on_the_order_of_listing(
 @given(nets(), st.sampled_from(["gauss-seidel", "jacobi"]), st.permutations(NAMES))
 @settings(max_examples=40)
 def test_a_signal_is_of_one_instant_in_all_its_targets(net: Net, algorithm: str, names: list[str]) -> None:
-    """What each part was given in each step is the source's value at its end for all targets, or at its start for all."""
+    """What each part was given in each step is the source's value at its end for all targets, or at its start for
+    all.
+    """
     table, slaves = run(net, names, net.links, "", {"algorithm": algorithm})
     if isinstance(table, str):
         return
@@ -196,7 +202,8 @@ def test_lines_begin_at_the_instant_of_the_value() -> None:
     close(master.plan)
     for name in "acd":
         seen = [values["u1"] for _, _, values in slaves[name].given][1:]
-        np.testing.assert_allclose(seen, STEP * (np.arange(1, COUNT) + 0.5), rtol=0.0, atol=1e-12)  # the mean over the step
+        # the mean over the step
+        np.testing.assert_allclose(seen, STEP * (np.arange(1, COUNT) + 0.5), rtol=0.0, atol=1e-12)
 
 
 def test_after_a_restore_the_held_value_is_that_of_the_step_taken_again() -> None:
@@ -214,7 +221,8 @@ def test_after_a_restore_the_held_value_is_that_of_the_step_taken_again() -> Non
     close(master.plan)
 
 
-# -- loops that are iterated --------------------------------------------------------------------------------------------
+# -- loops that are iterated
+# --------------------------------------------------------------------------------------------
 
 
 class Through(Part):
@@ -227,7 +235,9 @@ class Through(Part):
 
 
 def test_a_signal_that_leaves_an_iterated_loop_is_of_the_end_of_the_step() -> None:
-    """a and b make an algebraic loop, its signal goes to c as well, which acts on a: c would be stepped before the loop."""
+    """a and b make an algebraic loop, its signal goes to c as well, which acts on a: c would be stepped before the
+    loop.
+    """
     slaves = {"a": Through(), "b": Through(), "c": Direct()}
     links = ["a.y1 -> b.u1", "b.y1 -> a.u1", "a.y1 -> c.u1", "c.y2 -> a.u2", "a.y2 -> b.u2"]
     master = prepare({n: component(s, n) for n, s in slaves.items()}, links, STEP, COUNT)
@@ -249,7 +259,8 @@ def test_two_loops_that_take_iterated_signals_of_one_another_are_one() -> None:
     assert [sorted(loop["components"]) for loop in master.system.algorithm.summary()["loops"]] == [list("abcd")]
 
 
-# -- FMUs, both steppers ------------------------------------------------------------------------------------------------
+# -- FMUs, both steppers
+# ------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.compiler
@@ -280,7 +291,8 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return [random_linear(folder, f"f{i}", rng, version, 2, 2) for i, version in enumerate((2, 3))]
 
 
-# -- a train with balises -----------------------------------------------------------------------------------------------
+# -- a train with balises
+# -----------------------------------------------------------------------------------------------
 
 
 def permuted(seed: int, *, balises: bool, **overrides: Any) -> tuple[bytes, list[str]]:

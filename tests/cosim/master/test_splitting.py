@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from linear_runs import run_cut
-from zoo.masses import Chain, cuts
+from test_fmus.masses import Chain, cuts
 
 from cosim.coupling.plan import Plan
 from cosim.master.algorithms.gauss_seidel import GaussSeidel
@@ -62,7 +62,9 @@ METHODS: dict[str, tuple[Callable[[Plan], Any], str, int]] = {
     "iterate, interpolate": (everything, "interpolate", 2),
 }
 PLACES = st.integers(10_000, 990_000).map(lambda part: part / 1e6)
-"""A millionth of a step apart at least: nearer than 1e-9 s two times are one, and FMI 2.0 knows no step of length zero."""
+"""A millionth of a step apart at least: nearer than 1e-9 s two times are one, and FMI 2.0 knows no step of length
+zero.
+"""
 SPLITS = st.lists(st.lists(PLACES, max_size=3, unique=True).map(sorted), min_size=1, max_size=7)
 
 
@@ -74,18 +76,24 @@ def change_and_error(folder: Path, method: str, shares: Sequence[Sequence[float]
     whole = run_cut(cut, CHAIN, folder, DURATION / count, count, **how)
     split = run_cut(cut, CHAIN, folder, DURATION / count, count, control=lambda system: Split(system, shares), **how)
     np.testing.assert_array_equal(split.table["time"], whole.table["time"])
-    return max(float(np.abs(split.table[signal] - whole.table[signal]).max()) for signal in cut.signals.values()), whole.error
+    return max(
+        float(np.abs(split.table[signal] - whole.table[signal]).max()) for signal in cut.signals.values()
+    ), whole.error
 
 
 @pytest.mark.compiler
 @pytest.mark.parametrize("method", METHODS)
 def test_a_split_changes_no_more_than_the_order_of_the_method(tmp_path: Path, method: str) -> None:
-    """The change is below the error of the run itself, which is of the method's order, or half as much again for uneven parts."""
+    """The change is below the error of the run itself, which is of the method's order, or half as much again for uneven
+    parts.
+    """
 
     @given(SPLITS)
     @settings(max_examples=4)
     def law(shares: list[list[float]]) -> None:
-        (coarse, error), (fine, smaller) = (change_and_error(tmp_path, method, shares, count) for count in (COARSE, FINE))
+        (coarse, error), (fine, smaller) = (
+            change_and_error(tmp_path, method, shares, count) for count in (COARSE, FINE)
+        )
         assert np.log2(error / smaller) == pytest.approx(METHODS[method][2], abs=0.05)  # the next term is of order h
         assert coarse <= 1.5 * error
         assert fine <= 1.5 * smaller

@@ -13,7 +13,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from linear_runs import run_cut
 from mock_slaves import Counter, component
-from zoo.masses import Chain, cuts
+from test_fmus.masses import Chain, cuts
 
 from cosim.balises.telegram import Channel, FalseTelegram
 from cosim.errors import CouplingError
@@ -28,18 +28,20 @@ def doubling(tolerance: float, order: int = 2, smallest: float | None = None) ->
 
 @pytest.mark.parametrize(("inputs", "order"), [("hold", 2), ("extrapolate", 3)])
 def test_a_smaller_tolerance_gives_a_smaller_error(inputs: str, order: int, tmp_path: Path) -> None:
-    """An error of tol in every step of length h adds up to tol/h at most, times the growth of the whole (below e here)."""
+    """An error of tol in every step of length h adds up to tol/h at most, times the growth of the whole (below e
+    here).
+    """
     cut = cuts(CHAIN)["displacement-displacement"]
     errors, steps = [], []
     for tolerance in (1e-3, 1e-4, 1e-5):
         seen = run_cut(cut, CHAIN, tmp_path, 0.1, 10, inputs=inputs, control=doubling(tolerance, order))
-        tally = seen.master.control.tally
+        statistics = seen.master.control.statistics
         np.testing.assert_array_equal(seen.table["time"], [k * 0.1 for k in range(11)])
-        assert tally.forced == 0
-        assert tally.worst <= 1.0
-        assert seen.error < np.e * tolerance / tally.shortest
+        assert statistics.forced == 0
+        assert statistics.worst <= 1.0
+        assert seen.error < np.e * tolerance / statistics.shortest
         errors.append(seen.error)
-        steps.append(tally.accepted)
+        steps.append(statistics.accepted)
     assert errors[0] > 2.0 * errors[1] > 4.0 * errors[2]
     assert steps[0] < steps[1] < steps[2]
 
@@ -47,17 +49,19 @@ def test_a_smaller_tolerance_gives_a_smaller_error(inputs: str, order: int, tmp_
 def test_long_steps_where_nothing_happens(tmp_path: Path) -> None:
     quiet = Chain.two(damping=8.0)  # at rest after a few seconds
     seen = run_cut(cuts(quiet)["displacement-displacement"], quiet, tmp_path, 0.5, 60, control=doubling(1e-4))
-    tally = seen.master.control.tally
-    assert tally.shortest < 0.02
+    statistics = seen.master.control.statistics
+    assert statistics.shortest < 0.02
     assert seen.master.control._level == 0  # the last steps are whole communication steps
-    assert tally.rejected < 0.2 * tally.accepted
+    assert statistics.rejected < 0.2 * statistics.accepted
 
 
 def test_where_the_smallest_step_does_not_reach_it_is_told(tmp_path: Path) -> None:
-    seen = run_cut(cuts(CHAIN)["displacement-displacement"], CHAIN, tmp_path, 0.1, 10, control=doubling(1e-8, smallest=0.025))
+    seen = run_cut(
+        cuts(CHAIN)["displacement-displacement"], CHAIN, tmp_path, 0.1, 10, control=doubling(1e-8, smallest=0.025)
+    )
     control = seen.master.control
-    assert control.tally.forced > 0
-    assert control.tally.shortest == pytest.approx(0.025)
+    assert control.statistics.forced > 0
+    assert control.statistics.shortest == pytest.approx(0.025)
     assert control.summary()["first_forced_at"] == 0.0
     assert "set a smaller master.smallest_step" in control.warnings()[0]
 
@@ -80,10 +84,12 @@ def test_a_system_that_is_exact_is_not_changed_by_steps_that_are_taken_back() ->
     balises = Balises(positions(3.3, 7.1, 11.0), receivers=["listener"])
     seen = run(parts, pairs, 0.1, 15, balises, control=doubling(1e-6))
     again = [block(Motion(), "plant"), block(Listener(), "listener")]
-    told = run(again, [("plant.speed", "listener.speed")], 0.1, 15, Balises(positions(3.3, 7.1, 11.0), receivers=["listener"]))
+    told = run(
+        again, [("plant.speed", "listener.speed")], 0.1, 15, Balises(positions(3.3, 7.1, 11.0), receivers=["listener"])
+    )
     assert seen["listener.heard"][-1] == told["listener.heard"][-1] == 3.0
     assert [e.identity for e in seen.events] == [e.identity for e in told.events]
-    assert seen.master.control.tally.rejected > 0
+    assert seen.master.control.statistics.rejected > 0
     assert seen["plant.position"][np.searchsorted(seen.time, [e.stamp - 1e-9 for e in seen.events])] == pytest.approx(
         [3.3, 7.1, 11.0], abs=1e-9
     )
@@ -103,14 +109,15 @@ def test_telegrams_on_their_way_are_neither_lost_nor_told_twice(version: int) ->
         return run(parts, [("plant.speed", "listener.speed")], 0.1, 15, balises, starts=starts, **how)
 
     fixed, doubled = telegrams(), telegrams(control=doubling(1e-4))
-    assert doubled.master.control.tally.rejected > 0
+    assert doubled.master.control.statistics.rejected > 0
     assert doubled.master.balises.passed == fixed.master.balises.passed > 20
     for seen in (fixed, doubled):
         assert {e.kind for e in seen.events} == {"true", "missed", "false"}
     kinds = [{e.identity: e.kind for e in seen.events} for seen in (fixed, doubled)]
     assert kinds[0] == kinds[1]
     arrivals = [sorted(e.delivered_at for e in seen.events if e.kind == "true") for seen in (fixed, doubled)]
-    # an FMI 2 receiver that takes one telegram a step is told of a second one at the end of the step, which is shorter here
+    # an FMI 2 receiver that takes one telegram a step is told of a second one at the end of the step, which is shorter
+    # here
     assert arrivals[1] == pytest.approx(arrivals[0], abs=1e-9 if version == 3 else 0.1)
     assert {e.outcomes["listener"] for e in doubled.events if e.kind != "missed"} <= {"accepted", "replayed"}
     assert doubled["listener.heard"][-1] == fixed["listener.heard"][-1]

@@ -40,14 +40,24 @@ def test_the_folder_holds_scenario_files_and_hashes(tmp_path: Path) -> None:
     assert scenario["components"]["train"] == {"fmu": "files/train/coast.fmu", "parameters": {"x0[1]": 1.5}}
     assert (out / "made_from" / "files" / "train" / "coast.fmu").read_bytes() == fmu.read_bytes()
     manifest = json.loads(paths["made_from"].read_text())
-    part = {"path": str(fmu), "copy": "files/train/coast.fmu", "sha256": digest(fmu), "size": fmu.stat().st_size, "why": None}
+    part = {
+        "path": str(fmu),
+        "copy": "files/train/coast.fmu",
+        "sha256": digest(fmu),
+        "size": fmu.stat().st_size,
+        "why": None,
+    }
     assert manifest["files"] == [{"key": "components.train.fmu", "path": str(fmu), "parts": [part]}]
     assert {name: entry["sha256"] for name, entry in manifest["results"].items()} == {
         name: digest(out / name) for name in ("table.csv", "table.mat", "events.csv")
     }
     assert manifest["components"][0]["guid"] == outcome.result.summary["components"][0]["guid"]
     assert manifest["versions"]["numpy"] == np.__version__
-    assert (manifest["asked_by"], manifest["scenario"]["name"], manifest["scenario"]["from"]) == ("script", "script", "script")
+    assert (manifest["asked_by"], manifest["scenario"]["name"], manifest["scenario"]["from"]) == (
+        "script",
+        "script",
+        "script",
+    )
 
 
 def test_all_kinds_of_foreign_files_are_kept_and_the_scenario_runs_from_them(tmp_path: Path) -> None:
@@ -62,18 +72,23 @@ def test_all_kinds_of_foreign_files_are_kept_and_the_scenario_runs_from_them(tmp
     scenario._data["balises"] = {**scenario._data["balises"], "layout": "csv", "file": "line.csv"}
     del scenario._data["balises"]["positions"]
     scenario.add("first", fmu="coast.fmu").add("second", fmu="coast.fmu", parameters={"x0[1]": 2.0})
-    scenario.add("folder", recording="before", component="train").add("table", recording="before/table.csv", component="train")
+    scenario.add("folder", recording="before", component="train").add(
+        "table", recording="before/table.csv", component="train"
+    )
     outcome = quietly(scenario)
     outcome.write(tmp_path / "out", report=False)
     shutil.rmtree(home)
     moved = (tmp_path / "out").rename(tmp_path / "moved")
     kept = sorted(p for p in everything(moved / "made_from") if p.startswith("files"))
     results = ["events.csv", "messages.csv", "summary.json"]
-    assert kept == sorted([
-        "files/balises/line.csv", "files/first/coast.fmu",
-        *(f"files/folder/before/{n}" for n in (*results, "table.csv", "table.mat")),
-        *(f"files/table/{n}" for n in (*results, "table.csv")),
-    ])  # fmt: skip
+    assert kept == sorted(
+        [
+            "files/balises/line.csv",
+            "files/first/coast.fmu",
+            *(f"files/folder/before/{n}" for n in (*results, "table.csv", "table.mat")),
+            *(f"files/table/{n}" for n in (*results, "table.csv")),
+        ]
+    )
     again = quietly(Scenario.load(moved))
     np.testing.assert_array_equal(again.result.table, outcome.result.table)
     assert [e.identity for e in again.result.events] == ["B1", "B2"]
@@ -110,13 +125,18 @@ STARTS = st.one_of(NUMBERS, st.booleans(), st.integers(-(2**70), 2**70), st.text
 
 
 @given(st.dictionaries(st.text(min_size=1), STARTS, max_size=5), st.text(), st.lists(NUMBERS, min_size=1, max_size=4))
-def test_what_is_written_reads_back_to_the_same_scenario(parameters: dict[str, Any], title: str, places: list[float]) -> None:
+def test_what_is_written_reads_back_to_the_same_scenario(
+    parameters: dict[str, Any], title: str, places: list[float]
+) -> None:
     balises = {"position": "a.s", "speed": "a.v", "layout": "positions", "positions": places}
     data = {
-        "title": title, "stop": 1.0, "step": 0.1,
+        "title": title,
+        "stop": 1.0,
+        "step": 0.1,
         "connections": ["a.v -> b.v", {"from": "a.s", "to": "b.s", "values": [(1.0, 2.0)]}],
-        "components": {"a": {"model": "locomotive", "as": "block3", "parameters": parameters}}, "balises": balises,
-    }  # fmt: skip
+        "components": {"a": {"model": "locomotive", "as": "block3", "parameters": parameters}},
+        "balises": balises,
+    }
     table = parse_scenario(data, "law")
     with TemporaryDirectory() as folder:
         with renewed(folder, Origin.of(table, "law", Path(), "law")) as seal:
@@ -167,7 +187,9 @@ def test_a_second_run_into_the_same_folder_replaces_all_of_it(tmp_path: Path) ->
     assert not list((tmp_path / "out").glob(".made_from*"))
 
 
-def test_results_that_cannot_be_written_leave_the_former_ones_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_results_that_cannot_be_written_leave_the_former_ones_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     coast(tmp_path)
     quietly(coasting(tmp_path)).write(tmp_path / "out", report=False)
     before = everything(tmp_path / "out")
@@ -214,16 +236,19 @@ def test_folders_that_say_nothing_or_nonsense(tmp_path: Path) -> None:
         Scenario.load(tmp_path)
     (tmp_path / "made_from").mkdir()
     for content, complaint in (
-        ("{", "cannot be read: it is cut off or was edited"), ("[]", "cannot be read: it is not a table"),
-            ('{"format": 1}', "'scenario' is missing"),
+        ("{", "cannot be read: it is cut off or was edited"),
+        ("[]", "cannot be read: it is not a table"),
+        ('{"format": 1}', "'scenario' is missing"),
         ('{"format": 2}', "has format 2, this version reads format 1"),
-    ):  # fmt: skip
+    ):
         (tmp_path / "made_from" / "manifest.json").write_text(content)
         with pytest.raises(ProvenanceError, match=complaint):
             read_manifest(tmp_path)
 
 
-def test_a_folder_named_like_a_shipped_scenario_does_not_hide_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_named_like_a_shipped_scenario_does_not_hide_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     Path("freight_profile_d").mkdir()
     assert Scenario.load("freight_profile_d").where.endswith("freight_profile_d.toml")

@@ -67,16 +67,22 @@ def test_what_changed_since_is_told(kept: Path, tmp_path: Path) -> None:
     assert again.verdict == "bit-identical"
     guid = again.outcome.result.summary["components"][0]["guid"]
     assert again.changes == (
-        f"numpy: 1.0 then, {np.__version__} now", f"train: model {{old}} then, {guid} now",
-        f"{fmu}: it was changed after the run had begun", f"{fmu} is another file now; its copy in this folder was used.",
-    )  # fmt: skip
+        f"numpy: 1.0 then, {np.__version__} now",
+        f"train: model {{old}} then, {guid} now",
+        f"{fmu}: it was changed after the run had begun",
+        f"{fmu} is another file now; its copy in this folder was used.",
+    )
 
 
-@pytest.mark.parametrize("name", ["table.csv", "events.csv", "made_from/scenario.toml", "made_from/files/train/coast.fmu"])
+@pytest.mark.parametrize(
+    "name", ["table.csv", "events.csv", "made_from/scenario.toml", "made_from/files/train/coast.fmu"]
+)
 def test_an_edited_file_is_named(kept: Path, name: str) -> None:
     content = (kept / name).read_bytes()
     (kept / name).write_bytes(content + b"\n")
-    with pytest.raises(ProvenanceError, match=rf"{name} was changed since: its SHA-256 is not [0-9a-f]{{12}}.*\n.*--trust"):
+    with pytest.raises(
+        ProvenanceError, match=rf"{name} was changed since: its SHA-256 is not [0-9a-f]{{12}}.*\n.*--trust"
+    ):
         rerun(kept)
     (kept / name).unlink()
     with pytest.raises(ProvenanceError, match=f"{name} is missing"):
@@ -98,7 +104,9 @@ def test_a_large_file_is_looked_for_where_it_was(tmp_path: Path) -> None:
     quietly(coasting(tmp_path)).write(out, report=False, files_up_to=1e3)
     assert rerun(out).verdict == "bit-identical"
     moved = fmu.rename(tmp_path / "elsewhere.fmu")
-    with pytest.raises(ProvenanceError, match=rf"{fmu} is missing .* not copied \(.* MB are more than 0.001 MB\)") as gone:
+    with pytest.raises(
+        ProvenanceError, match=rf"{fmu} is missing .* not copied \(.* MB are more than 0.001 MB\)"
+    ) as gone:
         rerun(out)
     assert str(gone.value).endswith("--set train.fmu=FILE.")
     assert rerun(out, overrides={"train.fmu": moved}).verdict == "bit-identical"

@@ -32,7 +32,9 @@ parameters = {train_speed = 10.0}
 
 @pytest.fixture(scope="module", autouse=True)
 def _loaded(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Load what the fixture loads: pytester forgets what an inner session imported, and to import it again takes seconds."""
+    """Load what the fixture loads: pytester forgets what an inner session imported, and to import it again takes
+    seconds.
+    """
     path = tmp_path_factory.mktemp("loaded") / "run.toml"
     path.write_text(SCENARIO, encoding="utf-8")
     call = cosim.baselines.call.Call.run("run.toml", path.parent, path.with_name("base.json"))
@@ -89,17 +91,28 @@ def test_ten_lines_beside_a_vendor_fmu(pytester: pytest.Pytester) -> None:
     assert sorted(tree(pytester)) == [f"test_train/test_traction-100000.0.{kind}" for kind in ("csv", "json")]
     run(pytester).assert_outcomes(passed=1)
     header = json.loads(tree(pytester)["test_train/test_traction-100000.0.json"])
-    assert header["run"] == {"kind": "fmu", "source": "../../vendor.fmu", "stop": 1.0, "step": 0.01, "inputs": {"effort": 1e5}}
+    assert header["run"] == {
+        "kind": "fmu",
+        "source": "../../vendor.fmu",
+        "stop": 1.0,
+        "step": 0.01,
+        "inputs": {"effort": 1e5},
+    }
     assert header["components"][0]["model"] == "locomotive"
 
     pytester.makepyfile(test_train=TEN_LINES.replace("PARAMETERS", "{'mass': 80.8e3}"))  # one per cent heavier
     changed = run(pytester)
     changed.assert_outcomes(failed=1)
     changed.stdout.fnmatch_lines(
-        ["*fmu.position and 1 more: not as in the baseline baselines*test_traction-100000.0.json.*",
-         "*fmu.speed*", "*worst points*", "note: Parameter fmu.mass is 80800.0*",
-         "*html: .pytest_fmu*comparison.html", "*png: .pytest_fmu*.png"],
-    )  # fmt: skip
+        [
+            "*fmu.position and 1 more: not as in the baseline baselines*test_traction-100000.0.json.*",
+            "*fmu.speed*",
+            "*worst points*",
+            "note: Parameter fmu.mass is 80800.0*",
+            "*html: .pytest_fmu*comparison.html",
+            "*png: .pytest_fmu*.png",
+        ],
+    )
     changed.stdout.no_fnmatch_line("*Traceback*")
     changed.stdout.no_fnmatch_line("*During handling*")
     assert len(list((pytester.path / ".pytest_fmu").rglob("*.png"))) == 2
@@ -131,7 +144,9 @@ def test_check_fails_with_the_worst_and_writes_no_baseline(pytester: pytest.Pyte
     write(pytester, ONE, 1.5)
     checked = run(pytester)
     checked.assert_outcomes(failed=1)
-    checked.stdout.fnmatch_lines(["*at worst 0.5 m/s too high at 1 s*", "*accept them with: pytest --fmu-baseline=update*"])
+    checked.stdout.fnmatch_lines(
+        ["*at worst 0.5 m/s too high at 1 s*", "*accept them with: pytest --fmu-baseline=update*"]
+    )
     shown = run(pytester, "--fmu-baseline=diff")
     shown.assert_outcomes(passed=1)
     shown.stdout.fnmatch_lines(["1 checked: 1 differ", "*at worst 0.5 m/s too high*", "*png: .pytest_fmu*"])
@@ -162,7 +177,9 @@ def test_update_is_refused_while_a_test_fails(options: list[str], pytester: pyte
 def test_update_is_refused_where_a_module_cannot_be_collected(pytester: pytest.Pytester) -> None:
     write(pytester, ONE)
     pytester.makepyfile(test_broken="import no_such_module_anywhere")
-    run(pytester, "--fmu-baseline=update", "--continue-on-collection-errors").stdout.fnmatch_lines(["No baseline was written*"])
+    run(pytester, "--fmu-baseline=update", "--continue-on-collection-errors").stdout.fnmatch_lines(
+        ["No baseline was written*"]
+    )
     assert not (pytester.path / "baselines").exists()
 
 
@@ -185,7 +202,9 @@ def test_workers_stage_and_the_controller_writes(pytester: pytest.Pytester) -> N
 
 def test_several_calls_are_numbered_or_named(pytester: pytest.Pytester) -> None:
     calls = "class TestA:\n    def test_all(self, fmu_regression):\n"
-    calls += "".join(f"        fmu_regression(line({k}.0){name})\n" for k, name in enumerate(["", "", ", name='dry'"], 1))
+    calls += "".join(
+        f"        fmu_regression(line({k}.0){name})\n" for k, name in enumerate(["", "", ", name='dry'"], 1)
+    )
     write(pytester, MADE + calls)
     run(pytester, "--fmu-baseline=update").assert_outcomes(passed=1)
     names = {f"test_train/TestA.test_all{call}.json" for call in ("", "@2", "@dry")}
@@ -208,7 +227,9 @@ def test_folders_can_be_chosen_and_what_is_unused_is_told(pytester: pytest.Pytes
     write(pytester, ONE, 2.0)
     run(pytester).assert_outcomes(failed=1)
     assert list((pytester.path / "seen").rglob("*.html"))
-    run(pytester, "--fmu-baseline-dir=elsewhere", "--fmu-artifacts=there", "--fmu-baseline=update").assert_outcomes(passed=1)
+    run(pytester, "--fmu-baseline-dir=elsewhere", "--fmu-artifacts=there", "--fmu-baseline=update").assert_outcomes(
+        passed=1
+    )
     assert (pytester.path / "elsewhere" / "test_train" / "test_line.json").is_file()
 
 

@@ -1,4 +1,6 @@
-"""Comparisons made by hand: one signal that is too high for two seconds, one that is as it should be, one that is missing."""
+"""Comparisons made by hand: one signal that is too high for two seconds, one that is as it should be, one that is
+missing.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ def curves(rows: int = 601, excess: float = 0.05) -> Curves:
     error = np.where((time >= 20.0) & (time <= 22.0), excess, 0.0)
     gap = int(np.searchsorted(time, 30.0, "right"))
     tube_time, centre = np.insert(time, gap, np.nan), np.insert(reference, gap, np.nan)
-    return Curves(time, reference, time, reference + error, tube_time, centre - ALLOWED, centre + ALLOWED, time, error, ALLOWED)
+    return Curves(
+        time, reference, time, reference + error, tube_time, centre - ALLOWED, centre + ALLOWED, time, error, ALLOWED
+    )
 
 
 def differing(name: str = "train.speed", drawn: Curves | None = None, excess: float = 0.05) -> SignalComparison:
@@ -25,12 +29,25 @@ def differing(name: str = "train.speed", drawn: Curves | None = None, excess: fl
     text = f"{name}: from 20 to 22 s outside the tube, at worst {excess:g} m/s too high at 21 s (allowed 0.01 m/s)"
     finding = Finding("value", 20.0, 22.0, 2.1, 2.1 + excess, excess, ALLOWED, text)
     return SignalComparison(
-        name, "m/s", "differs", Tolerance(), ALLOWED, 1e-6, excess, 21.0, 0.0, 0.009, 0.03, [(21.0, 2.1, 2.15, excess)],
-        [finding], (), curves(excess=excess) if drawn is None else drawn,
-    )  # fmt: skip
+        name,
+        "m/s",
+        "differs",
+        Tolerance(),
+        ALLOWED,
+        1e-6,
+        excess,
+        21.0,
+        0.0,
+        0.009,
+        0.03,
+        [(21.0, 2.1, 2.15, excess)],
+        [finding],
+        (),
+        curves(excess=excess) if drawn is None else drawn,
+    )
 
 
-def passing(name: str = "train.position", share: float = 0.4) -> SignalComparison:
+def crossing(name: str = "train.position", share: float = 0.4) -> SignalComparison:
     """A signal that uses a share of its tolerance."""
     return SignalComparison(name, "m", "within", Tolerance(), ALLOWED, 1e-6, share * ALLOWED, 3.0, 0.0, 0.001)
 
@@ -46,7 +63,7 @@ def different() -> Comparison:
     return Comparison(
         "reference <1>",
         "result",
-        [passing(), differing(), missing()],
+        [crossing(), differing(), missing()],
         EventComparison(5, [lost], 1e-7),
         ["Other versions of fmpy."],
     )
@@ -54,4 +71,4 @@ def different() -> Comparison:
 
 def equal() -> Comparison:
     """Nothing differs."""
-    return Comparison("reference", "result", [passing(), passing("train.speed", 0.25)], EventComparison(5))
+    return Comparison("reference", "result", [crossing(), crossing("train.speed", 0.25)], EventComparison(5))

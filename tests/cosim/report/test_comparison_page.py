@@ -1,4 +1,6 @@
-"""Pictures, page and data of a comparison: the worst first, everything named, nothing from outside, in a real browser."""
+"""Pictures, page and data of a comparison: the worst first, everything named, nothing from outside, in a real
+browser.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,7 @@ from pathlib import Path
 import browser
 import numpy as np
 import pytest
-from hand_made_comparison import ALLOWED, curves, different, differing, equal, missing, passing
+from hand_made_comparison import ALLOWED, crossing, curves, different, differing, equal, missing
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -29,7 +31,8 @@ from cosim.report.figures.style import new_figure
 from cosim.report.page.comparison import comparison_page, draw_pictures, write_comparison, write_page, write_pictures
 from cosim.results.result import Result, SignalInfo
 
-# -- pictures -----------------------------------------------------------------------------------------------------------
+# -- pictures
+# -----------------------------------------------------------------------------------------------------------
 
 
 def test_axes_have_names_with_units_and_a_legend() -> None:
@@ -157,7 +160,8 @@ def test_it_draws_on_axes_given() -> None:
     assert comparison_error_figure(differing(), ax) is ax
 
 
-# -- page ---------------------------------------------------------------------------------------------------------------
+# -- page
+# ---------------------------------------------------------------------------------------------------------------
 
 
 def page_of(comparison: Comparison) -> str:
@@ -166,7 +170,11 @@ def page_of(comparison: Comparison) -> str:
 
 def test_the_page_says_what_differs_before_all_else() -> None:
     text = page_of(different())
-    verdict, worst, table = text.index("2 are not as in the reference"), text.index("at worst 0.05 m/s"), text.index("<table>")
+    verdict, worst, table = (
+        text.index("2 are not as in the reference"),
+        text.index("at worst 0.05 m/s"),
+        text.index("<table>"),
+    )
     assert verdict < worst < table
     assert "nearest: train.slip_ratio" in text
     assert "telegram &#x27;B7&#x27;" in text
@@ -184,7 +192,7 @@ def test_the_page_of_equal_runs() -> None:
 
 
 def test_the_table_has_the_worst_first() -> None:
-    signals = [passing("a", 0.1), passing("b", 0.9), differing("c"), missing("d")]
+    signals = [crossing("a", 0.1), crossing("b", 0.9), differing("c"), missing("d")]
     text = page_of(Comparison("x", "y", signals))
     table = text[text.index('id="all-signals"') :]
     assert re.findall(r'<th scope="row">(\w)</th>', table) == ["d", "c", "b", "a"]
@@ -194,7 +202,7 @@ def test_the_table_has_the_worst_first() -> None:
 def test_extra_signals_are_listed_and_fail_only_where_asked() -> None:
     extra = replace(missing("train.new"), status="extra", nearest=())
     for fails in (False, True):
-        text = page_of(Comparison("x", "y", [passing(), extra], extra_fails=fails))
+        text = page_of(Comparison("x", "y", [crossing(), extra], extra_fails=fails))
         assert "train.new" in text
         assert ('class="bad">only in the result' in text) is fails
 
@@ -203,7 +211,8 @@ def test_pictures_are_those_of_the_worst_signals_and_not_too_many() -> None:
     sizes = {f"signal_{i}": 0.02 + 0.001 * i for i in range(3)}
     comparison = Comparison("x", "y", [differing(name, excess=size) for name, size in sizes.items()])
     comparison = replace(
-        comparison, signals=[replace(s, findings=[replace(s.findings[0], size=sizes[s.name])]) for s in comparison.signals]
+        comparison,
+        signals=[replace(s, findings=[replace(s.findings[0], size=sizes[s.name])]) for s in comparison.signals],
     )
     pictures = draw_pictures(comparison, 1)
     assert list(pictures) == ["signal_2"]
@@ -215,7 +224,9 @@ def test_pictures_are_those_of_the_worst_signals_and_not_too_many() -> None:
 
 
 def test_the_verdict_says_how_many_it_does_not_list() -> None:
-    six, eight = (comparison_page(Comparison("x", "y", [differing(f"signal_{i}") for i in range(n)]), {}) for n in (6, 8))
+    six, eight = (
+        comparison_page(Comparison("x", "y", [differing(f"signal_{i}") for i in range(n)]), {}) for n in (6, 8)
+    )
     assert "more, listed below" not in six
     assert "... and 2 more, listed below" in eight
 
@@ -224,7 +235,8 @@ def test_telegrams_that_were_not_compared_are_said_not_to_be() -> None:
     assert "one side keeps no telegrams" in page_of(replace(equal(), events=EventComparison(compared=False)))
 
 
-# -- files --------------------------------------------------------------------------------------------------------------
+# -- files
+# --------------------------------------------------------------------------------------------------------------
 
 
 def test_files_of_a_comparison(tmp_path: Path) -> None:
@@ -235,7 +247,11 @@ def test_files_of_a_comparison(tmp_path: Path) -> None:
     assert data["equal"] is False
     assert [s["name"] for s in data["signals"]] == ["train.position", "train.speed", "train.slip"]
     assert data["signals"][2]["max_error"] is None  # NaN is no JSON
-    assert sorted(p.name for p in paths["html"].parent.iterdir()) == ["comparison.html", "comparison.json", "comparison_pictures"]
+    assert sorted(p.name for p in paths["html"].parent.iterdir()) == [
+        "comparison.html",
+        "comparison.json",
+        "comparison_pictures",
+    ]
 
 
 def test_pictures_of_an_earlier_comparison_go(tmp_path: Path) -> None:

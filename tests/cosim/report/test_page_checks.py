@@ -14,7 +14,9 @@ from cosim.report.figures.style import new_figure
 pytestmark = pytest.mark.browser
 
 PICTURE = f"data:image/png;base64,{b64encode(png(new_figure((3.0, 2.0)), 50)).decode()}"
-WHOLE = f'<h1>Title</h1><p>Some text.</p><img alt="a picture" src="{PICTURE}"><h2 id="a">Part</h2><a href="#a">there</a>'
+WHOLE = (
+    f'<h1>Title</h1><p>Some text.</p><img alt="a picture" src="{PICTURE}"><h2 id="a">Part</h2><a href="#a">there</a>'
+)
 WIDE = '<table><tr><th scope="row">' + '<td style="min-width: 9rem">0.123' * 20 + "</table>"
 STRUCTURE = {
     "<script>console.error('bad luck')</script>": "the console says: bad luck",
@@ -37,19 +39,24 @@ BROAD = {
 }
 CUT = {
     f'<div style="overflow: auto">{WIDE}</div>': "in print, what reaches over the edge of <div> is cut: 0.123",
-    "<style>@media print { .cut { height: 1em; overflow: hidden } }</style><p class=cut>seen<br><br><br>never-seen": "never-seen",
+    "<style>@media print { .cut { height: 1em; overflow: hidden } }</style><p "
+    "class=cut>seen<br><br><br>never-seen": "never-seen",
     "<details><summary>more</summary><p>hidden-words</details>": "hidden-words",
-    f'<style>@media print {{ .no {{ display: none }} }}</style><img class=no alt="y" src="{PICTURE}">': "in print there are 1",
+    f'<style>@media print {{ .no {{ display: none }} }}</style><img class=no alt="y" src="{PICTURE}">': "in print "
+    "there are 1",
 }
 SPLIT = {
-    f'<div style="height: 800px"></div><img alt="y" class=tall src="{PICTURE}"><style>.tall {{ height: 900px; width: 60px }} '
+    f'<div style="height: 800px"></div><img alt="y" class=tall src="{PICTURE}"><style>.tall {{ height: 900px; width: '
+    f"60px }} "
     "@media print { .tall { position: relative; top: 250px } }</style>": "a picture reaches over the edge",
 }
 
 
 def write(folder: Path, content: str, head: str = "<title>T</title>", lang: str = ' lang="en"') -> Path:
     path = folder / "page.html"
-    path.write_text(f'<!DOCTYPE html><html{lang}><head><meta charset="utf-8">{head}</head><body>{WHOLE}{content}', "utf-8")
+    path.write_text(
+        f'<!DOCTYPE html><html{lang}><head><meta charset="utf-8">{head}</head><body>{WHOLE}{content}', "utf-8"
+    )
     return path
 
 

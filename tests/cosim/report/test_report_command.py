@@ -38,7 +38,8 @@ def test_a_report_is_made_again(runs: Path, capsys: pytest.CaptureFixture[str]) 
     before = page.read_bytes()
     page.unlink()
     assert main(["report", str(runs / "one")]) == 0
-    assert sorted(page.read_bytes().splitlines()) == sorted(before.splitlines())  # the summary's keys are sorted in its file
+    # the summary's keys are sorted in its file
+    assert sorted(page.read_bytes().splitlines()) == sorted(before.splitlines())
     assert capsys.readouterr().out == f"report: {page}\n"
 
 
@@ -62,7 +63,9 @@ def test_folders_of_one_name_are_told_apart() -> None:
     assert len(set(default_labels(None, [Path("/a/one"), Path("/a/one")]))) == 2
 
 
-def test_an_older_folder_is_read_and_the_guess_is_told(runs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_older_folder_is_read_and_the_guess_is_told(
+    runs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     for name in ("table.csv", "events.csv", "messages.csv"):
         (tmp_path / name).write_bytes((runs / "two" / name).read_bytes())
     content = json.loads((runs / "two" / "summary.json").read_text("utf-8"))

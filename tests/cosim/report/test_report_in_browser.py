@@ -18,7 +18,8 @@ from cosim.results.result import Result
 pytestmark = pytest.mark.browser
 
 SENTENCE = (
-    "A rather long sentence that a component logged, with/a/path/that/does_not_break/anywhere_at_all/because_it_is_one_word. "
+    "A rather long sentence that a component logged, "
+    "with/a/path/that/does_not_break/anywhere_at_all/because_it_is_one_word. "
 )
 
 
@@ -26,8 +27,14 @@ def talkative() -> Result:
     """A failed run with long texts wherever somebody else writes them."""
     result = synthetic_result(step=0.2)
     long = "unbreakable_" * 15
-    summary = dict(result.summary) | {"warnings": [SENTENCE * 4, long], "notes": [SENTENCE], "description": SENTENCE * 3}
-    summary |= {"components": [{"name": long, "kind": "FMU", "source": f"/{long}.fmu", "cost": {"doStep": {"calls": 9}}}]}
+    summary = dict(result.summary) | {
+        "warnings": [SENTENCE * 4, long],
+        "notes": [SENTENCE],
+        "description": SENTENCE * 3,
+    }
+    summary |= {
+        "components": [{"name": long, "kind": "FMU", "source": f"/{long}.fmu", "cost": {"doStep": {"calls": 9}}}]
+    }
     messages = [Message(0.1 * i, "locomotive", "warning", "logAll", SENTENCE) for i in range(150)]
     return replace(result, summary=summary, failure=SENTENCE, messages=messages)
 

@@ -78,8 +78,11 @@ def test_one_row_and_no_row() -> None:
 
 
 def test_phases_and_start_of_the_evaluation_choose_the_rows() -> None:
-    time = [0.0, 1.0, 2.0, 2.25, 2.5, 2.75, 3.0, 4.0, 4.0, 5.0, 6.0, 7.0]  # four instants from 4 s on, one of them with an event
-    result = small_result(time, true__v=[0.0] * 12, obs__speed=[9.0, 5.0, -1.0, 2.0, 2.0, 2.0, 2.0, 7.0, 7.0, 7.0, 7.0, 7.0])
+    # four instants from 4 s on, one of them with an event
+    time = [0.0, 1.0, 2.0, 2.25, 2.5, 2.75, 3.0, 4.0, 4.0, 5.0, 6.0, 7.0]
+    result = small_result(
+        time, true__v=[0.0] * 12, obs__speed=[9.0, 5.0, -1.0, 2.0, 2.0, 2.0, 2.0, 7.0, 7.0, 7.0, 7.0, 7.0]
+    )
     spec = ReportSpec(
         true_speed="true.v",
         observers=["obs"],
@@ -185,11 +188,22 @@ def test_running_maximum_takes_the_largest_of_each_window() -> None:
 @pytest.mark.parametrize(
     ("value", "text"),
     [
-        (0.0123456, "0.0123"), (0.00009999, "0.000100"), (1.0, "1.00"), (13.894, "13.9"), (999.6, "1000"), (12345.0, "12300"),
-        (1.5e7, "1.50e7"), (1e-9, "1.00e-9"), (0, "0"), (-0.5, "-0.500"), (math.nan, "–"), (None, "–"), (math.inf, "∞"),
+        (0.0123456, "0.0123"),
+        (0.00009999, "0.000100"),
+        (1.0, "1.00"),
+        (13.894, "13.9"),
+        (999.6, "1000"),
+        (12345.0, "12300"),
+        (1.5e7, "1.50e7"),
+        (1e-9, "1.00e-9"),
+        (0, "0"),
+        (-0.5, "-0.500"),
+        (math.nan, "–"),
+        (None, "–"),
+        (math.inf, "∞"),
         ("x", "x"),
     ],
-)  # fmt: skip
+)
 def test_numbers_have_three_digits(value: object, text: str) -> None:
     assert number(value) == text
 

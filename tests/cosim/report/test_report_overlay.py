@@ -1,4 +1,6 @@
-"""Several runs laid over each other: lines that can be told apart, differences to the first run, what differs, bad input."""
+"""Several runs laid over each other: lines that can be told apart, differences to the first run, what differs, bad
+input.
+"""
 
 from __future__ import annotations
 
@@ -66,10 +68,12 @@ def test_without_phases_one_phase_holds_all_runs() -> None:
 @pytest.mark.parametrize(
     ("count", "labels", "message"),
     [
-        (2, ["a"], "2 results, 2 roles and 1 labels"), (2, ["a", "a"], "label 'a'"), (0, [], "0 results"),
+        (2, ["a"], "2 results, 2 roles and 1 labels"),
+        (2, ["a", "a"], "label 'a'"),
+        (0, [], "0 results"),
         (MOST_RUNS + 1, [str(i) for i in range(MOST_RUNS + 1)], "At most 12 runs"),
     ],
-)  # fmt: skip
+)
 def test_runs_that_cannot_be_laid_over_each_other(count: int, labels: list[str], message: str) -> None:
     with pytest.raises(ComparisonError, match=message):
         make_runs([scaled(1.0)] * count, [SPEC] * count, labels)
@@ -112,8 +116,11 @@ def test_single_observers_share_a_panel_whatever_their_names() -> None:
 
 
 def test_an_observer_of_one_run_only_has_a_panel() -> None:
-    runs = make_runs([scaled(1.0), scaled(1.0)], [replace(SPEC, observers=OBSERVERS[:2]), replace(SPEC, observers=OBSERVERS[1:])],
-                     ["a", "b"])  # fmt: skip
+    runs = make_runs(
+        [scaled(1.0), scaled(1.0)],
+        [replace(SPEC, observers=OBSERVERS[:2]), replace(SPEC, observers=OBSERVERS[1:])],
+        ["a", "b"],
+    )
     figure = estimate_overlay(runs, "slip")
     assert figure is not None
     drawn = [{str(line.get_label()) for line in ax.lines} & {"a", "b"} for ax in figure.axes]
@@ -151,11 +158,17 @@ def test_differences_are_those_of_the_metrics_of_each_run() -> None:
 @pytest.mark.parametrize(
     ("value", "first", "text"),
     [
-        (3.0, 2.0, "+1.0 (+50.0 %)"), (1.0, 2.0, "−1.0 (−50.0 %)"), (2.0, 2.0, "same"), (2.0, 0.0, "+2.0"),
-        (-1.0, -2.0, "+1.0 (+50.0 %)"), (math.inf, 2.0, "diverged"), (2.0, math.inf, "did not diverge"),
-        (math.inf, math.inf, "same"), (3, 5, "−2 (−40.0 %)"),
+        (3.0, 2.0, "+1.0 (+50.0 %)"),
+        (1.0, 2.0, "−1.0 (−50.0 %)"),
+        (2.0, 2.0, "same"),
+        (2.0, 0.0, "+2.0"),
+        (-1.0, -2.0, "+1.0 (+50.0 %)"),
+        (math.inf, 2.0, "diverged"),
+        (2.0, math.inf, "did not diverge"),
+        (math.inf, math.inf, "same"),
+        (3, 5, "−2 (−40.0 %)"),
     ],
-)  # fmt: skip
+)
 def test_difference_in_words(value: float, first: float, text: str) -> None:
     assert difference(value, first) == text
     assert cell(value, first).partition("\n")[2] == text
@@ -192,7 +205,13 @@ def test_settings_that_differ_are_named_and_no_others() -> None:
 
 
 def test_an_unusual_summary_differs_without_harm() -> None:
-    odd = {"components": [1, {"name": None, "parameters": 3}], "versions": 2, "master": [], "step": "x", "connections": None}
+    odd = {
+        "components": [1, {"name": None, "parameters": 3}],
+        "versions": 2,
+        "master": [],
+        "step": "x",
+        "connections": None,
+    }
     assert all(len(row) == 3 for row in differences(two(**odd)))
 
 

@@ -1,4 +1,6 @@
-"""Report figures, tables and page: labels with units, wild data, missing data, and a page that needs nothing from outside."""
+"""Report figures, tables and page: labels with units, wild data, missing data, and a page that needs nothing from
+outside.
+"""
 
 import math
 import re
@@ -119,7 +121,9 @@ def test_diverged_observer_does_not_squash_the_others(key: str, result: Result) 
 
 def test_diverged_observer_does_not_stretch_the_speed_axis(result: Result) -> None:
     speed = PANELS[0]
-    normal, diverged = (speed.draw(r, synthetic_spec(), None) for r in (result, synthetic_result(diverged="multirate_cdo")))
+    normal, diverged = (
+        speed.draw(r, synthetic_spec(), None) for r in (result, synthetic_result(diverged="multirate_cdo"))
+    )
     assert limits(diverged) == pytest.approx(limits(normal), rel=0.05)  # the odd one out set nothing but its own noise
     assert not any("off scale" in text for text in normal.get_legend_handles_labels()[1])
     assert "two CDOs (off scale)" in diverged.get_legend_handles_labels()[1]
@@ -151,7 +155,11 @@ def test_every_column_may_be_beyond_all_bounds() -> None:
 
 def test_observers_differ_in_colour_and_in_dashes() -> None:
     lines = [observer_line(OBSERVERS, o) for o in OBSERVERS]
-    assert len({to_hex(line["color"]) for line in lines}) == len({str(line["linestyle"]) for line in lines}) == len(OBSERVERS)
+    assert (
+        len({to_hex(line["color"]) for line in lines})
+        == len({str(line["linestyle"]) for line in lines})
+        == len(OBSERVERS)
+    )
 
 
 def test_equal_runs_give_equal_bytes(result: Result) -> None:
@@ -244,10 +252,15 @@ def test_every_text_is_escaped(result: Result) -> None:
     spec = replace(synthetic_spec(), title=evil, labels=dict.fromkeys(OBSERVERS, evil), notes=[evil])
     phases = [replace(p, name=evil) for p in spec.phases]
     summary = {
-        "scenario": evil, "localisation": {"method": "m", "reason": evil}, "description": evil,
-        "warnings": [evil], "notes": evil, "versions": {evil: evil},
-        "components": [{"name": evil, "kind": evil}], "certificates": {evil: {"explanation": evil}},
-    }  # fmt: skip
+        "scenario": evil,
+        "localisation": {"method": "m", "reason": evil},
+        "description": evil,
+        "warnings": [evil],
+        "notes": evil,
+        "versions": {evil: evil},
+        "components": [{"name": evil, "kind": evil}],
+        "certificates": {evil: {"explanation": evil}},
+    }
     page = Page(report_page(replace(result, summary=summary, failure=evil), replace(spec, phases=phases), {}))
     assert "onerror" not in {name for _, attrs in page.tags for name in attrs}
     assert page.text.count(evil) >= 10
@@ -315,7 +328,11 @@ def test_folder_that_cannot_be_written_is_refused(result: Result, tmp_path: Path
 
 def test_zones_are_shaded(result: Result) -> None:
     draw: Callable[..., Axes] = PANELS[1].draw
-    shaded = [p for p in draw(result, synthetic_spec(), None).patches if p.get_label() == "low adhesion" or p.get_zorder() == 0]
+    shaded = [
+        p
+        for p in draw(result, synthetic_spec(), None).patches
+        if p.get_label() == "low adhesion" or p.get_zorder() == 0
+    ]
     assert len(shaded) == len(ZONES)
 
 

@@ -1,4 +1,6 @@
-"""The recorder against a plain list: what is kept, in memory and in a file, decimated, filled by others, interrupted, full."""
+"""The recorder against a plain list: what is kept, in memory and in a file, decimated, filled by others, interrupted,
+full.
+"""
 
 from __future__ import annotations
 
@@ -131,7 +133,9 @@ def test_past_the_stated_size_rows_are_in_a_file_without_a_name(tmp_path: Path) 
 
 
 def test_memory_stays_bounded_whatever_the_length(monkeypatch: pytest.MonkeyPatch) -> None:
-    """100 MB of rows with 1 MB of memory; numpy tells tracemalloc of its arrays, and mapped pages are not among them."""
+    """100 MB of rows with 1 MB of memory; numpy tells tracemalloc of its arrays, and mapped pages are not among
+    them.
+    """
     monkeypatch.setattr(recorder_module, "BLOCK", 0.5e6)
     recorder, signals = Recorder([SignalInfo(f"a.s{i}") for i in range(99)], 0, memory=1e6), np.zeros(99)
     tracemalloc.start()
@@ -188,7 +192,9 @@ def test_the_last_point_has_its_room_before_it_is_known_to_be_the_last() -> None
         assert rows_of(recorder.table()) == [row(2 * k) for k in range(20)]
 
 
-def test_a_disk_that_breaks_its_promise_leaves_what_it_has_and_what_is_in_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_that_breaks_its_promise_leaves_what_it_has_and_what_is_in_memory(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     recorder = Recorder(SIGNALS, 0, memory=50 * ROW)
     add_points(recorder, 0, 60)
 

@@ -1,4 +1,6 @@
-"""Recording in whole runs: past the stated memory, thinned, with a full disk; and everything downstream on a table in a file."""
+"""Recording in whole runs: past the stated memory, thinned, with a full disk; and everything downstream on a table in a
+file.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,8 @@ def test_a_run_that_outgrows_its_memory_is_the_same_run(tmp_path: Path) -> None:
     assert isinstance(streamed.result.table, np.memmap)
     assert not isinstance(whole.result.table, np.memmap)
     np.testing.assert_array_equal(streamed.result.table, whole.result.table)
-    assert streamed.result.summary["rows"] == len(whole.result.table) == 57  # 51 points, two rows for each of three balises
+    # 51 points, two rows for each of three balises
+    assert streamed.result.summary["rows"] == len(whole.result.table) == 57
     written = streamed.write(tmp_path)
     np.testing.assert_array_equal(read_results(tmp_path).table, whole.result.table)
     assert written["report"].stat().st_size > 1e5
@@ -76,7 +79,11 @@ def test_conversion_to_si_takes_a_table_block_by_block(monkeypatch: pytest.Monke
     table = np.zeros(40, dtype=[(n, float) for n in ("time", *names)])
     for i, name in enumerate(("time", *names)):
         table[name] = np.arange(40.0) + 100 * i
-    units: dict[str, Unit | None] = {"a.speed": parse_unit("km/h"), "a.angle": parse_unit("deg"), "a.place": parse_unit("m")}
+    units: dict[str, Unit | None] = {
+        "a.speed": parse_unit("km/h"),
+        "a.angle": parse_unit("deg"),
+        "a.place": parse_unit("m"),
+    }
     whole = table.copy()
     found, signals = in_si(table, [SignalInfo(n) for n in names], units.get)
     np.testing.assert_allclose(found["a.speed"], whole["a.speed"] / 3.6, rtol=1e-15)

@@ -49,7 +49,17 @@ def result() -> Result:
     ]
     events = [
         BaliseRecord(
-            0.1, 0.15, 'B;1, "north"', 1 / 3, 0.1, 2.0, 13.9, "true", "rollback", 1e-12, {"a;b": "accepted", "c=d%": "late"}
+            0.1,
+            0.15,
+            'B;1, "north"',
+            1 / 3,
+            0.1,
+            2.0,
+            13.9,
+            "true",
+            "rollback",
+            1e-12,
+            {"a;b": "accepted", "c=d%": "late"},
         ),
         BaliseRecord(0.2, math.nan, "", 10.0, 10.0, kind="missed"),
     ]
@@ -171,7 +181,11 @@ def test_events_read_back(result: Result, tmp_path: Path) -> None:
     assert same_events(read_events(tmp_path / "e.csv"), result.events)
 
 
-@given(st.dictionaries(st.text(st.characters(exclude_categories=["Cs"]), max_size=6), st.text("ab;=%3", max_size=4), max_size=4))
+@given(
+    st.dictionaries(
+        st.text(st.characters(exclude_categories=["Cs"]), max_size=6), st.text("ab;=%3", max_size=4), max_size=4
+    )
+)
 def test_outcomes_read_back(outcomes: dict[str, str]) -> None:
     assert parse_outcomes(outcomes_text(outcomes)) == outcomes
 
@@ -187,7 +201,8 @@ def test_broken_event_row_names_its_line(result: Result, tmp_path: Path) -> None
 def test_summary_is_strict_json(tmp_path: Path) -> None:
     path = tmp_path / "s.json"
     write_summary(
-        path, {"z": np.float32(0.5), "a": [math.nan, math.inf, -math.inf], "n": np.arange(2), "b": np.True_, "p": Path("x")}
+        path,
+        {"z": np.float32(0.5), "a": [math.nan, math.inf, -math.inf], "n": np.arange(2), "b": np.True_, "p": Path("x")},
     )
     strict = json.loads(path.read_text(), parse_constant=lambda text: pytest.fail(f"{text} is not JSON"))
     assert strict == {"a": [None, "inf", "-inf"], "b": True, "n": [0, 1], "p": "x", "z": 0.5}

@@ -34,7 +34,9 @@ def trajectory(path: Path, order: str, version: str = "4", **changed: Any) -> Pa
     """A file as Dymola writes it: float32, an alias with a minus, a parameter, units in the descriptions."""
     flip = order == "binTrans"
     numbers = {
-        "dataInfo": np.array([[0, 1, 0, -1], [2, 2, 0, -1], [2, -2, 0, -1], [2, 3, 0, -1], [1, 2, 0, 0], [1, -2, 0, 0]], "i4"),
+        "dataInfo": np.array(
+            [[0, 1, 0, -1], [2, 2, 0, -1], [2, -2, 0, -1], [2, 3, 0, -1], [1, 2, 0, 0], [1, -2, 0, 0]], "i4"
+        ),
         "data_1": np.array([[0, 80.0], [1, 80.0]]),
         "data_2": np.array([[0, 1.0, 36], [0.5, 2.0, 72], [0.5, 3.0, 72], [1, 4.0, 108]], "f4"),
     } | changed
@@ -72,28 +74,41 @@ def test_texts_over_time_are_left_out(tmp_path: Path) -> None:
 
 def test_plots_exported_by_dymola(tmp_path: Path) -> None:
     content = {"names": letters(["Time", "a.b"]), "data": np.array([[0, 1.0], [2, 3.0]])}
-    savemat(tmp_path / "p.mat", {"Aclass": letters(["Atrajectory", "1.0", "Stored", "binNormal"]), **content}, format="4")
+    savemat(
+        tmp_path / "p.mat", {"Aclass": letters(["Atrajectory", "1.0", "Stored", "binNormal"]), **content}, format="4"
+    )
     result = load_result(tmp_path / "p.mat")
     assert (result.table.dtype.names, result.table.tolist()) == (("time", "a.b"), [(0, 1), (2, 3)])
 
 
-@pytest.mark.parametrize(("changed", "message"), [
-    ({"data_2": None}, "lacks data_2"),
-    ({"dataInfo": np.array([[0, 1, 0, -1]] * 5)}, "contradicts itself"),
-    ({"dataInfo": np.array([[0, 1, 0, -1]] * 5 + [[2, 9, 0, 0]])}, "'minus_mass' should be in row 9 of data_2"),
-    ({"dataInfo": np.array([[0, 1, 0, -1]] * 5 + [[3, 1, 0, 0]])}, "'minus_mass' should be in row 1 of data_3"),
-    ({"data_1": np.empty((0, 0))}, "'mass' should be in row 2 of data_1"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"data_2": None}, "lacks data_2"),
+        ({"dataInfo": np.array([[0, 1, 0, -1]] * 5)}, "contradicts itself"),
+        ({"dataInfo": np.array([[0, 1, 0, -1]] * 5 + [[2, 9, 0, 0]])}, "'minus_mass' should be in row 9 of data_2"),
+        ({"dataInfo": np.array([[0, 1, 0, -1]] * 5 + [[3, 1, 0, 0]])}, "'minus_mass' should be in row 1 of data_3"),
+        ({"data_1": np.empty((0, 0))}, "'mass' should be in row 2 of data_1"),
+    ],
+)
 def test_trajectory_that_contradicts_itself_is_refused(changed: dict[str, Any], message: str, tmp_path: Path) -> None:
     with pytest.raises(OutputError, match=message):
         load_result(trajectory(tmp_path / "t.mat", "binTrans", **changed))
 
 
-@pytest.mark.parametrize(("text", "expected"), [
-    ("", ("", None, None)), ("Mass", ("Mass", None, None)), ("Mass [kg]", ("Mass", "kg", None)), ("[kg]", ("", "kg", None)),
-    ("Angle [rad|deg]", ("Angle", "rad", "deg")), ("On [:#(type=Boolean)]", ("On", None, None)),
-    ("a[1] of [m|mm:#(fixed)]", ("a[1] of", "m", "mm")), ("row [1] of it", ("row [1] of it", None, None)),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("", ("", None, None)),
+        ("Mass", ("Mass", None, None)),
+        ("Mass [kg]", ("Mass", "kg", None)),
+        ("[kg]", ("", "kg", None)),
+        ("Angle [rad|deg]", ("Angle", "rad", "deg")),
+        ("On [:#(type=Boolean)]", ("On", None, None)),
+        ("a[1] of [m|mm:#(fixed)]", ("a[1] of", "m", "mm")),
+        ("row [1] of it", ("row [1] of it", None, None)),
+    ],
+)
 def test_units_in_descriptions(text: str, expected: tuple[str, str | None, str | None]) -> None:
     assert split_description(text) == expected
 
@@ -115,8 +130,10 @@ def test_workspace_of_matlab(tmp_path: Path) -> None:
 
 
 def test_frame_written_by_pandas(tmp_path: Path) -> None:
-    frame = pd.DataFrame({"v": [36.0, None], "n": [1, 2], "on": [True, False], "lap": [timedelta(minutes=1)] * 2},
-                         index=pd.Index([0.0, 0.5], name="time"))  # fmt: skip
+    frame = pd.DataFrame(
+        {"v": [36.0, None], "n": [1, 2], "on": [True, False], "lap": [timedelta(minutes=1)] * 2},
+        index=pd.Index([0.0, 0.5], name="time"),
+    )
     frame.attrs["units"] = {"v": "km/h"}
     frame.to_parquet(tmp_path / "f.parquet")
     result = load_result(tmp_path / "f.parquet")
@@ -156,8 +173,10 @@ def test_arrays_of_numpy(tmp_path: Path) -> None:
     result = load_result(tmp_path / "a.npy")
     assert result.table.dtype.names == ("time", "on", "n", "force[1]", "force[2]")
     assert result.table.tolist() == [(0, 1, 3, 1, 2), (0.5, 0, 4, 3, 4)]
-    for array, message in ((np.eye(2), r"expected a structured array.*got shape \(2, 2\)"),
-                           (np.array([(0.0, "a")], [("time", "f8"), ("s", "U1")]), "field 's' must hold numbers")):  # fmt: skip
+    for array, message in (
+        (np.eye(2), r"expected a structured array.*got shape \(2, 2\)"),
+        (np.array([(0.0, "a")], [("time", "f8"), ("s", "U1")]), "field 's' must hold numbers"),
+    ):
         np.save(tmp_path / "a.npy", array)
         with pytest.raises(OutputError, match=message):
             load_result(tmp_path / "a.npy")

@@ -114,11 +114,16 @@ def test_pandas_reads_the_parquet_file(tmp_path: Path) -> None:
     result = odd_result()
     frame = pd.read_parquet(written(result, tmp_path, "parquet"))
     assert frame.attrs["units"] == {"time": "s"} | {s.name: s.unit for s in result.signals}
-    assert all(frame[n].to_numpy().tobytes() == np.ascontiguousarray(result.table[n]).tobytes() for n in ("time", *NAMES))
+    assert all(
+        frame[n].to_numpy().tobytes() == np.ascontiguousarray(result.table[n]).tobytes() for n in ("time", *NAMES)
+    )
     field = pq.read_schema(tmp_path / "t.parquet").field("der(train.x)")
     assert field.metadata == {
-        b"unit": b"1", b"variability": b"discrete", b"description": "über [x]".encode(), b"display_unit": b"km/h",
-    }  # fmt: skip
+        b"unit": b"1",
+        b"variability": b"discrete",
+        b"description": "über [x]".encode(),
+        b"display_unit": b"km/h",
+    }
 
 
 def test_h5py_and_xarray_read_the_hdf5_file(tmp_path: Path) -> None:
@@ -153,7 +158,12 @@ def test_scipy_sees_the_matrices_of_a_trajectory(tmp_path: Path) -> None:
     seen = loadmat(written(result, tmp_path, "modelica"), chars_as_strings=False)
     assert list(seen)[-7:-1] == ["Aclass", "name", "description", "dataInfo", "data_1", "data_2"]
     assert ["".join(row).rstrip() for row in seen["Aclass"]] == ["Atrajectory", "1.1", "", "binTrans"]
-    assert ["".join(column).rstrip("\0") for column in seen["name"].T] == ["time", "train.speed", "train.a[1,2]", "train.mass"]
+    assert ["".join(column).rstrip("\0") for column in seen["name"].T] == [
+        "time",
+        "train.speed",
+        "train.a[1,2]",
+        "train.mass",
+    ]
     assert seen["dataInfo"].T.tolist() == [[0, 1, 0, -1], [2, 2, 0, -1], [2, 3, 0, -1], [1, 2, 0, 0]]
     assert seen["data_1"].tolist() == [[0.0, 0.4], [80e3, 80e3]]
     assert seen["data_2"].tobytes(order="F") == result.table.tobytes()
@@ -163,7 +173,9 @@ def test_scipy_sees_the_matrices_of_a_trajectory(tmp_path: Path) -> None:
 
 def test_parameters_that_are_no_numbers_are_left_out(tmp_path: Path) -> None:
     parameters = {"mass": 1.0, "gap": math.nan, "text": "a", "on": True, "speed": 2.0}
-    result = replace(odd_result(3, ("train.speed",)), summary={"components": [{"name": "train", "parameters": parameters}]})
+    result = replace(
+        odd_result(3, ("train.speed",)), summary={"components": [{"name": "train", "parameters": parameters}]}
+    )
     seen = loadmat(written(result, tmp_path, "modelica"), chars_as_strings=False)
     names = ["".join(column).rstrip("\0") for column in seen["name"].T]
     assert names == ["time", "train.speed", "train.mass", "train.on"]  # a speed, with a column, is no constant
@@ -252,8 +264,12 @@ def test_full_disk_leaves_the_former_file_and_nothing_else(tmp_path: Path, monke
 
 def test_endings_of_formats() -> None:
     assert {e: format_of(Path(f"a.b{e}")).name for e in (".csv", ".MAT", ".modelica.mat", ".pq", ".hdf5")} == {
-        ".csv": "csv", ".MAT": "mat", ".modelica.mat": "modelica", ".pq": "parquet", ".hdf5": "hdf5",
-    }  # fmt: skip
+        ".csv": "csv",
+        ".MAT": "mat",
+        ".modelica.mat": "modelica",
+        ".pq": "parquet",
+        ".hdf5": "hdf5",
+    }
     with pytest.raises(OutputError, match=r"one of \.csv, \.mat"):
         format_of(Path("run.txt"))
 
@@ -266,11 +282,25 @@ def test_headings_give_back_name_and_unit(result: Result) -> None:
         assert (name, split_unit(f"n [{unit}]")[1]) == (signal.name, back or "1")
 
 
-@pytest.mark.parametrize(("heading", "expected"), [
-    ("speed [m/s]", ("speed", "m/s")), ("speed[m/s]", ("speed", "m/s")), ("speed (km/h)", ("speed", "km/h")),
-    ("a[1]", ("a[1]", None)), ("a[1,2]", ("a[1,2]", None)), ("a[left]", ("a[left]", None)), ("der(x)", ("der(x)", None)),
-    ("a[1] [m]", ("a[1]", "m")), ("slip [-]", ("slip", "1")), ("T [°C]", ("T", "degC")), ("a [m/s²]", ("a", "m/s2")),
-    ("p [inHg]", ("p", "inHg")), ("speed (estimated)", ("speed (estimated)", None)), ("f[]", ("f[]", None)), ("f []", ("f", "1")),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("heading", "expected"),
+    [
+        ("speed [m/s]", ("speed", "m/s")),
+        ("speed[m/s]", ("speed", "m/s")),
+        ("speed (km/h)", ("speed", "km/h")),
+        ("a[1]", ("a[1]", None)),
+        ("a[1,2]", ("a[1,2]", None)),
+        ("a[left]", ("a[left]", None)),
+        ("der(x)", ("der(x)", None)),
+        ("a[1] [m]", ("a[1]", "m")),
+        ("slip [-]", ("slip", "1")),
+        ("T [°C]", ("T", "degC")),
+        ("a [m/s²]", ("a", "m/s2")),
+        ("p [inHg]", ("p", "inHg")),
+        ("speed (estimated)", ("speed (estimated)", None)),
+        ("f[]", ("f[]", None)),
+        ("f []", ("f", "1")),
+    ],
+)
 def test_headings_of_other_tools(heading: str, expected: tuple[str, str | None]) -> None:
     assert split_unit(heading) == expected

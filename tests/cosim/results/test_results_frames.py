@@ -28,7 +28,11 @@ def test_frames_hold_every_bit(result: Result) -> None:
         assert frame.iloc[:, place].to_numpy().tobytes() == column
         assert data[signal.name].to_numpy().tobytes() == column
         assert frame.attrs["units"][signal.name] == data[signal.name].attrs["units"] == signal.unit
-        assert frame.attrs["descriptions"][signal.name] == data[signal.name].attrs.get("long_name", "") == signal.description
+        assert (
+            frame.attrs["descriptions"][signal.name]
+            == data[signal.name].attrs.get("long_name", "")
+            == signal.description
+        )
         assert data[signal.name].attrs.get("display_unit") == signal.display_unit
 
 
@@ -74,7 +78,11 @@ def test_frame_of_somebody_else() -> None:
     frame.attrs = {"units": {"v": "km/h"}, "descriptions": {"v": "speed"}}
     result = from_pandas(frame)
     assert (result["v"][0], math.isnan(result["v"][1]), result["on"].tolist()) == (10.0, True, [1.0, 0.0])
-    assert (result.signals[0].unit, result.signals[0].display_unit, result.signals[0].description) == ("m/s", "km/h", "speed")
+    assert (result.signals[0].unit, result.signals[0].display_unit, result.signals[0].description) == (
+        "m/s",
+        "km/h",
+        "speed",
+    )
     with pytest.raises(OutputError, match="column 'mode' must hold numbers"):
         from_pandas(frame.assign(mode="coasting"))
     with pytest.raises(OutputError, match="no column 'time'"):

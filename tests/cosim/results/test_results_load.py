@@ -50,14 +50,17 @@ def test_csv_of_other_tools(kind: str, tmp_path: Path) -> None:
     assert result.summary == {"file": str(tmp_path / "t.csv"), "events_recorded": False}
 
 
-@pytest.mark.parametrize(("text", "columns"), [
-    ("time,a,b\n0,true,\n1,False,NA\n", {"a": [1.0, 0.0], "b": [NAN, NAN]}),
-    ("time,a\n0,1.#INF\n1,-1.#IND00\n", {"a": [math.inf, NAN]}),
-    ("time,a\n0,Infinity\n1,-inf\n", {"a": [math.inf, -math.inf]}),
-    ("time,a\n0,1 2\n1,3 4\n", {"a[1]": [1.0, 3.0], "a[2]": [2.0, 4.0]}),
-    ("time,a [km/h]\n0,36 72\n1,3.6 7.2\n", {"a[1]": [10.0, 1.0], "a[2]": [20.0, 2.0]}),
-    ("time,a[1,2],b\n0,1,2\n1,3,4\n", {"a[1,2]": [1.0, 3.0], "b": [2.0, 4.0]}),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("text", "columns"),
+    [
+        ("time,a,b\n0,true,\n1,False,NA\n", {"a": [1.0, 0.0], "b": [NAN, NAN]}),
+        ("time,a\n0,1.#INF\n1,-1.#IND00\n", {"a": [math.inf, NAN]}),
+        ("time,a\n0,Infinity\n1,-inf\n", {"a": [math.inf, -math.inf]}),
+        ("time,a\n0,1 2\n1,3 4\n", {"a[1]": [1.0, 3.0], "a[2]": [2.0, 4.0]}),
+        ("time,a [km/h]\n0,36 72\n1,3.6 7.2\n", {"a[1]": [10.0, 1.0], "a[2]": [20.0, 2.0]}),
+        ("time,a[1,2],b\n0,1,2\n1,3,4\n", {"a[1,2]": [1.0, 3.0], "b": [2.0, 4.0]}),
+    ],
+)
 def test_cells_of_other_tools(text: str, columns: dict[str, list[float]], tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text(text)
     result = load_result(tmp_path / "t.csv")
@@ -82,13 +85,23 @@ def test_fmpy_reads_what_we_read(tmp_path: Path) -> None:
 @settings(max_examples=40, deadline=None)
 @given(
     rows=st.lists(st.tuples(st.floats(0, 1e6), st.floats(allow_nan=False)), min_size=1, max_size=6).map(sorted),
-    separator=st.sampled_from(";\t"), end=st.sampled_from(["\n", "\r\n"]), quoted=st.booleans(), bom=st.booleans(),
-    blank=st.booleans(), unit=st.sampled_from(["", " [m/s]", "[m]"]),
-)  # fmt: skip
+    separator=st.sampled_from(";\t"),
+    end=st.sampled_from(["\n", "\r\n"]),
+    quoted=st.booleans(),
+    bom=st.booleans(),
+    blank=st.booleans(),
+    unit=st.sampled_from(["", " [m/s]", "[m]"]),
+)
 def test_dialects_say_the_same(
-    rows: list[tuple[float, float]], separator: str, end: str, quoted: bool, bom: bool, blank: bool, unit: str,
+    rows: list[tuple[float, float]],
+    separator: str,
+    end: str,
+    quoted: bool,
+    bom: bool,
+    blank: bool,
+    unit: str,
     tmp_path_factory: pytest.TempPathFactory,
-) -> None:  # fmt: skip
+) -> None:
     mark = '"' if quoted else ""
     lines = [separator.join(f"{mark}{name}{mark}" for name in ("Time", f"x{unit}"))]
     lines += [separator.join(repr(value).replace(".", ",") for value in row) for row in rows]
@@ -99,23 +112,26 @@ def test_dialects_say_the_same(
     assert result.signals[0].unit == (unit.strip(" []") or "1")
 
 
-@pytest.mark.parametrize(("text", "message"), [
-    ("", "is empty"),
-    ("\n \n", "is empty"),
-    ("0,1\n1,2\n", "line 1: expected names of columns"),
-    ("time,a\n0,1\n\n1,two\n", r"line 4, column 'a': expected a number, got 'two'"),
-    ("time,a\n0,1\n1\n", "line 3: expected 2 cells separated by commas, got 1"),
-    ("time;a\n0;1\n1;2;3\n", "line 3: expected 2 cells separated by semicolons, got 3"),
-    ("time,a\n0,1\n2,1\n1,1\n", r"time goes backwards in row 3, from 2 to 1 s"),
-    ("time,a\n0,1\nnan,1\n", r"the time in row 2 is not a number"),
-    ("time,a,a\n0,1,2\n", "two different columns are called 'a'"),
-    ("x,y\n0,1\n", "no column 'time'; columns: x, y"),
-    ("time [m],y\n0,1\n", "unit of time 'm'"),
-    ("time,,y\n0,1,2\n", "column 2 has no name"),
-    ("time,a\n0,1 2\n1,3\n", "line 3, column 'a': expected as many numbers"),
-    ("a\0b", "neither text nor one of the result formats"),
-    ("PK\x03\x04", "is an archive"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "is empty"),
+        ("\n \n", "is empty"),
+        ("0,1\n1,2\n", "line 1: expected names of columns"),
+        ("time,a\n0,1\n\n1,two\n", r"line 4, column 'a': expected a number, got 'two'"),
+        ("time,a\n0,1\n1\n", "line 3: expected 2 cells separated by commas, got 1"),
+        ("time;a\n0;1\n1;2;3\n", "line 3: expected 2 cells separated by semicolons, got 3"),
+        ("time,a\n0,1\n2,1\n1,1\n", r"time goes backwards in row 3, from 2 to 1 s"),
+        ("time,a\n0,1\nnan,1\n", r"the time in row 2 is not a number"),
+        ("time,a,a\n0,1,2\n", "two different columns are called 'a'"),
+        ("x,y\n0,1\n", "no column 'time'; columns: x, y"),
+        ("time [m],y\n0,1\n", "unit of time 'm'"),
+        ("time,,y\n0,1,2\n", "column 2 has no name"),
+        ("time,a\n0,1 2\n1,3\n", "line 3, column 'a': expected as many numbers"),
+        ("a\0b", "neither text nor one of the result formats"),
+        ("PK\x03\x04", "is an archive"),
+    ],
+)
 def test_csv_that_is_none_is_refused_in_words(text: str, message: str, tmp_path: Path) -> None:
     path = tmp_path / "t.csv"
     path.write_bytes(text.encode())

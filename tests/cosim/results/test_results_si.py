@@ -37,9 +37,9 @@ def test_columns_are_converted_and_say_so() -> None:
     assert (by_name["train.speed"].unit, by_name["train.speed"].display_unit) == ("m/s", "km/h")
     assert table["train.temperature"].tolist() == pytest.approx([273.15, 309.15], rel=1e-15)
     assert (by_name["train.temperature"].unit, by_name["train.temperature"].display_unit) == ("K", "degC")
-    for untouched in ("train.position", "train.strange", "train.bare"):
-        assert table[untouched].tolist() == [0.0, 36.0]
-        assert by_name[untouched] == next(s for s in SIGNALS if s.name == untouched)
+    for non_numeric in ("train.position", "train.strange", "train.bare"):
+        assert table[non_numeric].tolist() == [0.0, 36.0]
+        assert by_name[non_numeric] == next(s for s in SIGNALS if s.name == non_numeric)
 
 
 @pytest.mark.parametrize(

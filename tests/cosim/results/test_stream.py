@@ -1,4 +1,6 @@
-"""Streaming: a folder that is a whole result at every moment, whoever kills the program; and the same numbers as without."""
+"""Streaming: a folder that is a whole result at every moment, whoever kills the program; and the same numbers as
+without.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +20,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from small_scenarios import small
-from zoo.build import linear_fmu
-from zoo.description import Version
+from test_fmus.build import linear_fmu
+from test_fmus.description import Version
 
 from cosim import Scenario
 from cosim.diagnostics.messages import MessageLog
@@ -80,7 +82,8 @@ def test_what_the_power_took_is_left_out(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "content", [b"", b"time,a\n1,2\n", growing_header(DTYPE, 2)[:100], b"\x93NUMPY\x03\x00\x10\x00\x00\x00{'descr': 'f8'}  "]
+    "content",
+    [b"", b"time,a\n1,2\n", growing_header(DTYPE, 2)[:100], b"\x93NUMPY\x03\x00\x10\x00\x00\x00{'descr': 'f8'}  "],
 )
 def test_what_is_no_table_is_said_to_be_none(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "table.npy").write_bytes(content)
@@ -94,9 +97,11 @@ OPERATIONS = st.lists(st.tuples(st.sampled_from(["points", "event", "block"]), s
 
 
 @given(OPERATIONS, st.integers(1, 5), st.sampled_from([0.0, 1e9]))
-def test_at_every_moment_the_file_holds_the_first_rows(operations: list[tuple[str, int]], every: int, seconds: float) -> None:
+def test_at_every_moment_the_file_holds_the_first_rows(
+    operations: list[tuple[str, int]], every: int, seconds: float
+) -> None:
     """Against a recorder without a stream, converted by hand: 3.6 km/h are 1 m/s."""
-    moments: list[np.ndarray] = []
+    windows: list[np.ndarray] = []
     with TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
         patch.setattr(recorder_module, "BLOCK", 20 * ROW)
         patch.setattr(stream_module, "SECONDS", seconds)
@@ -105,13 +110,13 @@ def test_at_every_moment_the_file_holds_the_first_rows(operations: list[tuple[st
         number, file = 0, Path(folder) / "table.npy"
         for what, count in operations:
             number += operate(plain, streamed, what, count, number)
-            moments.append(np.load(file, allow_pickle=False))
-            assert seconds > 0.0 or what == "block" or every > 1 or len(moments[-1]) == streamed.count
+            windows.append(np.load(file, allow_pickle=False))
+            assert seconds > 0.0 or what == "block" or every > 1 or len(windows[-1]) == streamed.count
         expected = plain.table().copy()
         expected["a.speed"] = UNITS["a.speed"].factor * expected["a.speed"]
         np.testing.assert_array_equal(streamed.table(), expected)
         np.testing.assert_allclose(expected["a.speed"], -expected["a.place"], rtol=5e-16)  # three roundings of 1.1e-16
-        for seen in moments:
+        for seen in windows:
             np.testing.assert_array_equal(seen, expected[: len(seen)])
         np.testing.assert_array_equal(np.load(file, allow_pickle=False), expected)
 
@@ -169,7 +174,10 @@ def test_memory_stays_flat_and_the_end_is_trimmed(tmp_path: Path, monkeypatch: p
 
 def test_telegrams_and_messages_follow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stream_module, "SECONDS", 0.0)
-    events, log = [BaliseRecord(0.1, 0.2, "B1", 5.0, 5.0, odometer_reading=1.0, outcomes={"a;b": "accepted"})], MessageLog("a")
+    events, log = (
+        [BaliseRecord(0.1, 0.2, "B1", 5.0, 5.0, odometer_reading=1.0, outcomes={"a;b": "accepted"})],
+        MessageLog("a"),
+    )
     recorder = Recorder(SIGNALS, 0, stream=Stream(tmp_path, SIGNALS, UNITS.get, {}, lambda: events, [log]))
     for k in range(3):
         log.add(0.1 * k, f"said {k}", "warning")
@@ -221,11 +229,17 @@ def test_a_foreign_fmu_in_kilometres_per_hour(
 ) -> None:
     """v' = -v from 36 km/h: 10 exp(-t) m/s, to the rounding of 400 exact steps."""
     monkeypatch.setattr(recorder_module, "BLOCK", 1e3)
-    fmu = linear_fmu(tmp_path, "coast", [[-1.0]], [[0.0]], [[1.0]], [[0.0]], version=version, x0=[36.0], units={"y1": "km/h"})
+    fmu = linear_fmu(
+        tmp_path, "coast", [[-1.0]], [[0.0]], [[1.0]], [[0.0]], version=version, x0=[36.0], units={"y1": "km/h"}
+    )
     scenario = Scenario(stop=4.0, step=0.01, master={"stepper": stepper}).add("train", fmu=str(fmu))
     kept, streamed = quietly(scenario), quietly(scenario, stream=tmp_path / "out")
     np.testing.assert_array_equal(streamed.result.table, kept.result.table)
-    assert streamed.result.info("train.y1") == kept.result.info("train.y1") == read_results(tmp_path / "out").info("train.y1")
+    assert (
+        streamed.result.info("train.y1")
+        == kept.result.info("train.y1")
+        == read_results(tmp_path / "out").info("train.y1")
+    )
     assert (streamed.result.info("train.y1").unit, streamed.result.info("train.y1").display_unit) == ("m/s", "km/h")
     table = np.load(tmp_path / "out" / "table.npy")
     np.testing.assert_allclose(table["train.y1"], 10.0 * np.exp(-table["time"]), rtol=1e-12)
@@ -235,7 +249,9 @@ def test_nothing_of_a_former_run_is_left_and_who_reads_it_may_go_on(tmp_path: Pa
     for name in ("table.csv", "table.mat", "report.html"):
         (tmp_path / name).write_text("of a former run")
     seen: list[list[str]] = []
-    first = quietly(small(), stream=tmp_path, progress=lambda _t, _stop: seen.append(sorted(p.name for p in tmp_path.iterdir())))
+    first = quietly(
+        small(), stream=tmp_path, progress=lambda _t, _stop: seen.append(sorted(p.name for p in tmp_path.iterdir()))
+    )
     assert seen[0] == [".block", "events.csv", "made_from", "messages.csv", "summary.json", "table.npy"]
     before = first.result.table.copy()
     quietly(small().set("locomotive.train_speed", 5.0), stream=tmp_path)
@@ -250,7 +266,9 @@ def test_a_run_that_cannot_begin_leaves_former_results_whole(tmp_path: Path) -> 
     assert {p: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()} == before
 
 
-def test_a_full_disk_ends_the_run_and_the_folder_has_what_came_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_ends_the_run_and_the_folder_has_what_came_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(recorder_module, "BLOCK", 4e3)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, hard))
@@ -298,8 +316,12 @@ small(certificates="ignore").run(stream=folder)
 
 @pytest.mark.parametrize(("how", "code"), [("segfault", -signal.SIGSEGV), ("kill", -signal.SIGKILL)])
 def test_what_was_computed_outlives_the_program(tmp_path: Path, how: str, code: int) -> None:
-    """It dies within the step from 0.30 s on: all before that is there, and it runs again from what the folder holds."""
-    done = subprocess.run([sys.executable, "-c", CHILD, str(tmp_path), how], capture_output=True, check=False, env=ENVIRONMENT)
+    """It dies within the step from 0.30 s on: all before that is there, and it runs again from what the folder
+    holds.
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", CHILD, str(tmp_path), how], capture_output=True, check=False, env=ENVIRONMENT
+    )
     assert done.returncode == code, done.stderr.decode()
     found, whole = load_result(tmp_path), quietly(small()).result
     assert found.failure is not None

@@ -1,4 +1,6 @@
-"""Bad input: every mistake is answered with file, place, what was expected, and exit code 2; results so far are kept."""
+"""Bad input: every mistake is answered with file, place, what was expected, and exit code 2; results so far are
+kept.
+"""
 
 from __future__ import annotations
 
@@ -25,19 +27,31 @@ SETTINGS: dict[str, tuple[dict[str, Any], str]] = {
     "unknown preset": ({"observer.preset": "repared"}, "components.observer.*no preset 'repared'.*'repaired'"),
     "unknown option": ({"observer.options.premis": "live"}, "no option 'premis'.*premise"),
     "option out of range": ({"locomotive.options.zone_count": 65}, "zone_count = 65 of locomotive; choose 1 to 64"),
-    "option no whole number": ({"locomotive.options.zone_count": 2.5}, "zone_count = 2.5 of locomotive; choose 1 to 64"),
-    "option of another kind": ({"locomotive.options.zone_count": True}, "zone_count = True of locomotive; choose 1 to 64"),
+    "option no whole number": (
+        {"locomotive.options.zone_count": 2.5},
+        "zone_count = 2.5 of locomotive; choose 1 to 64",
+    ),
+    "option of another kind": (
+        {"locomotive.options.zone_count": True},
+        "zone_count = True of locomotive; choose 1 to 64",
+    ),
     "bad option": ({"observer.options.premise": "dead"}, "'dead'.*'frozen'"),
     "unknown parameter": ({"locomotive.mas": 1.0}, "locomotive: no variable 'mas'.*'mass'"),
     "unknown model": ({"report.observers": ["x y"]}, "report.observers"),
     "unknown key": ({"balises.spaceing": 3.0}, "balises.spaceing: unknown key.*'spacing'"),
     "unknown top-level key": ({"stepp": 3.0}, "stepp: unknown key.*'step'"),
-    "unknown iteration key": ({"master.iteration": {"max_iteration": 3}}, "max_iteration: unknown key.*'max_iterations'"),
+    "unknown iteration key": (
+        {"master.iteration": {"max_iteration": 3}},
+        "max_iteration: unknown key.*'max_iterations'",
+    ),
     "a word that log does not know": (
         {"driver.log": "everything"},
         r"driver\.log: expected 'all', 'errors', 'none', or a list of log categories \(got .everything.\)$",
     ),
-    "balises unsorted": ({"balises.positions": [3.0, 1.0]}, "increasing position.*number 2 at 1 m follows number 1 at 3 m"),
+    "balises unsorted": (
+        {"balises.positions": [3.0, 1.0]},
+        "increasing position.*number 2 at 1 m follows number 1 at 3 m",
+    ),
     "two balises at one place": ({"balises.positions": [1.0, 1.0]}, "one at a place"),
     "balise outside the track": ({"balises.track_end": 3.0}, "'B3' at 4 m lies outside the track from 0 m to 3 m"),
     "no balises": ({"balises.positions": []}, "at least one balise"),
@@ -91,7 +105,9 @@ def test_a_wrong_connection_is_named(case: str) -> None:
 def test_units_that_do_not_fit_are_refused_with_both_names() -> None:
     scenario = small()
     scenario._data["connections"] = ["locomotive.position -> odometer.wheel_speed"]
-    with pytest.raises(CosimError, match=r"locomotive.position -> odometer.wheel_speed: units 'm' and 'm/s' do not fit"):
+    with pytest.raises(
+        CosimError, match=r"locomotive.position -> odometer.wheel_speed: units 'm' and 'm/s' do not fit"
+    ):
         scenario.run()
 
 
@@ -99,10 +115,13 @@ def test_an_unconnected_input_keeps_its_start_value_and_is_reported() -> None:
     scenario = small()
     scenario._data["connections"] = scenario._data["connections"][:2]
     outcome = scenario.run()
-    assert any("Unconnected inputs" in w and "driver.odometer" in w and "observer.odometer" in w for w in outcome.warnings)
+    assert any(
+        "Unconnected inputs" in w and "driver.odometer" in w and "observer.odometer" in w for w in outcome.warnings
+    )
 
 
-# -- the command line ---------------------------------------------------------------------------------------------------
+# -- the command line
+# ---------------------------------------------------------------------------------------------------
 
 
 def run_cli(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str]:
@@ -114,7 +133,8 @@ def run_cli(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, s
 def plant_file(tmp_path: Path) -> Path:
     path = tmp_path / "plant.toml"
     path.write_text(
-        'stop = 1.0\nstep = 0.1\n[components.plant]\nfmu = "plant.fmu"\n[components.driver]\nmodel = "driver"\nas = "block3"\n'
+        'stop = 1.0\nstep = 0.1\n[components.plant]\nfmu = "plant.fmu"\n[components.driver]\nmodel = "driver"\nas = '
+        '"block3"\n'
     )
     return path
 
@@ -157,7 +177,9 @@ def test_an_fmu_of_another_platform(plant_file: Path, capsys: pytest.CaptureFixt
         (["info", "missing.fmu"], "missing.fmu does not exist"),
     ],
 )
-def test_a_wrong_command_ends_with_2_and_a_hint(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_wrong_command_ends_with_2_and_a_hint(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     code, error = run_cli(capsys, *arguments)
     assert code == 2
     assert re.search(message, error), error
@@ -180,14 +202,18 @@ def test_every_fault_of_a_file_is_named_at_once(tmp_path: Path, capsys: pytest.C
     assert "components.a: give exactly one of 'fmu'" in error
 
 
-def test_an_output_folder_that_cannot_be_written_is_found_early(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_output_folder_that_cannot_be_written_is_found_early(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "taken").write_text("a file")
     code, error = run_cli(capsys, "run", "--out", str(tmp_path / "taken" / "out"))
     assert code == 2
     assert "taken" in error
 
 
-def test_a_run_that_turns_to_nan_keeps_its_rows_and_ends_with_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_that_turns_to_nan_keeps_its_rows_and_ends_with_2(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = tmp_path / "diverging.toml"
     path.write_text(
         "stop = 60.0\nstep = 0.1\n"
@@ -204,7 +230,8 @@ def test_a_run_that_turns_to_nan_keeps_its_rows_and_ends_with_2(tmp_path: Path, 
     assert np.isfinite(result.table["time"]).all()
 
 
-# -- what a sceptical user tried ----------------------------------------------------------------------------------------
+# -- what a sceptical user tried
+# ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -310,10 +337,10 @@ def test_a_failed_run_with_seeds_writes_what_it_has(tmp_path: Path, capsys: pyte
 
 
 @pytest.mark.compiler
-@pytest.mark.parametrize("realisation", ["fmu2", "fmu3"])
-def test_what_a_failing_fmu_logged_is_part_of_the_message(realisation: str) -> None:
+@pytest.mark.parametrize("backend", ["fmu2", "fmu3"])
+def test_what_a_failing_fmu_logged_is_part_of_the_message(backend: str) -> None:
     overflow = {"driver.profile_speed": 1e305, "driver.effort_limit": 1e308, "driver.power_limit": 1e308}
-    outcome = small().run(overrides={"driver.as": realisation, **overflow})
+    outcome = small().run(overrides={"driver.as": backend, **overflow})
     assert outcome.failure is not None
     assert "Component 'driver' at t = " in outcome.failure
     assert "The FMU says: " in outcome.failure

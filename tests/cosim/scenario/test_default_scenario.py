@@ -1,9 +1,9 @@
 """The main job: four observers beside the locomotive FMU on profile D, over ten sampling seeds.
 
-The independent numbers are medians over ten sampling seeds of another implementation of the same equations (J = 900 kg m2,
-gaps up to 1.25 s, the driver acting without delay at 1 ms). Our driver acts through a traction chain of 0.2 s, because the
-printed gains are unstable at a sampling of 10 ms; adhesion jumps therefore kick the train differently, and the numbers agree
-in size, not in digits. Nothing here was tuned to them.
+The independent numbers are medians over ten sampling seeds of another implementation of the same equations (J = 900 kg
+m2, gaps up to 1.25 s, the driver acting without delay at 1 ms). Our driver acts through a traction chain of 0.2 s,
+because the printed gains are unstable at a sampling of 10 ms; adhesion jumps therefore kick the train differently, and
+the numbers agree in size, not in digits. Nothing here was tuned to them.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ def study() -> SeedStudy:
 
 
 @cache
-def one_run(realisation: str = "fmu3") -> Outcome:
-    overrides = {f"{name}.as": realisation for name in ("locomotive", "odometer", "driver")}
+def one_run(backend: str = "fmu3") -> Outcome:
+    overrides = {f"{name}.as": backend for name in ("locomotive", "odometer", "driver")}
     return Scenario.load("freight_profile_d").run(overrides=overrides)
 
 
@@ -48,7 +48,9 @@ def median(observer: str, phase: str) -> float:
         ("multirate_cdo", BRAKING, 0.061),
     ],
 )
-def test_medians_over_ten_seeds_agree_in_size_with_the_independent_ones(observer: str, phase: str, independent: float) -> None:
+def test_medians_over_ten_seeds_agree_in_size_with_the_independent_ones(
+    observer: str, phase: str, independent: float
+) -> None:
     # A factor of 1.5: twice the scatter that the independent quartile ranges themselves show between seeds.
     assert independent / 1.5 < median(observer, phase) < independent * 1.5
 
@@ -75,7 +77,8 @@ def test_the_run_is_that_of_profile_d() -> None:
     outcome = one_run()
     position, speed = outcome["locomotive.position"], outcome["locomotive.speed"]
     assert outcome.failure is None
-    assert position[-1] == pytest.approx(902.8, abs=1.5)  # 20 s up, 45 s at 50 km/h, 20 s down; the loop cuts its corners
+    # 20 s up, 45 s at 50 km/h, 20 s down; the loop cuts its corners
+    assert position[-1] == pytest.approx(902.8, abs=1.5)
     assert speed.max() == pytest.approx(50 / 3.6, abs=0.3)
     assert speed[-1] == 0.0
     assert outcome.result.summary["localisation"]["method"] == "rollback"
@@ -105,7 +108,9 @@ def test_fmu_and_block_plants_give_the_same_run() -> None:
 def test_the_published_gains_are_warned_about_and_diverge() -> None:
     outcome = Scenario.load("freight_profile_d").run(overrides={"takagi_sugeno_cdo.preset": "as_published"})
     assert any("takagi_sugeno_cdo (as_published): UNSTABLE" in w for w in outcome.warnings)
-    assert outcome.result.summary["certificates"]["takagi_sugeno_cdo"]["constant_limit"] == pytest.approx(0.286, rel=0.01)
+    assert outcome.result.summary["certificates"]["takagi_sugeno_cdo"]["constant_limit"] == pytest.approx(
+        0.286, rel=0.01
+    )
     error = np.abs(outcome["takagi_sugeno_cdo.speed"] - outcome["locomotive.speed"])
     assert error[outcome["time"] > 5.0].max() > 1.0  # ten of ten seeds in the independent runs
 

@@ -21,7 +21,7 @@ def warnings_of(observer: str, speed: float | None, **table: Any) -> list[str]:
     """Warnings for one observer over balises every 100 m, the first after 50 m."""
     balises = BalisesTable(
         position="p.position", speed="p.speed", layout="positions", positions=POSITIONS, expected_speed=speed
-    )  # fmt: skip
+    )
     gap = expected_gap(by_positions(POSITIONS), balises, 0.0)
     return check_certificates({"observer": ComponentTable(observer=observer, **table)}, gap, "warn", "here")[1]
 
@@ -32,12 +32,14 @@ def warnings_of(observer: str, speed: float | None, **table: Any) -> list[str]:
         ("differentiator_cdo", {}, "theta at most 0.4 is certified for 10 s"),
         ("multirate_cdo", {}, "theta_2 at most 0.4 is certified for 10 s"),
         (
-            "takagi_sugeno_cdo", {},
-            "innovation_decay = balise_gain_position = 0.8, balise_gain_speed = 0.16 and odometer gains of 0 are certified "
+            "takagi_sugeno_cdo",
+            {},
+            "innovation_decay = balise_gain_position = 0.8, balise_gain_speed = 0.16 and odometer gains of 0 are "
+            "certified "
             "for 10 s",
         ),
     ],
-)  # fmt: skip
+)
 def test_the_warning_names_the_nearest_certified_gains(observer: str, table: dict[str, Any], advice: str) -> None:
     (warning,) = warnings_of(observer, 10.0, **table)
     assert warning.endswith(
@@ -69,16 +71,21 @@ def test_no_advice_is_given_where_none_is_known_or_needed() -> None:
     assert "Instead" not in warning
     assert OBSERVERS["differentiator_cdo"]().advise(0.4) is None  # type: ignore[attr-defined]
     far = {
-        "innovation_decay": 3.0, "balise_gain_position": 2.4, "balise_gain_speed": 0.0, "odometer_gain_position": 0.7,
+        "innovation_decay": 3.0,
+        "balise_gain_position": 2.4,
+        "balise_gain_speed": 0.0,
+        "odometer_gain_position": 0.7,
         "odometer_gain_speed": 1.6,
-    }  # fmt: skip
+    }
     assert warnings_of("takagi_sugeno_cdo", 10.0, parameters=far) == []
 
 
 def test_an_adapting_observer_is_told_when_the_layout_is_another() -> None:
     calm = {"assumed_acceleration": 0.3, "ratio": 2.0}
     (warning,) = warnings_of("adaptive_gain_cdo", 10.0, parameters=calm)
-    assert warning.startswith("observer: expects balises every 50 m within 0 %, but the layout has them 100 to 100 m apart")
+    assert warning.startswith(
+        "observer: expects balises every 50 m within 0 %, but the layout has them 100 to 100 m apart"
+    )
     assert warnings_of("adaptive_gain_cdo", 10.0, parameters=calm | {"expected_spacing": 100.0}) == []
     assert warnings_of("adaptive_gain_cdo", 10.0, parameters=calm, options={"spacing": "learnt"}) == []
 
@@ -92,7 +99,9 @@ def test_an_adapting_observer_is_advised_within_its_rule_and_else_a_constant_gai
 
 
 def test_only_distances_give_distances() -> None:
-    table = BalisesTable(position="p.position", speed="p.speed", layout="instants", instants=[1.0, 2.5], expected_speed=None)
+    table = BalisesTable(
+        position="p.position", speed="p.speed", layout="instants", instants=[1.0, 2.5], expected_speed=None
+    )
     gap = expected_gap(InstantLayout(np.array([1.0, 2.5])), table, 0.0)
     assert (gap.seconds, gap.distance, gap.spacings) == (1.5, None, None)
     alone = expected_gap(by_positions([30.0]), table, 0.0)
@@ -107,7 +116,10 @@ def test_two_balises_at_one_place_are_refused_in_words() -> None:
 def test_the_adapting_observer_runs_over_balises_laid_by_distance() -> None:
     """A constant gain of 8 has lost the train by the end, the adapting one follows it to a centimetre a second."""
     errors = {}
-    for observer, parameters in (("adaptive_gain_cdo", {"expected_spacing": 15.0}), ("differentiator_cdo", {"theta": 8.0})):
+    for observer, parameters in (
+        ("adaptive_gain_cdo", {"expected_spacing": 15.0}),
+        ("differentiator_cdo", {"theta": 8.0}),
+    ):
         made: Scenario = small(certificates="ignore").set("stop", 40.0)
         made.set("observer.observer", observer).set("observer.parameters", {"estimated_speed": 9.0, **parameters})
         made.set("balises.positions", [15.0 * k for k in range(1, 25)])

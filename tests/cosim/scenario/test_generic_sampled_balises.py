@@ -1,4 +1,6 @@
-"""Generic observers of the freight train beside the locomotive, told of balises by the master: by spacing, and aperiodic."""
+"""Generic observers of the freight train beside the locomotive, told of balises by the master: by spacing, and
+aperiodic.
+"""
 
 from typing import Any
 
@@ -7,7 +9,12 @@ import pytest
 
 from cosim import Scenario
 
-OBSERVERS = {"exponential_gain": "theta", "output_predictor": "theta", "held_innovation": "theta", "hybrid_impulsive": None}
+OBSERVERS = {
+    "exponential_gain": "theta",
+    "output_predictor": "theta",
+    "held_innovation": "theta",
+    "hybrid_impulsive": None,
+}
 SPEED = 15.0  # [m/s]
 EFFORT = 900.0 + 32.4 * SPEED + 1.65287 * SPEED**2  # [N], what keeps that speed
 SPACING = 10.0  # [m], so 0.67 s

@@ -55,7 +55,9 @@ def test_tables_are_merged_later_wins_and_lists_are_replaced(write: Write) -> No
 
 
 LEAVES = st.integers() | st.text(max_size=3) | st.lists(st.integers(), max_size=2) | st.just(True)
-TREES = st.recursive(LEAVES, lambda inner: st.dictionaries(st.sampled_from("abcd"), inner, min_size=1, max_size=3), max_leaves=8)
+TREES = st.recursive(
+    LEAVES, lambda inner: st.dictionaries(st.sampled_from("abcd"), inner, min_size=1, max_size=3), max_leaves=8
+)
 TABLES = st.dictionaries(st.sampled_from("abcd"), TREES, max_size=4)
 
 
@@ -69,8 +71,12 @@ def leaves(tree: Mapping[str, Any], path: tuple[str, ...] = ()) -> dict[tuple[st
 
 @settings(max_examples=200)
 @given(TABLES, TABLES)
-def test_what_the_later_file_says_holds_and_the_rest_is_the_earlier_ones(earlier: dict[str, Any], later: dict[str, Any]) -> None:
-    """Leaf by leaf: those of the later tables, and those of the earlier ones that no later one stands above, at or below."""
+def test_what_the_later_file_says_holds_and_the_rest_is_the_earlier_ones(
+    earlier: dict[str, Any], later: dict[str, Any]
+) -> None:
+    """Leaf by leaf: those of the later tables, and those of the earlier ones that no later one stands above, at or
+    below.
+    """
     merged = deepcopy(earlier)
     merge(merged, deepcopy(later))
     new = leaves(later)
@@ -91,7 +97,9 @@ def test_connections_are_appended_and_one_to_the_same_input_replaces(write: Writ
 def test_an_input_can_be_left_free_and_a_component_taken_out_with_its_connections(write: Write) -> None:
     free = Scenario.load(write("free.toml", 'include = ["base.toml"]\nconnections = ["-> observer.effort"]')).table()
     assert "driver.effort -> locomotive.effort" in free.connections
-    alone = Scenario.load(write("alone.toml", 'include = ["base.toml"]\nbalises = false\n[components]\nobserver = false\n'))
+    alone = Scenario.load(
+        write("alone.toml", 'include = ["base.toml"]\nbalises = false\n[components]\nobserver = false\n')
+    )
     table = alone.table()
     assert set(table.components) == {"locomotive", "odometer", "driver"}
     assert not any("observer" in str(line) for line in table.connections)
@@ -102,15 +110,19 @@ def test_an_input_can_be_left_free_and_a_component_taken_out_with_its_connection
 def test_another_model_starts_anew_and_another_file_of_an_fmu_keeps_its_parameters(write: Write) -> None:
     write("one.toml", "stop = 1.0\nstep = 0.1\n[components.plant]\nfmu = 'v1.fmu'\nparameters = { mass = 2.0 }\n")
     new = (
-        Scenario.load(write("two.toml", "include = 'one.toml'\n[components.plant]\nfmu = 'v2.fmu'\n")).table().components["plant"]
+        Scenario.load(write("two.toml", "include = 'one.toml'\n[components.plant]\nfmu = 'v2.fmu'\n"))
+        .table()
+        .components["plant"]
     )
     assert (Path(str(new.fmu)).name, new.parameters) == ("v2.fmu", {"mass": 2.0})
     text = "include = 'base.toml'\n[components.observer]\nobserver = 'multirate_cdo'\n"
     other = Scenario.load(write("other.toml", text)).table().components["observer"]
-    assert (other.observer, other.realisation, other.parameters) == ("multirate_cdo", None, {})
+    assert (other.observer, other.backend, other.parameters) == ("multirate_cdo", None, {})
 
 
-def test_paths_stay_relative_to_the_file_they_stand_in(write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_paths_stay_relative_to_the_file_they_stand_in(
+    write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     write("track/csv.toml", '[balises]\nlayout = "csv"\nfile = "here.csv"\n')
     write("track/here.csv", "identity,position\nA,1.0\n")
     mine = write("runs/deep/mine.toml", 'include = ["../../base.toml", "../../track/csv.toml"]')
@@ -123,14 +135,17 @@ def test_paths_stay_relative_to_the_file_they_stand_in(write: Write, tmp_path: P
 def test_overrides_come_last_and_those_of_an_included_file_before_the_file_that_includes_it(write: Write) -> None:
     write(
         "one.toml",
-        'include = ["base.toml"]\nstop = 0.2\n[overrides]\nstop = 0.3\n"locomotive.mass" = 70e3\ndriver.as = "block2"\n',
+        'include = ["base.toml"]\nstop = 0.2\n[overrides]\nstop = 0.3\n"locomotive.mass" = 70e3\ndriver.as = '
+        '"block2"\n',
     )
     two = write("two.toml", 'include = ["one.toml"]\n[components.locomotive]\nparameters = { mass = 60e3 }\n')
-    three = write("three.toml", 'include = ["two.toml"]\nstop = 0.1\n[overrides]\nlocomotive.mass = 50e3\nbalises.seed = 4\n')
+    three = write(
+        "three.toml", 'include = ["two.toml"]\nstop = 0.1\n[overrides]\nlocomotive.mass = 50e3\nbalises.seed = 4\n'
+    )
     loaded = [Scenario.load(path).table() for path in (two.with_name("one.toml"), two, three)]
     assert [table.components["locomotive"].parameters["mass"] for table in loaded] == [70e3, 60e3, 50e3]
     assert [table.stop for table in loaded] == [0.3, 0.3, 0.1]
-    assert [table.components["driver"].realisation for table in loaded] == ["block2"] * 3
+    assert [table.components["driver"].backend for table in loaded] == ["block2"] * 3
     assert loaded[2].balises is not None
     assert loaded[2].balises.seed == 4
 
@@ -161,13 +176,29 @@ FAULTS = {
         "",
         r"part\.toml: components\.driver: unknown model 'drivr'.*included by",
     ),
-    "own": ("", "[components.driver]\npreset = 'x'\n", r"mine\.toml: components\.driver: driver has no preset(?!.*included)"),
+    "own": (
+        "",
+        "[components.driver]\npreset = 'x'\n",
+        r"mine\.toml: components\.driver: driver has no preset(?!.*included)",
+    ),
     "line": ('connections = ["driver.effort"]\n', "", r"part\.toml: connections, line 4: .*included by"),
-    "override": ("[overrides]\n'drver.x' = 1\n", "", r"part\.toml: overrides: cannot set 'drver\.x'.*did you mean 'driver'"),
+    "override": (
+        "[overrides]\n'drver.x' = 1\n",
+        "",
+        r"part\.toml: overrides: cannot set 'drver\.x'.*did you mean 'driver'",
+    ),
     "own override": ("", "[overrides]\n'balise.seed' = 1\n", r"mine\.toml: overrides: .*did you mean 'balises'"),
     "no table": ("", "overrides = 3\n", r"mine\.toml: overrides: expected a table"),
-    "removed": ("", "[components]\nobsrver = false\n", r"mine\.toml: components\.obsrver = false.*did you mean 'observer'"),
-    "free": ("", "connections = ['-> driver.odometr']\n", r"mine\.toml: connections: .*did you mean 'driver\.odometer'"),
+    "removed": (
+        "",
+        "[components]\nobsrver = false\n",
+        r"mine\.toml: components\.obsrver = false.*did you mean 'observer'",
+    ),
+    "free": (
+        "",
+        "connections = ['-> driver.odometr']\n",
+        r"mine\.toml: connections: .*did you mean 'driver\.odometer'",
+    ),
     "no list": ("connections = 'a -> b'\n", "", r"part\.toml: connections: expected a list"),
     "toml": ("[[[", "", r"part\.toml: not readable as TOML.*included by .*mine\.toml"),
 }

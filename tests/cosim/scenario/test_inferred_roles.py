@@ -49,7 +49,9 @@ def test_measures_cards_and_expectations_need_no_report_table() -> None:
     error = np.abs(outcome["observer.speed"] - outcome["locomotive.speed"]).max()
     assert error_measures(outcome)["observer.speed_error_max"] == pytest.approx(error, abs=1e-12)
     assert [judged.passed for judged in outcome.expectations] == [True]
-    assert {"Largest speed error", "Largest position error"} <= {fact[0] for fact in verdict_facts(outcome.result, outcome.spec)}
+    assert {"Largest speed error", "Largest position error"} <= {
+        fact[0] for fact in verdict_facts(outcome.result, outcome.spec)
+    }
 
 
 def test_a_sweep_prints_its_measures() -> None:
@@ -59,7 +61,9 @@ def test_a_sweep_prints_its_measures() -> None:
 
 def test_two_odometers_and_other_units_are_no_role() -> None:
     scenario = silent()
-    scenario.add("second", model="odometer", **{"as": "block3"}).add("other", observer="takagi_sugeno_cdo", **{"as": "block3"})
+    scenario.add("second", model="odometer", **{"as": "block3"}).add(
+        "other", observer="takagi_sugeno_cdo", **{"as": "block3"}
+    )
     scenario.connect("locomotive.wheel_speed -> second.wheel_speed", "second.reading -> other.odometer")
     del scenario._data["balises"]["odometer"]
     assert scenario.run().spec.odometer is None

@@ -71,8 +71,10 @@ class Together(HybridSystem):
 @pytest.mark.parametrize("algorithm", ["auto", "jacobi"])
 def test_an_observer_given_what_the_plant_was_given_is_the_one_inside_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, algorithm: str
-) -> None:  # fmt: skip
-    """A loop of driver, mass and observer; then mass and observer in one, beside what was recorded of the loop: 1e-11."""
+) -> None:
+    """A loop of driver, mass and observer; then mass and observer in one, beside what was recorded of the loop:
+    1e-11.
+    """
     monkeypatch.setattr(plant_models, "PLANTS", plant_models.PLANTS | {"mass": Mass})
     monkeypatch.setattr(fmu_observer, "OBSERVERS", fmu_observer.OBSERVERS | {"together": Together})
     block = {"as": "block3"}
@@ -96,6 +98,10 @@ def test_an_observer_given_what_the_plant_was_given_is_the_one_inside_it(
     assert inside.failure is None
     assert len(inside.result.events) == len(beside.result.events) == 5
     assert np.ptp(beside["driver.effort"]) > 1e3
-    for name, own in {"train.position": "position", "train.speed": "speed", "observer.position": "own_position",
-                      "observer.speed": "own_speed"}.items():  # fmt: skip
+    for name, own in {
+        "train.position": "position",
+        "train.speed": "speed",
+        "observer.position": "own_position",
+        "observer.speed": "own_speed",
+    }.items():
         np.testing.assert_allclose(inside[f"together.{own}"], beside[name], rtol=1e-11, atol=1e-11, err_msg=name)

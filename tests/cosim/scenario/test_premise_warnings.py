@@ -16,7 +16,9 @@ def run(speed: float) -> cosim.Outcome:
 
 def test_premises_outside_their_bounds_are_told() -> None:
     (warning,) = [text for text in run(60.0).warnings if "premise" in text]  # the model is made for 5 to 50 m/s
-    assert warning.startswith("observer: a premise of its Takagi-Sugeno model was outside its bounds at 2 sample(s) and for 1 s")
+    assert warning.startswith(
+        "observer: a premise of its Takagi-Sugeno model was outside its bounds at 2 sample(s) and for 1 s"
+    )
 
 
 @pytest.mark.parametrize("speed", [20.0])

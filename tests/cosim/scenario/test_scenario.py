@@ -66,7 +66,9 @@ def test_a_file_and_a_script_give_the_identical_run(file: Path) -> None:
     assert [e.stamp for e in from_file.result.events] == [e.stamp for e in from_script.result.events]
 
 
-def test_paths_are_relative_to_the_file_not_to_the_user(file: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_paths_are_relative_to_the_file_not_to_the_user(
+    file: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     monkeypatch.chdir(elsewhere)
@@ -85,7 +87,9 @@ def test_an_override_acts_on_its_run_only() -> None:
 
 def test_set_reaches_every_kind_of_key() -> None:
     scenario = small().set("stop", 0.2).set("balises.method", "interpolate").set("observer.preset", "as_published")
-    scenario.set("observer.options.premise", "live").set("report.evaluate_after", 0.1).set("observer.innovation_decay", 5.0)
+    scenario.set("observer.options.premise", "live").set("report.evaluate_after", 0.1).set(
+        "observer.innovation_decay", 5.0
+    )
     table = scenario.table()
     assert (table.stop, table.balises.method, table.report.evaluate_after) == (0.2, "interpolate", 0.1)
     observer = table.components["observer"]
@@ -97,7 +101,9 @@ def test_a_number_for_a_vector_parameter_sets_all_its_elements_and_a_list_each()
     outcome = small().set("driver.profile_speed", [10.0, 10.0, 9.0, 9.0, 9.0, 9.0, 9.0, 9.0]).run()
     starts = next(c for c in outcome.result.summary["components"] if c["name"] == "driver")["parameters"]
     assert (starts["profile_speed[1]"], starts["profile_speed[3]"], starts["profile_speed[8]"]) == (10.0, 9.0, 9.0)
-    assert small().run().result.summary["components"][2]["parameters"] == {f"profile_speed[{i}]": 10.0 for i in range(1, 9)}
+    assert small().run().result.summary["components"][2]["parameters"] == {
+        f"profile_speed[{i}]": 10.0 for i in range(1, 9)
+    }
 
 
 def test_the_summary_says_how_the_run_was_made() -> None:
@@ -142,13 +148,15 @@ def test_gaps_beyond_the_certificate_warn_before_the_run_or_refuse_it() -> None:
 
 
 def test_the_certificate_is_of_the_very_gains_in_use() -> None:
-    scenario = small().set("balises.expected_speed", 2.5).set("observer.innovation_decay", 3.0)  # eta 3 at 0.6 s: unstable
+    # eta 3 at 0.6 s: unstable
+    scenario = small().set("balises.expected_speed", 2.5).set("observer.innovation_decay", 3.0)
     assert scenario.run().result.summary["certificates"]["observer"]["constant_limit"] == pytest.approx(0.286, rel=0.01)
 
 
 def test_gaps_that_turn_out_too_long_are_told_afterwards() -> None:
     outcome = small(start=0.0).set("balises.positions", [1.0, 4.9]).set("observer.innovation_decay", 1.0).run()
-    # 3.9 m at about 10 m/s is 0.39 s; with eta = 1 the published gains are certified for less than that (0.25 s at eta = 2).
+    # 3.9 m at about 10 m/s is 0.39 s; with eta = 1 the published gains are certified for less than that (0.25 s at eta
+    # = 2).
     assert any("longest gap" in w for w in outcome.warnings)
 
 
@@ -160,14 +168,16 @@ def test_what_ships_is_valid(name: str) -> None:
 
 
 @pytest.mark.compiler
-@pytest.mark.parametrize("realisation", ["fmu2", "fmu3"])
+@pytest.mark.parametrize("backend", ["fmu2", "fmu3"])
 @pytest.mark.parametrize("policy", [None, "reject", "late"])
-def test_sealed_receivers_treat_late_telegrams_as_blocks_do(realisation: str, policy: str | None) -> None:
-    """By the FMU's own parameter; the block of the same FMI version does the same, but for roundings of a divided cell."""
+def test_sealed_receivers_treat_late_telegrams_as_blocks_do(backend: str, policy: str | None) -> None:
+    """By the FMU's own parameter; the block of the same FMI version does the same, but for roundings of a divided
+    cell.
+    """
     changes: dict[str, Any] = {"stop": 0.8, "balises.latency": 0.1, "balises.latency_jitter": 0.1}
     changes |= {} if policy is None else {"observer.late_policy": policy, "observer.replay_horizon": 4.0}
     runs, fates, counts = [], [], []
-    for kind in (realisation, realisation.replace("fmu", "block")):
+    for kind in (backend, backend.replace("fmu", "block")):
         outcome = small().run(overrides=changes | {"observer.as": kind})
         assert outcome.failure is None
         assert not any("late" in w for w in outcome.warnings if "rejected" not in w)
@@ -191,7 +201,9 @@ def test_sealed_receivers_treat_late_telegrams_as_blocks_do(realisation: str, po
 def test_an_enumeration_is_set_by_the_name_or_the_number_of_an_item(value: str | int) -> None:
     changes = {"observer.as": "fmu3", "balises.latency": 0.1}
     by_key = small().run(overrides=changes | {"observer.late_policy": "reject"}).result.table
-    by_parameter = small().run(overrides=changes | {"observer.parameters": {"late_policy": value, "estimated_speed": 10.0}})
+    by_parameter = small().run(
+        overrides=changes | {"observer.parameters": {"late_policy": value, "estimated_speed": 10.0}}
+    )
     np.testing.assert_array_equal(by_parameter.result.table["observer.position"], by_key["observer.position"])
 
 

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from small_scenarios import small
-from zoo.build import linear_fmu
+from test_fmus.build import linear_fmu
 
 from cosim import Scenario, shipped_scenarios
 from cosim.errors import CosimError, ScenarioError
@@ -50,7 +50,9 @@ def test_a_saved_scenario_runs_identically(tmp_path: Path) -> None:
 @example("lines\r\nof another system", {})
 @given(
     st.text(max_size=20),
-    st.dictionaries(st.text(min_size=1, max_size=5), st.floats(allow_nan=False, allow_infinity=False) | st.text(max_size=5)),
+    st.dictionaries(
+        st.text(min_size=1, max_size=5), st.floats(allow_nan=False, allow_infinity=False) | st.text(max_size=5)
+    ),
 )
 def test_every_text_and_number_survives(title: str, parameters: dict[str, Any]) -> None:
     scenario = Scenario(stop=1.0, step=0.1, title=title).add("a", model="driver", parameters=parameters)
@@ -110,7 +112,9 @@ def test_a_scenario_out_of_a_package_is_saved_with_its_fmus(tmp_path: Path) -> N
 
 @pytest.mark.compiler
 def test_an_fmu_alone_with_held_and_with_played_back_inputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """``v = 2 t`` under ``u = 2``; under the ramp ``u = t`` the mean over each step gives ``v = t^2 / 2`` but for rounding."""
+    """``v = 2 t`` under ``u = 2``; under the ramp ``u = t`` the mean over each step gives ``v = t^2 / 2`` but for
+    rounding.
+    """
     double_integrator(tmp_path)
     monkeypatch.chdir(tmp_path)
     held = Scenario.fmu("mass.fmu", stop=1.0, step=0.1, inputs={"u": 2.0}, parameters={"x0[1]": 5.0}).run()

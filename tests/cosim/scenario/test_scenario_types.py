@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mock_slaves import Mock, component, variable
-from zoo.typed import expected, typed_fmu
+from test_fmus.typed import expected, typed_fmu
 
 import cosim
 from cosim.errors import CosimError, CouplingError, ScenarioError
@@ -85,10 +85,16 @@ def test_a_file_with_everything_in_it(tmp_path: Path) -> None:
         ([], {"u_binary": "xyz"}, r"one.u_binary: expected bytes or a hexadecimal text"),
         ([], {"u_float64": "3"}, r"one.u_float64: expected a number, or a list of numbers for a vector \(got '3'\)"),
         ([], {"n": 2.5}, r"one.n cannot be set: expected a whole number for a UInt64"),
-        ([], {"u_enumeration": 4}, r"one.u_enumeration = 4 is no item of the enumeration: calm \(1\), busy \(2\), angry \(3\)"),
+        (
+            [],
+            {"u_enumeration": 4},
+            r"one.u_enumeration = 4 is no item of the enumeration: calm \(1\), busy \(2\), angry \(3\)",
+        ),
     ],
 )
-def test_what_does_not_fit_is_said_before_the_run(tmp_path: Path, record: list[str], parameters: Any, match: str) -> None:
+def test_what_does_not_fit_is_said_before_the_run(
+    tmp_path: Path, record: list[str], parameters: Any, match: str
+) -> None:
     path = typed_fmu(tmp_path)
     s = cosim.Scenario(stop=0.1, step=0.1).add("one", fmu=str(path), record=record, parameters=parameters)
     with pytest.raises(CosimError, match=match):
@@ -97,7 +103,9 @@ def test_what_does_not_fit_is_said_before_the_run(tmp_path: Path, record: list[s
 
 @pytest.mark.parametrize("value", [float("nan"), {"a": 1}, [1.0, [float("inf")]]])
 def test_a_file_takes_finite_values_only(value: Any) -> None:
-    with pytest.raises(ScenarioError, match=r"components.one.parameters.x: expected a finite number, true or false, a text"):
+    with pytest.raises(
+        ScenarioError, match=r"components.one.parameters.x: expected a finite number, true or false, a text"
+    ):
         cosim.Scenario(stop=1.0, step=0.1).add("one", fmu="x.fmu", parameters={"x": value}).run()
 
 
@@ -110,7 +118,11 @@ class Vectors(Mock):
 def test_vectors_of_scalars_and_structural_parameters_first() -> None:
     made = component(Vectors())
     assert start_values(made, {"mass": [1, 2.5]}) == {"mass[1]": 1.0, "mass[2]": 2.5}
-    assert list(start_values(made, {"mass": 3, "count": 2}).items()) == [("count", 2), ("mass[1]", 3.0), ("mass[2]", 3.0)]
+    assert list(start_values(made, {"mass": 3, "count": 2}).items()) == [
+        ("count", 2),
+        ("mass[1]", 3.0),
+        ("mass[2]", 3.0),
+    ]
     with pytest.raises(CouplingError, match=r"mock.count = 5 lies outside what the component declares: 1 to 4"):
         start_values(made, {"count": 5})
     with pytest.raises(CouplingError, match=r"mock.count = 0 is outside of what the component declares: 1 to 4"):

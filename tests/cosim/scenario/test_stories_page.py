@@ -22,7 +22,9 @@ def test_the_shipped_seed_is_within_the_table_of_twenty_seeds(name: str, monkeyp
     outcome = Scenario.load(name).run(warn=lambda _warning: None)
     page = (DOCS / "multi_vehicle_train.md").read_text(encoding="utf-8")
     told = {
-        cells[1].strip(): cells[1 + int(name[-1])].strip() for line in page.splitlines() if len(cells := line.split("|")) == 7
+        cells[1].strip(): cells[1 + int(name[-1])].strip()
+        for line in page.splitlines()
+        if len(cells := line.split("|")) == 7
     }
     for quantity, number in stories.story(outcome).items():
         cell = told[quantity]
@@ -30,7 +32,9 @@ def test_the_shipped_seed_is_within_the_table_of_twenty_seeds(name: str, monkeyp
             count, seeds = map(int, cell.split(" of "))
             assert number in ({0.0} if count == 0 else {1.0} if count == seeds else {0.0, 1.0}), quantity
         else:
-            low, high = map(float, cell.partition("(")[2].rstrip(")").split(" to ")) if "(" in cell else [float(cell)] * 2
+            low, high = (
+                map(float, cell.partition("(")[2].rstrip(")").split(" to ")) if "(" in cell else [float(cell)] * 2
+            )
             margin = 0.01 * max(abs(low), abs(high)) + 1e-9  # the cells have three digits
             assert low - margin <= number <= high + margin, quantity
     for module in ("stories", "train_scenarios"):

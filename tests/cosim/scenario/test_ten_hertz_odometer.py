@@ -1,4 +1,6 @@
-"""Chapter 3 with an odometer of 10 Hz for every observer: what changes beside the run with a fast one, and what must not."""
+"""Chapter 3 with an odometer of 10 Hz for every observer: what changes beside the run with a fast one, and what must
+not.
+"""
 
 from __future__ import annotations
 

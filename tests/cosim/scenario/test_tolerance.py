@@ -1,4 +1,6 @@
-"""The tolerance that FMUs are told: the component's, the scenario's, the declared one; refused values, FMUs that refuse it."""
+"""The tolerance that FMUs are told: the component's, the scenario's, the declared one; refused values, FMUs that refuse
+it.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from zoo.adaptive import adaptive_fmu
+from test_fmus.adaptive import adaptive_fmu
 
 from cosim import Scenario
 from cosim.components.loading import load_fmu

@@ -22,7 +22,9 @@ def archive() -> bytes:
     return file.getvalue()
 
 
-@pytest.mark.parametrize("data", [TEXT.encode("utf-8-sig"), TEXT.replace("\n", "\r\n").encode()], ids=["mark", "windows"])
+@pytest.mark.parametrize(
+    "data", [TEXT.encode("utf-8-sig"), TEXT.replace("\n", "\r\n").encode()], ids=["mark", "windows"]
+)
 def test_a_file_from_windows_is_read(data: bytes, tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_bytes(data)
     assert read_toml(tmp_path / "a.toml") == {"stop": 1.0, "step": 0.1}
@@ -33,7 +35,10 @@ def test_a_file_from_windows_is_read(data: bytes, tmp_path: Path) -> None:
     [
         (TEXT.encode("utf-16"), "line 1 is not UTF-8; save the file as UTF-8"),
         (b"title = 'x'\n# caf\xe9\n", "line 2 is not UTF-8"),
-        (b"stop = 1.0\n<<<<<<< HEAD\nstep = 0.1\n=======\nstep = 0.2\n>>>>>>> x\n", "line 2 begins the conflict of a merge"),
+        (
+            b"stop = 1.0\n<<<<<<< HEAD\nstep = 0.1\n=======\nstep = 0.2\n>>>>>>> x\n",
+            "line 2 begins the conflict of a merge",
+        ),
         (b"stop = \n", "at line 1, column 8"),
         (archive(), "'cosim new' writes a scenario"),
     ],

@@ -1,7 +1,8 @@
-"""Scenarios Sc1 to Sc4 of Table 4.4: what comes out of their stories, energy is conserved, and fixes count at their own instants.
+"""Scenarios Sc1 to Sc4 of Table 4.4: what comes out of their stories, energy is conserved, and fixes count at their own
+instants.
 
-The runs are those of the shipped seed. What is asked of them holds for all 20 seeds of docs/studies/stories.py; what holds for
-some only (an axle beyond 15 % and sand in Sc3, an axle beyond 15 % in Sc4) is not asked for.
+The runs are those of the shipped seed. What is asked of them holds for all 20 seeds of docs/studies/stories.py; what
+holds for some only (an axle beyond 15 % and sand in Sc3, an axle beyond 15 % in Sc4) is not asked for.
 """
 
 from __future__ import annotations
@@ -76,7 +77,8 @@ def sanded(outcome: Outcome, *, controller: bool = True) -> bool:
     return bool(max(asked, rows(outcome, "controller.sanding_request").max() if controller else 0.0) > 0.5)
 
 
-# -- the stories --------------------------------------------------------------------------------------------------------
+# -- the stories
+# --------------------------------------------------------------------------------------------------------
 
 
 def test_sc1_nothing_slips_on_clear_water() -> None:
@@ -115,7 +117,9 @@ def largest_slip(outcome: Outcome) -> tuple[float, float]:
 
 
 def test_sc3_the_effort_is_cut_and_hardly_any_sand_is_asked_for() -> None:
-    """Published is a slip of 16 to 40 % and no sand; over 20 seeds 13 to 25 %, and sand for up to 1.8 s in 5 of them."""
+    """Published is a slip of 16 to 40 % and no sand; over 20 seeds 13 to 25 %, and sand for up to 1.8 s in 5 of
+    them.
+    """
     outcome = run("freight_sc3")
     time, effort = rows(outcome, "time"), rows(outcome, "anti_slip.effort")
     slip, worst = largest_slip(outcome)
@@ -129,7 +133,9 @@ def test_sc3_the_effort_is_cut_and_hardly_any_sand_is_asked_for() -> None:
 
 
 def test_sc4_the_command_is_cut_before_the_slip_is_excessive() -> None:
-    """Published is a slip that the command follows; here the controller knows of it within the step: 11 to 17 % over 20 seeds."""
+    """Published is a slip that the command follows; here the controller knows of it within the step: 11 to 17 % over 20
+    seeds.
+    """
     outcome = run("freight_sc4")
     time, command = rows(outcome, "time"), rows(outcome, "controller.effort")
     assert 0.05 < largest_slip(outcome)[0] < 0.2
@@ -151,7 +157,8 @@ def test_with_estimates_the_train_stops_as_near_as_the_receiver_knows(name: str)
     outcome = run(name)
     assert rows(outcome, "train.speed")[-1] == 0.0
     missed = rows(outcome, "train.position")[-1] - 850.0
-    # It stops where the receiver says 850 m: its drift apart, the tolerance of the mission, and 0.3 m of estimate and brake.
+    # It stops where the receiver says 850 m: its drift apart, the tolerance of the mission, and 0.3 m of estimate and
+    # brake.
     assert abs(missed + rows(outcome, "receiver.drift")[-1]) < 0.35
 
 
@@ -172,7 +179,8 @@ def test_speed_errors_are_those_of_the_published_size(name: str) -> None:
 
 def test_in_slip_the_observer_of_the_adhesion_force_is_the_better_one() -> None:
     first, second = (mean_error(run("freight_sc2"), observer) for observer in OBSERVERS)
-    assert second > 1.3 * first  # published: 0.33 against 0.15; Takagi-Sugeno takes the effort for the force at the rail
+    # published: 0.33 against 0.15; Takagi-Sugeno takes the effort for the force at the rail
+    assert second > 1.3 * first
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -182,7 +190,8 @@ def test_couplers_are_never_at_risk(name: str) -> None:
     assert rows(outcome, "train.coupler_force[1]").max() < 0.4 * 850e3
 
 
-# -- physics ------------------------------------------------------------------------------------------------------------
+# -- physics
+# ------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -193,10 +202,15 @@ def test_energy_is_conserved(name: str) -> None:
     def work(force: Array, speed: Array) -> float:
         return float((0.5 * (force * speed)[1:] @ steps) + (0.5 * (force * speed)[:-1] @ steps))
 
-    speed, wheels, creep = rows(outcome, "train.speed"), axles(outcome, "axle_speed"), axles(outcome, "axle_creep_force")
+    speed, wheels, creep = (
+        rows(outcome, "train.speed"),
+        axles(outcome, "axle_speed"),
+        axles(outcome, "axle_creep_force"),
+    )
     wagons = np.array([rows(outcome, f"train.wagon_speed[{i}]") for i in range(1, 5)])
     turned = 0.5 * (np.abs(wheels)[:, 1:] + np.abs(wheels)[:, :-1]).mean(axis=0) * steps
-    air = 80e3 * np.maximum(rows(outcome, "train.cylinder_pressure[1]") - 0.3e5, 0.0) / 3.2e5  # 1 N per kg at full service
+    # 1 N per kg at full service
+    air = 80e3 * np.maximum(rows(outcome, "train.cylinder_pressure[1]") - 0.3e5, 0.0) / 3.2e5
     # The effort that acted in the step before each row: told at the rims, without the air brake.
     effort = (rows(outcome, "train.rim_effort") + np.sign(speed) * air)[1:]
     spent = {
@@ -208,7 +222,8 @@ def test_energy_is_conserved(name: str) -> None:
         "slip": sum(work(force, wheel - speed) for force, wheel in zip(creep, wheels, strict=True)),
     }
     traction = float(np.maximum(effort, 0.0) @ turned)
-    assert sum(spent.values()) == pytest.approx(traction, rel=1e-3)  # trapezoids at 20 ms; the train stands at both ends
+    # trapezoids at 20 ms; the train stands at both ends
+    assert sum(spent.values()) == pytest.approx(traction, rel=1e-3)
     if name in WITH_ESTIMATES:  # over the hill, 300 m of it: no potential energy but that of 2.4 m
         assert spent["gradient"] == pytest.approx(166e3 * 9.81 * 0.008 * 300.0, rel=2e-3)
 
@@ -219,7 +234,8 @@ def test_the_observers_know_of_the_indirect_brake(observer: str) -> None:
     braking = (rows(outcome, "controller.brake_demand") > 0.01) & (rows(outcome, "train.speed") > 0.5)
     rail = rows(outcome, "train.adhesion_force")[braking]
     assert rail.mean() < -30e3
-    assert np.abs(rows(outcome, f"{observer}.adhesion_force")[braking] - rail).mean() < 4e3  # 29e3 where they are not told
+    # 29e3 where they are not told
+    assert np.abs(rows(outcome, f"{observer}.adhesion_force")[braking] - rail).mean() < 4e3
 
 
 def test_soapy_water_has_the_peak_that_the_files_claim() -> None:
@@ -231,11 +247,14 @@ def test_soapy_water_has_the_peak_that_the_files_claim() -> None:
         assert soapy.peak(35.0 / 3.6)[1] == pytest.approx(0.065, abs=5e-4)
 
 
-# -- how it runs --------------------------------------------------------------------------------------------------------
+# -- how it runs
+# --------------------------------------------------------------------------------------------------------
 
 
 BOTH = pytest.mark.parametrize(
-    ("component", "observer"), [(OBSERVERS[0], AugmentedHighGainCdo()), (OBSERVERS[1], AugmentedTakagiSugenoCdo())], ids=OBSERVERS
+    ("component", "observer"),
+    [(OBSERVERS[0], AugmentedHighGainCdo()), (OBSERVERS[1], AugmentedTakagiSugenoCdo())],
+    ids=OBSERVERS,
 )
 
 
@@ -254,16 +273,27 @@ def test_blocks_and_fmus_give_the_same_run(name: str) -> None:
     blocks = {f"{component}.as": "block3" for component in Scenario.load(name).table().components}
     python = Scenario.load(name).run(warn=lambda _warning: None, overrides={**short, **blocks})
     assert native["train.speed"][-1] > 0.0
-    for signal in ("train.speed", "train.coupler_force[1]", "anti_slip.effort", "multirate_cdo.speed", "takagi_sugeno_cdo.speed"):
+    for signal in (
+        "train.speed",
+        "train.coupler_force[1]",
+        "anti_slip.effort",
+        "multirate_cdo.speed",
+        "takagi_sugeno_cdo.speed",
+    ):
         # the same operations in the same order; what remains is the order of additions in compiled expressions
         np.testing.assert_allclose(native[signal], python[signal], rtol=1e-9, atol=1e-9)
 
 
 @BOTH
 def test_read_fixes_count_like_events_at_their_own_stamps(component: str, observer: Any) -> None:
-    # The scenarios read the receiver's held output; here a block is told the same fixes as events of FMI 2, by count and stamp.
+    # The scenarios read the receiver's held output; here a block is told the same fixes as events of FMI 2, by count
+    # and stamp.
     scenario = Scenario.load("freight_sc3")
-    changes: dict[str, Any] = {"stop": 8.0, "mission.departure_time": 1.0, f"{component}.record": ["effort", "odometer"]}
+    changes: dict[str, Any] = {
+        "stop": 8.0,
+        "mission.departure_time": 1.0,
+        f"{component}.record": ["effort", "odometer"],
+    }
     outcome = scenario.run(warn=lambda _warning: None, overrides=changes)
     block: Any = make_block(observer, fmi_version=2)
     reference = {v.name: v.valueReference for v in block.model_description.modelVariables}

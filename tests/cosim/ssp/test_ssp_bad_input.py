@@ -16,8 +16,10 @@ RAMP = f"""<ssd:Component name="ramp" source="resources/ramp.fmu">
 <ssd:Connectors>{connector("speed", "output", "m/s")}</ssd:Connectors></ssd:Component>"""
 ADDER = f"""<ssd:Component name="sum" source="resources/sum.fmu">
 <ssd:Connectors>{connector("u", "input", "m/s")}{connector("w", "input", "kg")}{connector("y", "output")}</ssd:Connectors>
-</ssd:Component>"""
-GOOD = ssd(f"<ssd:Elements>{RAMP}\n{ADDER}</ssd:Elements>\n<ssd:Connections>\n{wire('ramp.speed', 'sum.u')}</ssd:Connections>")
+</ssd:Component>"""  # noqa: E501
+GOOD = ssd(
+    f"<ssd:Elements>{RAMP}\n{ADDER}</ssd:Elements>\n<ssd:Connections>\n{wire('ramp.speed', 'sum.u')}</ssd:Connections>"
+)
 
 
 @pytest.fixture(scope="session")
@@ -71,50 +73,78 @@ WRONG = {
     "unknown element": (changed("ssd:Connections>", "ssd:Wires>"), "Element 'Wires': This element is not expected"),
     "unknown attribute": (changed("startElement", "from"), "line 9: Element 'Connection', attribute 'from'"),
     "missing attribute": (changed(' startConnector="speed"', ""), "'startConnector' is required but missing"),
-    "wrong namespace": (changed("SSP1/SystemStructureDescription", "SSP9/Other"), "line 1: element 'SystemStructureDescription'"),
+    "wrong namespace": (
+        changed("SSP1/SystemStructureDescription", "SSP9/Other"),
+        "line 1: element 'SystemStructureDescription'",
+    ),
     "wrong root": (ssm(""), "element 'ParameterMapping'", "expected 'SystemStructureDescription'"),
-    "unknown version": (changed('version="1.0"', 'version="3.0"'), "line 1: version '3.0' of SSP is not known; 1.0 and 2.0"),
+    "unknown version": (
+        changed('version="1.0"', 'version="3.0"'),
+        "line 1: version '3.0' of SSP is not known; 1.0 and 2.0",
+    ),
     "document type": ("<!DOCTYPE a [<!ENTITY b 'c'>]>" + GOOD, "document type declaration"),
     "undefined unit where numbers go": (
         changed('name="u" kind="input"><ssc:Real unit="m/s"', 'name="u" kind="input"><ssc:Real unit="kn"'),
         "nothing defines the unit 'kn', so numbers cannot be brought from 'm/s' to 'kn'",
     ),
     "unit defined twice": (changed('Unit name="kg"', 'Unit name="km/h"'), "unit 'km/h' is defined twice"),
-    "missing FMU": (changed("ramp.fmu", "rmap.fmu"), "line 3: source 'resources/rmap.fmu'", "did you mean 'resources/ramp.fmu'"),
+    "missing FMU": (
+        changed("ramp.fmu", "rmap.fmu"),
+        "line 3: source 'resources/rmap.fmu'",
+        "did you mean 'resources/ramp.fmu'",
+    ),
     "source outside": (changed("resources/ramp", "../ramp"), "source '../ramp.fmu' leads out of the package"),
     "source by URL": (changed("resources/ramp", "https://example.org/ramp"), "only files within the package"),
     "source is no FMU": (
-        changed("resources/ramp.fmu", "SystemStructure.ssd"), "line 3: ramp: SystemStructure.ssd is not a readable FMU"
+        changed("resources/ramp.fmu", "SystemStructure.ssd"),
+        "line 3: ramp: SystemStructure.ssd is not a readable FMU",
     ),
     "no source": (UNSOURCED, "component 'ramp' has no source"),
     "other type": (changed('name="ramp"', 'name="ramp" type="text/x-modelica"'), "is of type 'text/x-modelica'"),
     "model exchange": (changed('name="ramp"', 'name="ramp" implementation="ModelExchange"'), "asks for ModelExchange"),
-    "two elements of one name": (changed('name="sum"', 'name="ramp"'), "line 5: system 'root' has two elements named 'ramp'"),
+    "two elements of one name": (
+        changed('name="sum"', 'name="ramp"'),
+        "line 5: system 'root' has two elements named 'ramp'",
+    ),
     "two connectors of one name": (changed('name="w"', 'name="u"'), "'sum' has two connectors named 'u'"),
     "connector without variable": (changed('name="y"', 'name="z"'), "has no variable 'z'", "known:"),
     "connector of another kind": (
-        changed('name="y" kind="output"', 'name="y" kind="input"'), "kind 'input'", "causality 'output'"
+        changed('name="y" kind="output"', 'name="y" kind="input"'),
+        "kind 'input'",
+        "causality 'output'",
     ),
     "connector of another type": (changed("<ssc:Real/>", "<ssc:Boolean/>"), "of type Boolean", "of type Real"),
-    "unknown end": (changed('Element="sum"', 'Element="smu"'), "line 9: connection: system 'root' has no element 'smu'"),
+    "unknown end": (
+        changed('Element="sum"', 'Element="smu"'),
+        "line 9: connection: system 'root' has no element 'smu'",
+    ),
     "unknown connector": (changed('Connector="u"', 'Connector="v"'), "'sum' has no connector 'v'"),
     "output to output": (
-        changed('endConnector="u"', 'endConnector="y"'), "kinds 'output' and 'output'", "is not one that SSP allows"
+        changed('endConnector="u"', 'endConnector="y"'),
+        "kinds 'output' and 'output'",
+        "is not one that SSP allows",
     ),
     "two sources": (changed("</ssd:Connections>", TWICE), "sum.u has two sources, ramp.speed and sum.y"),
-    "units that do not fit": (changed('endConnector="u"', 'endConnector="w"'), "line 9: units 'm/s' and 'kg' do not fit"),
+    "units that do not fit": (
+        changed('endConnector="u"', 'endConnector="w"'),
+        "line 9: units 'm/s' and 'kg' do not fit",
+    ),
     "nothing to run": (ssd(""), "line 2: the system holds no component"),
     "no parameter set": (changed("ssv:Parameters>", "ssv:Values>", with_parameter("")), "Element 'Values'"),
     "parameter that is no number": (with_parameter(real("sum.w", "two")), "'two' is not a valid value"),
     "parameter twice": (with_parameter(real("a", "1") * 2), "parameter 'a' is given twice"),
     "parameter in an undefined unit": (with_parameter(real("sum.u", "1", "mph")), "nothing defines the unit 'mph'"),
-    "parameter in a unit that does not fit": (with_parameter(real("sum.u", "1", "kg")), "units 'kg' and 'm/s' do not fit"),
+    "parameter in a unit that does not fit": (
+        with_parameter(real("sum.u", "1", "kg")),
+        "units 'kg' and 'm/s' do not fit",
+    ),
     "mapping without target": (
-        with_parameter(real("a", "1"), MAPPED), "'a' is mapped to 'sum.uu', nothing of the root system (did you mean 'sum.u'"
+        with_parameter(real("a", "1"), MAPPED),
+        "'a' is mapped to 'sum.uu', nothing of the root system (did you mean 'sum.u'",
     ),
     "missing parameter file": (with_bindings(EXTERNAL), "source 'resources/a.ssv': the package has no such file"),
     "annotation that is none of ours": (changed(ROOT_END, OURS + ROOT_END), "'fmu-observer.scenario' is not JSON"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", WRONG)
@@ -126,7 +156,9 @@ def test_one_message_with_the_place(case: str, tmp_path: Path, fmus_of: dict[str
 
 
 def test_the_good_one_is_good(tmp_path: Path, fmus_of: dict[str, Path]) -> None:
-    assert Scenario.load(package(tmp_path / "system.ssp", {"SystemStructure.ssd": GOOD, **fmus_of})).run().failure is None
+    assert (
+        Scenario.load(package(tmp_path / "system.ssp", {"SystemStructure.ssd": GOOD, **fmus_of})).run().failure is None
+    )
 
 
 def test_several_faults_of_the_schema_are_named_together(tmp_path: Path) -> None:
@@ -144,7 +176,9 @@ def test_a_structure_within_itself(tmp_path: Path) -> None:
     nested = '<ssd:Component name="again" type="application/x-ssp-definition" source="{}"/>'
     files = {"SystemStructure.ssd": ssd(f"<ssd:Elements>{nested.format('b.ssd')}</ssd:Elements>")}
     files["b.ssd"] = ssd(f"<ssd:Elements>{nested.format('SystemStructure.ssd')}</ssd:Elements>")
-    refused(package(tmp_path / "a.ssp", files), "b.ssd, line 3: component 'again' nests 'SystemStructure.ssd' within itself")
+    refused(
+        package(tmp_path / "a.ssp", files), "b.ssd, line 3: component 'again' nests 'SystemStructure.ssd' within itself"
+    )
     inner = f'<ssd:System name="loop" id="loop"><ssd:Elements>{nested.format("#loop")}</ssd:Elements></ssd:System>'
     text = ssd(f"<ssd:Elements>{inner}</ssd:Elements>")
     refused(package(tmp_path / "c.ssp", {"SystemStructure.ssd": text}), "nests the system '#loop' within itself")
@@ -156,7 +190,10 @@ def test_connections_in_a_circle(tmp_path: Path, fmus_of: dict[str, Path]) -> No
     through = "".join(f'<ssd:System name="{name}">{within}</ssd:System>' for name in "pq")
     wires = wire("p.b", "q.a") + wire("q.b", "p.a") + wire("p.b", "sum.u")
     text = ssd(f"<ssd:Elements>{ADDER}{through}</ssd:Elements><ssd:Connections>{wires}</ssd:Connections>")
-    refused(package(tmp_path / "a.ssp", {"SystemStructure.ssd": text, **fmus_of}), "the connections to sum.u lead in a circle")
+    refused(
+        package(tmp_path / "a.ssp", {"SystemStructure.ssd": text, **fmus_of}),
+        "the connections to sum.u lead in a circle",
+    )
 
 
 # -- archives -------------------------------------------------------------------------------------------------------
@@ -172,7 +209,9 @@ def test_archives_that_are_none_or_dangerous(tmp_path: Path) -> None:
         package(tmp_path / "other.ssp", {"readme.txt": "x"}),
         "it has no SystemStructure.ssd at its top level; it holds readme.txt",
     )
-    refused(package(tmp_path / "slip.ssp", {"SystemStructure.ssd": GOOD, "../evil": "x"}), "'../evil', which leads outside")
+    refused(
+        package(tmp_path / "slip.ssp", {"SystemStructure.ssd": GOOD, "../evil": "x"}), "'../evil', which leads outside"
+    )
 
 
 def test_an_archive_that_would_fill_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -197,7 +236,9 @@ def test_a_damaged_member(tmp_path: Path, fmus_of: dict[str, Path]) -> None:
 # -- command line ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("command", [["run", "{}", "--quiet"], ["info", "{}"], ["list", "{}"], ["export", "{}", "out.ssp"]])
+@pytest.mark.parametrize(
+    "command", [["run", "{}", "--quiet"], ["info", "{}"], ["list", "{}"], ["export", "{}", "out.ssp"]]
+)
 def test_the_command_line_says_it_and_exits_with_2(
     command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

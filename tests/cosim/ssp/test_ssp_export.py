@@ -1,4 +1,6 @@
-"""SSP export: back to the same run bit for bit, valid by the schemas, and readable for somebody else's reader and master."""
+"""SSP export: back to the same run bit for bit, valid by the schemas, and readable for somebody else's reader and
+master.
+"""
 
 from __future__ import annotations
 
@@ -89,15 +91,16 @@ def test_fmus_by_path_run_the_same_after_the_round_trip(tmp_path: Path, fmi: int
 
 def test_values_that_are_not_real_numbers_survive(tmp_path: Path) -> None:
     types = """<TypeDefinitions><SimpleType name="Gear"><Enumeration><Item name="none" value="0"/><Item name="low" value="10"/>
-</Enumeration></SimpleType></TypeDefinitions>"""
+</Enumeration></SimpleType></TypeDefinitions>"""  # noqa: E501
     kinds = {"on": "<Boolean{}/>", "count": "<Integer{}/>", "gear": '<Enumeration declaredType="Gear"{}/>'}
     ends = {"send": ("output", ""), "take": ("input", ' start="0"')}
     scenario = Scenario(stop=1.0, step=0.5)
     for name, (causality, start) in ends.items():
         variables = "".join(
             f'<ScalarVariable name="{v}" valueReference="{i}" causality="{causality}" variability="discrete">'
-            f"{kind.format(start)}</ScalarVariable>" for i, (v, kind) in enumerate(kinds.items())
-        )  # fmt: skip
+            f"{kind.format(start)}</ScalarVariable>"
+            for i, (v, kind) in enumerate(kinds.items())
+        )
         scenario.add(name, fmu=str(described_fmu(tmp_path, name, variables, types)))
     for name, value in (("on", 1.0), ("count", -3.0), ("gear", "low")):
         scenario.set(f"take.{name}", value)
@@ -143,7 +146,10 @@ def test_one_name_for_two_units_becomes_two(tmp_path: Path) -> None:
         scenario.add(name, fmu=str(described_fmu(tmp_path, name, variable, definition.format(factor))))
     text = texts(scenario.export_ssp(tmp_path / "units.ssp"))["SystemStructure.ssd"].decode()
     assert text.count("<ssc:Unit ") == 2
-    assert [text.count(f'Real unit="{name}"') + text.count(f'Float64 unit="{name}"') for name in ("u", "u (2)")] == [1, 2]
+    assert [text.count(f'Real unit="{name}"') + text.count(f'Float64 unit="{name}"') for name in ("u", "u (2)")] == [
+        1,
+        2,
+    ]
 
 
 # -- other tools ----------------------------------------------------------------------------------------------------
@@ -153,8 +159,12 @@ def test_one_name_for_two_units_becomes_two(tmp_path: Path) -> None:
 def test_the_reader_of_fmpy_reads_it(tmp_path: Path) -> None:
     structure = fmpy.ssp.ssd.read_ssd(str(small().export_ssp(tmp_path / "small.ssp", "1.0")))
     assert [c.name for c in fmpy.ssp.ssd.find_components(structure.system)] == [
-        "locomotive", "odometer", "driver", "observer", "balise_reader",
-    ]  # fmt: skip
+        "locomotive",
+        "odometer",
+        "driver",
+        "observer",
+        "balise_reader",
+    ]
     assert len(structure.system.connections) == 10
     assert {u.name for u in structure.units} >= {"m", "m/s", "N"}
 
@@ -167,8 +177,8 @@ def test_the_master_of_fmpy_runs_it(tmp_path: Path) -> None:
     path = scenario.export_ssp(tmp_path / "pair.ssp", "1.0")
     theirs = fmpy.ssp.simulation.simulate_ssp(str(path), stop_time=1.0, step_size=0.125)
     ours = Scenario.load(path).run()
-    # it labels the values of t + h as t, so its row k holds our row k + 1; it exchanges nothing before the first step, and its
-    # adder, without states, sees the ramp one step late: its row k is our row k from the second on
+    # it labels the values of t + h as t, so its row k holds our row k + 1; it exchanges nothing before the first step,
+    # and its adder, without states, sees the ramp one step late: its row k is our row k from the second on
     assert np.array_equal(theirs["time"], ours["time"][:-1])
     assert np.abs(theirs["ramp.speed"] - ours["ramp.speed"][1:]).max() < 1e-13
     assert np.abs(theirs["sum.y"] - ours["sum.y"][:-1])[1:].max() < 1e-13
@@ -178,7 +188,9 @@ def test_the_master_of_fmpy_runs_it(tmp_path: Path) -> None:
 # -- command line ---------------------------------------------------------------------------------------------------
 
 
-def test_export_info_list_and_run(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_export_info_list_and_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     pair(tmp_path)
     Path("pair.toml").write_text(

@@ -77,7 +77,7 @@ def test_nested_systems_become_flat_components_and_direct_connections(load: Load
     speed, y = outputs(scenario)
     assert len(speed) == 1001
     assert np.abs(speed - (10.0 + 2.0 * np.arange(1001) / 1000.0)).max() < EXACT * 100
-    assert np.array_equal(y, 2.0 * speed)  # through km/h and back in the structure, untouched in the run
+    assert np.array_equal(y, 2.0 * speed)  # through km/h and back in the structure, non_numeric in the run
 
 
 def test_the_direction_of_a_connection_is_that_of_its_kinds(load: Load) -> None:
@@ -100,7 +100,9 @@ def test_suppressed_units_pass_the_number(load: Load) -> None:
     speed, y = outputs(load(ssd(nested(outer_wires=wire("ramp.speed", "onboard.v", suppressUnitConversion="true")))))
     assert np.abs(y - 2.0 * speed / 3.6).max() < EXACT * 100  # 10 m/s is taken for 10 km/h
     linear = '<ssc:LinearTransformation factor="3.6"/>'
-    speed, y = outputs(load(ssd(nested(outer_wires=wire("ramp.speed", "onboard.v", linear, suppressUnitConversion="1")))))
+    speed, y = outputs(
+        load(ssd(nested(outer_wires=wire("ramp.speed", "onboard.v", linear, suppressUnitConversion="1"))))
+    )
     assert np.abs(y - 2.0 * speed).max() < EXACT * 100
 
 
@@ -111,22 +113,27 @@ def test_a_connector_in_another_unit_than_the_variable_is_converted(load: Load) 
     (connection,) = load(ssd(plain)).table().connections
     assert isinstance(connection, ConnectionTable)
     assert connection.factor == pytest.approx(1.0, rel=1e-15)
-    suppressed = direct + f"<ssd:Connections>{wire('ramp.speed', 'sum.u', suppressUnitConversion='true')}</ssd:Connections>"
+    suppressed = (
+        direct + f"<ssd:Connections>{wire('ramp.speed', 'sum.u', suppressUnitConversion='true')}</ssd:Connections>"
+    )
     (connection,) = load(ssd(suppressed)).table().connections
     assert connection.factor == pytest.approx(3.6, rel=1e-15)  # the number that is shown, in km/h
 
 
 def test_a_signal_dictionary_is_a_bus(load: Load) -> None:
     bus = "".join(
-        f'<ssd:SignalDictionaryReference name="{name}" dictionary="bus"><ssd:Connectors>{connector("velocity", "inout")}'
-        "</ssd:Connectors></ssd:SignalDictionaryReference>" for name in ("here", "there")
-    )  # fmt: skip
+        f'<ssd:SignalDictionaryReference name="{name}" '
+        f'dictionary="bus"><ssd:Connectors>{connector("velocity", "inout")}'
+        "</ssd:Connectors></ssd:SignalDictionaryReference>"
+        for name in ("here", "there")
+    )
     entry = '<ssb:DictionaryEntry name="velocity"><ssc:Real/></ssb:DictionaryEntry>'
     dictionary = f'<ssb:SignalDictionary version="1.0">{entry}</ssb:SignalDictionary>'
     structure = ssd(
         f"<ssd:Elements>{RAMP}{ADDER}{bus}</ssd:Elements>"
         f"<ssd:Connections>{wire('ramp.speed', 'here.velocity')}{wire('there.velocity', 'sum.u')}</ssd:Connections>"
-        f'<ssd:SignalDictionaries><ssd:SignalDictionary name="bus">{dictionary}</ssd:SignalDictionary></ssd:SignalDictionaries>'
+        f"<ssd:SignalDictionaries><ssd:SignalDictionary "
+        f'name="bus">{dictionary}</ssd:SignalDictionary></ssd:SignalDictionaries>'
     )
     assert load(structure).table().connections == ["ramp.speed -> sum.u"]
     with pytest.raises(ValueError, match=r"dictionary 'bus' has no entry 'velocity'; did you mean 'velocities'"):
@@ -232,17 +239,21 @@ def variable(name: str, reference: int, causality: str, kind: str) -> str:
 
 LAMP, GEAR = enumeration("Lamp", off=1, dim=2, full=3), enumeration("Gear", none=0, low=10, high=20)
 KINDS = f"<TypeDefinitions>{LAMP}{GEAR}</TypeDefinitions>"
-SENDER = "".join((
-    variable("on", 1, "output", "<Boolean/>"),
-    variable("count", 2, "output", "<Integer/>"),
-    variable("lamp", 3, "output", '<Enumeration declaredType="Lamp"/>'),
-))  # fmt: skip
-TAKER = "".join((
-    variable("on", 1, "input", '<Boolean start="false"/>'),
-    variable("count", 2, "input", '<Integer start="0"/>'),
-    variable("gear", 3, "input", '<Enumeration declaredType="Gear" start="0"/>'),
-    variable("label", 4, "parameter", '<String start=""/>'),
-))  # fmt: skip
+SENDER = "".join(
+    (
+        variable("on", 1, "output", "<Boolean/>"),
+        variable("count", 2, "output", "<Integer/>"),
+        variable("lamp", 3, "output", '<Enumeration declaredType="Lamp"/>'),
+    )
+)
+TAKER = "".join(
+    (
+        variable("on", 1, "input", '<Boolean start="false"/>'),
+        variable("count", 2, "input", '<Integer start="0"/>'),
+        variable("gear", 3, "input", '<Enumeration declaredType="Gear" start="0"/>'),
+        variable("label", 4, "parameter", '<String start=""/>'),
+    )
+)
 
 
 def discrete(tmp_path: Path, wires: str, bindings: str = "") -> Scenario:
@@ -253,7 +264,9 @@ def discrete(tmp_path: Path, wires: str, bindings: str = "") -> Scenario:
         elements += f"""<ssd:Component name="{name}" source="resources/{name}.fmu">
 <ssd:Connectors>{connectors}</ssd:Connectors></ssd:Component>"""
     structure = ssd(f"{bindings}<ssd:Elements>{elements}</ssd:Elements><ssd:Connections>{wires}</ssd:Connections>")
-    members = {f"resources/{n}.fmu": described_fmu(tmp_path, n, v, KINDS) for n, v in (("send", SENDER), ("take", TAKER))}
+    members = {
+        f"resources/{n}.fmu": described_fmu(tmp_path, n, v, KINDS) for n, v in (("send", SENDER), ("take", TAKER))
+    }
     return Scenario.load(package(tmp_path / "discrete.ssp", {"SystemStructure.ssd": structure, **members}))
 
 
@@ -271,14 +284,18 @@ def mapping(kind: str, *pairs: tuple[str, str]) -> str:
         ([("0", "false")], (1.0, 0.0)),
     ],
 )
-def test_boolean_mappings_are_linear(tmp_path: Path, pairs: list[tuple[str, str]], expected: tuple[float, float]) -> None:
+def test_boolean_mappings_are_linear(
+    tmp_path: Path, pairs: list[tuple[str, str]], expected: tuple[float, float]
+) -> None:
     (table,) = discrete(tmp_path, wire("send.on", "take.on", mapping("Boolean", *pairs))).table().connections
     assert (table.factor, table.offset, table.values) == (*expected, [])
 
 
 def test_integer_mappings_are_tables(tmp_path: Path) -> None:
     (table,) = (
-        discrete(tmp_path, wire("send.count", "take.count", mapping("Integer", ("1", "7"), ("2", "2")))).table().connections
+        discrete(tmp_path, wire("send.count", "take.count", mapping("Integer", ("1", "7"), ("2", "2"))))
+        .table()
+        .connections
     )
     assert table.values == [(1.0, 7.0)]
 
@@ -291,7 +308,9 @@ def test_enumerations_are_mapped_by_the_names_of_their_items(tmp_path: Path) -> 
     (table,) = discrete(tmp_path, wire("send.lamp", "take.gear", mapping("Enumeration", *pairs))).table().connections
     assert table.values == [(1.0, 0.0), (2.0, 10.0), (3.0, 10.0)]
     pairs[2] = ("full", "hgh")
-    with pytest.raises(ValueError, match=r"line \d+: item 'full' is mapped to 'hgh', which is no item .* did you mean 'high'"):
+    with pytest.raises(
+        ValueError, match=r"line \d+: item 'full' is mapped to 'hgh', which is no item .* did you mean 'high'"
+    ):
         discrete(tmp_path, wire("send.lamp", "take.gear", mapping("Enumeration", *pairs)))
 
 
@@ -320,7 +339,9 @@ def test_elements_of_arrays_by_indices(tmp_path: Path) -> None:
     for name, (kind, size) in sizes.items():
         end = f'<ssd:Connector name="x" kind="{kind}"><ssc:Float64/><ssc:Dimension size="{size}"/></ssd:Connector>'
         source = f"resources/{name}.fmu"
-        parts[name] = f'<ssd:Component name="{name}" source="{source}"><ssd:Connectors>{end}</ssd:Connectors></ssd:Component>'
+        parts[name] = (
+            f'<ssd:Component name="{name}" source="{source}"><ssd:Connectors>{end}</ssd:Connectors></ssd:Component>'
+        )
     through = '<ssd:Connectors><ssd:Connector name="bus" kind="output"/></ssd:Connectors>'
     within = f"<ssd:Elements>{parts['send']}</ssd:Elements><ssd:Connections>{wire('send.x', 'bus')}</ssd:Connections>"
     elements = f'<ssd:System name="in">{through}{within}</ssd:System>{parts["whole"]}{parts["first"]}'
@@ -338,7 +359,7 @@ def test_a_parameter_of_the_system_reaches_the_components(load: Load) -> None:
     linear = '<ssc:LinearTransformation factor="2.5"/>'
     wires = wire("start", "ramp.x0[1]", linear)
     structure = ssd(
-        f"{start}{bound(real('start', '4'))}<ssd:Elements>{own}</ssd:Elements><ssd:Connections>{wires}</ssd:Connections>"
+        f"{start}{bound(real('start', '4'))}<ssd:Elements>{own}</ssd:Elements><ssd:Connections>{wires}</ssd:Connections>"  # noqa: E501
     )
     assert load(structure).table().components["ramp"].parameters == {"x0[1]": 10.0}
 

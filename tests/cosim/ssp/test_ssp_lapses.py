@@ -1,4 +1,6 @@
-"""Form that public packages get wrong: read with a warning that says how, refused by --strict; never another number by it."""
+"""Form that public packages get wrong: read with a warning that says how, refused by --strict; never another number by
+it.
+"""
 
 from __future__ import annotations
 
@@ -19,12 +21,12 @@ RAMP = f"""<ssd:Component name="ramp" source="resources/ramp.fmu">
 <ssd:Connectors>{connector("speed", "output", "m/s")}</ssd:Connectors></ssd:Component>"""
 ADDER = f"""<ssd:Component name="sum" source="resources/sum.fmu">
 <ssd:Connectors>{connector("u", "input", "m/s")}{connector("w", "input", "m/s")}{connector("y", "output", "m/s")}</ssd:Connectors>
-</ssd:Component>"""
+</ssd:Component>"""  # noqa: E501
 ELEMENTS = f"{connector('all', 'output', 'm/s')}</ssd:Connectors><ssd:Elements>{RAMP}{ADDER}</ssd:Elements>"
 WIRES = f"<ssd:Connections>{wire('ramp.speed', 'sum.u')}{wire('sum.y', 'all')}</ssd:Connections>"
 GOOD = ssd(f"<ssd:Connectors>{ELEMENTS}{WIRES}")
 STEP = """<ssd:DefaultExperiment startTime="0" stopTime="1"><ssd:Annotations><ssc:Annotation type="com.opensimulationplatform">
-<osp:Algorithm xmlns:osp="urn:osp">{}</osp:Algorithm></ssc:Annotation></ssd:Annotations></ssd:DefaultExperiment>"""
+<osp:Algorithm xmlns:osp="urn:osp">{}</osp:Algorithm></ssc:Annotation></ssd:Annotations></ssd:DefaultExperiment>"""  # noqa: E501
 
 U_IN_METRES, NO_SSC = (
     'name="u" kind="input"><ssc:Real unit="m/s"',
@@ -32,10 +34,26 @@ U_IN_METRES, NO_SSC = (
 )
 LAPSES: dict[str, tuple[str, str, str]] = {
     "no unit": (U_IN_METRES, U_IN_METRES.replace("m/s", ""), "unit '' is not defined in this file; taken as no unit"),
-    "unit in brackets": ('"output"><ssc:Real unit="m/s"', '"output"><ssc:Real unit="[m/s]"', "unit '[m/s]' is not defined"),
-    "unit by its name alone": ('<ssc:Unit name="m/s"><ssc:BaseUnit m="1" s="-1"/></ssc:Unit>', "", "unit 'm/s' is not defined"),
-    "element without name": ('endConnector="all"', 'endElement="" endConnector="all"', 'endElement="" names no element'),
-    "undeclared prefix": (EXPERIMENT, STEP.format("").replace(' xmlns:osp="urn:osp"', ""), "prefix 'osp' is used and not"),
+    "unit in brackets": (
+        '"output"><ssc:Real unit="m/s"',
+        '"output"><ssc:Real unit="[m/s]"',
+        "unit '[m/s]' is not defined",
+    ),
+    "unit by its name alone": (
+        '<ssc:Unit name="m/s"><ssc:BaseUnit m="1" s="-1"/></ssc:Unit>',
+        "",
+        "unit 'm/s' is not defined",
+    ),
+    "element without name": (
+        'endConnector="all"',
+        'endElement="" endConnector="all"',
+        'endElement="" names no element',
+    ),
+    "undeclared prefix": (
+        EXPERIMENT,
+        STEP.format("").replace(' xmlns:osp="urn:osp"', ""),
+        "prefix 'osp' is used and not",
+    ),
     "undeclared prefix of SSP": (NO_SSC, "", "prefix 'ssc' is used and not declared"),
 }
 
@@ -90,7 +108,9 @@ def test_a_good_package_is_read_strictly(packed: Callable[[str], Path]) -> None:
 
 def test_an_unknown_unit_goes_to_no_other(packed: Callable[[str], Path]) -> None:
     """The one leniency that would change numbers."""
-    with pytest.raises(ScenarioError, match="nothing defines the unit 'kn', so numbers cannot be brought from 'm/s' to 'kn'"):
+    with pytest.raises(
+        ScenarioError, match="nothing defines the unit 'kn', so numbers cannot be brought from 'm/s' to 'kn'"
+    ):
         Scenario.load(packed(GOOD.replace(U_IN_METRES, U_IN_METRES.replace("m/s", "kn"))))
 
 
@@ -98,7 +118,9 @@ def test_an_odd_definition_of_a_unit_is_told(packed: Callable[[str], Path]) -> N
     litres = '<ssc:Unit name="L/min"><ssc:BaseUnit m="3" s="-1" factor="0.0006"/></ssc:Unit></ssd:Units>'
     _, told = run(packed(GOOD.replace("</ssd:Units>", litres)))
     (line,) = (text for text in told if "L/min" in text)
-    assert "is defined as 0.0006 m3.s-1, usually it is 1.66667e-05 m3.s-1; values are converted by the definition" in line
+    assert (
+        "is defined as 0.0006 m3.s-1, usually it is 1.66667e-05 m3.s-1; values are converted by the definition" in line
+    )
     assert not any("km/h" in text for text in told)
 
 
@@ -107,16 +129,27 @@ def test_an_odd_definition_of_a_unit_is_told(packed: Callable[[str], Path]) -> N
     [
         ('<osp:FixedStepAlgorithm baseStepSize="0.05"/>', 0.05, None),
         (
-            '<osp:SimulationInformation><osp:FixedStepMaster description="" stepSize="0.02"/></osp:SimulationInformation>',
+            '<osp:SimulationInformation><osp:FixedStepMaster description="" '
+            'stepSize="0.02"/></osp:SimulationInformation>',
             0.02,
             None,
         ),
-        ('<osp:FixedStepAlgorithm baseStepSize="often"/>', 0.001, "FixedStepAlgorithm has the step 'often', expected seconds"),
+        (
+            '<osp:FixedStepAlgorithm baseStepSize="often"/>',
+            0.001,
+            "FixedStepAlgorithm has the step 'often', expected seconds",
+        ),
         ('<osp:FixedStepAlgorithm baseStepSize="-1"/>', 0.001, "has the step '-1', expected seconds"),
-        ('<osp:VariableStepMaster initialStepSize="0.1"/>', 0.001, "asks for VariableStepMaster, which is not carried out"),
+        (
+            '<osp:VariableStepMaster initialStepSize="0.1"/>',
+            0.001,
+            "asks for VariableStepMaster, which is not carried out",
+        ),
     ],
 )
-def test_the_step_in_an_annotation_is_read(packed: Callable[[str], Path], written: str, step: float, words: str | None) -> None:
+def test_the_step_in_an_annotation_is_read(
+    packed: Callable[[str], Path], written: str, step: float, words: str | None
+) -> None:
     scenario = Scenario.load(packed(GOOD.replace(EXPERIMENT, STEP.format(written))))
     table = scenario.table()
     assert table.step == pytest.approx(step, rel=1e-12)

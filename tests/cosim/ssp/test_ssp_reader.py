@@ -1,4 +1,6 @@
-"""Exported systems tell their observers of balises in any tool, and read back they are told by the master again, once."""
+"""Exported systems tell their observers of balises in any tool, and read back they are told by the master again,
+once.
+"""
 
 from __future__ import annotations
 
@@ -69,7 +71,11 @@ def test_read_back_every_balise_is_told_once(tmp_path: Path) -> None:
 
 def test_balises_by_instants_have_no_reader_and_that_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     scenario = small().balises(
-        position="locomotive.position", speed="locomotive.speed", layout="instants", instants=[0.1, 0.2], method="rollback"
+        position="locomotive.position",
+        speed="locomotive.speed",
+        layout="instants",
+        instants=[0.1, 0.2],
+        method="rollback",
     )
     again = Scenario.load(scenario.export_ssp(tmp_path / "small.ssp", "1.0"))
     assert "balise_reader" not in again.table().components
@@ -77,7 +83,9 @@ def test_balises_by_instants_have_no_reader_and_that_is_said(tmp_path: Path, cap
 
 
 def test_parameters_have_no_unit_of_their_own(tmp_path: Path) -> None:
-    """OMSimulator does not read a Float64 with a unit; the standard takes that of the variable where none is written."""
+    """OMSimulator does not read a Float64 with a unit; the standard takes that of the variable where none is
+    written.
+    """
     path = small().export_ssp(tmp_path / "small.ssp", "2.0")
     with zipfile.ZipFile(path) as archive:
         sets = [archive.read(name) for name in archive.namelist() if name.endswith(".ssv")]

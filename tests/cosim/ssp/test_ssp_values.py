@@ -1,4 +1,6 @@
-"""Values of every type through an SSP and back; what SSP cannot hold is refused when it is written, not when it is read."""
+"""Values of every type through an SSP and back; what SSP cannot hold is refused when it is written, not when it is
+read.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,7 @@ from typing import Any
 import pytest
 from lxml import etree
 from ssp_files import UNITS, connector, package, ramp_fmu, ssd, sum_fmu, wire
-from zoo.typed import typed_fmu
+from test_fmus.typed import typed_fmu
 
 from cosim import Scenario
 from cosim.cli import main
@@ -18,12 +20,22 @@ from cosim.errors import CosimError
 from cosim.ssp.document import SCHEMAS
 
 PARAMETERS: dict[str, Any] = {
-    "n": 2, "u_float64": 0.1, "u_int8": -128, "u_uint64": 2**64 - 1, "u_int64": -(2**63), "u_boolean": True,
-    "u_string": "ü <&> \"x'", "u_binary": "00ff", "u_enumeration": "busy", "u_vector": [0.5, -1.5],
+    "n": 2,
+    "u_float64": 0.1,
+    "u_int8": -128,
+    "u_uint64": 2**64 - 1,
+    "u_int64": -(2**63),
+    "u_boolean": True,
+    "u_string": "ü <&> \"x'",
+    "u_binary": "00ff",
+    "u_enumeration": "busy",
+    "u_vector": [0.5, -1.5],
     "u_matrix": [[1.0, 2.0], [3.0, 4.0]],
-    "u_pair_string": ["a b", ""], "u_pair_binary": ["00", "ffee"], "u_pair_boolean": [True, False],
+    "u_pair_string": ["a b", ""],
+    "u_pair_binary": ["00", "ffee"],
+    "u_pair_boolean": [True, False],
     "u_pair_uint64": [2**64 - 1, 0],
-}  # fmt: skip
+}
 
 
 def typed(folder: Path, **parameters: Any) -> Scenario:
@@ -44,7 +56,9 @@ def test_values_of_every_type_come_back(tmp_path: Path) -> None:
             checker.assertValid(etree.fromstring(archive.read(name)))
     again = Scenario.load(path)
     found = again.table().components["a"].parameters
-    assert {name: flat(value) for name, value in found.items()} == {name: flat(value) for name, value in PARAMETERS.items()}
+    assert {name: flat(value) for name, value in found.items()} == {
+        name: flat(value) for name, value in PARAMETERS.items()
+    }
     assert again.run(warn=lambda _text: None).failure is None
 
 
@@ -91,7 +105,9 @@ def test_an_enumeration_without_items_passes_as_a_number(tmp_path: Path) -> None
 
 
 @pytest.mark.compiler
-def test_an_fmu_that_cannot_be_read_is_not_called_an_unwritable_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_fmu_that_cannot_be_read_is_not_called_an_unwritable_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "junk.fmu").write_bytes(b"junk")
     (tmp_path / "s.toml").write_text('stop = 1.0\nstep = 0.1\n[components.a]\nfmu = "junk.fmu"\n')
     assert main(["export", str(tmp_path / "s.toml"), str(tmp_path / "s.ssp")]) == 2
@@ -103,7 +119,8 @@ def test_an_fmu_that_cannot_be_read_is_not_called_an_unwritable_file(tmp_path: P
 def structure(folder: Path, tail: str, unit: str = "m/s") -> Path:
     """A ramp and an adder, connected; `tail` is what stands behind the system."""
     elements = "".join(
-        f'<ssd:Component name="{name}" source="resources/{name}.fmu"><ssd:Connectors>{connector(*face)}</ssd:Connectors>'
+        f'<ssd:Component name="{name}" '
+        f'source="resources/{name}.fmu"><ssd:Connectors>{connector(*face)}</ssd:Connectors>'
         "</ssd:Component>"
         for name, face in (("ramp", ("speed", "output", unit)), ("sum", ("u", "input", "m/s")))
     )
@@ -123,7 +140,9 @@ def test_a_run_without_end_is_refused(tmp_path: Path, capsys: pytest.CaptureFixt
 
 @pytest.mark.compiler
 @pytest.mark.parametrize("factor", ["0", "INF"])
-def test_a_unit_that_measures_nothing_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], factor: str) -> None:
+def test_a_unit_that_measures_nothing_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], factor: str
+) -> None:
     path = structure(tmp_path, UNITS.replace("0.2777777777777778", factor), "km/h")
     assert main(["show", str(path)]) == 2
     error = capsys.readouterr().err

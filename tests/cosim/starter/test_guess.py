@@ -29,18 +29,34 @@ def test_words_of_a_name(text: str, words: list[str]) -> None:
 
 
 NAMED: list[tuple[Quantity, str, str | None]] = [
-    ("position", "Position", "m"), ("position", "train.s", "m"), ("position", "Weg", "km"), ("position", "abscisse_tete", "m"),
-    ("position", "x_zug", "m"), ("position", "posizione", None), ("speed", "v", "m/s"), ("speed", "vehicle.vel", "km/h"),
+    ("position", "Position", "m"),
+    ("position", "train.s", "m"),
+    ("position", "Weg", "km"),
+    ("position", "abscisse_tete", "m"),
+    ("position", "x_zug", "m"),
+    ("position", "posizione", None),
+    ("speed", "v", "m/s"),
+    ("speed", "vehicle.vel", "km/h"),
     ("speed", "Geschwindigkeit_Zug", "km/h"),
-    ("speed", "vitesse", None), ("speed", "TrainSpeed", "mph"), ("speed", "velocità", "m/s"),
-    ("wheel_speed", "vRad", "m/s"), ("wheel_speed", "axle1.speed", "m/s"),
+    ("speed", "vitesse", None),
+    ("speed", "TrainSpeed", "mph"),
+    ("speed", "velocità", "m/s"),
+    ("wheel_speed", "vRad", "m/s"),
+    ("wheel_speed", "axle1.speed", "m/s"),
     ("wheel_speed", "omega_wheel", "rad/s"),
-    ("wheel_speed", "odometer", "m/s"), ("wheel_speed", "Vitesse_roue", "km/h"), ("wheel_speed", "axle_speed", "rpm"),
-    ("effort", "F_trac", "N"), ("effort", "Zugkraft", "kN"),
-    ("effort", "effort_traction", "N"), ("effort", "TractiveForce", None),
+    ("wheel_speed", "odometer", "m/s"),
+    ("wheel_speed", "Vitesse_roue", "km/h"),
+    ("wheel_speed", "axle_speed", "rpm"),
+    ("effort", "F_trac", "N"),
+    ("effort", "Zugkraft", "kN"),
+    ("effort", "effort_traction", "N"),
+    ("effort", "TractiveForce", None),
     ("effort", "trac_brake_force", "N"),
-    ("slip", "Schlupf", "%"), ("adhesion_force", "Haftkraft", "kN"), ("mass", "m", "kg"), ("mass", "Masse", "t"),
-]  # fmt: skip
+    ("slip", "Schlupf", "%"),
+    ("adhesion_force", "Haftkraft", "kN"),
+    ("mass", "m", "kg"),
+    ("mass", "Masse", "t"),
+]
 
 
 @pytest.mark.parametrize(("quantity", "name", "unit"), NAMED)
@@ -53,28 +69,44 @@ def test_a_signal_is_known_by_its_name_and_unit(quantity: Quantity, name: str, u
 
 
 STRANGERS: list[tuple[Quantity, str, str | None, str]] = [
-    ("position", "radius", "mm", "wheel radius"), ("position", "x", "kg", ""),
+    ("position", "radius", "mm", "wheel radius"),
+    ("position", "x", "kg", ""),
     ("position", "wheel_position", "m", ""),
-    ("position", "s", None, ""), ("speed", "v", "V", "voltage"), ("speed", "v_ref", "m/s", ""),
+    ("position", "s", None, ""),
+    ("speed", "v", "V", "voltage"),
+    ("speed", "v_ref", "m/s", ""),
     ("speed", "wheel_speed", "m/s", ""),
     ("speed", "speed_limit", "m/s", ""),
-    ("speed", "speed", "rad/s", "of a shaft"), ("speed", "u1", "m/s", "wind speed"),
-    ("wheel_speed", "speed", "m/s", ""), ("wheel_speed", "wheel_radius", "m", ""), ("wheel_speed", "wheel_load", None, ""),
-    ("effort", "brake_force", "N", ""), ("effort", "torque", "N.m", ""), ("effort", "adhesion_force", "N", ""),
-    ("slip", "y", None, ""), ("mass", "x", "kg", ""),
-]  # fmt: skip
+    ("speed", "speed", "rad/s", "of a shaft"),
+    ("speed", "u1", "m/s", "wind speed"),
+    ("wheel_speed", "speed", "m/s", ""),
+    ("wheel_speed", "wheel_radius", "m", ""),
+    ("wheel_speed", "wheel_load", None, ""),
+    ("effort", "brake_force", "N", ""),
+    ("effort", "torque", "N.m", ""),
+    ("effort", "adhesion_force", "N", ""),
+    ("slip", "y", None, ""),
+    ("mass", "x", "kg", ""),
+]
 UNSURE = {("position", "radius"), ("position", "s"), ("speed", "u1")}
 
 
 @pytest.mark.parametrize(("quantity", "name", "unit", "description"), STRANGERS)
-def test_what_is_something_else_is_not_taken_for_it(quantity: Quantity, name: str, unit: str | None, description: str) -> None:
+def test_what_is_something_else_is_not_taken_for_it(
+    quantity: Quantity, name: str, unit: str | None, description: str
+) -> None:
     """A few look so much like it that they may be offered, but never as sure."""
     found = guess(quantity, [signal(name, unit, description)])
     assert found is None or ((quantity, name) in UNSURE and found.sureness != "sure")
 
 
 def test_the_best_comes_first_and_the_others_are_told() -> None:
-    signals = [signal("v2", "m/s"), signal("y", "m/s"), signal("speed", "m/s", "Speed of the train"), signal("v_soll", "m/s")]
+    signals = [
+        signal("v2", "m/s"),
+        signal("y", "m/s"),
+        signal("speed", "m/s", "Speed of the train"),
+        signal("v_soll", "m/s"),
+    ]
     found = guess("speed", signals)
     assert found is not None
     assert (found.signal.name, found.sureness, found.others) == ("speed", "sure", ["v2", "y"])

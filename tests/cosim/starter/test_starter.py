@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from zoo.build import linear_fmu
-from zoo.description import Model, Variable, description_xml
-from zoo.typed import typed_fmu
+from test_fmus.build import linear_fmu
+from test_fmus.description import Model, Variable, description_xml
+from test_fmus.typed import typed_fmu
 
 import fmu_observer
 import plant_models
@@ -44,7 +44,8 @@ def into(name: str, reference: int, unit: str | None = None, **more: Any) -> Var
     return Variable(name, reference, "input", unit=unit, start=more.pop("start", 0.0), **more)
 
 
-# -- FMUs that run -------------------------------------------------------------------------------------------------------
+# -- FMUs that run
+# -------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.compiler
@@ -68,11 +69,22 @@ def test_a_locomotive_runs_as_written_and_is_localised(version: Any, tmp_path: P
 @pytest.mark.compiler
 @pytest.mark.parametrize("version", [1, 2, 3])
 def test_a_plant_in_german_and_other_units_is_driven_in_si(version: Any, tmp_path: Path) -> None:
-    """A point of 90 t in kN, km and km/h: the observer, told in N, m and m/s, sees the speed that the FMU tells in km/h."""
+    """A point of 90 t in kN, km and km/h: the observer, told in N, m and m/s, sees the speed that the FMU tells in
+    km/h.
+    """
     units = {"Zugkraft": "kN", "Weg": "km", "Geschwindigkeit": "km/h"}
     A, B, C, D = [[0, 1], [0, 0]], [[0], [1000 / 90e3]], [[1e-3, 0], [0, 3.6]], [[0], [0]]
     fmu = linear_fmu(
-        tmp_path, "zug", A, B, C, D, version=version, inputs=["Zugkraft"], outputs=["Weg", "Geschwindigkeit"], units=units
+        tmp_path,
+        "zug",
+        A,
+        B,
+        C,
+        D,
+        version=version,
+        inputs=["Zugkraft"],
+        outputs=["Weg", "Geschwindigkeit"],
+        units=units,
     )
     made = write_starter(fmu, tmp_path / "zug.toml")
     assert made.kind == "train"
@@ -97,7 +109,9 @@ def test_an_observer_is_put_beside_a_locomotive(tmp_path: Path) -> None:
 @pytest.mark.compiler
 @pytest.mark.parametrize("version", [1, 2, 3])
 def test_without_signals_of_a_train_the_fmu_runs_alone(version: Any, tmp_path: Path) -> None:
-    """Numbers, truth values, texts, enumerations, bytes and arrays as inputs: what can be set stands there at its start value."""
+    """Numbers, truth values, texts, enumerations, bytes and arrays as inputs: what can be set stands there at its start
+    value.
+    """
     made = write_starter(typed_fmu(tmp_path, version=version), tmp_path / "mine.toml")
     assert made.kind == "alone"
     parameters = tomllib.loads(made.text)["components"]["fmu"]["parameters"]
@@ -106,7 +120,8 @@ def test_without_signals_of_a_train_the_fmu_runs_alone(version: Any, tmp_path: P
     assert Scenario.load(tmp_path / "mine.toml").run().failure is None
 
 
-# -- descriptions --------------------------------------------------------------------------------------------------------
+# -- descriptions
+# --------------------------------------------------------------------------------------------------------
 
 
 def valid(path: Path) -> Scenario:
@@ -177,14 +192,20 @@ def test_units_that_nobody_understands_ask_for_a_factor(tmp_path: Path) -> None:
     table = valid(tmp_path / "mine.toml").table()
     tables = [c for c in table.connections if not isinstance(c, str)]
     assert {(c.source, c.target, c.factor, c.units) for c in tables} == {
-        ("driver.effort", "plant.force", 1.0, "ignore"), ("plant.speed", "odometer.wheel_speed", 1.0, "ignore"),
-    }  # fmt: skip
+        ("driver.effort", "plant.force", 1.0, "ignore"),
+        ("plant.speed", "odometer.wheel_speed", 1.0, "ignore"),
+    }
     assert table.balises is None
     assert made.text.count("is not understood: write the factor") == 2
 
 
 def test_the_mass_is_taken_from_the_fmu_in_kg(tmp_path: Path) -> None:
-    parts = [into("F", 1, "N"), out("s", 2, "m"), out("v", 3, "m/s"), Variable("Masse", 4, "parameter", start=420.0, unit="t")]
+    parts = [
+        into("F", 1, "N"),
+        out("s", 2, "m"),
+        out("v", 3, "m/s"),
+        Variable("Masse", 4, "parameter", start=420.0, unit="t"),
+    ]
     write_starter(described(tmp_path, *parts), tmp_path / "mine.toml", observer="discrete_uio")
     observer = valid(tmp_path / "mine.toml").table().components["observer"]
     assert (observer.observer, observer.parameters["mass"]) == ("discrete_uio", 420e3)
@@ -202,10 +223,15 @@ def test_the_step_is_the_fmus_own(tmp_path: Path) -> None:
 def test_texts_of_a_vendor_cannot_leave_their_line(tmp_path: Path) -> None:
     wild = 'a\nstop = 1\n"] # \\ " \t \x7f é → b'
     parts = [
-        into('F "trac" -> \\ , x', 1, "N"), out("s", 2, "m"), out("v", 3, "m/s"),
-        into("odd\nname = 3", 4), Variable("p.[q] #", 5, "parameter", start=1.5),
-    ]  # fmt: skip
-    fmu = described(tmp_path, *parts, edit=('name="s"', f'name="s" description="{"".join(f"&#{ord(c)};" for c in wild)}"'))
+        into('F "trac" -> \\ , x', 1, "N"),
+        out("s", 2, "m"),
+        out("v", 3, "m/s"),
+        into("odd\nname = 3", 4),
+        Variable("p.[q] #", 5, "parameter", start=1.5),
+    ]
+    fmu = described(
+        tmp_path, *parts, edit=('name="s"', f'name="s" description="{"".join(f"&#{ord(c)};" for c in wild)}"')
+    )
     made = write_starter(fmu, tmp_path / "mine.toml")
     table = valid(tmp_path / "mine.toml").table()
     assert table.stop == 60.0
@@ -232,7 +258,8 @@ def test_a_very_large_fmu_gives_a_file_that_can_be_read(tmp_path: Path) -> None:
     assert "few[2]" in made.text
 
 
-# -- what is refused -----------------------------------------------------------------------------------------------------
+# -- what is refused
+# -----------------------------------------------------------------------------------------------------
 
 
 def test_what_is_no_fmu_or_not_for_co_simulation_is_refused(tmp_path: Path) -> None:

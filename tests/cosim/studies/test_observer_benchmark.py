@@ -1,4 +1,6 @@
-"""Comparison of observers on one recorded run: the numbers of the run itself, whoever takes part, and failures in words."""
+"""Comparison of observers on one recorded run: the numbers of the run itself, whoever takes part, and failures in
+words.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,8 @@ def benchmark() -> ObserverBenchmark:
     return benchmark_observers(two(), ["observer", "uio"], repeat=2)
 
 
-# -- the numbers of the run -------------------------------------------------------------------------------------------------
+# -- the numbers of the run
+# -------------------------------------------------------------------------------------------------
 
 
 def test_on_profile_d_every_observer_gives_the_numbers_of_the_joint_run() -> None:
@@ -97,7 +100,8 @@ def test_each_repetition_has_its_cost(benchmark: ObserverBenchmark) -> None:
         assert all(cost > 0.0 for cost in score.costs)
 
 
-# -- scores -----------------------------------------------------------------------------------------------------------------
+# -- scores
+# -----------------------------------------------------------------------------------------------------------------
 
 
 def test_errors_at_balises_are_those_of_a_naive_search(benchmark: ObserverBenchmark) -> None:
@@ -147,7 +151,8 @@ def test_a_certificate_is_held_against_both_gaps() -> None:
     assert CertifiedGap(0.5, None, None).holds_expected is None
 
 
-# -- who takes part -----------------------------------------------------------------------------------------------------------
+# -- who takes part
+# -----------------------------------------------------------------------------------------------------------
 
 
 def test_by_default_all_take_part_that_fit_and_the_others_are_named() -> None:
@@ -177,11 +182,14 @@ def test_a_scenario_without_observers_serves_shipped_ones() -> None:
     data["connections"] = ["driver.effort -> locomotive.effort", "locomotive.wheel_speed -> odometer.wheel_speed"]
     sides = find_sides(Scenario(**data))
     assert {signal: link[0] for signal, link in sides.template().items()} == {
-        "effort": "driver.effort", "wheel_speed": "locomotive.wheel_speed", "odometer": "odometer.reading",
-    }  # fmt: skip
+        "effort": "driver.effort",
+        "wheel_speed": "locomotive.wheel_speed",
+        "odometer": "odometer.reading",
+    }
 
 
-# -- failures -----------------------------------------------------------------------------------------------------------------
+# -- failures
+# -----------------------------------------------------------------------------------------------------------------
 
 
 def test_an_unknown_observer_is_refused_with_the_nearest_name() -> None:
@@ -194,7 +202,9 @@ def test_one_that_cannot_be_coupled_or_diverges_keeps_its_row_with_the_reason() 
     found = benchmark_observers(scenario, ["luenberger", "observer", "uio"])
     assert found.failed == ["luenberger", "observer"]
     reasons = {score.name: str(score.failure) for score in found.scores}
-    assert reasons["luenberger"] == "cannot be coupled: nothing in this scenario gives its inputs torque, measured_angle"
+    assert (
+        reasons["luenberger"] == "cannot be coupled: nothing in this scenario gives its inputs torque, measured_angle"
+    )
     assert reasons["observer"].startswith("diverged: its speed error reached 1e+200 m/s")
     assert found.scores[2].failure is None
     assert found.scores[2].whole is not None
@@ -206,7 +216,8 @@ def test_a_plant_that_fails_is_said() -> None:
         benchmark_observers(two().set("locomotive.train_speed", 1e308).balises(method="interpolate"), ["uio"])
 
 
-# -- what is written ------------------------------------------------------------------------------------------------------------
+# -- what is written
+# ------------------------------------------------------------------------------------------------------------
 
 
 class Texts(HTMLParser):
@@ -228,7 +239,9 @@ def test_page_picture_and_data_say_the_same(benchmark: ObserverBenchmark, tmp_pa
     assert [entry["label"] for entry in data["observers"]] == ["observer", "UIO"]
     assert data["observers"][1]["whole"]["speed"]["rms"] == benchmark.scores[1].speed_rms
     page = paths["page"].read_text(encoding="utf-8")
-    assert {"Overview", "Errors by phase", "Speed error against time", "Certificates", "Telegrams"} <= set(Texts(page).found)
+    assert {"Overview", "Errors by phase", "Speed error against time", "Certificates", "Telegrams"} <= set(
+        Texts(page).found
+    )
     assert page.count("data:image/png;base64,") == 2
     assert paths["picture"].read_bytes().startswith(b"\x89PNG")
     assert "http" not in page
@@ -246,11 +259,14 @@ def test_the_picture_has_units_and_a_point_for_each_observer(benchmark: Observer
     assert "[µs]" in cost.get_ylabel()
 
 
-# -- interrupted ------------------------------------------------------------------------------------------------------------
+# -- interrupted
+# ------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("at", [1, 2, 3])
-def test_what_was_computed_before_an_interruption_is_kept(at: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_was_computed_before_an_interruption_is_kept(
+    at: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The first run is the plant's, the others one observer each."""
     step, begun = Master.run, []
 

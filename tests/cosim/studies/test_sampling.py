@@ -39,7 +39,8 @@ def test_a_latin_hypercube_has_one_point_in_every_stratum_of_every_name(count: i
         sorted(int(count * (log(row["b"]) / log(1e6) + 0.5)) for row in rows),
     ]
     for found in strata:
-        np.testing.assert_allclose(found, range(count), atol=0 if count == 1 else 1)  # a point at a border may round over it
+        # a point at a border may round over it
+        np.testing.assert_allclose(found, range(count), atol=0 if count == 1 else 1)
     assert {row["c"] for row in rows} <= {"x", "y", "z"}
     assert rows == variations(ranges, "latin", count, seed)
 

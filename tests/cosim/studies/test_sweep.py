@@ -38,7 +38,9 @@ def travelled(outcome: Outcome) -> float:
 def swept() -> SweepResult:
     """Two masses and two latencies of the small scenario."""
     sweep = small(title="Swept").vary({"locomotive.mass": MASSES, "balises.latency": [0.0, 0.02]})
-    return sweep.run(measure={"last speed": lambda outcome: outcome["locomotive.speed"][-1]}, units={"last speed": "m/s"})
+    return sweep.run(
+        measure={"last speed": lambda outcome: outcome["locomotive.speed"][-1]}, units={"last speed": "m/s"}
+    )
 
 
 def test_each_run_is_the_one_with_these_overrides(swept: SweepResult) -> None:
@@ -83,9 +85,13 @@ def test_runs_that_fail_do_not_stop_the_others(tmp_path: Path) -> None:
     def touchy(outcome: Outcome) -> float:
         return 1.0 / (travelled(outcome) < 2.5)
 
-    sweep = plant().balises(position="train.position", speed="train.speed", layout="csv", file="balises.csv").vary(
-        {"balises.file": ["none.csv", str(tmp_path / "some.csv"), "missing.csv"], "train.train_speed": [10.0, 20.0]}
-    )  # fmt: skip
+    sweep = (
+        plant()
+        .balises(position="train.position", speed="train.speed", layout="csv", file="balises.csv")
+        .vary(
+            {"balises.file": ["none.csv", str(tmp_path / "some.csv"), "missing.csv"], "train.train_speed": [10.0, 20.0]}
+        )
+    )
     (tmp_path / "some.csv").write_text("position\n1.0\n")
     result = sweep.run(measure={"touchy": touchy, "travelled": travelled})
     assert [run.number for run in result.failed] == [0, 1, 4, 5]
@@ -124,8 +130,9 @@ def test_what_is_computed_stays_when_the_sweep_is_interrupted(tmp_path: Path) ->
         plant().vary({"train.mass": [70e3, 80e3, 90e3, 100e3]}).run(progress=interrupt, directory=tmp_path)
     assert sorted(p.name for p in tmp_path.glob("run_*")) == ["run_000", "run_001"]
     assert [run["settings"] for run in json.loads((tmp_path / "index.json").read_text())["runs"]] == [
-        {"train.mass": 70e3}, {"train.mass": 80e3},
-    ]  # fmt: skip
+        {"train.mass": 70e3},
+        {"train.mass": 80e3},
+    ]
 
 
 def test_outcomes_that_are_not_kept_are_read_from_their_folders(tmp_path: Path) -> None:
@@ -198,7 +205,9 @@ def test_a_study_over_seeds_is_the_sweep_over_them() -> None:
     assert study.errors["observer", "whole run"] == [row["observer.speed_error_max"] for row in table]
 
 
-def test_who_interrupts_a_run_stops_the_sweep_and_keeps_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_who_interrupts_a_run_stops_the_sweep_and_keeps_what_is_done(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     step, begun = Master.run, []
 
     def interrupted(master: Master) -> None:

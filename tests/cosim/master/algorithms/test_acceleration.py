@@ -8,12 +8,21 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.optimize import root
 
-from cosim.master.algorithms.acceleration import Acceleration, Aitken, FixedPoint, Newton, make_acceleration, scaled_norm
+from cosim.master.algorithms.acceleration import (
+    Acceleration,
+    Aitken,
+    FixedPoint,
+    Newton,
+    make_acceleration,
+    scaled_norm,
+)
 
 numbers = st.floats(-3.0, 3.0)
 
 
-def search(acceleration: Acceleration, g: object, z: np.ndarray, rounds: int, scale: np.ndarray | None = None) -> np.ndarray:
+def search(
+    acceleration: Acceleration, g: object, z: np.ndarray, rounds: int, scale: np.ndarray | None = None
+) -> np.ndarray:
     """The guess after so many calls of the map."""
     acceleration.begin(np.ones(len(z)) if scale is None else scale)
     for _ in range(rounds):
@@ -29,7 +38,8 @@ def test_one_value_is_found_in_two_sweeps_whatever_the_gain(gain: float, offset:
     assume(abs(start - wanted) > 1e-3)
     for made in (Aitken(1), Newton(1), Newton(1, lambda: np.array([[gain]]))):
         found = search(made, lambda z: gain * z + offset, np.array([start]), 2)
-        assert found[0] == pytest.approx(wanted, rel=1e-9, abs=1e-9)  # roundings over |1 - gain| >= 0.01 and a difference >= 1e-5
+        # roundings over |1 - gain| >= 0.01 and a difference >= 1e-5
+        assert found[0] == pytest.approx(wanted, rel=1e-9, abs=1e-9)
 
 
 @given(st.integers(1, 5), st.integers(0, 10_000), st.floats(0.1, 6.0))

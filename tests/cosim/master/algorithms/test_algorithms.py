@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from iterated_runs import prepare, run
 from mock_slaves import FMI2, Counter, Mock, component
 from scipy.linalg import block_diag, expm
-from zoo.masses import Chain, Cut, cuts
+from test_fmus.masses import Chain, Cut, cuts
 
 from cosim.components.component import Component
 from cosim.components.loading import load_block, load_fmu
@@ -32,7 +32,8 @@ def load(cut: Cut, folder: Path, version: Any = 2, **capabilities: Any) -> dict[
     return {name: load_fmu(path, name) for name, path in cut.fmus(folder, version, **capabilities).items()}
 
 
-# -- the recurrences ----------------------------------------------------------------------------------------------------
+# -- the recurrences
+# ----------------------------------------------------------------------------------------------------
 
 
 class Recurrence:
@@ -43,7 +44,9 @@ class Recurrence:
 
     def __init__(self, cut: Cut, order: Sequence[str], h: float) -> None:
         parts = [cut.parts[name] for name in order]
-        augmented = [expm(h * np.block([[p.A, p.B], [np.zeros((p.B.shape[1], p.A.shape[1] + p.B.shape[1]))]])) for p in parts]
+        augmented = [
+            expm(h * np.block([[p.A, p.B], [np.zeros((p.B.shape[1], p.A.shape[1] + p.B.shape[1]))]])) for p in parts
+        ]
         self.F = block_diag(*(e[: len(p.A), : len(p.A)] for e, p in zip(augmented, parts, strict=True)))
         self.G = block_diag(*(e[: len(p.A), len(p.A) :] for e, p in zip(augmented, parts, strict=True)))
         self.C, self.D = block_diag(*(p.C for p in parts)), block_diag(*(p.D for p in parts))
@@ -60,7 +63,9 @@ class Recurrence:
 
     def step(self, algorithm: str) -> None:
         """`new` says which connections use the value of the end of the step: then `u = L_new y+ + L_old y`."""
-        new = {"jacobi": np.zeros_like(self.newest), "gauss-seidel": self.newest, "iterate": np.ones_like(self.newest)}[algorithm]
+        new = {"jacobi": np.zeros_like(self.newest), "gauss-seidel": self.newest, "iterate": np.ones_like(self.newest)}[
+            algorithm
+        ]
         later, earlier = np.where(new, self.L, 0.0), np.where(new, 0.0, self.L)
         through = self.C @ self.G + self.D
         right = self.C @ self.F @ self.x + through @ earlier @ self.y
@@ -158,7 +163,8 @@ def test_the_order_of_listing_changes_nothing_where_every_source_comes_first() -
     law()
 
 
-# -- threads ------------------------------------------------------------------------------------------------------------
+# -- threads
+# ------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.compiler
@@ -211,7 +217,11 @@ def test_of_several_failures_the_first_of_the_plan_is_told_once_all_have_come_ba
             self.x["total"] += 1.0
 
     works = Works()
-    parts = {"good": component(works, "good"), "first": component(Fails(), "first"), "second": component(Fails(), "second")}
+    parts = {
+        "good": component(works, "good"),
+        "first": component(Fails(), "first"),
+        "second": component(Fails(), "second"),
+    }
     master = prepare(parts, [], 0.1, 5, {"algorithm": "jacobi", "threads": 3})
     with pytest.raises(RunError, match="Component 'first' at t = 0 s: doStep failed: broken"):
         master.run()
@@ -251,7 +261,8 @@ def test_the_pool_ends_with_the_run() -> None:
     assert threading.active_count() == before
 
 
-# -- the choice ---------------------------------------------------------------------------------------------------------
+# -- the choice
+# ---------------------------------------------------------------------------------------------------------
 
 
 class Held(Mock):
@@ -291,7 +302,9 @@ def test_auto_is_gauss_seidel_until_there_is_an_algebraic_loop() -> None:
     assert "each holds a state somewhere" in harmless.reason
     loop = choice("auto", {"a": Direct(), "b": Direct(), "c": Held()}, [*RING, ("a", "c")])
     assert (loop.algorithm, loop.iterated) == ("iterate", (("a", "b"),))
-    assert loop.reason == ("There is an algebraic loop, a.u -> a.y -> b.u -> b.y -> a.u; the rest is stepped by Gauss-Seidel.")
+    assert loop.reason == (
+        "There is an algebraic loop, a.u -> a.y -> b.u -> b.y -> a.u; the rest is stepped by Gauss-Seidel."
+    )
     assert loop.groups == (("a", "b"), ("c",))
 
 
@@ -331,5 +344,7 @@ def test_iterate_takes_every_loop_and_says_where_there_is_none() -> None:
 def test_a_loop_that_is_only_possible_is_noted_and_stepped_as_ever() -> None:
     made = choice("auto", {"a": Silent(), "b": Direct()}, RING)
     assert made.algorithm == "gauss-seidel"
-    assert made.notes[0].startswith("Possible algebraic loop a.u -> a.y -> b.u -> b.y -> a.u: an FMU in it does not say")
+    assert made.notes[0].startswith(
+        "Possible algebraic loop a.u -> a.y -> b.u -> b.y -> a.u: an FMU in it does not say"
+    )
     assert choice("iterate", {"a": Silent(), "b": Direct()}, RING).notes == ()

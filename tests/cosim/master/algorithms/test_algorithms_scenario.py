@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from zoo.masses import DIVERGENT, Chain, Loop, Part, cuts
+from test_fmus.masses import DIVERGENT, Chain, Loop, Part, cuts
 
 import cosim
 import cosim.cli
@@ -30,11 +30,19 @@ def test_the_summary_says_what_was_chosen_and_why(tmp_path: Path) -> None:
     told = outcome.result.summary["master"]["algorithm"]
     assert told["name"] == "iterate"
     assert told["reason"] == (
-        "There is an algebraic loop, first.u -> first.y -> second.u -> second.y -> first.u; the rest is stepped by Gauss-Seidel."
+        "There is an algebraic loop, first.u -> first.y -> second.u -> second.y -> first.u; the rest is stepped by "
+        "Gauss-Seidel."
     )
     assert told["groups"] == [["first", "second"]]
     assert told["loops"][0]["iterated"] == ["second.y"]
-    assert set(told["loops"][0]) >= {"mean_iterations", "max_iterations", "largest_residual", "worst_step", "method", "jacobian"}
+    assert set(told["loops"][0]) >= {
+        "mean_iterations",
+        "max_iterations",
+        "largest_residual",
+        "worst_step",
+        "method",
+        "jacobian",
+    }
 
 
 @pytest.mark.compiler
@@ -87,13 +95,17 @@ def test_a_component_of_an_iterated_loop_takes_every_step(tmp_path: Path) -> Non
         .add("first", fmu="first.fmu")
         .add("second", fmu="second.fmu", every=2)
     )
-    with pytest.raises(cosim.CosimError, match="second: every = 2 is not possible: it is part of a loop that is iterated"):
+    with pytest.raises(
+        cosim.CosimError, match="second: every = 2 is not possible: it is part of a loop that is iterated"
+    ):
         made.connect(*DIVERGENT.connections).run()
 
 
 @pytest.mark.compiler
 def test_a_loop_that_does_not_converge_keeps_the_results_and_shows_its_residuals(tmp_path: Path, capsys: Any) -> None:
-    """Too few sweeps for the method: the run fails on the command line without a traceback, and the rows so far are written."""
+    """Too few sweeps for the method: the run fails on the command line without a traceback, and the rows so far are
+    written.
+    """
     turn = np.array([[0.0, -2.0], [2.0, 0.0]])
     parts = {
         name: Part(name, turn, np.zeros((2, 1)), np.array([[0.0, 1.0]]), np.array([[gain]]), ("u",), ("y",), (1.0, 0.0))

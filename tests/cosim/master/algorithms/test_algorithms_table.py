@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from iterated_runs import run
 from test_algorithms import load, worst_error
-from zoo.masses import Chain, cuts
+from test_fmus.masses import Chain, cuts
 
 PAGE = Path(__file__).parents[4] / "docs" / "algorithms.md"
 CHAIN = Chain.two()
@@ -49,7 +49,9 @@ def line(name: str, way: str, numbers: tuple[float, float, float, float]) -> str
 @pytest.mark.parametrize(("name", "way"), ROWS)
 def test_a_row_of_the_table_is_what_comes_out(tmp_path: Path, name: str, way: str) -> None:
     """To the digits shown; an energy that is kept to rounding is shown as such."""
-    found = re.search(rf"^\| {re.escape(name)} \| {re.escape(way)} \|(.*)\|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
+    found = re.search(
+        rf"^\| {re.escape(name)} \| {re.escape(way)} \|(.*)\|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE
+    )
     assert found is not None
     coarse, fine, order, gain = (float(cell) for cell in found[1].split("|"))
     numbers = measured(tmp_path, name, way)

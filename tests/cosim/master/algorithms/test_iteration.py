@@ -1,4 +1,6 @@
-"""Loops iterated within a step: against closed forms, against the implicit recurrence, and everything that can go wrong."""
+"""Loops iterated within a step: against closed forms, against the implicit recurrence, and everything that can go
+wrong.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,7 @@ from iterated_runs import prepare, run
 from mock_slaves import EventMode, Mock, component
 from scipy.optimize import brentq
 from test_algorithms import ALL_CUTS, CHAIN, as_array, load, order_of, recurrence, worst_error
-from zoo.masses import CONVERGENT, DIVERGENT, Chain, Loop, Part, cuts
+from test_fmus.masses import CONVERGENT, DIVERGENT, Chain, Loop, Part, cuts
 
 from cosim.components.component import Component
 from cosim.components.loading import load_block, load_fmu
@@ -36,7 +38,8 @@ def by(method: str, **more: Any) -> dict[str, Any]:
     return {"iteration": {"method": method, **more}}
 
 
-# -- algebraic loops ----------------------------------------------------------------------------------------------------
+# -- algebraic loops
+# ----------------------------------------------------------------------------------------------------
 
 
 def driven(gains: tuple[np.ndarray, np.ndarray], offsets: tuple[np.ndarray, np.ndarray]) -> dict[str, Part]:
@@ -92,13 +95,23 @@ def test_a_constant_loop_stands_on_its_solution(tmp_path: Path, loop: Loop, meth
 @pytest.mark.parametrize(
     ("n", "gain", "method"),
     [
-        (1, 0.5, "fixed-point"), (3, 0.5, "fixed-point"), (1, 0.5, "aitken"), (1, 3.0, "aitken"),
-        (1, 3.0, "newton"), (3, 0.5, "newton"), (3, 2.0, "newton"), (6, 3.0, "newton"),
+        (1, 0.5, "fixed-point"),
+        (3, 0.5, "fixed-point"),
+        (1, 0.5, "aitken"),
+        (1, 3.0, "aitken"),
+        (1, 3.0, "newton"),
+        (3, 0.5, "newton"),
+        (3, 2.0, "newton"),
+        (6, 3.0, "newton"),
     ],
-)  # fmt: skip
+)
 @pytest.mark.parametrize("directional", [False, True])
-def test_a_moving_loop_is_solved_at_every_point(tmp_path: Path, n: int, gain: float, method: str, directional: bool) -> None:
-    """An accepted residual of 1e-9 of the value leaves at most its condition times as much in the solution (here below 30)."""
+def test_a_moving_loop_is_solved_at_every_point(
+    tmp_path: Path, n: int, gain: float, method: str, directional: bool
+) -> None:
+    """An accepted residual of 1e-9 of the value leaves at most its condition times as much in the solution (here below
+    30).
+    """
     parts = random_loop(n, gain, n)
     table, summary = run(build(parts, tmp_path, directional=directional), crossed(n), 0.05, 30, by(method))
     found = np.stack([table[f"first.y{i}"] for i in range(n)], axis=1)
@@ -117,7 +130,9 @@ def test_a_moving_loop_is_solved_at_every_point(tmp_path: Path, n: int, gain: fl
 def test_a_part_that_gives_no_derivatives_is_learnt(tmp_path: Path) -> None:
     """One declares directional derivatives and the other does not: no Jacobian from them, Broyden's updates instead."""
     parts = random_loop(2, 2.0, 5)
-    components = build({"first": parts["first"]}, tmp_path, directional=True) | build({"second": parts["second"]}, tmp_path)
+    components = build({"first": parts["first"]}, tmp_path, directional=True) | build(
+        {"second": parts["second"]}, tmp_path
+    )
     table, summary = run(components, crossed(2), 0.05, 20)
     np.testing.assert_allclose(table["first.y1"], solution(parts, table["time"])[:, 1], rtol=0.0, atol=1e-7)
     assert summary["loops"][0]["jacobian"] == "Broyden updates"
@@ -170,7 +185,8 @@ def test_a_nonlinear_loop_is_solved_at_every_point(method: str) -> None:
     np.testing.assert_allclose(table["a.y"], wanted, rtol=1e-8, atol=1e-9)
 
 
-# -- loops with states --------------------------------------------------------------------------------------------------
+# -- loops with states
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.compiler
@@ -247,12 +263,14 @@ def test_the_listing_changes_an_iterated_loop_within_the_tolerance_only(tmp_path
     @settings(max_examples=6)
     def law(names: list[str]) -> None:
         for name, values in result(names).items():
-            np.testing.assert_allclose(values, first[name], rtol=0.0, atol=15 * 1e-8)  # residual 1e-9 times a condition below 10
+            # residual 1e-9 times a condition below 10
+            np.testing.assert_allclose(values, first[name], rtol=0.0, atol=15 * 1e-8)
 
     law()
 
 
-# -- balises inside a loop ----------------------------------------------------------------------------------------------
+# -- balises inside a loop
+# ----------------------------------------------------------------------------------------------
 
 
 class Controller(Listener):
@@ -293,7 +311,9 @@ LAYOUTS: dict[str, tuple[list[str], list[tuple[str, str]], list[str]]] = {
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("method", ["rollback", "interpolate"])
 def test_balises_inside_an_iterated_loop_are_told_once_and_leave_no_trace(method: Any, layout: str) -> None:
-    """The plant moves bit for bit as without them; each telegram comes once, at the instant at which the plant is there."""
+    """The plant moves bit for bit as without them; each telegram comes once, at the instant at which the plant is
+    there.
+    """
     places = (0.6, 1.3, 2.9, 2.95, 5.0)
     names, pairs, loop = LAYOUTS[layout]
     systems = {"plant": Pushed, "listener": Controller, "driver": Driver}
@@ -312,7 +332,8 @@ def test_balises_inside_an_iterated_loop_are_told_once_and_leave_no_trace(method
     for name in ("plant.position", "plant.speed", "listener.push"):
         assert told[name][points].tobytes() == plain[name].tobytes()
     if layout == "receiver in the loop":
-        np.testing.assert_allclose(plain["plant.speed"], 10.0 / 1.03 ** np.arange(11), rtol=1e-8)  # v+ = v - 0.1 * 0.3 v+
+        # v+ = v - 0.1 * 0.3 v+
+        np.testing.assert_allclose(plain["plant.speed"], 10.0 / 1.03 ** np.arange(11), rtol=1e-8)
     assert [event.position for event in told.events] == list(places)
     assert told["listener.heard"][-1] == len(places)
     if method == "rollback":
@@ -320,7 +341,8 @@ def test_balises_inside_an_iterated_loop_are_told_once_and_leave_no_trace(method
         np.testing.assert_allclose(told.after("listener.at"), [e.stamp for e in told.events], rtol=0.0, atol=1e-12)
 
 
-# -- what the summary tells ---------------------------------------------------------------------------------------------
+# -- what the summary tells
+# ---------------------------------------------------------------------------------------------
 
 
 def test_the_summary_tells_of_sweeps_and_residuals() -> None:
@@ -343,7 +365,8 @@ def test_the_summary_tells_of_sweeps_and_residuals() -> None:
     assert abs(table["a.y"][1] - 0.2) < 1e-3
 
 
-# -- what can go wrong --------------------------------------------------------------------------------------------------
+# -- what can go wrong
+# --------------------------------------------------------------------------------------------------
 
 
 class NoSolution(Bent):
@@ -516,7 +539,9 @@ def test_discrete_values_are_passed_on_whole() -> None:
 
 
 def test_a_rejected_step_leaves_no_trace_in_what_was_learnt() -> None:
-    """Step doubling saves and restores the algorithm with everything else: taking the same step again gives the same bits."""
+    """Step doubling saves and restores the algorithm with everything else: taking the same step again gives the same
+    bits.
+    """
     master = prepare({"a": component(Bent(), "a")}, ["a.y -> a.u"], 0.5, 5)
     master.run()
     system = master.system
@@ -534,7 +559,9 @@ def test_a_rejected_step_leaves_no_trace_in_what_was_learnt() -> None:
 def test_step_doubling_and_iteration_go_together() -> None:
     master = prepare({"a": component(Bent(), "a")}, ["a.y -> a.u"], 0.5, 5)
     made = master.system.algorithm
-    again = Master(master.plan, master.axis, algorithm=lambda _: made, control=lambda system: DoublingStep(system, 1e-6))
+    again = Master(
+        master.plan, master.axis, algorithm=lambda _: made, control=lambda system: DoublingStep(system, 1e-6)
+    )
     again.run()
     close(master.plan)
     table = again.recorder.table()

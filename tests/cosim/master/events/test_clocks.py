@@ -13,7 +13,7 @@ from event_runs import parts, prepare, run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mock_slaves import Counter, component
-from zoo.events import (
+from test_fmus.events import (
     DELAY,
     alarm_times,
     countdown_fmu,
@@ -55,7 +55,8 @@ def ticks_of(slave: Clocked, h: float = 0.07, count: int = 10, **how: Any) -> li
     return slave.seen
 
 
-# -- instants of C examples ---------------------------------------------------------------------------------------------
+# -- instants of C examples
+# ---------------------------------------------------------------------------------------------
 
 
 @given(steps)
@@ -82,10 +83,13 @@ def test_clock_instants_are_exact_to_rounding(folder: Path, h: float) -> None:
 @given(steps)
 @settings(max_examples=20)
 def test_a_triggered_clock_takes_its_value_along_at_the_exact_instant(folder: Path, step: tuple[float, int]) -> None:
-    """The source returns early where nobody expected it; the integral of the receiver tells the instants: sum level (t - t_k)."""
+    """The source returns early where nobody expected it; the integral of the receiver tells the instants: sum level (t
+    - t_k).
+    """
     h, count = step
     seen = run(parts(s=triggered_fmu(folder), r=receiver_fmu(folder)), WIRES, h, count)
-    assert seen.end("r.integral") == pytest.approx(received_integral(h * count), abs=1e-8)  # 17 crossings, each 1e-9 s at most
+    # 17 crossings, each 1e-9 s at most
+    assert seen.end("r.integral") == pytest.approx(received_integral(h * count), abs=1e-8)
     expected = crossing_times(h * count - EDGE)
     np.testing.assert_allclose(seen.jumps("r.when")[: len(expected)], expected, rtol=0.0, atol=1e-9)
 
@@ -100,10 +104,11 @@ def test_a_countdown_rings_its_delay_after_what_armed_it(folder: Path) -> None:
 
 
 def test_without_event_mode_the_loss_shows(folder: Path) -> None:
-    """The same models without event mode, steps of 100 ms: 24 of 34 ticks are not seen apart, and the integral is 0.086 off.
+    """The same models without event mode, steps of 100 ms: 24 of 34 ticks are not seen apart, and the integral is 0.086
+    off.
 
-    The crossings at k 0.173 s, k = 1 ... 5, are seen at the ends of their steps and, stepped after the source, taken from the
-    beginnings of these on: 0.1, 0.3, 0.5, 0.6, 0.8 s instead of 0.173, 0.346, 0.519, 0.692, 0.865 s.
+    The crossings at k 0.173 s, k = 1 ... 5, are seen at the ends of their steps and, stepped after the source, taken
+    from the beginnings of these on: 0.1, 0.3, 0.5, 0.6, 0.8 s instead of 0.173, 0.346, 0.519, 0.692, 0.865 s.
     """
     source, sink = triggered_fmu(folder, "blind", event_mode=False), receiver_fmu(folder, "deaf", event_mode=False)
     seen = run(parts(s=source, r=sink), ["s.crossing_value -> r.tick_value"], 0.1, 10)
@@ -115,7 +120,8 @@ def test_without_event_mode_the_loss_shows(folder: Path) -> None:
     assert len(periodic_ticks(1.0)) == 34
 
 
-# -- kinds of clocks ----------------------------------------------------------------------------------------------------
+# -- kinds of clocks
+# ----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", ["constant", "fixed", "tunable"])
@@ -184,7 +190,8 @@ def test_simultaneous_clocks_are_set_by_priority() -> None:
     assert order == [[92, 91, 93], [92], [92, 91, 93], [92]]
 
 
-# -- what clocks may not say --------------------------------------------------------------------------------------------
+# -- what clocks may not say
+# --------------------------------------------------------------------------------------------
 
 
 def _nothing_of_nothing(_references: Any, counters: Any, resolutions: Any, qualifiers: Any) -> None:
@@ -213,7 +220,9 @@ def test_impossible_intervals_are_refused_with_component_clock_and_time(slave: C
 
 
 def test_an_interval_that_turns_bad_on_the_way_ends_the_run_with_what_was_computed() -> None:
-    master = prepare([component(Clocked("changing", [(0.1, CHANGED), (0.1, CHANGED), (math.nan, CHANGED)]), "c")], [], 0.07, 10)
+    master = prepare(
+        [component(Clocked("changing", [(0.1, CHANGED), (0.1, CHANGED), (math.nan, CHANGED)]), "c")], [], 0.07, 10
+    )
     with pytest.raises(RunError, match=r"Component 'c' at t = 0.2 s: clock 'tick' \(changing\) has the interval nan"):
         master.run()
     close(master.plan)
@@ -230,11 +239,14 @@ def test_a_countdown_of_zero_rings_at_the_instant_that_arms_it(folder: Path) -> 
     assert seen.jumps("c.alarms") == [0.21]
 
 
-# -- connections --------------------------------------------------------------------------------------------------------
+# -- connections
+# --------------------------------------------------------------------------------------------------------
 
 
 def test_one_clock_may_trigger_several_and_unconnected_ones_stay_silent(folder: Path) -> None:
-    components = parts(s=triggered_fmu(folder), r=receiver_fmu(folder), other=receiver_fmu(folder), lonely=receiver_fmu(folder))
+    components = parts(
+        s=triggered_fmu(folder), r=receiver_fmu(folder), other=receiver_fmu(folder), lonely=receiver_fmu(folder)
+    )
     wires = [*WIRES, "s.crossing -> other.tick", "s.crossing_value -> other.tick_value"]
     seen = run(components, wires, 0.1, 10)
     np.testing.assert_array_equal(seen["r.integral"], seen["other.integral"])
@@ -294,12 +306,17 @@ def test_descriptions_hold_the_attributes_of_clocks(folder: Path) -> None:
     assert not any(v.type == "Clock" for v in read_description(timed_fmu(folder)).modelVariables)
 
 
-# -- in a scenario ------------------------------------------------------------------------------------------------------
+# -- in a scenario
+# ------------------------------------------------------------------------------------------------------
 
 
 def test_a_scenario_connects_clocks_and_may_leave_events_local(folder: Path) -> None:
     def outcome(**master: Any) -> Any:
-        s = cosim.Scenario(stop=1.0, step=0.1).add("s", fmu=str(triggered_fmu(folder))).add("r", fmu=str(receiver_fmu(folder)))
+        s = (
+            cosim.Scenario(stop=1.0, step=0.1)
+            .add("s", fmu=str(triggered_fmu(folder)))
+            .add("r", fmu=str(receiver_fmu(folder)))
+        )
         s.connect(*WIRES)
         return s.master(**master).run() if master else s.run()
 
@@ -314,5 +331,9 @@ def test_a_scenario_connects_clocks_and_may_leave_events_local(folder: Path) -> 
 
 
 def test_the_structure_of_a_scenario_with_clocks_can_be_shown(folder: Path) -> None:
-    s = cosim.Scenario(stop=1.0, step=0.1).add("r", fmu=str(receiver_fmu(folder))).add("s", fmu=str(triggered_fmu(folder)))
+    s = (
+        cosim.Scenario(stop=1.0, step=0.1)
+        .add("r", fmu=str(receiver_fmu(folder)))
+        .add("s", fmu=str(triggered_fmu(folder)))
+    )
     assert s.connect(*WIRES).structure().text()

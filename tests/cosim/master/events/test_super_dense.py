@@ -16,7 +16,7 @@ from event_runs import EventRun, parts, prepare, run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mock_slaves import FMI2, Counter, EventMode, Mock, component
-from zoo.events import (
+from test_fmus.events import (
     INSTANTS,
     NEVER_SETTLES,
     awkward_fmu,
@@ -54,7 +54,8 @@ def rows_at(seen: EventRun, time: float) -> np.ndarray:
     return np.flatnonzero(np.abs(seen.time - time) < 1e-9)
 
 
-# -- at the same instant ------------------------------------------------------------------------------------------------
+# -- at the same instant
+# ------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("version", [1, 2, 3])
@@ -70,11 +71,14 @@ def test_whoever_integrates_a_discrete_value_does_so_from_the_exact_instant(
         h,
         count,
     )
-    assert seen.end("i.integral") == pytest.approx(timed_integral(h * count), abs=2e-8)  # 4 jumps of 4 at most, 1e-9 s each
+    # 4 jumps of 4 at most, 1e-9 s each
+    assert seen.end("i.integral") == pytest.approx(timed_integral(h * count), abs=2e-8)
 
 
 def test_left_local_the_jump_arrives_at_the_communication_point_and_the_loss_shows(folder: Path) -> None:
-    """Jumps at 0.07, 0.255, 0.4, 0.7123 s; stepped after the source, the integrator feels them from 0, 0.2, 0.3, 0.7 s on."""
+    """Jumps at 0.07, 0.255, 0.4, 0.7123 s; stepped after the source, the integrator feels them from 0, 0.2, 0.3, 0.7 s
+    on.
+    """
     wires, components = ["s.level -> i.u"], lambda: parts(s=timed_fmu(folder), i=integrator_fmu(folder))
     together, alone = run(components(), wires, 0.1, 10), run(components(), wires, 0.1, 10, events="local")
     assert together.end("i.integral") == pytest.approx(timed_integral(1.0), abs=ULPS)
@@ -105,9 +109,12 @@ def test_a_chain_passes_a_change_on_within_one_instant(folder: Path) -> None:
 
 def test_the_order_of_listing_does_not_matter(folder: Path) -> None:
     made = {
-        "s": triggered_fmu(folder), "r": receiver_fmu(folder), "t": timed_fmu(folder), "i": integrator_fmu(folder),
+        "s": triggered_fmu(folder),
+        "r": receiver_fmu(folder),
+        "t": timed_fmu(folder),
+        "i": integrator_fmu(folder),
         "c": countdown_fmu(folder),
-    }  # fmt: skip
+    }
     wires = [*WIRES, "t.level -> i.u", "s.crossing -> c.start"]
     reference = None
     for order in list(itertools.permutations(made))[::17]:
@@ -151,19 +158,24 @@ def test_discrete_inputs_change_in_event_mode_only() -> None:
     np.testing.assert_allclose([time for time, _ in flag.seen], [0.3, 0.6, 0.9], rtol=0.0, atol=ULPS)
 
 
-# -- taken back and redone ----------------------------------------------------------------------------------------------
+# -- taken back and redone
+# ----------------------------------------------------------------------------------------------
 
 
 def test_a_redone_step_leaves_no_trace(folder: Path) -> None:
-    """Bit-identical with a run in which the same instants were announced beforehand and nothing had to be taken back."""
+    """Bit-identical with a run in which the same instants were announced beforehand and nothing had to be taken
+    back.
+    """
     level = 0.173
     instants = tuple(level * k for k in range(1, 6))
     told = timed_fmu(folder, "told", instants=instants, levels=(1.0, 2.0, 3.0, 4.0, 5.0), first=0.0)
 
     def bystanders() -> list[Component]:
         return [
-            block(Motion(), "plant"), block(Listener(), "listener"), *parts(i=integrator_fmu(folder)),
-        ]  # fmt: skip
+            block(Motion(), "plant"),
+            block(Listener(), "listener"),
+            *parts(i=integrator_fmu(folder)),
+        ]
 
     wires = ["s.{} -> i.u", "plant.speed -> listener.speed"]
     unknown = run([*bystanders(), *parts(s=triggered_fmu(folder))], [w.format("count") for w in wires], 0.1, 10)
@@ -266,7 +278,8 @@ def test_who_takes_whole_steps_only_gets_values_at_the_next_point_and_is_noted(f
     ]
 
 
-# -- with everything else -----------------------------------------------------------------------------------------------
+# -- with everything else
+# -----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("method", ["rollback", "predict", "interpolate"])
@@ -282,7 +295,9 @@ def test_balises_are_told_once_whatever_events_divide_the_step(
         balises = Balises(layout, receivers=["listener"], method=method, channel=Channel(latency=latency))
         events = parts(s=triggered_fmu(folder), r=receiver_fmu(folder)) if with_events else []
         components = [block(Motion(), "plant"), block(Listener(), "listener"), *events]
-        return run(components, ["plant.speed -> listener.speed", *(WIRES if with_events else [])], 0.1, 10, balises=balises)
+        return run(
+            components, ["plant.speed -> listener.speed", *(WIRES if with_events else [])], 0.1, 10, balises=balises
+        )
 
     divided, whole = telegrams(True), telegrams(False)
     logs = [seen.master.balises.mailbox.log for seen in (divided, whole)]  # type: ignore[union-attr]
@@ -327,7 +342,8 @@ def test_events_are_hit_whatever_algorithm_and_step_control(folder: Path, how: d
     assert (seen.end("r.count"), seen.end("p.count")) == (5.0, 34.0)
 
 
-# -- the end of the run -------------------------------------------------------------------------------------------------
+# -- the end of the run
+# -------------------------------------------------------------------------------------------------
 
 
 def test_a_request_to_terminate_ends_the_run_with_everybody_at_that_time(folder: Path) -> None:
@@ -353,7 +369,8 @@ def test_all_who_ask_for_the_end_are_named(folder: Path) -> None:
     assert seen.master.ended_early == "Components 'a' and 'b' asked to terminate at t = 0.25 s."
 
 
-# -- bad answers --------------------------------------------------------------------------------------------------------
+# -- bad answers
+# --------------------------------------------------------------------------------------------------------
 
 
 def planned(plan: Callable[[float, int], float], h: float = 0.1, count: int = 10) -> tuple[list[float], EventRun]:
@@ -373,7 +390,12 @@ def test_an_event_at_a_communication_point_happens_once(error: float) -> None:
 
 def test_instants_that_differ_by_rounding_are_one() -> None:
     slaves = [Planned(lambda _t, n, e=e: 0.25 + e if n == 0 else math.inf) for e in (0.0, 5e-10)]
-    run([component(s, f"s{i}") for i, s in enumerate(slaves)] + [component(Counter(), "c")], ["s0.events -> c.rate"], 0.1, 10)
+    run(
+        [component(s, f"s{i}") for i, s in enumerate(slaves)] + [component(Counter(), "c")],
+        ["s0.events -> c.rate"],
+        0.1,
+        10,
+    )
     assert slaves[0].seen == [0.25]
     wires = ["s0.events -> c.rate", "s1.events -> d.rate"]
     slaves = [Planned(lambda _t, n, e=e: 0.25 + e if n == 0 else math.inf) for e in (0.0, 5e-10)]
@@ -421,4 +443,5 @@ def test_events_at_the_start_are_seen_in_the_first_row() -> None:
     slave = Clocked("constant", intervalDecimal=0.25)
     seen = run([component(slave, "s"), component(Counter(), "c")], ["s.ticks -> c.rate"], 0.1, 5)
     assert seen["s.ticks"][0] == 1.0
-    assert seen.end("c.total") == pytest.approx(0.25 + 2 * 0.25, abs=ULPS)  # the tick at 0.5 s comes with the last point
+    # the tick at 0.5 s comes with the last point
+    assert seen.end("c.total") == pytest.approx(0.25 + 2 * 0.25, abs=ULPS)

@@ -1,0 +1,111 @@
+"""The watched plant: the planned component whose position and speed outputs find the balises."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from cosim.balises.plant_error import PlantError
+from cosim.components.component import Component
+from cosim.coupling.plan import PlannedComponent
+
+
+class PlantMonitor:
+    """Steps the plant and reads its position and speed.
+
+    Args:
+        planned: the plant in the plan.
+        position: column of its position within its outputs. speed: column of its speed.
+        position_scale, speed_scale: factors to [m] and [m/s].
+    """
+
+    def __init__(
+        self,
+        planned: PlannedComponent,
+        position: int,
+        speed: int,
+        position_scale: float = 1.0,
+        speed_scale: float = 1.0,
+    ) -> None:
+        self._planned = planned
+        self._position, self._speed = position, speed
+        self._scales = position_scale, speed_scale
+        self.redo_differences = 0
+        self.error = PlantError()
+        """What the plant's own solver leaves open of its position."""
+
+    @property
+    def position_column(self) -> int:
+        """Column of the position within the plant's outputs."""
+        return self._position
+
+    @property
+    def speed_column(self) -> int:
+        """Column of the speed within the plant's outputs."""
+        return self._speed
+
+    @property
+    def speed_scale(self) -> float:
+        """Factor from the plant's own unit of speed to [m/s]."""
+        return self._scales[1]
+
+    @property
+    def position_scale(self) -> float:
+        """Factor from the plant's own unit of position to [m]."""
+        return self._scales[0]
+
+    @property
+    def component(self) -> Component:
+        """The plant."""
+        return self._planned.component
+
+    @property
+    def outputs(self) -> np.ndarray:
+        """All outputs of the plant, a view, shape (q,)."""
+        return self._planned.outputs
+
+    @property
+    def position(self) -> float:
+        """Position [m]."""
+        return float(self._planned.outputs[self._position]) * self._scales[0]
+
+    @property
+    def speed(self) -> float:
+        """Speed [m/s]."""
+        return float(self._planned.outputs[self._speed]) * self._scales[1]
+
+    def between(self, start: np.ndarray, share: float, position: float) -> np.ndarray:
+        """The plant's outputs at a share of a step that began with outputs `start`, where its position was `position`
+        [m].
+
+        Continuous outputs lie on a line between the ends, discrete ones are held, the position is the given one.
+        """
+        end = self._planned.outputs
+        outputs = np.where(self._planned.continuous, start + share * (end - start), start)
+        outputs[self._position] = position / self._scales[0]
+        return outputs
+
+    def step(self, t: float, until: float) -> None:
+        """Send the inputs, advance to `until` [s], read outputs."""
+        self._planned.drive(t, until)
+
+    def send(self, t: float, until: float) -> None:
+        """Send the prepared inputs for a step from `t` to `until` [s]."""
+        self._planned.send(t, until)
+
+    def read(self) -> None:
+        """Read the outputs."""
+        self._planned.read()
+
+    def save(self) -> Any:
+        """Save the plant's state."""
+        return self.component.save()
+
+    def restore(self, state: Any) -> None:
+        """Restore the plant's state."""
+        self.component.restore(state)
+
+    def release(self, state: Any) -> None:
+        """Free a saved state."""
+        self.component.release(state)

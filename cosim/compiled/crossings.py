@@ -1,0 +1,129 @@
+"""Crossings: steps over a balise that the stepper does by itself, where everything about them is ordinary.
+
+The plant is localised by rollback and everybody is told at once: such a step ends with a record of the crossing, which
+Python makes into a telegram when the stretch is over. Knows no master.
+"""
+
+from __future__ import annotations
+
+import ctypes
+
+import numpy as np
+
+from cosim.balises.delivery import OUTCOMES
+from cosim.balises.layout import InstantLayout, TrackLayout
+from cosim.balises.localiser import ACCELERATION_LIMIT
+from cosim.balises.rollback import RollbackLocaliser
+from cosim.balises.service import BaliseService
+from cosim.compiled.journal import Call
+from cosim.compiled.notifying import Telling
+from cosim.compiled.program import CPassed, Program
+from cosim.components.component import NEVER
+from cosim.coupling.plan import Plan
+
+AT_MOST = 256
+"""Crossings in one stretch."""
+
+WORDS = (*OUTCOMES, "told")
+"""By rank; the last one stands for an outcome that is not known."""
+
+
+class Crossings:
+    """What the stepper needs for steps over balises.
+
+    Args:
+        program: the plan in C. plan: prepared. service: of the run.
+        tellings: of the receivers that can be told by the stepper, by place in the plan.
+    """
+
+    def __init__(self, program: Program, plan: Plan, service: BaliseService, tellings: dict[int, Telling]) -> None:
+        assert isinstance(service.localiser, RollbackLocaliser)
+        self.service, self.localiser, self._head = service, service.localiser, program.head.balises
+        self._tellings, self._slaves, self._told = tellings, len(plan.steps), 0
+        self._places = {telling.component.name: place for place, telling in sorted(tellings.items())}
+        self._possible = set(self._places) == {r.planned.component.name for r in service.receivers} and self._is_plain()
+        self._prepare(program, plan)
+
+    def allow(self, wanted: bool) -> bool:
+        """Whether the coming stretch may hold such steps; to be asked before each."""
+        idle = wanted and self._possible and self.service.has_nothing_found
+        idle = idle and all(telling.component.next_event == NEVER for telling in self._tellings.values())
+        self._head.on = idle
+        if idle:
+            for telling in self._tellings.values():
+                telling.begin()
+        return idle
+
+    def collect(self) -> None:
+        """Log what was passed in the stretch."""
+        count = int(self._head.passed_count)
+        if not count:
+            return
+        layout = self.localiser.layout
+        balises = layout.balises if isinstance(layout, TrackLayout) else None
+        for i, passed in enumerate(self._passed[:count]):
+            first = i * self._slaves
+            told = {name: WORDS[self._outcomes[first + place]] for name, place in self._places.items()}
+            balise = None if balises is None else balises[passed.which]
+            crossing = self.localiser.crossing(passed.stamp, balise, passed.position, passed.speed)
+            self.service.told_elsewhere(crossing, passed.reading, told)
+        for telling in self._tellings.values():
+            telling.end()
+        self._head.passed_count = 0
+        self._told += count
+
+    def close(self) -> None:
+        """Add events and states to the counters of the components; they are timed with the steps that they belong
+        to.
+        """
+        for telling in self._tellings.values():
+            # a step to the telegram and one from there on: inputs and outputs once more
+            for kind in ("event", "get", "set"):
+                telling.component.call_statistics[kind].add(0.0, self._told)
+        plant = self.localiser.watch.component.call_statistics
+        for kind, count in (("save", self._told), ("restore", self._plant.more_calls), ("release", self._told)):
+            plant[kind].add(0.0, int(count))  # each step of the plant beyond the first begins with its state restored
+        self._told = 0
+
+    # -- set-up -----------------------------------------------------------------------------------------------------
+
+    def _is_plain(self) -> bool:
+        """Whether every telegram is told at once and as it is, and the plant is a plain one."""
+        channel, layout, plant = self.service.channel, self.localiser.layout, self.localiser.watch.component
+        changed = channel.missed_fraction or channel.missed or channel.latency or channel.latency_jitter
+        if channel.position_noise and isinstance(layout, TrackLayout):
+            changed = changed or any(balise.location_accuracy for balise in layout.balises)
+        return not changed and plant.fmi_version in (2, 3) and plant.can_save and not getattr(plant, "clocks", False)
+
+    def _prepare(self, program: Program, plan: Plan) -> None:
+        watch, layout, head, keep = self.localiser.watch, self.localiser.layout, self._head, program.keep
+        place = [step.component.name for step in plan.steps].index(self.service.plant)
+        first = plan.steps[place].columns.start
+        columns = first + watch.position_column, first + watch.speed_column
+        places = layout.positions if isinstance(layout, TrackLayout) else np.zeros(0)
+        self._plant = program.slaves[place]
+        program.watch(place, *columns, (watch.position_scale, watch.speed_scale), places, ACCELERATION_LIMIT)
+        if isinstance(layout, InstantLayout):
+            head.by_instant, head.instant_count = True, len(layout.instants)
+            head.instants = keep(layout.instants.astype(np.float64))
+        else:
+            head.accuracies = keep(np.array([balise.location_accuracy for balise in layout.balises]))
+        if self._possible:
+            for name, call in (
+                ("save_state", Call.SAVE),
+                ("restore_state", Call.RESTORE),
+                ("release_state", Call.RELEASE),
+            ):
+                setattr(head, name, program.function(watch.component, str(call.function(watch.component.fmi_version))))
+        head.odometer = -1 if self.service.odometer is None else self.service.odometer
+        head.continuous = keep(plan.continuous.astype(np.uint8))
+        told = [self._tellings.get(i) for i in range(self._slaves)]
+        self._telegrams = (ctypes.c_void_p * self._slaves)(
+            *(None if t is None else ctypes.addressof(t.telegram) for t in told)
+        )
+        head.telegrams = ctypes.addressof(self._telegrams)
+        for name in ("start", "final", "there", "arrived"):
+            setattr(head, name, keep(np.zeros(len(plan.values))))
+        self._passed, self._outcomes = (CPassed * AT_MOST)(), (ctypes.c_int64 * (AT_MOST * self._slaves))()
+        head.passed, head.passed_limit = ctypes.cast(self._passed, ctypes.POINTER(CPassed)), AT_MOST
+        head.outcomes = ctypes.cast(self._outcomes, ctypes.POINTER(ctypes.c_int64))

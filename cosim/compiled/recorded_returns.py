@@ -1,0 +1,59 @@
+"""Answers: what functions of an FMU said when the stepper called them, handed to the Python that would have called
+them.
+
+So the Python stepper goes on from the middle of a step with its own rules for errors, events, early returns and
+termination, and the FMU is not called twice. Touches the table of functions that fmpy's slave goes through.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+OK = 0
+VALUES = 3  # place of the values among the arguments of a function that gets variables
+
+
+class Answer:
+    """Stands in for a function of the library, for one call.
+
+    Args:
+        status: what it returned. results: what it wrote into its last arguments. values: the doubles it read, as bytes.
+    """
+
+    def __init__(self, status: int = OK, results: tuple[Any, ...] = (), values: bytes | None = None) -> None:
+        self.status, self.results, self.values = status, results, values
+
+    def __call__(self, *arguments: Any) -> int:
+        """Answer as the library did."""
+        if self.results:
+            for argument, result in zip(arguments[-len(self.results) :], self.results, strict=True):
+                argument._obj.value = result
+        if self.values is not None:
+            ctypes.memmove(arguments[VALUES], self.values, len(self.values))
+        return self.status
+
+
+@contextmanager
+def answered(slave: Any, answers: Mapping[str, Sequence[Answer]]) -> Iterator[None]:
+    """Within this context each function in `answers` answers its first calls so; further calls reach the library."""
+    functions: dict[str, Any] = slave._functions
+    real = {name: functions[name] for name in answers}
+
+    def stand_in(name: str, waiting: list[Answer]) -> Any:
+        def call(*arguments: Any) -> int:
+            answer = waiting.pop(0)
+            if not waiting:
+                functions[name] = real[name]
+            return answer(*arguments)
+
+        call.restype, call.argnames, call.argtypes = ctypes.c_int, (), ()  # type: ignore[attr-defined]
+        return call
+
+    functions.update({name: stand_in(name, list(queue)) for name, queue in answers.items() if queue})
+    try:
+        yield
+    finally:
+        functions.update(real)

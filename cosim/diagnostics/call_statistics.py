@@ -1,0 +1,133 @@
+"""How often a component is called for what, and how long that takes. Standard library only.
+
+Steps, events, saved and restored states are timed one by one, since a call of the clock is nothing beside them. Reading
+and writing are counted, and every `EVERY`-th is timed: timing all would cost more than the calls themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from time import perf_counter
+from typing import Any
+
+EARLY, EVERY = 3, 64  # the third call is timed, the first ones are not like the others; then every 64th
+KINDS = ("get", "set", "event", "save", "restore", "release")
+OF_METHOD = {
+    "tell": "event",
+    "handle_event": "event",
+    "report_clock": "event",
+    "save": "save",
+    "restore": "restore",
+    "release": "release",
+}
+"""What a method of a component counts as."""
+
+
+class CallStatistics:
+    """Count and time of one kind of call."""
+
+    __slots__ = ("_counted", "_pending", "_seconds", "_timed", "depth")
+
+    def __init__(self) -> None:
+        self._counted, self._timed, self._seconds, self.depth = 0, 0, 0.0, 0
+        self._pending: list[Callable[[], int]] = []
+
+    @property
+    def count(self) -> int:
+        """How many calls there were."""
+        return self._counted + sum(calls() for calls in self._pending)
+
+    @property
+    def seconds(self) -> float:
+        """Seconds of all calls, estimated from those that were timed [s]."""
+        return self._seconds * self.count / self._timed if self._timed else 0.0
+
+    def add(self, seconds: float, count: int = 1) -> None:
+        """Take calls that were timed elsewhere, e.g. by a stepper in C.
+
+        Args:
+            seconds: of all of them [s]. count: how many.
+        """
+        self._counted += count
+        self._timed += count
+        self._seconds += seconds
+
+    def counting(
+        self, call: Callable[[], None], explain: Callable[[Exception], Exception], last: Any = None, number: int = 0
+    ) -> Callable[[], None]:
+        """The same call, counted; one in many is timed. Costs 40 ns.
+
+        Args:
+            call: what is called often. explain: what to raise in place of what it raises.
+            last: a cell in which to store, before each call, its `number`; see `cosim.process.last_call`.
+        """
+        last = [0] if last is None else last
+        cycle = left = EARLY
+
+        def timed() -> None:
+            nonlocal cycle, left
+            self._counted += cycle
+            cycle = left = EVERY
+            begin = perf_counter()
+            call()
+            self._seconds += perf_counter() - begin
+            self._timed += 1
+
+        def counted() -> None:
+            nonlocal left
+            left -= 1
+            last[0] = number
+            try:
+                if left:
+                    call()
+                else:
+                    timed()
+            except Exception as error:
+                raise explain(error) from error
+
+        self._pending.append(lambda: cycle - left)
+        return counted
+
+
+def counted(method: Callable[..., Any], kind: str) -> Callable[..., Any]:
+    """A method of a component that is counted under `kind`; one that calls another of its kind counts once."""
+
+    @wraps(method)
+    def call(self: Any, *arguments: Any, **named: Any) -> Any:
+        statistics: CallStatistics = self.call_statistics[kind]
+        if statistics.depth:
+            return method(self, *arguments, **named)
+        statistics.depth, begin = 1, perf_counter()
+        try:
+            return method(self, *arguments, **named)
+        finally:
+            statistics.depth = 0
+            statistics.add(perf_counter() - begin)
+
+    return call
+
+
+def count_methods(cls: type) -> None:
+    """Let the methods that a class of components defines count themselves."""
+    for name, kind in OF_METHOD.items():
+        method = cls.__dict__.get(name)
+        if callable(method) and not getattr(method, "__isabstractmethod__", False):
+            setattr(cls, name, counted(method, kind))
+
+
+def new_call_statistics() -> dict[str, CallStatistics]:
+    """Tallies of a component that has not been called yet."""
+    return {kind: CallStatistics() for kind in KINDS}
+
+
+def call_statistics_table(
+    steps: int, seconds: float, call_statistics: dict[str, CallStatistics]
+) -> dict[str, dict[str, float]]:
+    """Calls and seconds by kind, plain data; kinds that never occurred are left out.
+
+    Args:
+        steps: calls of doStep. seconds: in them [s]. call_statistics: of all other kinds.
+    """
+    table: dict[str, dict[str, float]] = {"doStep": {"calls": steps, "seconds": seconds}} if steps else {}
+    return table | {kind: {"calls": t.count, "seconds": t.seconds} for kind, t in call_statistics.items() if t.count}

@@ -1,0 +1,51 @@
+"""Drawing lines: gives the components of a plan the lines that a run asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from cosim.coupling.plan import Plan, PlannedComponent
+from cosim.master.interpolation.interpolators import make_interpolator
+from cosim.master.interpolation.line import Line, Method
+from fmus.ports import FLOATING_TYPES
+
+
+def draw_lines(plan: Plan, method: Method) -> Mapping[str, str]:
+    """Let all continuous connected inputs follow lines.
+
+    Args:
+        plan: prepared, components instantiated. method: as for `Line`.
+
+    Returns:
+        By component, the interpolator that tells it of its lines (see `interpolators`).
+    """
+    givers = _givers(plan)
+    return {s.component.name: _draw(s, plan, givers, method) for s in plan.steps if len(s.inputs)}
+
+
+def _draw(planned: PlannedComponent, plan: Plan, givers: list[PlannedComponent], method: Method) -> str:
+    inputs, component = planned.inputs, planned.component
+    continuous = np.array(
+        [
+            bool(plan.continuous[source]) and place not in inputs.tables and _is_continuous(planned, name)
+            for place, (name, source) in enumerate(zip(inputs.names, inputs.sources, strict=True))
+        ]
+    )
+    if not continuous.any():
+        return "held"
+    line = Line(method, [givers[source].component for source in inputs.sources], continuous)
+    planned.interpolator = make_interpolator(line, inputs, component)
+    plan.interpolators.append(planned.interpolator)
+    return planned.interpolator.name
+
+
+def _is_continuous(planned: PlannedComponent, name: str) -> bool:
+    variable = planned.component.variables[name]
+    return variable.type in FLOATING_TYPES and variable.variability in (None, "continuous")
+
+
+def _givers(plan: Plan) -> list[PlannedComponent]:
+    """The component that owns each column of the values."""
+    return [step for step in plan.steps for _ in range(step.columns.stop - step.columns.start)]

@@ -1,0 +1,125 @@
+"""Interpolators: how a slave is told that its inputs follow a line during a step.
+
+| interpolator | needs | what the slave sees |
+|---|---|---|
+| ``derivatives`` | FMI 1 or 2 with ``canInterpolateInputs`` | value at the start and slope: the line itself |
+| ``intermediate`` | FMI 3 with ``providesIntermediateUpdate`` | the line, set at each instant at which it asks |
+| ``mean`` | nothing | the mean of the line over the step, held; its value at the end for direct feedthrough |
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar
+
+import numpy as np
+
+from cosim.components.component import Component
+from cosim.components.fmi3 import FMI3Component
+from cosim.coupling.graph import declared_feedthrough
+from cosim.coupling.inputs import Inputs
+from cosim.master.interpolation.line import Line
+
+
+class InputInterpolator(ABC):
+    """Tells one component of the line of its inputs.
+
+    Args:
+        line: the line. inputs: the connected inputs it belongs to.
+    """
+
+    name: ClassVar[str]
+
+    def __init__(self, line: Line, inputs: Inputs) -> None:
+        self.line, self._inputs = line, inputs
+
+    @abstractmethod
+    def send(self, t: float, until: float) -> None:
+        """Tell of the line for a step from `t` to `until` [s]."""
+
+    def begin(self) -> None:
+        """A step begins: what is held over it was true where its source stands now."""
+        self.line.begin()
+
+    def prepare(self, until: float, *, ends_known: bool | np.ndarray = False) -> None:
+        """Gather the inputs and bend the line for a step to `until` [s]; arguments as for `Line.bend`."""
+        self._inputs.gather()
+        self.line.bend(self._inputs.buffer, until, held=self._inputs.held, ends_known=ends_known)
+
+    def forget(self, jumped: np.ndarray) -> None:
+        """Values of the plan that jumped, as a mask of shape (n,): no line of an input leads over it."""
+        self.line.forget(jumped[self._inputs.sources])
+
+    def save(self) -> Any:
+        """What a step changes here."""
+        return self.line.save()
+
+    def restore(self, state: Any) -> None:
+        """Return to what was saved."""
+        self.line.restore(state)
+
+
+class MeanInterpolator(InputInterpolator):
+    """Holds the mean of the line: exact for its integral, so of second order where states integrate the input."""
+
+    name = "mean"
+
+    def __init__(self, line: Line, inputs: Inputs, component: Component) -> None:
+        super().__init__(line, inputs)
+        direct = {name for names in declared_feedthrough(component).values() for name in names}
+        self._direct = np.array([name in direct for name in inputs.names], dtype=bool)
+
+    def send(self, t: float, until: float) -> None:  # noqa: D102 - see InputInterpolator
+        line = self.line
+        self._inputs.buffer[:] = np.where(self._direct, line.at(until), line.at(0.5 * (t + until)))
+        self._inputs.send()
+
+
+class DerivativeInterpolator(InputInterpolator):
+    """Sets value and first derivative at the start of the step (setRealInputDerivatives)."""
+
+    name = "derivatives"
+
+    def __init__(self, line: Line, inputs: Inputs, component: Component) -> None:
+        super().__init__(line, inputs)
+        self._moving = np.flatnonzero(line.continuous)
+        names = [inputs.names[i] for i in self._moving]
+        self._tell, self._slopes = component.make_derivative_writer(names)
+
+    def send(self, t: float, until: float) -> None:  # noqa: D102 - see InputInterpolator
+        self._inputs.buffer[:] = self.line.at(t)
+        self._inputs.send()
+        self._slopes[:] = self.line.slope[self._moving]
+        self._tell()
+
+
+class IntermediateInterpolator(InputInterpolator):
+    """Sets the value of the line whenever the slave asks for it within its step (intermediateUpdate)."""
+
+    name = "intermediate"
+
+    def __init__(self, line: Line, inputs: Inputs, component: FMI3Component) -> None:
+        super().__init__(line, inputs)
+        self._moving = np.flatnonzero(line.continuous)
+        names = [inputs.names[i] for i in self._moving]
+        self._set_moving, self._now = component.writer(names)
+        self.taken = component.follow_within_step(names, self._set)
+
+    def send(self, t: float, until: float) -> None:  # noqa: D102 - see InputInterpolator
+        self._inputs.buffer[:] = self.line.at(t)
+        self._inputs.send()
+
+    def _set(self, time: float) -> None:
+        self._now[:] = self.line.at(time)[self._moving]
+        self._set_moving()
+
+
+def make_interpolator(line: Line, inputs: Inputs, component: Component) -> InputInterpolator:
+    """The best interpolator that a component takes."""
+    if component.fmi_version in (1, 2) and component.capabilities.canInterpolateInputs and component.kind == "FMU":
+        return DerivativeInterpolator(line, inputs, component)
+    if isinstance(component, FMI3Component):
+        interpolator = IntermediateInterpolator(line, inputs, component)
+        if interpolator.taken:
+            return interpolator
+    return MeanInterpolator(line, inputs, component)

@@ -1,0 +1,109 @@
+"""A line: the straight course of each input of one component, through the last two values that its source gave.
+
+Where the value is that of the end of the step the line interpolates, elsewhere it extrapolates. How a slave is told of
+it is in `interpolators`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from cosim.components.component import TIME_TOLERANCE, Component
+
+Method = Literal["interpolate", "extrapolate"]
+
+
+@dataclass
+class History:
+    """The last two values that the sources gave, and when.
+
+    Args:
+        earlier, later: shape (m,). earlier_at, later_at: [s], shape (m,); NaN where there is none.
+    """
+
+    earlier: np.ndarray
+    later: np.ndarray
+    earlier_at: np.ndarray
+    later_at: np.ndarray
+
+    def copy(self) -> History:
+        """An independent copy."""
+        return History(self.earlier.copy(), self.later.copy(), self.earlier_at.copy(), self.later_at.copy())
+
+
+class Line:
+    """The course of the inputs of one component, ``u(s) = later + slope * (s - later_at)``.
+
+    Args:
+        method: ``interpolate`` uses a line where both ends of it are known and holds elsewhere; ``extrapolate``
+            continues the last line there.
+        sources: the component that gives each input, shape (m,).
+        continuous: inputs that may follow a line, shape (m,); the others are held.
+    """
+
+    def __init__(self, method: Method, sources: Sequence[Component], continuous: np.ndarray) -> None:
+        self.method, self.continuous = method, continuous
+        self._distinct = list({id(c): c for c in sources}.values())
+        self._source_of = np.array([[id(d) for d in self._distinct].index(id(c)) for c in sources], dtype=np.intp)
+        count = len(continuous)
+        self._history = History(np.zeros(count), np.zeros(count), np.full(count, np.nan), np.full(count, np.nan))
+        self.slope = np.zeros(count)
+        self._stood = np.full(count, np.nan)
+
+    def begin(self) -> None:
+        """A step begins: what is held over it was true where its source stands now."""
+        self._stood = self._times()
+
+    def bend(
+        self,
+        gathered: np.ndarray,
+        until: float,
+        *,
+        held: bool | np.ndarray = False,
+        ends_known: bool | np.ndarray = False,
+    ) -> None:
+        """Take what was gathered for a step that ends at `until` [s], shape (m,).
+
+        Args:
+            held: the values are those of the start of the step; for all or each, shape (m,).
+            ends_known: the values are those of `until`, wherever their components stand (a step that is iterated); for
+                all or each, shape (m,).
+        """
+        seen_at = np.where(ends_known, until, np.where(held, self._stood, self._times()))
+        history = self._history
+        newer = seen_at > history.later_at + TIME_TOLERANCE
+        first = np.isnan(history.later_at)
+        history.earlier = np.where(newer, history.later, history.earlier)
+        history.earlier_at = np.where(newer, history.later_at, history.earlier_at)
+        history.later = gathered.copy()
+        history.later_at = np.where(newer | first, seen_at, history.later_at)
+        usable = self.continuous & (history.later_at - history.earlier_at > TIME_TOLERANCE)
+        if self.method == "interpolate":
+            usable &= history.later_at >= until - TIME_TOLERANCE
+        span = np.where(usable, history.later_at - history.earlier_at, 1.0)
+        self.slope = np.where(usable, (history.later - history.earlier) / span, 0.0)
+
+    def at(self, time: float) -> np.ndarray:
+        """Values of the inputs at a time [s], shape (m,)."""
+        values: np.ndarray = self._history.later + self.slope * (time - self._history.later_at)
+        return values
+
+    def forget(self, which: np.ndarray) -> None:
+        """Inputs whose source jumped, as a mask of shape (m,): no line leads over it."""
+        self._history.earlier_at[which] = self._history.later_at[which] = np.nan
+
+    def save(self) -> History:
+        """What a step changes here."""
+        return self._history.copy()
+
+    def restore(self, state: History) -> None:
+        """Return to what was saved."""
+        self._history = state.copy()
+
+    def _times(self) -> np.ndarray:
+        """When the values of the sources were true: where their components stand [s]."""
+        return np.array([c.time for c in self._distinct])[self._source_of]

@@ -1,0 +1,170 @@
+"""Backends: which shipped models run as native FMUs and which as Python blocks, and the FMUs, built where they were
+not yet.
+
+FMU and block give the same numbers, bit for bit; the FMU is quicker. Touches the cache of FMUs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from cosim.errors import FmuLoadError
+from cosim.scenario.tables import Backend, ComponentTable
+from fmus.toolchain.compile import CompilerMissing, find_compiler
+from plant_models.hybrid import HybridSystem
+
+NATIVE: Backend = "fmu3"
+IN_PYTHON: Backend = "block3"
+AT_A_TIME = 2
+"""Compilers that work at once; each takes a processor and some hundred megabytes for seconds."""
+
+FAULTS = (OSError, RuntimeError, ValueError)
+"""What building raises: no compiler, a compiler that refuses, a system that cannot be traced, a cache that cannot be
+written.
+"""
+
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Request:
+    """A shipped model in a scenario.
+
+    Args:
+        table: of the component. system: its hybrid system. where: place for messages.
+    """
+
+    table: ComponentTable
+    system: HybridSystem
+    where: str
+
+
+@dataclass
+class Realised:
+    """How the shipped models run.
+
+    Args:
+        kinds: by component. files: FMUs of those that are native. notes: why others are not that could have been.
+    """
+
+    kinds: dict[str, Backend] = field(default_factory=dict)
+    files: dict[str, Path] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+
+def intended(table: ComponentTable, system: HybridSystem) -> Backend:
+    """How a shipped model will run, as far as that is known before its FMU is built."""
+    if table.backend is not None:
+        return table.backend
+    return NATIVE if system.traceable and _missing_compiler() is None else IN_PYTHON
+
+
+def realise(requests: Mapping[str, Request], tell: Tell) -> Realised:
+    """Decide, and build the FMUs that are not in the cache, `AT_A_TIME` at once.
+
+    Args:
+        requests: by component. tell: told of each FMU that is built, and how long that took.
+
+    Raises:
+        FmuLoadError: an FMU that the scenario asks for by ``as`` cannot be built; where it does not ask, the model is a
+        block.
+    """
+    made = Realised({name: intended(request.table, request.system) for name, request in requests.items()})
+    native = {name: request for name, request in requests.items() if made.kinds[name].startswith("fmu")}
+    found, faults = _build(native, made.kinds, tell)
+    made.files |= found
+    for name, fault in faults.items():
+        if requests[name].table.backend is not None:
+            raise cannot_build(requests[name].where, requests[name].system, fault) from fault
+        made.kinds[name] = IN_PYTHON
+    _note(requests, made, faults)
+    return made
+
+
+def cannot_build(where: str, system: HybridSystem, fault: Exception) -> FmuLoadError:
+    """The error for an FMU that cannot be built; `where` is the place for the message."""
+    return FmuLoadError(f"{where}: cannot build the FMU of {system.name}: {fault}")
+
+
+# -- deciding
+# -----------------------------------------------------------------------------------------------------------
+
+
+def _missing_compiler() -> str | None:
+    """Why there is no compiler, or None."""
+    try:
+        find_compiler()
+    except CompilerMissing as error:
+        return str(error)
+    return None
+
+
+def _note(requests: Mapping[str, Request], made: Realised, faults: Mapping[str, Exception]) -> None:
+    """Say why models are blocks that nobody asked to be blocks."""
+    blocks = [name for name, kind in made.kinds.items() if kind == IN_PYTHON and requests[name].table.backend is None]
+    opaque = [name for name in blocks if not requests[name].system.traceable]
+    if opaque:
+        made.notes.append(f"Cannot be traced, so they run as Python blocks: {', '.join(opaque)}.")
+    for name, fault in faults.items():
+        made.notes.append(f"{name} runs as a Python block, as its FMU cannot be built: {fault}")
+    others = [name for name in blocks if name not in opaque and name not in faults]
+    if others:
+        made.notes.append(f"Run as Python blocks, which is slower: {', '.join(others)}. {_missing_compiler()}")
+
+
+# -- building
+# -----------------------------------------------------------------------------------------------------------
+
+
+def _build(
+    requests: Mapping[str, Request], kinds: Mapping[str, Backend], tell: Tell
+) -> tuple[dict[str, Path], dict[str, Exception]]:
+    """The FMUs by component, and what went wrong with the others. Only the compilers run beside each other."""
+    from fmus.cache import CacheEntry, cache_entry  # noqa: PLC0415 - only for those who run
+
+    entries: dict[str, CacheEntry] = {}
+    faults: dict[str, Exception] = {}
+    for name, request in requests.items():
+        version: Any = int(kinds[name][-1])
+        try:
+            entries[name] = cache_entry(request.system, version, request.table.preset)
+        except FAULTS as error:
+            faults[name] = error
+    missing = {entry.path: entry.draft for entry in entries.values() if entry.draft is not None}
+    wrong = _compile(missing, tell) if missing else {}
+    faults |= {name: wrong[entry.path] for name, entry in entries.items() if entry.path in wrong}
+    return {name: entry.path for name, entry in entries.items() if name not in faults}, faults
+
+
+def _compile(drafts: Mapping[Path, Any], tell: Tell) -> dict[Path, Exception]:
+    """Compile and pack; what went wrong, by path."""
+    faults: dict[Path, Exception] = {}
+    tell(f"building {'an FMU' if len(drafts) == 1 else f'{len(drafts)} FMUs'}, kept for later runs")
+    with ThreadPoolExecutor(AT_A_TIME) as pool:
+        working: dict[Future[tuple[Any, float]], Path] = {
+            pool.submit(_timed, draft): path for path, draft in drafts.items()
+        }
+        try:
+            for done in as_completed(working):
+                path = working[done]
+                try:
+                    libraries, seconds = done.result()
+                    drafts[path].pack(libraries, path)
+                except FAULTS as error:
+                    faults[path] = error
+                else:
+                    tell(f"building {path.stem} ... {seconds:.1f} s")
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)  # interrupted: what waits is not begun
+            raise
+    return faults
+
+
+def _timed(draft: Any) -> tuple[Any, float]:
+    begin = perf_counter()
+    return draft.compile(), perf_counter() - begin

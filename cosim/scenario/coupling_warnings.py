@@ -1,0 +1,81 @@
+"""Remarks: what a user should know about a coupled system before it runs, in words. Changes nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from cosim.components.component import Component
+from cosim.coupling.connection import Connection, local_sources, unconnected_inputs
+from cosim.coupling.graph import undeclared
+from cosim.scenario.schema import ScenarioTable
+from cosim.scenario.starts import given_values
+from cosim.scenario.tables import BalisesTable
+
+CARRIED = {
+    "derivatives": "value and slope to",
+    "intermediate": "set within the step of",
+    "mean": "mean over the step to",
+    "held": "held, because discrete, for",
+}
+
+
+def coupling_warnings(
+    table: ScenarioTable, components: Mapping[str, Component], connections: Sequence[Connection]
+) -> tuple[list[str], list[str]]:
+    """Doubts and notes about what is connected, and what is not.
+
+    Args:
+        table: the scenario. components: by name. connections: checked.
+
+    Returns:
+        Texts that warn, and texts that only explain.
+    """
+    free = unconnected_inputs(connections, components.values(), given_values(table))
+    doubts = [f"Unconnected inputs keep their start values: {', '.join(free)}."] if free else []
+    deaf = [
+        name for name, of in table.components.items() if of.tolerance is not None and components[name].fmi_version == 1
+    ]
+    if deaf:
+        doubts.append(
+            f"FMI 1.0 co-simulation has no call that takes a tolerance; it does nothing for {', '.join(deaf)}."
+        )
+    notes = []
+    hidden = [
+        f"{name}.{signal}" for name, signals in local_sources(connections, components).items() for signal in signals
+    ]
+    if hidden:
+        notes.append(
+            f"Local variables that others read; no FMU declares what acts on them at once: {', '.join(hidden)}."
+        )
+    silent = undeclared(components.values())
+    if silent:
+        notes.append(f"Declare no dependencies, algebraic loops through them assumed absent: {', '.join(silent)}.")
+    return doubts, notes
+
+
+def lines_note(lines: Mapping[str, str], inputs: str) -> str:
+    """How components are told of inputs that follow a line.
+
+    Args:
+        lines: interpolator of each component. inputs: what the scenario asks for.
+    """
+    by_interpolator: dict[str, list[str]] = {}
+    for name, interpolator in lines.items():
+        by_interpolator.setdefault(interpolator, []).append(name)
+    said = "; ".join(f"{CARRIED[interpolator]}: {', '.join(names)}" for interpolator, names in by_interpolator.items())
+    return f"Inputs between communication points ({inputs}): {said or 'none are connected'}."
+
+
+def late_telegram_warnings(
+    table: BalisesTable, components: Mapping[str, Component], receivers: Sequence[str]
+) -> list[str]:
+    """A block replays what arrives late, and so does an FMU with the parameter `late_policy`; another one may not."""
+    delay = table.latency + table.latency_jitter
+    sealed = [n for n in receivers if components[n].kind == "FMU" and "late_policy" not in components[n].variables]
+    if not sealed or delay <= 0.0:
+        return []
+    return [
+        f"Telegrams arrive up to {delay:g} s late; {', '.join(sealed)}: a sealed FMU without a parameter late_policy "
+        f"does not "
+        "say what it does with late stamps."
+    ]
