@@ -116,7 +116,7 @@ def test_events_told_after_a_restore_are_told_again(version: Any) -> None:
     made.exit_initialization()
     state = made.save()
     for _ in range(3):
-        made.tell(made.events["balise"], 0.0, 0.05, {"position": 3.0, "unknown": 1.0})
+        made.notify(made.events["balise"], 0.0, 0.05, {"position": 3.0, "unknown": 1.0})
         made.advance(0.0, 0.1)
         assert read(made, ["last", "at", "heard"]) == pytest.approx([3.0, 0.05, 1.0])
         assert made.outcomes()["lost"] == 0  # type: ignore[index]
