@@ -27,6 +27,9 @@ FACES: dict[int, type[FMI2Block] | type[FMI3Block]] = {2: FMI2Block, 3: FMI3Bloc
 def make_block(system: HybridSystem, fmi_version: Literal[2, 3] = 3, **arguments: Any) -> FMI2Block | FMI3Block:
     """A block with the FMI 2 or FMI 3 face; further arguments as for `Face`.
 
+    Args:
+        system: the hybrid system. fmi_version: 2 or 3.
+
     Raises:
         ValueError: the version is neither 2 nor 3, or an argument is one that `Face` refuses.
     """

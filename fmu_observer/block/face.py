@@ -53,7 +53,11 @@ class BlockCallError(FMICallException, BlockError):
 
 
 def refused(function: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[Any, P], R]:
-    """Turn the `BlockError` of a call into fmpy's exception, with the name of the call, of the block, and the time."""
+    """Turn the `BlockError` of a call into fmpy's exception, with the name of the call, of the block, and the time.
+
+    Args:
+        function: a call of the face.
+    """
 
     @wraps(function)
     def call(self: Any, /, *args: P.args, **kwargs: P.kwargs) -> R:
@@ -147,7 +151,11 @@ class Face:
         return f"{self.fmi_version}.0"
 
     def setDebugLogging(self, loggingOn: bool, categories: Sequence[str]) -> None:
-        """Nothing to switch: what is wrong is raised, or logged by Python's `logging`."""
+        """Nothing to switch: what is wrong is raised, or logged by Python's `logging`.
+
+        Args:
+            loggingOn: whether the importer wants log messages. categories: of the log.
+        """
 
     # -- life -------------------------------------------------------------------------------------------------------
 
@@ -209,7 +217,12 @@ class Face:
     def directional_derivative(
         self, unknowns: Sequence[int], knowns: Sequence[int], seed: Sequence[float]
     ) -> list[float]:
-        """Exact directional derivatives of real outputs and derivatives, see `Sensitivity.directional`."""
+        """Exact directional derivatives of real outputs and derivatives, see `Sensitivity.directional`.
+
+        Args:
+            unknowns: value references of outputs or derivatives. knowns: value references of inputs or states.
+            seed: direction, one number for each known.
+        """
         self.instance.require_alive()
         if self.mode == "instantiated":
             raise BlockError("directional derivatives are there from initialization mode on.")
@@ -230,7 +243,11 @@ class Face:
         self.instance.load(state)
 
     def freeFMUState(self, state: BlockState) -> None:
-        """Nothing to free: states are Python values."""
+        """Nothing to free: states are Python values.
+
+        Args:
+            state: as `getFMUState` or `getFMUstate` gave it.
+        """
 
     def serializeFMUState(self, state: BlockState) -> bytes:
         """A state as bytes, to be read by any block of the same model, also in another process."""
@@ -238,13 +255,21 @@ class Face:
 
     @refused
     def deserializeFMUState(self, serializedState: bytes, state: BlockState | None = None) -> BlockState:
-        """The state that `serializeFMUState` wrote."""
+        """The state that `serializeFMUState` wrote.
+
+        Args:
+            serializedState: bytes.
+        """
         return self.instance.check(deserialize(serializedState, self.instance.shape))
 
     # -- internals --------------------------------------------------------------------------------------------------
 
     def refusal(self, function: str, reason: object) -> BlockCallError:
-        """The exception for a refused call: it names the call, the block and the time."""
+        """The exception for a refused call: it names the call, the block and the time.
+
+        Args:
+            function: name of the call. reason: what was wrong, in words.
+        """
         status = FMI_DISCARD if isinstance(reason, StepDiscarded) else FMI_ERROR
         return BlockCallError(function, f"{self.instanceName} at t = {self.instance.runtime.t!r} s: {reason}", status)
 

@@ -41,7 +41,14 @@ class FMI3Block(Face, FMU3Slave):
         intermediateUpdate: Any = None,
         requiredIntermediateVariables: Any = None,
     ) -> None:
-        """Start values; `eventModeUsed` and `earlyReturnAllowed` as in FMI 3."""
+        """Start values; `eventModeUsed` and `earlyReturnAllowed` as in FMI 3.
+
+        Args:
+            visible: without effect, there is nothing to see. loggingOn: whether the importer wants log messages.
+            logMessage: called with what is wrong with events.
+            intermediateUpdate: without effect: blocks call nobody within a step.
+            requiredIntermediateVariables: without effect: blocks call nobody within a step.
+        """
         self.instance.reset()
         self.instance.events.listener = (
             None if logMessage is None else lambda text: logMessage(None, FMI_WARNING, WARNINGS, text.encode())
@@ -53,6 +60,9 @@ class FMI3Block(Face, FMU3Slave):
     def setDebugLogging(self, loggingOn: bool, categories: Sequence[str]) -> None:
         """Nothing to switch: what is wrong is raised, or logged by Python's `logging`. Unknown categories are
         refused.
+
+        Args:
+            loggingOn: whether the importer wants log messages.
         """
         known = [category.name for category in self.model_description.logCategories]
         for name in categories:
@@ -63,7 +73,12 @@ class FMI3Block(Face, FMU3Slave):
     def enterInitializationMode(
         self, tolerance: float | None = None, startTime: float = 0.0, stopTime: float | None = None
     ) -> None:
-        """Begin initialisation at `startTime` [s]."""
+        """Begin initialisation at `startTime` [s].
+
+        Args:
+            tolerance: without effect: the integration step is a parameter.
+            stopTime: end of the run [s], without effect.
+        """
         self.instance.require("instantiated")
         self.instance.set_up(startTime)
         self.instance.mode = "initialization"
@@ -91,7 +106,11 @@ class FMI3Block(Face, FMU3Slave):
 
     @refused
     def setClock(self, vr: Sequence[int], values: Sequence[bool]) -> None:
-        """Activate triggered input clocks; the events happen in `updateDiscreteStates`."""
+        """Activate triggered input clocks; the events happen in `updateDiscreteStates`.
+
+        Args:
+            vr: value references.
+        """
         self.instance.require("event")
         numbers = [self.instance.variables.clock_number(reference) for reference in vr]
         for number, value in zip(numbers, values, strict=True):
@@ -99,7 +118,11 @@ class FMI3Block(Face, FMU3Slave):
 
     @refused
     def getClock(self, vr: Sequence[int]) -> list[bool]:
-        """Whether clocks are active."""
+        """Whether clocks are active.
+
+        Args:
+            vr: value references.
+        """
         self.instance.require_alive()
         return [self.instance.variables.clock_number(reference) in self.instance.events.active for reference in vr]
 
@@ -127,6 +150,10 @@ class FMI3Block(Face, FMU3Slave):
         """Advance by one communication step [s], or, where early return is allowed, to the first periodic instant
         inside it.
 
+        Args:
+            currentCommunicationPoint: start of the step [s]. communicationStepSize: its length [s], above zero.
+            noSetFMUStatePriorToCurrentPoint: as in FMI: no state of an earlier time will be set.
+
         Returns:
             (eventHandlingNeeded, terminateSimulation, earlyReturn, lastSuccessfulTime).
         """
@@ -137,38 +164,66 @@ class FMI3Block(Face, FMU3Slave):
 
     @refused
     def getFloat64(self, vr: Sequence[int], nValues: int | None = None) -> list[float]:
-        """Values of Float64 variables."""
+        """Values of Float64 variables.
+
+        Args:
+            vr: value references. nValues: how many values are expected; None for one a reference.
+        """
         return self.instance.get(vr)
 
     @refused
     def setFloat64(self, vr: Sequence[int], values: Sequence[float]) -> None:
-        """Set Float64 variables."""
+        """Set Float64 variables.
+
+        Args:
+            vr: value references.
+        """
         self.instance.set(vr, values)
 
     @refused
     def getInt32(self, vr: Sequence[int], nValues: int | None = None) -> list[int]:
-        """Values of event counts, integer outputs and counts of outcomes."""
+        """Values of event counts, integer outputs and counts of outcomes.
+
+        Args:
+            vr: value references. nValues: how many values are expected; None for one a reference.
+        """
         return self.instance.get_whole(vr, INT32)
 
     @refused
     def setInt32(self, vr: Sequence[int], values: Sequence[int]) -> None:
-        """Set event counts."""
+        """Set event counts.
+
+        Args:
+            vr: value references.
+        """
         self.instance.set_whole(vr, values, INT32)
 
     @refused
     def getInt64(self, vr: Sequence[int], nValues: int | None = None) -> list[int]:
-        """The number of the late policy."""
+        """The number of the late policy.
+
+        Args:
+            vr: value references. nValues: how many values are expected; None for one a reference.
+        """
         return self.instance.get_whole(vr, INT64)
 
     @refused
     def setInt64(self, vr: Sequence[int], values: Sequence[int]) -> None:
-        """Set the late policy by its number."""
+        """Set the late policy by its number.
+
+        Args:
+            vr: value references.
+        """
         self.instance.set_whole(vr, values, INT64)
 
     def fmi3SetFloat64(
         self, _component: object, vr: Iterable[int], _n: int, values: Iterable[float], _n_values: int
     ) -> None:
-        """The low-level setter used by fmpy's `Input`."""
+        """The low-level setter used by fmpy's `Input`.
+
+        Args:
+            vr: value references.
+        """
         self.setFloat64(list(vr), list(values))
 
     @refused

@@ -66,6 +66,9 @@ class Instance:
     def get(self, references: Sequence[int]) -> list[float]:
         """Values of Float64 / Real variables by value reference.
 
+        Args:
+            references: value references.
+
         Raises:
             BlockError: a value reference is unknown or of another type, or the block has been freed.
         """
@@ -76,6 +79,9 @@ class Instance:
 
     def set(self, references: Sequence[int], values: Sequence[float]) -> None:
         """Set Float64 / Real variables by value reference; nothing is set unless everything may be.
+
+        Args:
+            references: value references.
 
         Raises:
             BlockError: a value reference is unknown, or the variable cannot be set in this mode.
@@ -90,6 +96,9 @@ class Instance:
     def get_whole(self, references: Sequence[int], roles: Sequence[Role]) -> list[int]:
         """Values of whole numbers that have one of these roles.
 
+        Args:
+            references: value references.
+
         Raises:
             BlockError: a value reference is unknown or of another type, or a value is no whole number of 32 bits.
         """
@@ -100,6 +109,9 @@ class Instance:
 
     def set_whole(self, references: Sequence[int], values: Sequence[int], roles: Sequence[Role]) -> None:
         """Set whole numbers that have one of these roles; nothing is set unless everything may be.
+
+        Args:
+            references: value references.
 
         Raises:
             BlockError: a value reference is unknown or of another type, the variable cannot be set now, or not to this

@@ -104,7 +104,11 @@ class NumpyKernel(_Arrays):
 
 
 class TracedKernel(_Arrays):
-    """Evaluation by traced CasADi functions through preset buffers (a few microseconds a call, no allocation)."""
+    """Evaluation by traced CasADi functions through preset buffers (a few microseconds a call, no allocation).
+
+    Args:
+        system: traced once, when the kernel is made.
+    """
 
     def __init__(self, system: HybridSystem) -> None:
         super().__init__(system)
