@@ -1,4 +1,4 @@
-"""The FMI 2 face of a block: the calls of fmpy's `FMU2Slave`, events by count, stamp and payload."""
+"""The FMI 2 interface of a block: the calls of fmpy's `FMU2Slave`, events by count, stamp and payload."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from typing import Any
 
 from fmpy.fmi2 import FMU2Slave, fmi2LastSuccessfulTime, fmi2Terminated
 
-from fmu_observer.block.face import FMI_WARNING, WARNINGS, Face, refused
+from fmu_observer.block.interface import FMI_WARNING, WARNINGS, FMIInterface, refused
 from fmu_observer.block.variables import BlockError, Role
 
 WHOLE: tuple[Role, ...] = ("count", "integer_output", "outcome", "policy")
 
 
-class FMI2Block(Face, FMU2Slave):
+class FMI2Block(FMIInterface, FMU2Slave):
     """A hybrid system with the call surface of an FMI 2.0 co-simulation slave.
 
     An event: set the payload, ``<event>_time`` (unset: the start of the step) and raise ``<event>_count`` by one before
     `doStep`; a stamp inside the step is hit exactly, one after it waits, one before it goes by the late policy.
-    Arguments as for `Face`.
+    Arguments as for `FMIInterface`.
     """
 
     fmi_version = 2
@@ -171,8 +171,8 @@ class FMI2Block(Face, FMU2Slave):
 
     # -- saved states: FMI 2 spells them so; fmpy knows both spellings ------------------------------------------------
 
-    getFMUstate = Face.getFMUState
-    setFMUstate = Face.setFMUState
-    freeFMUstate = Face.freeFMUState
-    serializeFMUstate = Face.serializeFMUState
-    deSerializeFMUstate = Face.deserializeFMUState
+    getFMUstate = FMIInterface.getFMUState
+    setFMUstate = FMIInterface.setFMUState
+    freeFMUstate = FMIInterface.freeFMUState
+    serializeFMUstate = FMIInterface.serializeFMUState
+    deSerializeFMUstate = FMIInterface.deserializeFMUState

@@ -1,4 +1,4 @@
-"""The FMI 3 face of a block: the calls of fmpy's `FMU3Slave`, event mode and triggered input clocks included."""
+"""The FMI 3 interface of a block: the calls of fmpy's `FMU3Slave`, event mode and triggered input clocks included."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from typing import Any
 
 from fmpy.fmi3 import FMU3Slave
 
-from fmu_observer.block.face import FMI_WARNING, WARNINGS, Face, refused
+from fmu_observer.block.interface import FMI_WARNING, WARNINGS, FMIInterface, refused
 from fmu_observer.block.variables import BlockError, Mode, Role
 
 INT32: tuple[Role, ...] = ("count", "integer_output", "outcome")
 INT64: tuple[Role, ...] = ("policy",)
 
 
-class FMI3Block(Face, FMU3Slave):
+class FMI3Block(FMIInterface, FMU3Slave):
     """A hybrid system with the call surface of an FMI 3.0 co-simulation slave.
 
     An event: `enterEventMode`, `setClock`, payload and, where it happened earlier, ``<event>_time`` by `setFloat64`,
     `updateDiscreteStates`, `enterStepMode`; with ``announcement="counts"`` as in FMI 2, and event mode has nothing to
     do. A block on which `instantiate` was never called (fmpy's `simulate_fmu` does not) uses event mode as soon as its
-    caller does. Arguments as for `Face`.
+    caller does. Arguments as for `FMIInterface`.
     """
 
     fmi_version = 3

@@ -1,7 +1,7 @@
 """The instance behind a block: a runtime with its events, its variables by value reference, and the mode of its life.
 
-Both FMI faces (`fmi2`, `fmi3`) drive this one; it knows value references and modes, and nothing of fmpy's classes. What
-it refuses it refuses with a reason; the face adds the name, the call and the time.
+Both FMI interfaces (`fmi2`, `fmi3`) drive this one; it knows value references and modes, and nothing of fmpy's classes.
+What it refuses it refuses with a reason; the interface adds the name, the call and the time.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ POLICY_NUMBERS = ", ".join(f"{i} ({name})" for i, name in enumerate(LATE_POLICIE
 
 
 class Instance:
-    """One running copy of a hybrid system behind an FMI face.
+    """One running copy of a hybrid system behind an FMI interface.
 
     Args:
         system: the hybrid system.

@@ -1,7 +1,7 @@
 """How an estimation error moves from one sample to the next, exactly: what every kind of sampled error has in common.
 
 An error equation says what flows between samples and how it starts after one; the transition over a gap is one matrix
-exponential, no bound and no approximation. The search for certificates (`aperiodic`) sees this face only.
+exponential, no bound and no approximation. The search for certificates (`aperiodic`) sees this interface only.
 """
 
 from __future__ import annotations

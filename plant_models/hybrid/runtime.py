@@ -1,7 +1,7 @@
 """Runtime: a hybrid system moving through time, events included.
 
 This is the reference for the C runtime: the same grid, the same order of events, the same numbers. It knows no FMI; the
-block (package `fmu_observer`) puts that face on it.
+block (package `fmu_observer`) puts that interface on it.
 """
 
 from __future__ import annotations

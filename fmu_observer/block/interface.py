@@ -1,7 +1,7 @@
-"""What the two FMI faces share: identity, folder, refused calls, prepared calls, saved states and the life cycle.
+"""What the two FMI interfaces share: identity, folder, refused calls, prepared calls, saved states and the life cycle.
 
-fmpy's tools recognise an FMU by its class, so the faces subclass fmpy's slaves and replace every call; no library is
-loaded.
+fmpy's tools recognise an FMU by its class, so the interfaces subclass fmpy's slaves and replace every call; no library
+is loaded.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def refused(function: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[
     """Turn the `BlockError` of a call into fmpy's exception, with the name of the call, of the block, and the time.
 
     Args:
-        function: a call of the face.
+        function: a call of the interface.
     """
 
     @wraps(function)
@@ -71,8 +71,8 @@ def refused(function: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[
     return call
 
 
-class Face:
-    """State and life cycle common to the FMI 2 and the FMI 3 face of a block.
+class FMIInterface:
+    """State and life cycle common to the FMI 2 and the FMI 3 interface of a block.
 
     A new block is in the mode *instantiated*; `instantiate` makes a used one new again. Calls that the standard does
     not allow in a mode are refused with a `BlockCallError`, as the exported FMU refuses them.
@@ -133,7 +133,7 @@ class Face:
         return self.instance.events.counters
 
     @property
-    def component(self) -> Face:
+    def component(self) -> FMIInterface:
         """What fmpy hands back to the low-level calls."""
         return self
 
