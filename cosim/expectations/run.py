@@ -8,7 +8,7 @@ import numpy as np
 
 from cosim.expectations.judged import given
 from cosim.expectations.window import Window, window_of
-from cosim.report.spec import ReportSpec
+from cosim.evaluation.spec import ReportSpec
 from cosim.results.result import Result
 
 

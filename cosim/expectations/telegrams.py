@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from cosim.expectations.judged import Judged
 from cosim.expectations.run import Run, span
 from cosim.expectations.window import Window
-from cosim.report.event_counts import USED
+from cosim.evaluation.event_counts import USED
 from cosim.results.result import BaliseRecord
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 
 from cosim.errors import UnmetError
 from cosim.expectations.judged import Judged, judged_text
-from cosim.report.spec import ReportSpec
+from cosim.evaluation.spec import ReportSpec
 from cosim.results.result import Result
 
 if TYPE_CHECKING:

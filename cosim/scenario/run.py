@@ -22,8 +22,8 @@ from cosim.coupling.clocks import connect_clocks
 from cosim.coupling.connection import Connection, connect
 from cosim.coupling.plan import Plan, make_plan
 from cosim.diagnostics.call_log import CallLog
-from cosim.diagnostics.divergence import explained_failure
-from cosim.diagnostics.logged_slave import log_calls
+from cosim.structure.divergence import explained_failure
+from cosim.components.logged_slave import log_calls
 from cosim.diagnostics.messages import in_order
 from cosim.errors import CosimError
 from cosim.expectations.check import check_expectations
@@ -34,8 +34,8 @@ from cosim.master.interpolation.draw import draw_lines
 from cosim.master.master import Master, close
 from cosim.process.interruption import Interruption
 from cosim.process.sentinel import limited_calls
-from cosim.report.result_warnings import result_warnings
-from cosim.report.spec import Phase, ReportSpec
+from cosim.evaluation.result_warnings import result_warnings
+from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.results.recorder import Recorder
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 from cosim.results.si import InFormerUnits, in_si

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from cosim.diagnostics.structure import Structure
+from cosim.structure.structure import Structure
 from cosim.errors import CosimError, ScenarioError
 from cosim.scenario.includes import Key, attribute, find_file, read_tables, shipped_scenarios
 from cosim.scenario.origin import Origin

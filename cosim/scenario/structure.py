@@ -13,8 +13,8 @@ from cosim.components.recording import RecordingComponent
 from cosim.coupling.clocks import connect_clocks
 from cosim.coupling.connection import Connection, connect, unconnected_inputs
 from cosim.coupling.graph import Group, undeclared
-from cosim.diagnostics.inspect import group_index, make_links, make_part, rate_text
-from cosim.diagnostics.structure import Balises, Link, Structure
+from cosim.structure.inspect import group_index, make_links, make_part, rate_text
+from cosim.structure.structure import Balises, Link, Structure
 from cosim.errors import CosimError, CouplingError
 from cosim.master.algorithms.choose import AlgorithmChoice, choose_algorithm
 from cosim.scenario.backends import intended

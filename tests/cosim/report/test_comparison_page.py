@@ -27,7 +27,7 @@ from cosim.report.figures.comparison_figure import (
     worst_window,
 )
 from cosim.report.figures.panels import png
-from cosim.report.figures.style import new_figure
+from cosim.drawing.style import new_figure
 from cosim.report.page.comparison import comparison_page, draw_pictures, write_comparison, write_page, write_pictures
 from cosim.results.result import Result, SignalInfo
 

@@ -9,7 +9,7 @@ import browser
 import pytest
 
 from cosim.report.figures.panels import png
-from cosim.report.figures.style import new_figure
+from cosim.drawing.style import new_figure
 
 pytestmark = pytest.mark.browser
 
