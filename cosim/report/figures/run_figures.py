@@ -8,8 +8,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
-from cosim.report.figures.drawing import curve, is_noisy, is_wild, legend_above, shade_zones, time_axis
-from cosim.report.figures.scales import bounded, value_limits
 from cosim.drawing.style import (
     NOISY_LINE,
     ODOMETER_LINE,
@@ -24,6 +22,8 @@ from cosim.drawing.style import (
 from cosim.evaluation.indicators import on_intervals
 from cosim.evaluation.roles import estimate, label, recorded
 from cosim.evaluation.spec import ReportSpec
+from cosim.report.figures.drawing import curve, is_noisy, is_wild, legend_above, shade_zones, time_axis
+from cosim.report.figures.scales import bounded, value_limits
 from cosim.results.result import Result
 
 KMH = 3.6  # km/h in a m/s

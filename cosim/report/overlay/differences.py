@@ -8,8 +8,8 @@ from typing import Any
 from cosim.evaluation.event_counts import count_events
 from cosim.evaluation.facts import list_entry, mapping_entry
 from cosim.evaluation.numbers import DASH, number
-from cosim.report.overlay.runs import Run
 from cosim.evaluation.roles import phases
+from cosim.report.overlay.runs import Run
 from cosim.results.result import BaliseRecord, Result
 
 COMPONENT_ENTRIES = {"kind": "kind", "fmi_version": "FMI version", "model": "model", "preset": "preset", "guid": "GUID"}

@@ -8,9 +8,9 @@ from itertools import groupby
 
 from cosim.evaluation.metrics import PhaseMetrics
 from cosim.evaluation.numbers import error_number, number
-from cosim.report.page.parts import grouped_table
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
+from cosim.report.page.parts import grouped_table
 
 
 @dataclass(frozen=True)

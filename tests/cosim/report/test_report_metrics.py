@@ -10,11 +10,11 @@ from numpy.testing import assert_allclose
 from synthetic_run import OBSERVERS, synthetic_result, synthetic_spec
 
 from cosim.evaluation.event_counts import accepted_stamps, count_events
-from cosim.report.figures.scales import error_scale, running_maximum, value_limits
 from cosim.evaluation.indicators import indicator_statistics, on_intervals
 from cosim.evaluation.metrics import error_size, phase_metrics
 from cosim.evaluation.numbers import error_number, number
 from cosim.evaluation.spec import Phase, ReportSpec
+from cosim.report.figures.scales import error_scale, running_maximum, value_limits
 from cosim.results.result import BaliseRecord, Result
 
 EXACT = 1e-12  # closed forms, up to the rounding of some thousand sums
