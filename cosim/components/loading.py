@@ -133,7 +133,7 @@ def _open(path: Path, name: str) -> Archive:
 
 
 def load_block(system: HybridSystem, name: str, fmi_version: Literal[2, 3] = 3, **arguments: Any) -> Component:
-    """A Python block as a component; further arguments as for `fmu_observer.block.Face`."""
+    """A Python block as a component; further arguments as for `fmu_observer.block.FMIInterface`."""
     block = make_block(system, fmi_version, instance_name=name, **arguments)
     source = system.source or type(system).__qualname__
     face = COMPONENTS[_version(block.model_description)]

@@ -307,7 +307,7 @@ class Kinds(Mock):
 
 
 class Kinds2(FMI2, Kinds):
-    """The same with an FMI 2 face."""
+    """The same with an FMI 2 interface."""
 
 
 @pytest.mark.parametrize(

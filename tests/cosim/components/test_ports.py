@@ -23,7 +23,7 @@ class Mixed(Mock):
 
 
 class Mixed2(FMI2, Mixed):
-    """The same with an FMI 2 face."""
+    """The same with an FMI 2 interface."""
 
 
 @pytest.mark.parametrize("slave", [Mixed(), Mixed2()])
