@@ -1,4 +1,4 @@
-"""What the train believes: observers, detectors, their certificates, and the FMU-style face over any of them.
+"""What the train believes: observers, detectors, their certificates, and the FMU-style interface over any of them.
 
 Importing this package costs nothing: observers are loaded when they are asked for. It may use `plant_models`, never
 `fmus` or `cosim`.

@@ -143,7 +143,11 @@ class Train(HybridSystem):
         )
 
     def rolling(self, speed: float, wheel_radius: float = 0.575) -> dict[str, float]:
-        """Start values by name of a train that rolls as one at `speed` [m/s], its wheels without slip [m]."""
+        """Start values by name of a train that rolls as one at `speed` [m/s], its wheels without slip [m].
+
+        Args:
+            wheel_radius: of all wheels [m].
+        """
         starts = {"train_speed": speed, **{f"wagon_velocity[{i + 1}]": speed for i in range(self.wagons)}}
         return starts | {f"axle_rate[{k + 1}]": speed / wheel_radius for k in range(self.axles)}
 
