@@ -119,7 +119,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _run_hosted(options: argparse.Namespace) -> int:
     """FMUs with Python inside, see `fmus.hosted`; a file of the user's goes into them."""
-    hosted, own = import_module("fmus.hosted"), import_module("fmus.cli.user_system")
+    hosted, own = import_module("fmus.hosted"), import_module("plant_models.user_file")
     if options.platform != "host":
         raise ValueError("--hosted builds for this machine only; leave --platform out.")
     for name in _names(options):
@@ -182,10 +182,10 @@ def _names(options: argparse.Namespace) -> list[str]:
 
 
 def _system(name: str, words: Sequence[str]) -> Any:
-    own, recipes = import_module("fmus.cli.user_system"), import_module("fmus.recipes")
-    if own.names_a_file(name):
-        cls = own.load_class(name)
-        return own.make_system(cls, dict(_option(text, cls.option_choices) for text in words))
+    own, recipes = import_module("plant_models.user_file"), import_module("fmus.recipes")
+    if name not in recipes.RECIPES and (own.names_a_file(name) or ":" in name):
+        cls = own.load_class(name, recipes.SYSTEM)
+        return own.make(cls, dict(_option(text, cls.option_choices) for text in words))
     choices = recipes.RECIPES[name].option_choices if name in recipes.RECIPES else {}
     return recipes.recipe(name, **dict(_option(text, choices) for text in words))
 
