@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cosim.balises.service import BaliseService
-from cosim.components.capabilities import tool_warning
 from cosim.components.component import Component
 from cosim.components.fmi3 import FMI3Component
 from cosim.components.logged_slave import log_calls
@@ -54,7 +53,8 @@ from cosim.scenario.schema import ScenarioTable, step_count
 from cosim.scenario.starts import start_values
 from cosim.scenario.summary import first_summary, run_summary
 from cosim.structure.divergence import explained_failure
-from fmus.check.sense import doubled_names
+from fmus.fmi.capabilities import tool_warning
+from fmus.fmi.sense import doubled_names
 from plant_models.hybrid.units import Unit
 
 if TYPE_CHECKING:

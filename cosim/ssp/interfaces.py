@@ -15,7 +15,7 @@ from cosim.ssp.common import FAMILIES, NamedUnit
 from cosim.ssp.document import Node, fail
 from cosim.ssp.lapses import Lapses
 from cosim.ssp.model import ComponentElement, Connector
-from fmus.check.sense import doubled_names
+from fmus.fmi.sense import doubled_names
 from plant_models.hybrid.units import BASE_SYMBOLS, Unit, UnitError, parse_unit
 
 

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from plant_models.railway.adhesion import POLACH_DRY, POLACH_WET, PolachCurve
+from plant_models.railway.adhesion.polach import POLACH_DRY, POLACH_WET, PolachCurve
 
 KMH = 3.6  # km/h in one m/s
 MAP_SPEEDS = tuple(

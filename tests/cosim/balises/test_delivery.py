@@ -17,8 +17,8 @@ from mock_slaves import FMI2, EventMode, Mock, component, variable
 import fmu_observer
 from cosim.balises.layout import InstantLayout
 from cosim.balises.telegram import Channel
-from cosim.components.capabilities import read_capabilities
 from cosim.components.component import Component
+from fmus.fmi.capabilities import read_capabilities
 
 H = 0.1
 PERFECT = Channel()

@@ -9,7 +9,7 @@ import pytest
 from coupled_runs import Pushed, block
 from mock_slaves import FMI2, Mock, component, variable
 
-from fmus.ports import make_reader, make_writer
+from fmus.fmi.ports import make_reader, make_writer
 
 
 class Mixed(Mock):
