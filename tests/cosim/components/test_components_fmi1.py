@@ -15,7 +15,7 @@ from test_fmus.events import awkward_fmu
 from test_fmus.typed import typed_fmu
 
 from cosim.components.component import Component
-from cosim.components.described import EventPort
+from fmus.fmi.described import EventPort
 from cosim.components.fmi1 import FMI1Component
 from cosim.components.loading import describe_fmu, load_fmu
 from cosim.coupling.connection import connect
