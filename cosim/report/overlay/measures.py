@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import isfinite, isnan
 
+from cosim.report.error_table import MEASURED
 from cosim.report.metrics import PhaseMetrics, phase_metrics
 from cosim.report.numbers import DASH, error_number, number
 from cosim.report.overlay.runs import Run, observers_of, one_each
 from cosim.report.page.phases import COLUMNS
-from cosim.report.page.table import MEASURED
 from cosim.report.phase_details import phase_details
 from cosim.report.roles import label, phases
 
