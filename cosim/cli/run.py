@@ -202,8 +202,8 @@ def _tell(outcome: Outcome, study: Any, paths: dict[str, Path], options: argpars
 
     print(_headline(summary))
     if outcome.result.table.size:
+        from cosim.evaluation.metrics import phase_metrics  # noqa: PLC0415 - only here
         from cosim.report.error_table import error_text  # noqa: PLC0415
-        from cosim.report.metrics import phase_metrics  # noqa: PLC0415 - only here
 
         metrics = phase_metrics(outcome.result, outcome.spec)
         if metrics:
