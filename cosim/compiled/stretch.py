@@ -9,9 +9,8 @@ meets: then the Python stepper finishes the step from where it stands.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from functools import partial
 from time import perf_counter
 from typing import Any
@@ -22,13 +21,15 @@ from cosim.compiled.library import load_stepper
 from cosim.compiled.notifying import Telling, can_be_told
 from cosim.compiled.program import NotCompilable, Program, Stop
 from cosim.compiled.recorded_returns import Answer, answered
-from cosim.components.component import NEVER, TIME_TOLERANCE, Component
+from cosim.components.component import Component
 from cosim.coupling.plan import Mover, Plan, PlannedComponent
 from cosim.master.axis import TimeAxis
 from cosim.master.control.control import StepControl
 from cosim.master.control.fixed import FixedStep
+from cosim.master.stepper import Stretch
 from cosim.master.system import NO_ROWS, Row, System
 from cosim.results.recorder import Recorder
+from fmus.fmi.standard import NEVER, TIME_TOLERANCE
 from fmus.toolchain.compile import CompilationError, CompilerMissing
 
 LONGEST = 4096
@@ -46,24 +47,6 @@ WITHIN = frozenset({Stop.REFUSED, Stop.WRITE, Stop.STEP, Stop.READ, Stop.CROSSED
 
 STEPPED = frozenset({Stop.STEP, Stop.READ, Stop.CROSSED})
 """That one has been called to do the step."""
-
-Finish = Callable[[], Sequence[Row]]
-
-
-@dataclass(frozen=True)
-class Stretch:
-    """What a stretch did.
-
-    Args:
-        done: steps done and recorded.
-        finish: does what is left of the next step, or all of it, in Python and returns its event rows; None where the
-            next step may be the stepper's again.
-        suspect: a value of the last row is not finite.
-    """
-
-    done: int
-    finish: Finish | None = None
-    suspect: bool = False
 
 
 class CompiledStepper:

@@ -14,7 +14,7 @@ from typing import Any
 EARLY, EVERY = 3, 64  # the third call is timed, the first ones are not like the others; then every 64th
 KINDS = ("get", "set", "event", "save", "restore", "release")
 OF_METHOD = {
-    "tell": "event",
+    "notify": "event",
     "handle_event": "event",
     "report_clock": "event",
     "save": "save",

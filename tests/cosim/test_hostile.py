@@ -144,7 +144,7 @@ def test_a_limit_is_for_one_call_and_not_for_many(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(watch, "LAST_CALL", page)
     page.limit(0.5)
     ended: list[str] = []
-    looking = watch._PlantMonitor(0)
+    looking = watch._Watch(0)
     monkeypatch.setattr(looking, "_end", ended.append)
     for now in [(1, 0.0)] * 3 + [(2, 0.0), (2, 0.1), (2, 0.2)] + [(0, 0.2)] * 4:
         page.call[0], page.time[0] = now

@@ -11,10 +11,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cosim.components.component import TIME_TOLERANCE
 from cosim.coupling.plan import Plan, PlannedComponent
 from cosim.errors import CouplingError
 from cosim.master.axis import TimeAxis
+from fmus.fmi.standard import TIME_TOLERANCE
 
 
 class SlowMover:

@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from cosim.components.component import TIME_TOLERANCE
 from cosim.coupling.plan import Mover, PlannedComponent
+from fmus.fmi.standard import TIME_TOLERANCE
 
 
 @dataclass

@@ -68,18 +68,18 @@ def test_a_start_value_the_slave_refuses_is_a_run_error_with_the_value() -> None
 
 
 @pytest.mark.parametrize("step", ["instantiate", "enterInitializationMode", "exitInitializationMode"])
-@pytest.mark.parametrize("face", [Mock, FMI2])
-def test_a_life_that_fails_says_where(step: str, face: type[Mock]) -> None:
+@pytest.mark.parametrize("interface", [Mock, FMI2])
+def test_a_life_that_fails_says_where(step: str, interface: type[Mock]) -> None:
     def refuse(_self: Any, **_: Any) -> None:
         raise FMICallException(step, ERROR)
 
-    slave = type("Broken", (face,), {step: refuse})()
+    slave = type("Broken", (interface,), {step: refuse})()
     with pytest.raises(RunError, match=f"Component 'mock'.*{step} failed"):
         started(slave)
 
 
 class Train2(FMI2, Train):
-    """FMI 2 face."""
+    """FMI 2 interface."""
 
 
 class Clock(EventMode):
@@ -116,7 +116,7 @@ def test_events_told_after_a_restore_are_told_again(version: Any) -> None:
     made.exit_initialization()
     state = made.save()
     for _ in range(3):
-        made.tell(made.events["balise"], 0.0, 0.05, {"position": 3.0, "unknown": 1.0})
+        made.notify(made.events["balise"], 0.0, 0.05, {"position": 3.0, "unknown": 1.0})
         made.advance(0.0, 0.1)
         assert read(made, ["last", "at", "heard"]) == pytest.approx([3.0, 0.05, 1.0])
         assert made.outcomes()["lost"] == 0  # type: ignore[index]

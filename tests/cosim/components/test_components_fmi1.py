@@ -186,14 +186,14 @@ def test_what_fmi_1_does_not_have_is_said() -> None:
     made.enter_initialization(0.0, 1.0)
     made.exit_initialization()
 
-    def tell(event: EventPort) -> None:
-        made.tell(event, 0.0, 0.0, {})
+    def notify(event: EventPort) -> None:
+        made.notify(event, 0.0, 0.0, {})
 
     event = EventPort("balise", 1, None, {})
     calls = {
         "save its state": made.save,
         "restore a state": lambda: made.restore(None),
-        "takes no events": lambda: tell(event),
+        "takes no events": lambda: notify(event),
     }
     for words, call in calls.items():
         with pytest.raises(RunError, match=f"Component 'old' at t = 0 s: an FMI 1.0 slave .*{words}"):
