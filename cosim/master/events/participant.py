@@ -8,7 +8,7 @@ from typing import Any
 
 from cosim.components.component import TIME_TOLERANCE
 from cosim.components.fmi3 import FMI3Component
-from cosim.coupling.plan import PlannedComponent
+from cosim.coupling.planned import PlannedComponent
 from cosim.master.events.gates import Gate
 
 Wire = tuple["Participant", int]
