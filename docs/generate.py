@@ -20,8 +20,8 @@ from pydantic.fields import FieldInfo
 
 import fmu_observer
 from cosim import Outcome, Scenario
+from cosim.evaluation.metrics import phase_metrics
 from cosim.report.figures.main_picture import main_picture
-from cosim.report.metrics import phase_metrics
 from cosim.report.page.table import text_table
 from cosim.scenario import expectation_tables as expectations
 from cosim.scenario import schema, tables

@@ -119,12 +119,20 @@ class VariableTable:
 
 
 def referenced(items: Sequence[ItemOfTable], first: int, count: int = 1) -> Sequence[ItemOfTable]:
-    """Those that have `count` value references from `first` on, of what stands in the order of the variables."""
+    """Those that have `count` value references from `first` on, of what stands in the order of the variables.
+
+    Args:
+        items: in the order of the variables.
+    """
     return items[first - FIRST_REFERENCE : first - FIRST_REFERENCE + count]
 
 
 def exposed_inputs(system: HybridSystem) -> tuple[Signal, ...]:
-    """Inputs and event payloads, without the noises that the runtime draws itself."""
+    """Inputs and event payloads, without the noises that the runtime draws itself.
+
+    Args:
+        system: the hybrid system.
+    """
     return system.input_signals[: len(system.input_signals) - len(system.noises)]
 
 

@@ -52,7 +52,7 @@ class Plan:
         return [MAIN_SOURCE]
 
     def source_files(self) -> dict[str, bytes]:
-        """Our files in ``sources/``, by name: the runtime with the face of this FMI version, and the model."""
+        """Our files in ``sources/``, by name: the runtime with the interface of this FMI version, and the model."""
         others = set().union(*(names for version, names in FACES.items() if version != self.fmi_version))
         files = {name: text for name, text in runtime_sources().items() if name not in others}
         files["model.c"] = generate_model(self.system, self.equations, self.description, self.preset).encode()

@@ -11,8 +11,8 @@ from pathlib import Path
 from fmpy.model_description import ModelDescription, ModelVariable
 from fmpy.validation import validate_fmu
 
-from fmus.check.binaries import LIBRARY_SUFFIXES, why_not_here
-from fmus.check.description import read_description
+from fmus.fmi.binaries import LIBRARY_SUFFIXES, why_not_here
+from fmus.fmi.description import read_description
 from fmus.toolchain.machine_code import platforms_of_library
 from fmus.toolchain.platforms import host_platform
 

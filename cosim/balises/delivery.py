@@ -13,10 +13,10 @@ from typing import Any, Literal
 import numpy as np
 
 from cosim.balises.telegram import payload
-from cosim.components.component import TIME_TOLERANCE
 from cosim.components.described import EventPort
 from cosim.coupling.planned import PlannedComponent
 from cosim.results.result import BaliseRecord
+from fmus.fmi.standard import TIME_TOLERANCE
 
 Timing = Literal["exact", "stale"]
 OUTCOMES = (

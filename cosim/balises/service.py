@@ -18,11 +18,11 @@ from cosim.balises.delivery import Delivery, Receiver
 from cosim.balises.layout import InstantLayout
 from cosim.balises.localiser import Localiser
 from cosim.balises.telegram import Channel, Crossing, FalseTelegram, Mailbox
-from cosim.components.component import TIME_TOLERANCE
 from cosim.coupling.chain import Mover, Position, Stage, around
 from cosim.coupling.plan import Plan
 from cosim.errors import CouplingError
 from cosim.results.result import BaliseRecord
+from fmus.fmi.standard import TIME_TOLERANCE
 
 Row = tuple[float, np.ndarray]
 Snapshot = tuple[Crossing, np.ndarray]

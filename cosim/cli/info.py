@@ -9,9 +9,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from cosim.components.capabilities import read_capabilities
 from cosim.components.loading import read_description, runs_here
 from cosim.ssp.names import is_package
+from fmus.fmi.capabilities import read_capabilities
 
 
 def register(commands: Any) -> None:

@@ -49,9 +49,9 @@ def _rooms(kind: str, entries: Mapping[str, Any]) -> dict[str, list[str]]:
     """Names by the room they live in; scenarios live in none."""
     if kind == "scenarios":
         return {"": list(entries)}
-    from fmus.recipes import RECIPES, by_room  # noqa: PLC0415 - CasADi is loaded only by those who list
+    from fmus.recipes import by_room  # noqa: PLC0415 - CasADi is loaded only by those who list
 
-    return by_room({name: RECIPES[name] for name in entries})
+    return by_room(entries)
 
 
 def _details(kind: str, name: str, entry: Mapping[str, Any]) -> list[str]:

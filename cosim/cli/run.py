@@ -202,7 +202,7 @@ def _tell(outcome: Outcome, study: Any, paths: dict[str, Path], options: argpars
 
     print(_headline(summary))
     if outcome.result.table.size:
-        from cosim.report.metrics import phase_metrics  # noqa: PLC0415 - only here
+        from cosim.evaluation.metrics import phase_metrics  # noqa: PLC0415 - only here
         from cosim.report.page.table import text_table  # noqa: PLC0415
 
         metrics = phase_metrics(outcome.result, outcome.spec)

@@ -17,9 +17,10 @@ from cosim.balises.delivery import OUTCOMES, Delivery, Receiver, snapped
 from cosim.balises.telegram import PAYLOAD
 from cosim.compiled.program import Program
 from cosim.compiled.recorded_returns import Answer
-from cosim.components.component import NEVER, Component
+from cosim.components.component import Component
 from cosim.results.result import BaliseRecord
 from fmu_observer.event_protocol import OUTCOME_VARIABLES
+from fmus.fmi.standard import NEVER
 
 FUNCTIONS = ("fmi3EnterEventMode", "fmi3SetClock", "fmi3SetFloat64", "fmi3UpdateDiscreteStates", "fmi3EnterStepMode")
 FIELDS = ("position", "location_accuracy", "odometer_reading", "delivered_at", "stamp")  # in the order of `stepper.h`

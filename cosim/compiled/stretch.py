@@ -22,7 +22,7 @@ from cosim.compiled.library import load_stepper
 from cosim.compiled.notifying import Telling, can_be_told
 from cosim.compiled.program import NotCompilable, Program, Stop
 from cosim.compiled.recorded_returns import Answer, answered
-from cosim.components.component import NEVER, TIME_TOLERANCE, Component
+from cosim.components.component import Component
 from cosim.coupling.chain import Mover, Position, Stage
 from cosim.coupling.plan import Plan
 from cosim.coupling.planned import PlannedComponent
@@ -31,6 +31,7 @@ from cosim.master.control.control import StepControl
 from cosim.master.control.fixed import FixedStep
 from cosim.master.system import NO_ROWS, Row, System
 from cosim.results.recorder import Recorder
+from fmus.fmi.standard import NEVER, TIME_TOLERANCE
 from fmus.toolchain.compile import CompilationError, CompilerMissing
 
 LONGEST = 4096

@@ -12,9 +12,9 @@ from typing import Literal
 
 import numpy as np
 
-from cosim.components.component import NEVER, TIME_TOLERANCE
 from cosim.errors import ScenarioError, nearest
 from cosim.results.result import Result, SignalInfo
+from fmus.fmi.standard import NEVER, TIME_TOLERANCE
 
 Interpolation = Literal["linear", "hold"]
 

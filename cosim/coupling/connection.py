@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from fmpy.model_description import ModelVariable
 
 from cosim.components.component import Component
-from cosim.components.described import NUMERIC_TYPES
-from cosim.components.elements import Element, described, elements_of
 from cosim.coupling.transformation import Transformation
 from cosim.errors import CouplingError, nearest
-from fmus.ports import FLOATING_TYPES, getter_type
+from fmus.fmi.elements import Element, described, elements_of
+from fmus.fmi.types import FLOATING_TYPES, NUMERIC_TYPES, getter_type
 from plant_models.hybrid.units import UnitError, conversion
 
 Link = tuple[str, str] | tuple[str, str, Transformation]

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 
 from cosim.components.component import Component
 from cosim.coupling.connection import Connection
-from fmus.ports import FLOATING_TYPES
+from fmus.fmi.types import FLOATING_TYPES
 
 Signal = tuple[str, str]
 """(component, variable) of a source; an array is one signal."""

@@ -14,7 +14,6 @@ from typing import Any, Protocol
 import numpy as np
 
 from cosim.components.component import Component
-from cosim.components.described import NUMERIC_TYPES
 from cosim.coupling.clocks import ClockConnection
 from cosim.coupling.connection import Connection, local_sources
 from cosim.coupling.inputs import connected_inputs
@@ -23,6 +22,7 @@ from cosim.coupling.non_numeric import non_numeric_cells, non_numeric_inputs, wi
 from cosim.coupling.planned import InputInterpolator, PlannedComponent
 from cosim.errors import CouplingError, nearest
 from cosim.results.result import SignalInfo
+from fmus.fmi.types import NUMERIC_TYPES
 
 
 class Service(Protocol):

@@ -14,7 +14,6 @@ import numpy as np
 
 from cosim.balises.service import BaliseService
 from cosim.compiled.choice import Choice, Wanted, choose_stepper
-from cosim.components.component import TIME_TOLERANCE
 from cosim.coupling.plan import Plan
 from cosim.errors import RunError
 from cosim.master.algorithms.algorithm import Algorithm
@@ -29,6 +28,7 @@ from cosim.master.system import Row, System
 from cosim.process.last_call import LAST_CALL
 from cosim.results.recorder import Recorder
 from cosim.results.result import SignalInfo
+from fmus.fmi.standard import TIME_TOLERANCE
 
 PROGRESS_INTERVAL = 64
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from cosim.errors import UnmetError
+from cosim.evaluation.spec import ReportSpec
 from cosim.expectations.judged import Judged, judged_text
-from cosim.report.spec import ReportSpec
 from cosim.results.result import Result
 
 if TYPE_CHECKING:

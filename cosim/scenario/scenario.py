@@ -10,7 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from cosim.diagnostics.structure import Structure
 from cosim.errors import CosimError, ScenarioError
 from cosim.scenario.includes import Key, attribute, find_file, read_tables, shipped_scenarios
 from cosim.scenario.origin import Origin
@@ -22,6 +21,7 @@ from cosim.scenario.save import plain, save_scenario, scenario_text
 from cosim.scenario.schema import ScenarioTable, parse_scenario
 from cosim.scenario.streaming import finish_stream, streaming_to
 from cosim.ssp.names import is_package, stem
+from cosim.structure.structure import Structure
 
 if TYPE_CHECKING:
     from cosim.studies.sampling import Mode, Range

@@ -13,8 +13,6 @@ from cosim.components.recording import RecordingComponent
 from cosim.coupling.clocks import connect_clocks
 from cosim.coupling.connection import Connection, connect, unconnected_inputs
 from cosim.coupling.graph import Group, undeclared
-from cosim.diagnostics.inspect import group_index, make_links, make_part, rate_text
-from cosim.diagnostics.structure import Balises, Link, Structure
 from cosim.errors import CosimError, CouplingError
 from cosim.master.algorithms.choose import AlgorithmChoice, choose_algorithm
 from cosim.scenario.backends import intended
@@ -25,6 +23,8 @@ from cosim.scenario.models import make_system, open_recording
 from cosim.scenario.schema import ScenarioTable
 from cosim.scenario.starts import given_values
 from cosim.scenario.tables import ComponentTable
+from cosim.structure.inspect import group_index, make_links, make_part, rate_text
+from cosim.structure.structure import Balises, Link, Structure
 
 
 def scenario_structure(table: ScenarioTable, name: str, folder: Path, where: str) -> Structure:

@@ -12,11 +12,11 @@ from typing import Any
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from cosim.components.component import Component
-from cosim.components.described import NUMERIC_TYPES
-from cosim.components.elements import elements_of
 from cosim.components.loading import describe_fmu, read_description, runs_here
 from cosim.errors import FmuLoadError
 from cosim.starter.guess import Signal
+from fmus.fmi.elements import elements_of
+from fmus.fmi.types import NUMERIC_TYPES
 from plant_models.hybrid.units import UnitError
 
 NAME = "fmu"

@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from cosim.components.component import TIME_TOLERANCE
-from cosim.report.event_counts import USED
-from cosim.report.indicators import IndicatorStatistics, indicator_statistics, on_intervals
-from cosim.report.metrics import PhaseMetrics, phase_metrics
-from cosim.report.roles import Quantity, estimate, estimation_error
-from cosim.report.spec import Phase, ReportSpec
+from cosim.evaluation.event_counts import USED
+from cosim.evaluation.indicators import IndicatorStatistics, indicator_statistics, on_intervals
+from cosim.evaluation.metrics import PhaseMetrics, phase_metrics
+from cosim.evaluation.roles import Quantity, estimate, estimation_error
+from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.results.result import BaliseRecord, Result
 from cosim.results.summary_file import jsonable
+from fmus.fmi.standard import TIME_TOLERANCE
 
 WHOLE = "whole run"
 DIVERGED = 1000.0

@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cosim.report.metrics import PhaseMetrics
-from cosim.report.numbers import DASH, error_number, number
+from cosim.evaluation.metrics import PhaseMetrics
+from cosim.evaluation.numbers import DASH, error_number, number
 from cosim.studies.observer_scores import CertifiedGap, ObserverScore
 
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from cosim.errors import RunError
-from cosim.report.metrics import phase_metrics
-from cosim.report.spec import ReportSpec
+from cosim.evaluation.metrics import phase_metrics
+from cosim.evaluation.spec import ReportSpec
 from cosim.scenario import Scenario
 
 QUARTILES = (25.0, 50.0, 75.0)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cosim.errors import ComparisonError, OutputError
-from cosim.report.numbers import number as number_text
+from cosim.evaluation.numbers import number as number_text
 from cosim.results.load import load_result
 from cosim.results.result import Result
 from cosim.scenario.outcome import Outcome

@@ -20,8 +20,8 @@ from fmu_observer.design.certified_gains import RATIOS, SHARES, Gains, balise_fa
 from fmu_observer.design.noise_amplification import NoiseAmplification, noise_amplification
 
 if TYPE_CHECKING:
-    from fmu_observer.observers.train import TrainObserver
     from fmu_observer.observers.train.high_gain_observer import HighGainTrainObserver
+    from fmu_observer.observers.train.train_observer import TrainObserver
 
 Trust = Literal["balises", "odometer"]
 
@@ -124,7 +124,7 @@ def design_high_gain(
     Raises:
         ValueError: bad input (see `balise_gaps`), or nothing could be certified.
     """
-    from fmu_observer.observers.train import DifferentiatorCdo  # noqa: PLC0415 - observers use designs
+    from fmu_observer.observers.train.differentiator_cdo import DifferentiatorCdo  # noqa: PLC0415 - observers use designs
 
     chosen = DifferentiatorCdo() if observer is None else observer
     gaps = balise_gaps(spacing, speeds)
@@ -151,7 +151,7 @@ def design_takagi_sugeno(
     Raises:
         ValueError: bad input (see `balise_gaps`), an unknown `trust`, or nothing could be certified.
     """
-    from fmu_observer.observers.train import TakagiSugenoCdo  # noqa: PLC0415 - observers use designs
+    from fmu_observer.observers.train.takagi_sugeno_cdo import TakagiSugenoCdo  # noqa: PLC0415 - observers use designs
 
     gaps, observer = balise_gaps(spacing, speeds), TakagiSugenoCdo()
     if trust not in ("balises", "odometer"):
@@ -188,7 +188,7 @@ def design_adaptive(
     Raises:
         ValueError: bad input (see `balise_gaps`), or no rule could be certified; the constant theta that can is named.
     """
-    from fmu_observer.observers.train import AdaptiveGainCdo  # noqa: PLC0415 - observers use designs
+    from fmu_observer.observers.train.adaptive_gain_cdo import AdaptiveGainCdo  # noqa: PLC0415 - observers use designs
 
     gaps, observer = balise_gaps(spacing, speeds), AdaptiveGainCdo()
     longest, middle = _with_margin(gaps, margin), 0.5 * (gaps.nearest + gaps.farthest)

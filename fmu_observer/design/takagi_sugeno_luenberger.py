@@ -56,7 +56,11 @@ def placed_gains(model: TakagiSugenoModel, poles: np.ndarray) -> np.ndarray:
 
 
 def vertex_errors(model: TakagiSugenoModel, gains: np.ndarray) -> list[np.ndarray]:
-    """``A_i - K_i C`` in the model's scaled coordinates, N matrices of shape (n, n)."""
+    """``A_i - K_i C`` in the model's scaled coordinates, N matrices of shape (n, n).
+
+    Args:
+        gains: of all vertices.
+    """
     T = np.asarray(model.scaling)
     return [(A - K @ model.C) * T[:, None] / T for A, K in zip(model.A, gains, strict=True)]
 

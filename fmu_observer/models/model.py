@@ -156,5 +156,9 @@ def shift_matrix(length: int, width: int = 1) -> np.ndarray:
 
 
 def stacked(values: tuple[Array, ...]) -> Array:
-    """Scalars as a vector; an empty tuple gives shape (0,)."""
+    """Scalars as a vector; an empty tuple gives shape (0,).
+
+    Args:
+        values: numbers or arrays of shape (members,).
+    """
     return vector(*values) if values else np.zeros(0)

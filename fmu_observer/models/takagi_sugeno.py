@@ -51,6 +51,9 @@ class Premise:
     def share(self, value: Array) -> Array:
         """Membership of the upper bound, ``(f - low) / (high - low)`` limited to [0, 1]; the lower bound has the
         rest.
+
+        Args:
+            value: of the premise.
         """
         return np.clip((value - self.low) / (self.high - self.low), 0.0, 1.0)
 
@@ -170,7 +173,11 @@ class TakagiSugenoModel:
         return tuple(weights)
 
     def outside(self, values: tuple[Array, ...]) -> Array:
-        """1 where some premise is outside its bounds, else 0."""
+        """1 where some premise is outside its bounds, else 0.
+
+        Args:
+            values: of the premises.
+        """
         flags = [p.outside(value) for p, value in zip(self.premises, values, strict=True)]
         worst: Array = 0.0
         for flag in flags:
@@ -178,7 +185,11 @@ class TakagiSugenoModel:
         return worst
 
     def blend(self, weights: tuple[Array, ...], x: Array, u: Array) -> Array:
-        """``sum_i h_i (A_i x + B_i u)``, shape (n,)."""
+        """``sum_i h_i (A_i x + B_i u)``, shape (n,).
+
+        Args:
+            weights: of the vertices, sum 1.
+        """
         total = 0.0 * x
         for weight, A, B in zip(weights, self.A, self.B, strict=True):
             linear = A @ x

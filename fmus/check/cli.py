@@ -70,7 +70,7 @@ def _exit_code(report: Any, strict: bool) -> int:
 
 
 def _checked(options: argparse.Namespace) -> Any:
-    running, archives = import_module("fmus.check.run"), import_module("fmus.check.archive")
+    running, archives = import_module("fmus.check.run"), import_module("fmus.fmi.archive")
     starts = _starts(options.start)
     archive = archives.open_archive(options.file)
     tqdm = import_module("tqdm").tqdm

@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 
 from fmus.check.instance import FmuInstance
-from fmus.check.library import MODEL_EXCHANGE
-
-MAX_EVENT_ITERATIONS = 100
+from fmus.fmi.standard import MAX_EVENT_ITERATIONS, MODEL_EXCHANGE
 
 
 class FmuModel(FmuInstance):

@@ -20,8 +20,7 @@ class Steppable(Protocol):
     """A co-simulation component, from instantiation to the end.
 
     1. `instantiate`, `set_start`, `enter_initialization`, readers and writers, `exit_initialization`, then `advance` in
-      turn,
-       `terminate`, `free`. `reset` leads back to the state after `instantiate`.
+       turn, `terminate`, `free`. `reset` leads back to the state after `instantiate`.
     2. `save`, `restore` and `release` exist where `can_save` says so.
     3. Each call raises one of `FAILURES` where the slave refuses or throws.
     """

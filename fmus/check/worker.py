@@ -17,10 +17,10 @@ from typing import Any, NoReturn
 
 from fmus.check.catalogue import CATALOGUE, REPEATED, Check
 from fmus.check.context import Context
-from fmus.check.description import read_description
 from fmus.check.findings import Finding, Outcome, Verdict, failed
 from fmus.check.instance import SlaveError
 from fmus.check.job import Job
+from fmus.fmi.description import read_description
 
 BY_HAND = "check this by hand"
 DIFFERS = "not run, because equal runs differ"

@@ -136,6 +136,9 @@ def filled(starts: Mapping[str, float], values: Values | None, what: str) -> np.
 def known(name: str, names: Iterable[str], what: str) -> str:
     """The name itself.
 
+    Args:
+        what: kind of thing, for the message.
+
     Raises:
         ValueError: it is not among `names`; the nearest ones are given.
     """

@@ -99,7 +99,11 @@ def to_state_space(
 def jacobians(
     part: ContinuousPart, x: np.ndarray, u: np.ndarray, t: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Exact A, B, C, D of a continuous part at states `x` of shape (nc,) and inputs `u` of shape (m,)."""
+    """Exact A, B, C, D of a continuous part at states `x` of shape (nc,) and inputs `u` of shape (m,).
+
+    Args:
+        t: time [s].
+    """
     system = part.system
     state, inputs, p = part.whole(x, u, part.parameters)
     signs = np.sign(state[system.friction_indices()])

@@ -268,7 +268,8 @@ OF_EACH_KIND = {
     "exponential_gain",
     "slip_indicator",
 }
-"""Both faces of FMI stand on one model code, so every shipped system is tested as FMI 3.0, and as FMI 2.0 one of each
+"""Both interfaces of FMI stand on one model code, so every shipped system is tested as FMI 3.0, and as FMI 2.0 one of
+each
 kind: stiff with dry friction, sampled, noisy, with memory, with events of its own and from outside, with a sliding
 mode, with matrices."""
 

@@ -12,12 +12,12 @@ from functools import partial
 
 import numpy as np
 
-from cosim.components.component import TIME_TOLERANCE
 from cosim.coupling.chain import Mover, Position, Preparer, Stage, around
 from cosim.coupling.plan import Plan
 from cosim.coupling.planned import PlannedComponent
 from cosim.errors import CouplingError
 from cosim.master.axis import TimeAxis
+from fmus.fmi.standard import TIME_TOLERANCE
 
 
 class SlowRate:

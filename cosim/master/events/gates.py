@@ -13,7 +13,7 @@ from fmpy.model_description import ModelVariable
 
 from cosim.components.component import Component
 from cosim.coupling.inputs import Inputs
-from fmus.ports import FLOATING_TYPES
+from fmus.fmi.types import FLOATING_TYPES
 
 Send = Callable[[], None]
 

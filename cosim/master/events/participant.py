@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from cosim.components.component import TIME_TOLERANCE
 from cosim.components.fmi3 import FMI3Component
 from cosim.coupling.planned import PlannedComponent
 from cosim.master.events.gates import Gate
+from fmus.fmi.standard import TIME_TOLERANCE
 
 Wire = tuple["Participant", int]
 """A participant and one of its triggered input clocks."""

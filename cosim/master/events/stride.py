@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cosim.components.component import TIME_TOLERANCE
 from cosim.coupling.chain import Mover, Position, Stage, around, unchanged
 from cosim.coupling.planned import PlannedComponent
+from fmus.fmi.standard import TIME_TOLERANCE
 
 
 @dataclass

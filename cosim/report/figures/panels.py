@@ -10,11 +10,11 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
+from cosim.evaluation.roles import estimate, estimation_error, recorded
+from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.error_figures import position_error_figure, speed_error_figure
 from cosim.report.figures.gap_figure import gap_figure, sampling_gaps
 from cosim.report.figures.run_figures import adhesion_figure, slip_figure, speed_figure
-from cosim.report.roles import estimate, estimation_error, recorded
-from cosim.report.spec import ReportSpec
 from cosim.results.result import Result
 
 DPI = 130

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from cosim.errors import ComparisonError
-from cosim.report.spec import Phase, ReportSpec
+from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.results.result import Result
 
 MOST_RUNS = 12  # that anybody can tell apart in a figure

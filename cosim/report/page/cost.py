@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cosim.report.facts import list_entry, number_entry
-from cosim.report.numbers import DASH, number
+from cosim.evaluation.facts import list_entry, number_entry
+from cosim.evaluation.numbers import DASH, number
 from cosim.report.page.parts import paragraph, simple_table
 from cosim.results.result import Result
 

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-from cosim.report.metrics import PhaseMetrics
-from cosim.report.numbers import error_number, number
+from cosim.evaluation.metrics import PhaseMetrics
+from cosim.evaluation.numbers import error_number, number
+from cosim.evaluation.roles import label
+from cosim.evaluation.spec import ReportSpec
 from cosim.report.page.parts import grouped_table
-from cosim.report.roles import label
-from cosim.report.spec import ReportSpec
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,11 @@ from plant_models.hybrid.system import Array
 
 
 def flattened(matrix: Array) -> list[Array]:
-    """Entries row by row, as scalars."""
+    """Entries row by row, as scalars.
+
+    Args:
+        matrix: shape (n, n).
+    """
     rows, columns = matrix.shape
     return [matrix[i, j] for i in range(rows) for j in range(columns)]
 

@@ -29,7 +29,11 @@ class HermiteCubic(NamedTuple):
 
     @classmethod
     def of(cls, h: Array, p0: Array, v0: Array, p1: Array, v1: Array) -> HermiteCubic:
-        """From positions [m] and speeds [m/s] at both ends of a step of length `h` [s]."""
+        """From positions [m] and speeds [m/s] at both ends of a step of length `h` [s].
+
+        Args:
+            h: length of the step [s]. p0, v0: position [m] and speed [m/s] at its start. p1, v1: at its end.
+        """
         rise = p1 - p0
         return cls(p0, h * v0, 3.0 * rise - h * (2.0 * v0 + v1), h * (v0 + v1) - 2.0 * rise)
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import browser
 import pytest
 
+from cosim.drawing.style import new_figure
 from cosim.report.figures.panels import png
-from cosim.report.figures.style import new_figure
 
 pytestmark = pytest.mark.browser
 

@@ -16,9 +16,9 @@ from small_scenarios import small
 
 from cosim import Scenario
 from cosim.errors import RunError, ScenarioError
+from cosim.evaluation.metrics import phase_metrics
+from cosim.evaluation.spec import ReportSpec
 from cosim.master.master import Master
-from cosim.report.metrics import phase_metrics
-from cosim.report.spec import ReportSpec
 from cosim.results.load import load_result
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 from cosim.studies.observer_scores import CertifiedGap, error_at_balises, false_alarms, longest_gap

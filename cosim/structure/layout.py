@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import TypeVar
 
-from cosim.diagnostics.shapes import Box, Edge, Frame, Layout, Size, Wire
-from cosim.diagnostics.structure import Structure
+from cosim.structure.shapes import Box, Edge, Frame, Layout, Size, Wire
+from cosim.structure.structure import Structure
 
 BOX_GAP, BAND_GAP, PASS = 0.28, 0.34, 0.16  # between boxes and bands; height left free for a wire that passes
 # of group frames, and the room of a wire that runs back

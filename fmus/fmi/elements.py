@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 from fmpy.model_description import ModelVariable
 
-from fmus.ports import size
+from fmus.fmi.types import size
 
 INDEXED = re.compile(r"(?P<base>.+)\[(?P<indices>\s*\d+\s*(?:,\s*\d+\s*)*)\]", re.DOTALL)
 

@@ -19,11 +19,11 @@ from matplotlib.patches import Circle, FancyBboxPatch, PathPatch, Polygon
 from matplotlib.path import Path as Curve
 from matplotlib.textpath import TextPath
 
-from cosim.diagnostics.layout import EVENT_PORT, lay_out
-from cosim.diagnostics.shapes import FOOT, PAD, Box, Edge, Frame, Layout, Size, Wire
-from cosim.diagnostics.structure import Link, Part, Structure
+from cosim.drawing.style import RC, new_figure, styled
 from cosim.errors import OutputError
-from cosim.report.figures.style import RC, new_figure, styled
+from cosim.structure.layout import EVENT_PORT, lay_out
+from cosim.structure.shapes import FOOT, PAD, Box, Edge, Frame, Layout, Size, Wire
+from cosim.structure.structure import Link, Part, Structure
 
 COLOURS = {"fresh": "#33475B", "held": "#D55E00", "iterated": "#7A4FA3", "loop": "#B00020", "event": "#009E73"}
 MEANINGS = {

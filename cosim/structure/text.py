@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from textwrap import TextWrapper
 
-from cosim.diagnostics.structure import Link, Part, Port, Structure
+from cosim.structure.structure import Link, Part, Port, Structure
 
 DASH = "-"
 

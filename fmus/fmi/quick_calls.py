@@ -10,7 +10,7 @@ import ctypes
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from fmus.native_calls import prepared_call
+from fmus.fmi.native_calls import prepared_call
 
 Discrete = tuple[bool, bool, bool, bool, bool, float]
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.report.event_counts import USED
-from cosim.report.roles import Quantity, estimation_error
-from cosim.report.spec import ReportSpec
+from cosim.evaluation.event_counts import USED
+from cosim.evaluation.roles import Quantity, estimation_error
+from cosim.evaluation.spec import ReportSpec
 from cosim.results.result import BaliseRecord, Result
 
 SAME = 1e-9  # times this close, relative to their size, are one: an event table may have been written with fewer digits

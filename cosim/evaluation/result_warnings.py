@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from cosim.report.facts import list_entry
-from cosim.report.metrics import FEWEST_INSTANTS, instants, judged_size, within
-from cosim.report.numbers import number
-from cosim.report.roles import estimation_error, label, phases, recorded
-from cosim.report.spec import Phase, ReportSpec
+from cosim.evaluation.facts import list_entry
+from cosim.evaluation.metrics import FEWEST_INSTANTS, instants, judged_size, within
+from cosim.evaluation.numbers import number
+from cosim.evaluation.roles import estimation_error, label, phases, recorded
+from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.results.result import Result
 
 STANDSTILL = 0.01

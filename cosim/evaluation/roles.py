@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from cosim.report.spec import Phase, ReportSpec
+from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.results.result import Result
 
 Quantity = Literal["speed", "position"]

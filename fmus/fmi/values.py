@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from fmpy.model_description import ModelVariable
 
-from cosim.components.elements import Element, layout
-from fmus.exact_ports import Values, make_exact_reader, make_exact_writer
-from fmus.ports import make_reader, make_writer
+from fmus.fmi.elements import Element, layout
+from fmus.fmi.exact_ports import Values, make_exact_reader, make_exact_writer
+from fmus.fmi.ports import make_reader, make_writer
 
 if TYPE_CHECKING:
     from cosim.components.component import Component

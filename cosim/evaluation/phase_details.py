@@ -9,11 +9,11 @@ from math import isnan
 
 import numpy as np
 
-from cosim.report.corrections import Corrections, corrections, used_by
-from cosim.report.indicators import on_share
-from cosim.report.metrics import FEWEST_INSTANTS, error_size, instants, judged_size, within
-from cosim.report.roles import coupler_force, estimate, phases, recorded
-from cosim.report.spec import Phase, ReportSpec
+from cosim.evaluation.corrections import Corrections, corrections, used_by
+from cosim.evaluation.indicators import on_share
+from cosim.evaluation.metrics import FEWEST_INSTANTS, error_size, instants, judged_size, within
+from cosim.evaluation.roles import coupler_force, estimate, phases, recorded
+from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.results.result import Result
 
 

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from fmpy.model_description import ModelVariable
 
-from fmus.ports import c_type, getter_type, is_native, size
+from fmus.fmi.ports import is_native
+from fmus.fmi.types import c_type, getter_type, size
 
 Values = tuple[Any, ...]
 ENCODING = ("utf-8", "surrogateescape")

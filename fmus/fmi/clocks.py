@@ -17,7 +17,7 @@ from typing import Any
 from fmpy.fmi3 import fmi3IntervalChanged, fmi3IntervalNotYetKnown, fmi3IntervalUnchanged
 from fmpy.model_description import ModelVariable
 
-from cosim.components.component import NEVER, TIME_TOLERANCE
+from fmus.fmi.standard import NEVER, TIME_TOLERANCE
 
 PERIODIC = ("constant", "fixed", "tunable", "calculated")
 APERIODIC = ("changing", "countdown")

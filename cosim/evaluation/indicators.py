@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.report.metrics import FEWEST_INSTANTS, instants
-from cosim.report.roles import estimate
-from cosim.report.spec import ReportSpec
+from cosim.evaluation.metrics import FEWEST_INSTANTS, instants
+from cosim.evaluation.roles import estimate
+from cosim.evaluation.spec import ReportSpec
 from cosim.results.result import Result
 
 THRESHOLD = 1.5  # the indicator is 1 (nominal) or 2 (degraded)

@@ -1,7 +1,7 @@
-"""What the two FMI faces share: identity, folder, refused calls, prepared calls, saved states and the life cycle.
+"""What the two FMI interfaces share: identity, folder, refused calls, prepared calls, saved states and the life cycle.
 
-fmpy's tools recognise an FMU by its class, so the faces subclass fmpy's slaves and replace every call; no library is
-loaded.
+fmpy's tools recognise an FMU by its class, so the interfaces subclass fmpy's slaves and replace every call; no library
+is loaded.
 """
 
 from __future__ import annotations
@@ -53,7 +53,11 @@ class BlockCallError(FMICallException, BlockError):
 
 
 def refused(function: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[Any, P], R]:
-    """Turn the `BlockError` of a call into fmpy's exception, with the name of the call, of the block, and the time."""
+    """Turn the `BlockError` of a call into fmpy's exception, with the name of the call, of the block, and the time.
+
+    Args:
+        function: a call of the interface.
+    """
 
     @wraps(function)
     def call(self: Any, /, *args: P.args, **kwargs: P.kwargs) -> R:
@@ -67,8 +71,8 @@ def refused(function: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[
     return call
 
 
-class Face:
-    """State and life cycle common to the FMI 2 and the FMI 3 face of a block.
+class FMIInterface:
+    """State and life cycle common to the FMI 2 and the FMI 3 interface of a block.
 
     A new block is in the mode *instantiated*; `instantiate` makes a used one new again. Calls that the standard does
     not allow in a mode are refused with a `BlockCallError`, as the exported FMU refuses them.
@@ -129,7 +133,7 @@ class Face:
         return self.instance.events.counters
 
     @property
-    def component(self) -> Face:
+    def component(self) -> FMIInterface:
         """What fmpy hands back to the low-level calls."""
         return self
 
@@ -147,7 +151,11 @@ class Face:
         return f"{self.fmi_version}.0"
 
     def setDebugLogging(self, loggingOn: bool, categories: Sequence[str]) -> None:
-        """Nothing to switch: what is wrong is raised, or logged by Python's `logging`."""
+        """Nothing to switch: what is wrong is raised, or logged by Python's `logging`.
+
+        Args:
+            loggingOn: whether the importer wants log messages. categories: of the log.
+        """
 
     # -- life -------------------------------------------------------------------------------------------------------
 
@@ -209,7 +217,12 @@ class Face:
     def directional_derivative(
         self, unknowns: Sequence[int], knowns: Sequence[int], seed: Sequence[float]
     ) -> list[float]:
-        """Exact directional derivatives of real outputs and derivatives, see `Sensitivity.directional`."""
+        """Exact directional derivatives of real outputs and derivatives, see `Sensitivity.directional`.
+
+        Args:
+            unknowns: value references of outputs or derivatives. knowns: value references of inputs or states.
+            seed: direction, one number for each known.
+        """
         self.instance.require_alive()
         if self.mode == "instantiated":
             raise BlockError("directional derivatives are there from initialization mode on.")
@@ -230,7 +243,11 @@ class Face:
         self.instance.load(state)
 
     def freeFMUState(self, state: BlockState) -> None:
-        """Nothing to free: states are Python values."""
+        """Nothing to free: states are Python values.
+
+        Args:
+            state: as `getFMUState` or `getFMUstate` gave it.
+        """
 
     def serializeFMUState(self, state: BlockState) -> bytes:
         """A state as bytes, to be read by any block of the same model, also in another process."""
@@ -238,13 +255,21 @@ class Face:
 
     @refused
     def deserializeFMUState(self, serializedState: bytes, state: BlockState | None = None) -> BlockState:
-        """The state that `serializeFMUState` wrote."""
+        """The state that `serializeFMUState` wrote.
+
+        Args:
+            serializedState: bytes.
+        """
         return self.instance.check(deserialize(serializedState, self.instance.shape))
 
     # -- internals --------------------------------------------------------------------------------------------------
 
     def refusal(self, function: str, reason: object) -> BlockCallError:
-        """The exception for a refused call: it names the call, the block and the time."""
+        """The exception for a refused call: it names the call, the block and the time.
+
+        Args:
+            function: name of the call. reason: what was wrong, in words.
+        """
         status = FMI_DISCARD if isinstance(reason, StepDiscarded) else FMI_ERROR
         return BlockCallError(function, f"{self.instanceName} at t = {self.instance.runtime.t!r} s: {reason}", status)
 

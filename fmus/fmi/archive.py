@@ -13,9 +13,9 @@ from tempfile import TemporaryDirectory
 
 from fmpy.model_description import ModelDescription
 
-from fmus.check.binaries import platform_folder, platforms_with, why_not_here
-from fmus.check.description import FILE, read_description, why_unreadable
-from fmus.check.sense import nonsense, tell_apart
+from fmus.fmi.binaries import platform_folder, platforms_with, why_not_here
+from fmus.fmi.description import FILE, read_description, why_unreadable
+from fmus.fmi.sense import nonsense, tell_apart
 
 MAX_UNPACKED_BYTES = 2 * 1024**3
 MAX_FILES = 100_000

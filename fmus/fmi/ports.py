@@ -3,7 +3,7 @@
 Values are doubles; arrays of FMI 3 lie row by row. Variables of a native FMU go through preset ctypes buffers, doubles
 that lie together straight into the caller's array; those of a Python block go through calls it prepares; everything
 else goes through fmpy's list calls. What must stay as it is (texts, bytes, 64-bit integers) has the ports in
-`fmus.exact_ports`.
+`fmus.fmi.exact_ports`.
 """
 
 from __future__ import annotations
@@ -12,56 +12,13 @@ import ctypes
 import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import prod
 from typing import Any, Literal
 
 import numpy as np
 from fmpy.model_description import ModelVariable
 
-from fmus.native_calls import prepared_call
-
-REAL_TYPE = {1: "Real", 2: "Real", 3: "Float64"}
-FLOATING_TYPES = frozenset({"Real", "Float64", "Float32"})
-
-CTYPES: dict[str, tuple[Any, str, Any]] = {
-    "Real": (ctypes.c_double, "d", np.float64),
-    "Float64": (ctypes.c_double, "d", np.float64),
-    "Float32": (ctypes.c_float, "f", np.float32),
-    "Integer": (ctypes.c_int, "i", np.int32),
-    "Int8": (ctypes.c_int8, "b", np.int8),
-    "UInt8": (ctypes.c_uint8, "B", np.uint8),
-    "Int16": (ctypes.c_int16, "h", np.int16),
-    "UInt16": (ctypes.c_uint16, "H", np.uint16),
-    "Int32": (ctypes.c_int32, "i", np.int32),
-    "UInt32": (ctypes.c_uint32, "I", np.uint32),
-    "Int64": (ctypes.c_int64, "q", np.int64),
-    "UInt64": (ctypes.c_uint64, "Q", np.uint64),
-}
-"""FMI type -> C type, its letter in `struct`, and its dtype."""
-
-BOOLEANS: dict[int, tuple[Any, str, Any]] = {
-    1: (ctypes.c_char, "B", np.uint8),
-    2: (ctypes.c_int, "i", np.int32),
-    3: (ctypes.c_bool, "B", np.uint8),
-}
-"""The same for Boolean, by FMI version. Numbers, not truth values: a slave may say 2 for true."""
-
-
-def size(variable: ModelVariable) -> int:
-    """Number of values of a variable: 1, or the product of its dimensions."""
-    return prod(variable.shape) if variable.shape else 1
-
-
-def getter_type(kind: str, fmi_version: int) -> str:
-    """The type in the name of the functions that read and write a variable type."""
-    if kind == "Enumeration":
-        return "Int64" if fmi_version == 3 else "Integer"
-    return kind
-
-
-def c_type(kind: str, fmi_version: int) -> tuple[Any, str, Any]:
-    """C type, letter in `struct` and dtype of a getter's numeric type."""
-    return BOOLEANS[fmi_version] if kind == "Boolean" else CTYPES[kind]
+from fmus.fmi.native_calls import prepared_call
+from fmus.fmi.types import FLOATING_TYPES, REAL_TYPE, c_type, getter_type, size
 
 
 def is_native(slave: Any) -> bool:

@@ -16,7 +16,7 @@ from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.fmi3 import FMU3Model, FMU3ScheduledExecution, FMU3Slave
 from fmpy.model_description import ModelDescription
 
-CO_SIMULATION, MODEL_EXCHANGE, SCHEDULED_EXECUTION = "coSimulation", "modelExchange", "scheduledExecution"
+from fmus.fmi.standard import CO_SIMULATION, MODEL_EXCHANGE, SCHEDULED_EXECUTION, fmi_version
 
 FACES: dict[tuple[int, str], type] = {
     (2, CO_SIMULATION): FMU2Slave,
@@ -35,11 +35,6 @@ CAPABILITY_FUNCTIONS = {
     "hasEventMode": ("EnterEventMode", "UpdateDiscreteStates", "EnterStepMode"),
 }
 """Functions that belong to a capability, in FMI 2 spelling; case is ignored."""
-
-
-def fmi_version(description: ModelDescription) -> int:
-    """2 or 3."""
-    return int(str(description.fmiVersion)[0])
 
 
 def functions_of(version: int, interface: str) -> list[str]:

@@ -14,8 +14,8 @@ from cosim.coupling.clocks import ClockConnection
 from cosim.coupling.connection import Connection
 from cosim.coupling.feedthrough import AlgebraicLoop, declared_feedthrough, undeclared_outputs
 from cosim.coupling.instants import held_signals
-from cosim.diagnostics.structure import Link, Part, Port, Signal
 from cosim.master.algorithms.choose import AlgorithmChoice
+from cosim.structure.structure import Link, Part, Port, Signal
 
 ABILITIES = {
     "canHandleVariableCommunicationStepSize": "variable step",

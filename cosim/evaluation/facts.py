@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any
 
-from cosim.report.numbers import number
+from cosim.evaluation.numbers import number
 from cosim.results.result import Result
 
 

@@ -15,11 +15,11 @@ from cosim.ssp.common import FAMILIES, NamedUnit
 from cosim.ssp.document import Node, fail
 from cosim.ssp.lapses import Lapses
 from cosim.ssp.model import ComponentElement, Connector
-from fmus.check.sense import doubled_names
+from fmus.fmi.sense import doubled_names
 from plant_models.hybrid.units import BASE_SYMBOLS, Unit, UnitError, parse_unit
 
 
-class Face:
+class Interface:
     """The variables of an FMU.
 
     Args:
@@ -91,8 +91,8 @@ class Face:
         return Unit(powers, 1.0 if base.factor is None else float(base.factor), float(base.offset or 0.0))
 
 
-def face_of(element: ComponentElement, lapses: Lapses) -> Face:
-    """The face of a component's FMU.
+def interface_of(element: ComponentElement, lapses: Lapses) -> Interface:
+    """The interface of a component's FMU.
 
     Args:
         element: the component. lapses: told of names that it gives twice.
@@ -107,4 +107,4 @@ def face_of(element: ComponentElement, lapses: Lapses) -> Face:
     doubled = doubled_names(description)
     if doubled is not None:
         lapses.forgive(element.node, f"{element.member}: {doubled}")
-    return Face(description, f"component {element.name!r} ({element.member})")
+    return Interface(description, f"component {element.name!r} ({element.member})")

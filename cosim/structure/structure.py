@@ -1,6 +1,6 @@
 """The structure of a run: components, connections, groups, loops and order, as plain data. Standard library only.
 
-Made by `cosim.diagnostics.inspect`, printed by `cosim.diagnostics.text`, drawn by `cosim.diagnostics.picture`.
+Made by `cosim.structure.inspect`, printed by `cosim.structure.text`, drawn by `cosim.structure.picture`.
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ class Structure:
         Args:
             width: columns at which long lists are broken; None for no limit.
         """
-        from cosim.diagnostics.text import structure_text  # noqa: PLC0415 - it needs this class
+        from cosim.structure.text import structure_text  # noqa: PLC0415 - it needs this class
 
         return structure_text(self, width)
 
@@ -176,7 +176,7 @@ class Structure:
         Raises:
             OutputError: the ending is unknown or the file cannot be written.
         """
-        from cosim.diagnostics.picture import draw_structure  # noqa: PLC0415 - matplotlib is loaded only by those who draw
+        from cosim.structure.picture import draw_structure  # noqa: PLC0415 - matplotlib is loaded only by those who draw
 
         return draw_structure(self, path)
 

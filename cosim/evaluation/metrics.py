@@ -7,8 +7,8 @@ from math import inf, nan
 
 import numpy as np
 
-from cosim.report.roles import estimation_error, phases
-from cosim.report.spec import Phase, ReportSpec
+from cosim.evaluation.roles import estimation_error, phases
+from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.results.result import Result
 
 FEWEST_INSTANTS = 5
