@@ -9,9 +9,8 @@ meets: then the Python stepper finishes the step from where it stands.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from functools import partial
 from time import perf_counter
 from typing import Any
@@ -29,6 +28,7 @@ from cosim.coupling.planned import PlannedComponent
 from cosim.master.axis import TimeAxis
 from cosim.master.control.control import StepControl
 from cosim.master.control.fixed import FixedStep
+from cosim.master.stepper import Stretch
 from cosim.master.system import NO_ROWS, Row, System
 from cosim.results.recorder import Recorder
 from fmus.fmi.standard import NEVER, TIME_TOLERANCE
@@ -51,24 +51,6 @@ STEPPED = frozenset({Stop.STEP, Stop.READ, Stop.CROSSED})
 """That one has been called to do the step."""
 
 COMPILED_STAGE = "one call into the compiled stepper"
-
-Finish = Callable[[], Sequence[Row]]
-
-
-@dataclass(frozen=True)
-class Stretch:
-    """What a stretch did.
-
-    Args:
-        done: steps done and recorded.
-        finish: does what is left of the next step, or all of it, in Python and returns its event rows; None where the
-            next step may be the stepper's again.
-        suspect: a value of the last row is not finite.
-    """
-
-    done: int
-    finish: Finish | None = None
-    suspect: bool = False
 
 
 class CompiledStepper:
