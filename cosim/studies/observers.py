@@ -13,7 +13,7 @@ from cosim.balises.recorded import read_layout
 from cosim.coupling.connection import Link
 from cosim.errors import CosimError, RunError, ScenarioError, nearest
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.page.table import text_table
+from cosim.report.error_table import error_text
 from cosim.results.folder import write_results
 from cosim.results.load import load_result
 from cosim.results.result import Result
@@ -98,7 +98,7 @@ class ObserverBenchmark:
         parts = [f"{self.spec.title}: {len(rows)} observers on one recorded run of {self.steps} steps", aligned(rows)]
         metrics = [phase for score in self.scores for phase in score.phases]
         if metrics:
-            parts += ["", text_table(metrics, self.labelled_spec())]
+            parts += ["", error_text(metrics, self.labelled_spec())]
         for score in self.scores:
             parts += [f"{score.label}: {text}" for text in ([score.failure] if score.failure else [])]
         return "\n".join([*parts, *(f"- {note}" for note in self.notes)])
