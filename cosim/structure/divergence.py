@@ -15,7 +15,8 @@ from cosim.errors import RunError
 from plant_models.hybrid.units import UnitError, parse_unit
 
 if TYPE_CHECKING:
-    from cosim.coupling.plan import Plan, PlannedComponent
+    from cosim.coupling.plan import Plan
+    from cosim.coupling.planned import PlannedComponent
 
 PLAUSIBLE = {
     parse_unit(unit).exponents: limit

@@ -45,7 +45,7 @@ class Gate:
         ]
         self._sent: tuple[object, ...] = ()
         self._sent_clocked: dict[int, bytes] = {}
-        inputs.send = self._send_at_first
+        inputs.gate(self._send_at_first)
 
     @property
     def listens(self) -> bool:
@@ -54,7 +54,7 @@ class Gate:
 
     def open(self) -> None:
         """The component runs: from now on Step Mode takes continuous inputs only."""
-        self._inputs.send = self._send_flowing
+        self._inputs.gate(self._send_flowing)
 
     def changed(self) -> bool:
         """Whether gathered discrete inputs differ from what the component knows."""
