@@ -78,7 +78,14 @@ def exact_writer(instance: Instance, variable: ModelVariable) -> Callable[[Seque
 
 
 def write_start(instance: Instance, variable: ModelVariable, element: Element | None, values: list[Any]) -> None:
-    """Write a whole variable, or one element of it, once."""
+    """Write a whole variable, or one element of it, once.
+
+    Args:
+        instance: whose variable it is.
+        variable: what is written.
+        element: the element; None for the whole variable.
+        values: of the variable or the element.
+    """
     if element is not None and element.index is not None:
         everything = list(exact_reader(instance, variable)())
         everything[element.index] = values[0]
