@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from textwrap import TextWrapper
+from typing import TYPE_CHECKING
 
-from cosim.structure.structure import Link, Part, Port, Structure
+if TYPE_CHECKING:
+    from cosim.structure.structure import Link, Part, Port, Structure
+
 
 DASH = "-"
 
