@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cosim.evaluation.metrics import PhaseMetrics
-from cosim.evaluation.numbers import DASH, error_number, number
+from cosim.evaluation.numbers import number
 from cosim.studies.observer_scores import CertifiedGap, ObserverScore
 
 
@@ -40,13 +40,6 @@ def certified(certificate: CertifiedGap | None) -> str | None:
         return None
     words = {True: "yes", False: "NO", None: "?"}
     return f"{words[certificate.holds_expected]}/{words[certificate.holds_seen]}"
-
-
-def cell(value: Any) -> str:
-    """A cell of a table as text."""
-    if isinstance(value, str | int):
-        return str(value)
-    return DASH if value is None else error_number(value)
 
 
 def aligned(rows: Sequence[Mapping[str, str]]) -> str:

@@ -9,9 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import fmu_observer
 from cosim.balises.recorded import read_layout
 from cosim.coupling.connection import Link
 from cosim.errors import CosimError, RunError, ScenarioError, nearest
+from cosim.evaluation.numbers import cell
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.page.table import text_table
 from cosim.results.folder import write_results
@@ -26,7 +28,7 @@ from cosim.scenario.outcome import INTERRUPTED
 from cosim.scenario.schema import step_count
 from cosim.scenario.tables import ComponentTable
 from cosim.studies.observer_scores import CertifiedGap, ObserverScore, divergence, longest_gap, measured
-from cosim.studies.observer_table import aligned, cell, main_row
+from cosim.studies.observer_table import aligned, main_row
 from cosim.studies.playback import (
     FACTS,
     Sides,
@@ -253,8 +255,6 @@ def find_candidates(scenario: Scenario, sides: Sides, names: Sequence[str] | Non
 
 
 def _named(scenario: Scenario, sides: Sides, name: str) -> Candidate:
-    import fmu_observer  # noqa: PLC0415 - the registry, beside its only use here
-
     if name in sides.observers:
         return _own(sides, name)
     if name not in fmu_observer.OBSERVERS:
