@@ -12,6 +12,7 @@ from typing import Any
 from cosim.components.loading import read_description, runs_here
 from cosim.ssp.names import is_package
 from fmus.fmi.capabilities import read_capabilities
+from fmus.text_table import text_table
 
 
 def register(commands: Any) -> None:
@@ -36,9 +37,8 @@ def execute(options: argparse.Namespace) -> int:
         print(json.dumps(data, indent=2))
         return 0
     variables = data.pop("variables")
-    width = max(map(len, data))
-    for key, value in data.items():
-        print(f"{key:<{width}}  {', '.join(map(str, value)) if isinstance(value, list) else value}")
+    rows = [[key, ", ".join(map(str, value)) if isinstance(value, list) else str(value)] for key, value in data.items()]
+    print("\n".join(text_table(rows, left=(0, 1))))
     for causality in ("input", "output", "parameter", "local"):
         chosen = [v for v in variables if v["causality"] == causality]
         print(f"{causality}s ({len(chosen)}):")

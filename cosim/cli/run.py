@@ -198,16 +198,16 @@ def _tell(outcome: Outcome, study: Any, paths: dict[str, Path], options: argpars
         data = dict(summary) | {"failure": outcome.failure, "files": {k: str(p) for k, p in paths.items()}}
         print(json.dumps(jsonable(data), indent=2))
         return
-    from cosim.report.page.cost import cost_text  # noqa: PLC0415 - only here
+    from cosim.report.cost import cost_text  # noqa: PLC0415 - only here
 
     print(_headline(summary))
     if outcome.result.table.size:
         from cosim.evaluation.metrics import phase_metrics  # noqa: PLC0415 - only here
-        from cosim.report.page.table import text_table  # noqa: PLC0415
+        from cosim.report.error_table import error_text  # noqa: PLC0415
 
         metrics = phase_metrics(outcome.result, outcome.spec)
         if metrics:
-            print(text_table(metrics, outcome.spec))
+            print(error_text(metrics, outcome.spec))
     print(cost_text(outcome.result), end="\n\n")
     if study is not None:
         print(study.text())

@@ -41,7 +41,7 @@ class Records:
 
     Args:
         shared: folder that the controller gave to this worker; None for a controller, which makes one when it is
-        needed.
+            needed.
     """
 
     KEY: pytest.StashKey[Records] = pytest.StashKey()

@@ -74,7 +74,7 @@ def check_certificates(
 
     Args:
         components: tables of the balise receivers by name. gap: what to expect. mode: ``warn``, ``require`` or
-        ``ignore``.
+            ``ignore``.
 
     Returns:
         Certificates by component as plain data, and warnings.

@@ -65,7 +65,7 @@ def join(earlier: Sequence[Line], later: Sequence[Line], removed: Iterable[str])
 
     Args:
         earlier, later: connections as written, lines or tables. removed: components that are gone, with their
-        connections.
+            connections.
 
     Raises:
         ScenarioError: an input is to be left free that nothing is connected to.

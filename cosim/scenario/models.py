@@ -65,7 +65,7 @@ def component_factories(
         tables: of the components. folder: paths are relative to it. where: place for messages.
         tell: told of FMUs that are built. span: start and stop of the run [s], which recordings must cover.
         tolerance: of the FMUs whose table says nothing else; see
-        `cosim.components.described.Described.choose_tolerance`.
+            `cosim.components.described.Described.choose_tolerance`.
 
     Raises:
         ScenarioError, FmuLoadError: a component cannot be made.

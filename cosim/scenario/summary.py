@@ -40,7 +40,7 @@ def run_summary(name: str, table: ScenarioTable, plan: Plan, master: Master, set
 
     Args:
         name: of the scenario. table: the scenario. plan, master: after the run. setup_seconds: wall time of the set-up
-        [s].
+            [s].
     """
     axis, timing = master.axis, master.timing
     reached = float(master.recorder.table()["time"][-1]) if master.recorder.count else axis.start

@@ -42,7 +42,7 @@ class Type:
 
     Args:
         name: as written, for example ``Float64``. unit: of a real number, where one is given. enumeration: name of its
-        type.
+            type.
     """
 
     name: str

@@ -104,7 +104,7 @@ def add_parameter(parent: Node, name: str, kind: str, values: Sequence[Any], sha
 
     Args:
         parent: ``Parameters`` element. kind: type in the words of SSP. values: in row-major order. shape: empty for a
-        scalar.
+            scalar.
     """
     node = child(parent, "ssv", "Parameter", name=name)
     texts = [_text(value, FAMILIES[kind]) for value in values]
