@@ -25,7 +25,7 @@ from cosim.results.result import Result
 from cosim.results.summary_file import jsonable
 
 if TYPE_CHECKING:
-    from cosim.studies.observers import ObserverBenchmark
+    from cosim.observer_benchmark.observers import ObserverBenchmark
 
 PAGE, PICTURE, DATA = "observers.html", "observers.png", "observers.json"
 DPI = 120

@@ -15,21 +15,9 @@ from cosim.coupling.connection import Link
 from cosim.errors import CosimError, RunError, ScenarioError, nearest
 from cosim.evaluation.numbers import cell
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.error_table import error_text
-from cosim.results.folder import write_results
-from cosim.results.load import load_result
-from cosim.results.result import Result
-from cosim.scenario import Outcome, Scenario
-from cosim.scenario.balise_service import BALISE_EVENT
-from cosim.scenario.certificates import check_certificates, expected_gap
-from cosim.scenario.layouts import make_layout
-from cosim.scenario.models import make_system
-from cosim.scenario.outcome import INTERRUPTED
-from cosim.scenario.schema import step_count
-from cosim.scenario.tables import ComponentTable
-from cosim.studies.observer_scores import CertifiedGap, ObserverScore, divergence, longest_gap, measured
-from cosim.studies.observer_table import aligned, main_row
-from cosim.studies.playback import (
+from cosim.observer_benchmark.observer_scores import CertifiedGap, ObserverScore, divergence, longest_gap, measured
+from cosim.observer_benchmark.observer_table import aligned, main_row
+from cosim.observer_benchmark.playback import (
     FACTS,
     Sides,
     find_sides,
@@ -38,6 +26,18 @@ from cosim.studies.playback import (
     recording_scenario,
     train_observers,
 )
+from cosim.report.error_table import error_text
+from cosim.results.folder import write_results
+from cosim.results.load import load_result
+from cosim.results.result import Result
+from cosim.scenario.balise_service import BALISE_EVENT
+from cosim.scenario.certificates import check_certificates, expected_gap
+from cosim.scenario.layouts import make_layout
+from cosim.scenario.models import make_system
+from cosim.scenario.outcome import INTERRUPTED, Outcome
+from cosim.scenario.schema import step_count
+from cosim.scenario.tables import ComponentTable
+from cosim.simulation.scenario import Scenario
 
 Progress = Callable[[str, int, int], None]
 MICROSECONDS = 1e6

@@ -9,7 +9,7 @@ from typing import Any
 
 from cosim.evaluation.metrics import PhaseMetrics
 from cosim.evaluation.numbers import number
-from cosim.studies.observer_scores import CertifiedGap, ObserverScore
+from cosim.observer_benchmark.observer_scores import CertifiedGap, ObserverScore
 from fmus.text_table import text_table
 
 
