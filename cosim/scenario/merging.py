@@ -20,7 +20,11 @@ Line = tuple[Any, str]
 
 
 def merge(earlier: dict[str, Any], later: Mapping[str, Any]) -> None:
-    """Merge tables into earlier ones, in place; connections are not looked at (see `join`)."""
+    """Merge tables into earlier ones, in place; connections are not looked at (see `join`).
+
+    Args:
+        later: what comes on top.
+    """
     _merge({k: v for k, v in later.items() if k != "connections"}, earlier, ())
 
 

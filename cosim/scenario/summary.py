@@ -18,7 +18,11 @@ MESSAGES_SHOWN = 20
 
 
 def first_summary(name: str, table: ScenarioTable, plan: Plan) -> dict[str, Any]:
-    """What is known before the first step; arguments as for `run_summary`."""
+    """What is known before the first step; arguments as for `run_summary`.
+
+    Args:
+        name: of the scenario. table: of the scenario. plan: prepared, components instantiated.
+    """
     return {
         "scenario": name,
         "title": table.title,

@@ -182,14 +182,22 @@ class Scenario:
         return self._name or stem(self.where)
 
     def add(self, name: str, **table: Any) -> Self:
-        """Add a component; keys as in a file: `fmu`, `model` or `observer`, `parameters`, `preset`, `options`, ..."""
+        """Add a component; keys as in a file: `fmu`, `model` or `observer`, `parameters`, `preset`, `options`, ...
+
+        Args:
+            table: of the scenario.
+        """
         if name in self._data["components"]:
             raise ScenarioError(f"{self.where}: there is a component {name!r} already.")
         self._data["components"][name] = plain(table)
         return self
 
     def connect(self, *lines: str) -> Self:
-        """Add connections: ``"source.signal -> target.signal, target.signal"``."""
+        """Add connections: ``"source.signal -> target.signal, target.signal"``.
+
+        Args:
+            lines: such as ``"train.speed -> observer.odometer"``.
+        """
         self._data["connections"] = [*self._data["connections"], *lines]
         return self
 
