@@ -70,7 +70,7 @@ def make_part(
 
     Args:
         component: what is described. connections: of all components. group: number of its group. rate: of its steps, in
-        words.
+            words.
         clocks: connections between clocks.
     """
     description = component.description

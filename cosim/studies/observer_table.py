@@ -10,6 +10,7 @@ from typing import Any
 from cosim.evaluation.metrics import PhaseMetrics
 from cosim.evaluation.numbers import DASH, error_number, number
 from cosim.studies.observer_scores import CertifiedGap, ObserverScore
+from fmus.text_table import text_table
 
 
 def main_row(score: ObserverScore) -> dict[str, Any]:
@@ -51,12 +52,4 @@ def cell(value: Any) -> str:
 
 def aligned(rows: Sequence[Mapping[str, str]]) -> str:
     """Rows as lines of equal width; the first column to the left, the others to the right."""
-    if not rows:
-        return ""
-    table = [list(rows[0]), *(list(row.values()) for row in rows)]
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    lines = [
-        "  ".join(text.rjust(w) if i else text.ljust(w) for i, (text, w) in enumerate(zip(row, widths, strict=True)))
-        for row in table
-    ]
-    return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
+    return "\n".join(text_table([list(rows[0]), *(list(row.values()) for row in rows)], heading=True)) if rows else ""

@@ -13,7 +13,7 @@ from cosim.balises.recorded import read_layout
 from cosim.coupling.connection import Link
 from cosim.errors import CosimError, RunError, ScenarioError, nearest
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.page.table import text_table
+from cosim.report.error_table import error_text
 from cosim.results.folder import write_results
 from cosim.results.load import load_result
 from cosim.results.result import Result
@@ -48,7 +48,7 @@ class Candidate:
     Args:
         name: in the benchmark. table: how it is made. sources: where its inputs come from.
         origin: ``scenario`` or ``defaults``. settings: what was assumed, in words. misfit: why it cannot be coupled, or
-        empty.
+            empty.
     """
 
     name: str
@@ -98,7 +98,7 @@ class ObserverBenchmark:
         parts = [f"{self.spec.title}: {len(rows)} observers on one recorded run of {self.steps} steps", aligned(rows)]
         metrics = [phase for score in self.scores for phase in score.phases]
         if metrics:
-            parts += ["", text_table(metrics, self.labelled_spec())]
+            parts += ["", error_text(metrics, self.labelled_spec())]
         for score in self.scores:
             parts += [f"{score.label}: {text}" for text in ([score.failure] if score.failure else [])]
         return "\n".join([*parts, *(f"- {note}" for note in self.notes)])
@@ -150,7 +150,7 @@ def benchmark_observers(
             shipped train observers whose inputs and event the scenario can serve.
         record: folder for the recording, an ordinary results folder; by default it is thrown away.
         recorded: folder of an earlier recording (or of any run of this scenario) to be played back instead of a new
-        run.
+            run.
         repeat: runs of each observer; the cost per step is the median of them.
         progress: called with what is done now, the number done and the number in all.
         warn: told of what is doubtful about the recorded run.

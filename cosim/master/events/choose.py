@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Literal
 
 from cosim.balises.early_return import EarlyReturnLocaliser
 from cosim.components.fmi3 import FMI3Component
-from cosim.coupling.plan import Plan, PlannedComponent
+from cosim.coupling.plan import Plan
+from cosim.coupling.planned import PlannedComponent
 from cosim.master.events.coordinator import EventCoordinator
 from cosim.master.events.gates import Gate, clock_references
 from cosim.master.events.participant import Participant

@@ -7,7 +7,7 @@ from __future__ import annotations
 from typing import Any
 
 from cosim.components.fmi3 import FMI3Component
-from cosim.coupling.plan import PlannedComponent
+from cosim.coupling.planned import PlannedComponent
 from cosim.master.events.gates import Gate
 from fmus.fmi.standard import TIME_TOLERANCE
 

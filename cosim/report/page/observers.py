@@ -17,10 +17,10 @@ from matplotlib.figure import Figure
 from cosim.errors import OutputError
 from cosim.evaluation.event_counts import outcome_columns
 from cosim.evaluation.numbers import DASH, number
+from cosim.report.error_table import html_table
 from cosim.report.figures.error_figures import speed_error_figure
 from cosim.report.figures.observers_figure import observers_picture
 from cosim.report.page.parts import box, bullets, page, paragraph, scrolling, section, simple_table
-from cosim.report.page.table import html_table
 from cosim.results.result import Result
 from cosim.results.summary_file import jsonable
 
