@@ -118,7 +118,7 @@ def test_parameters_that_are_refused_are_told_and_the_others_start() -> None:
     batch.set("stretch", [[0.25, 0.6], [0.6, 0.25], [0.1, 0.2]])
     batch.start()
     assert list(batch.failures) == [1]
-    assert "the stretch has no length (stretch[1] = 0.5" in batch.failures[1]
+    assert "the stretch has no length" in batch.failures[1]
     batch.advance(0.5)
     np.testing.assert_array_equal(np.isnan(batch.get("speed")), [False, True, False])
     batch.reset()
