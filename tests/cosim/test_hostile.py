@@ -356,7 +356,7 @@ def test_a_damaged_stepper_in_the_cache_is_built_again(tmp_path: Path, monkeypat
         (folder / name).write_bytes(b"a library" * 1000)
         return folder / name
 
-    monkeypatch.setattr(library, "compile_library", compiled)
+    monkeypatch.setattr("fmus.toolchain.cached_library.compile_library", compiled)
     path = stepper_library(find_compiler(), tmp_path)
     assert stepper_library(find_compiler(), tmp_path) == path
     assert len(built) == 1

@@ -149,7 +149,7 @@ def test_the_library_is_compiled_once(tmp_path: Path, monkeypatch: pytest.Monkey
     def never(*_: Any) -> Any:
         raise AssertionError("compiled again")
 
-    monkeypatch.setattr(library, "compile_library", never)
+    monkeypatch.setattr("fmus.toolchain.cached_library.compile_library", never)
     assert library.stepper_library(compiler, tmp_path) == path
     assert path.stat().st_mtime_ns == before
     assert sorted(p.name for p in path.parent.iterdir()) == [f"{path.stem}.sha256", path.name]
