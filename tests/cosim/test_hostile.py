@@ -19,7 +19,6 @@ from test_fmus.events import DEEDS, hostile_fmu
 
 from cosim import CosimError, Scenario, load_result
 from cosim.cli import main
-from cosim.compiled import library
 from cosim.compiled.library import stepper_library
 from cosim.components import surroundings
 from cosim.components.fmi2 import FMI2Component
