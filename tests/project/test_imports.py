@@ -1,4 +1,4 @@
-"""Imports: no circle of files, few imports hidden in functions. The order of rooms is import-linter's, in pyproject.toml."""
+"""Imports: no circle of files, few imports hidden in functions. The order of rooms is kept by import-linter."""
 
 from __future__ import annotations
 
