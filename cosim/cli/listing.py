@@ -15,7 +15,11 @@ KINDS = ("scenarios", "models", "observers", "all")
 
 
 def register(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Args:
+        commands: subparsers of the program.
+    """
     parser = commands.add_parser(
         "list", help="list what ships", description="Scenarios, plants and observers with their sources."
     )
@@ -25,7 +29,11 @@ def register(commands: Any) -> None:
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Print the lists."""
+    """Print the lists.
+
+    Args:
+        options: of the command line.
+    """
     if is_package(options.what):
         return _execute_package(options)
     data = {kind: entries for kind, entries in catalogue().items() if options.what in (kind, "all")}

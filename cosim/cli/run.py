@@ -23,7 +23,11 @@ CALL_LOG = "calls.log"
 
 
 def register(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Args:
+        commands: subparsers of the program.
+    """
     description = "Run a scenario: shipped, from a TOML file, or from a system structure package (SSP)."
     epilog = (
         "Exit codes: 0 done, 1 an expectation of the scenario is not met (or --strict), 2 the run failed or could "
@@ -59,7 +63,11 @@ def register(commands: Any) -> None:
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Run and write; everything computed is written also when the run fails."""
+    """Run and write; everything computed is written also when the run fails.
+
+    Args:
+        options: of the command line.
+    """
     from cosim.results.folder import check_writable  # noqa: PLC0415 - scipy is loaded only by those who run
 
     scenario = load_scenario(options)

@@ -243,7 +243,7 @@ class Component(Described):
             event: one of `events`.
             t: current time of the component [s].
             stamp: when the event happened [s]: at or before `t`, or within the coming step where the component takes
-            stamps.
+                stamps.
             payload: fields by name; fields the component does not declare are dropped.
 
         Where `event_needs_step` says so, only the last event told before a step happens, and it happens in that step.

@@ -141,6 +141,9 @@ def rerun(
 def stored_scenario(manifest: Manifest) -> Scenario:
     """The scenario that a results folder holds; the log of all calls, which belongs to its folder, is not written
     again.
+
+    Args:
+        manifest: of the results.
     """
     from cosim.scenario import Scenario  # noqa: PLC0415 - a scenario loads results folders, and these make scenarios
 

@@ -19,9 +19,9 @@ def save_result(result: Result, path: str | Path, *, units: bool = True) -> list
     Args:
         result: what to write.
         path: the file. Its ending says the format: ``.csv``, ``.mat``, ``.modelica.mat``, ``.npy``, ``.parquet``,
-        ``.h5``.
+            ``.h5``.
         units: whether the headings of CSV name units, as in ``train.speed [m/s]``; `cosim.load_result` takes them off
-        again.
+            again.
 
     Returns:
         The files written: `path` and, beside a CSV or NumPy file, ``NAME.events.csv`` where there are telegrams.

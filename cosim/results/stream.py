@@ -42,7 +42,7 @@ class Stream:
     Args:
         directory: the folder; results that a former run left there are removed.
         signals: what is recorded, in the components' own units. unit_of: the unit of a column, None where there is
-        none.
+            none.
         summary: what is known before the run.
         events: the telegrams so far, which only grow. logs: what the components have logged so far.
 

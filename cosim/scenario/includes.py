@@ -50,7 +50,7 @@ def attribute(message: str, where: str, places: Mapping[Key, str]) -> str:
 
     Args:
         message: lines such as ``my.toml: components.plant.fmu: ...``. where: the file that was loaded. places: see
-        `Tables`.
+            `Tables`.
     """
     head = f"{where}: "
     lines = [line.removeprefix(head) if line.startswith(head) else None for line in message.split("\n")]

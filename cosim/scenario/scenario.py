@@ -138,8 +138,7 @@ class Scenario:
 
         Args:
             folder: where the file will stand: paths in the text are relative to it. Where not given they stay as they
-            are,
-                relative to the folder of this scenario.
+                are, relative to the folder of this scenario.
 
         Raises:
             ScenarioError: something in the scenario cannot be; every fault is named.
@@ -185,14 +184,22 @@ class Scenario:
         return self._name or stem(self.where)
 
     def add(self, name: str, **table: Any) -> Self:
-        """Add a component; keys as in a file: `fmu`, `model` or `observer`, `parameters`, `preset`, `options`, ..."""
+        """Add a component; keys as in a file: `fmu`, `model` or `observer`, `parameters`, `preset`, `options`, ...
+
+        Args:
+            table: of the scenario.
+        """
         if name in self._data["components"]:
             raise ScenarioError(f"{self.where}: there is a component {name!r} already.")
         self._data["components"][name] = plain(table)
         return self
 
     def connect(self, *lines: str) -> Self:
-        """Add connections: ``"source.signal -> target.signal, target.signal"``."""
+        """Add connections: ``"source.signal -> target.signal, target.signal"``.
+
+        Args:
+            lines: such as ``"train.speed -> observer.odometer"``.
+        """
         self._data["connections"] = [*self._data["connections"], *lines]
         return self
 
@@ -217,7 +224,7 @@ class Scenario:
         Args:
             check: what is checked: ``speed_error``, ``signal``, ``on``, ``telegrams``, ...
             table: its keys as in a file; ``start`` and ``end`` may stand for ``from``, which Python keeps for itself,
-            and ``to``.
+                and ``to``.
         """
         self._data["expect"] = [*self._data.get("expect", []), {"check": check, **table}]
         return self
@@ -278,7 +285,7 @@ class Scenario:
 
         Args:
             values: names as for `set`, each with the values it takes; or a list of variations, each a mapping of names
-            to values.
+                to values.
             mode: ``grid``: every combination, the last name changes quickest; ``zip``: first with first, second with
                 second; ``latin`` (Latin hypercube) and ``random``: `count` points of `cosim.studies.sampling.uniform`
                 ranges and lists.
@@ -319,7 +326,7 @@ class Scenario:
             finished: called with the outcome before the components are closed, which is what is returned as well: what
                 it writes is not lost where an FMU crashes while it is freed.
             spare: a folder to which rows are written as for `stream`, only in case the process dies: whoever gives it
-            removes it.
+                removes it.
 
         Returns:
             The outcome: result, report roles, warnings; also for a run that failed on the way (see `Outcome.failure`).

@@ -40,6 +40,9 @@ def finish_stream(outcome: Outcome, directory: str | Path, warn: Callable[[str],
     """Write what only the end of a run tells. Where the disk refuses, the folder keeps what was streamed, and a warning
     says so.
 
+    Args:
+        directory: results folder. warn: called with each warning.
+
     Returns:
         The outcome, whose table is written as ``npy``, and in other formats only where the scenario asks for them.
     """

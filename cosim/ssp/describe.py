@@ -43,7 +43,11 @@ def describe_package(name: str) -> dict[str, Any]:
 
 
 def text_of_package(data: dict[str, Any]) -> str:
-    """The same for people."""
+    """The same for people.
+
+    Args:
+        data: plain data of `describe`.
+    """
     lines = [f"{data['name']}: {data['description']}".rstrip(": ")]
     lines += [f"SSP {data['SSP version']}, variants: {', '.join(data['variants'])}"]
     times = {key: "not given" if data[key] is None else f"{data[key]:g} s" for key in ("start", "stop", "step")}

@@ -62,6 +62,9 @@ def load_package(name: str, strict: bool = False) -> Loaded:
 def list_variants(name: str) -> dict[str, str]:
     """The structures in an SSP: their names as ``#NAME`` takes them, the default one first, and the titles within them.
 
+    Args:
+        name: of the member.
+
     Raises:
         CosimError: one of them cannot be read.
     """
@@ -72,6 +75,9 @@ def list_variants(name: str) -> dict[str, str]:
 
 def find_variant(package: Package, variant: str) -> str:
     """The member that a variant's name means: its file name, with its ending or without, or the name written within it.
+
+    Args:
+        package: the open package.
 
     Raises:
         ScenarioError: there is none.
@@ -90,6 +96,9 @@ def find_variant(package: Package, variant: str) -> str:
 
 def load_structure(structure: Structure, package: Package) -> Loaded:
     """The scenario of one system structure.
+
+    Args:
+        package: the open package.
 
     Raises:
         CosimError: something in it cannot be carried out.

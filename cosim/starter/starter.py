@@ -27,7 +27,7 @@ class Starter:
 
     Args:
         text: of the file. kind: ``train``, ``observer`` or ``alone``. remarks: what the user should be told, a line
-        each.
+            each.
     """
 
     text: str

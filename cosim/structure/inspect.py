@@ -71,7 +71,7 @@ def make_part(
 
     Args:
         component: what is described. connections: of all components. group: number of its group. rate: of its steps, in
-        words.
+            words.
         clocks: connections between clocks. chain: how it moves over a step, in words.
     """
     description = component.description

@@ -48,7 +48,7 @@ class Candidate:
     Args:
         name: in the benchmark. table: how it is made. sources: where its inputs come from.
         origin: ``scenario`` or ``defaults``. settings: what was assumed, in words. misfit: why it cannot be coupled, or
-        empty.
+            empty.
     """
 
     name: str
@@ -150,7 +150,7 @@ def benchmark_observers(
             shipped train observers whose inputs and event the scenario can serve.
         record: folder for the recording, an ordinary results folder; by default it is thrown away.
         recorded: folder of an earlier recording (or of any run of this scenario) to be played back instead of a new
-        run.
+            run.
         repeat: runs of each observer; the cost per step is the median of them.
         progress: called with what is done now, the number done and the number in all.
         warn: told of what is doubtful about the recorded run.

@@ -89,14 +89,13 @@ class Sweep:
 
         Args:
             workers: processes at a time; 1 runs in this process. A script that uses more needs
-            ``if __name__ == "__main__":``.
+                ``if __name__ == "__main__":``.
             progress: called with the number done and the number in all.
             measure: own numbers to take of each outcome, ``{"name": function}``; called in this process.
             units: of these numbers, by name, for pictures.
             keep: keep the outcomes in memory; without them only measures are left, and what is in `directory`.
             directory: where each run is written as soon as it is done, ``run_000``, ``run_001``, ..., with an index at
-            the end,
-                also where the sweep is interrupted.
+                the end, also where the sweep is interrupted.
 
         Returns:
             The runs in order of the variations, with settings, measures, outcome or failure.

@@ -28,9 +28,9 @@ class Capabilities:
         needsExecutionTool: another program must be installed.
         canBeInstantiatedOnlyOncePerProcess: two instances in one process are not allowed.
         canNotUseMemoryManagementFunctions: it ignores the callbacks for memory (FMI 1, 2); they are passed all the
-        same.
+            same.
         canRunAsynchronuously: its doStep may return before it is done (FMI 1, 2), if the master can wait; this one
-        cannot.
+            cannot.
         canHandleVariableCommunicationStepSize: the communication step may vary.
         fixedInternalStepSize: its own step [s], where it says so (FMI 3).
         canInterpolateInputs: it takes derivatives of inputs (FMI 1, 2).

@@ -78,7 +78,11 @@ def exact_writer(component: Component, variable: ModelVariable) -> Callable[[Seq
 
 
 def write_start(component: Component, variable: ModelVariable, element: Element | None, values: list[Any]) -> None:
-    """Write a whole variable, or one element of it, once."""
+    """Write a whole variable, or one element of it, once.
+
+    Args:
+        values: one for each reference.
+    """
     if element is not None and element.index is not None:
         everything = list(exact_reader(component, variable)())
         everything[element.index] = values[0]

@@ -62,7 +62,7 @@ class _Trajectory:
 
     Args:
         signals: the variables. info: matrix and place of each, shape (variables, 4). start: values at the start, of
-        ``data_1``.
+            ``data_1``.
         data: values over time, of ``data_2``. about: what we put into files of ours.
     """
 

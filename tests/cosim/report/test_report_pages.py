@@ -17,7 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from synthetic_run import OBSERVERS, ZONES, synthetic_result, synthetic_spec
 
-from cosim.drawing.style import new_figure, observer_line
+from cosim.drawing.style import new_figure, observer_line, png
 from cosim.errors import OutputError
 from cosim.evaluation.metrics import phase_metrics
 from cosim.evaluation.spec import ReportSpec
@@ -25,7 +25,7 @@ from cosim.report.error_table import error_text
 from cosim.report.figures.drawing import thin
 from cosim.report.figures.gap_figure import certified_gaps, sampling_gaps
 from cosim.report.figures.main_picture import main_picture
-from cosim.report.figures.panels import PANELS, Panel, draw_all, png
+from cosim.report.figures.panels import PANELS, Panel, draw_all
 from cosim.report.figures.zooms import ZOOM_KEYS
 from cosim.report.page.parts import folded
 from cosim.report.page.report import report_page, write_report
