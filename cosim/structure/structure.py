@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from cosim.structure.text import structure_text
+
 Signal = tuple[str, str]
 """(component, variable)"""
 
@@ -165,8 +167,6 @@ class Structure:
         Args:
             width: columns at which long lists are broken; None for no limit.
         """
-        from cosim.structure.text import structure_text  # noqa: PLC0415 - it needs this class
-
         return structure_text(self, width)
 
     def draw(self, path: str | Path) -> Path:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from textwrap import TextWrapper
+from typing import TYPE_CHECKING
 
-from cosim.structure.structure import Link, Part, Port, Structure
 from fmus.text_table import text_table
+
+if TYPE_CHECKING:
+    from cosim.structure.structure import Link, Part, Port, Structure
 
 DASH = "-"
 
