@@ -51,6 +51,7 @@ class Part:
             declares.
         abilities: capabilities that matter to a master, in words. group: index of its group in `Structure.groups`.
         rate: every how many communication steps it runs, or how many times in one, in words; empty for once a step.
+        chain: how it moves over a step, in words: the stages, outermost first, then what is done within them.
     """
 
     name: str
@@ -64,6 +65,7 @@ class Part:
     abilities: tuple[str, ...]
     group: int
     rate: str = ""
+    chain: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
