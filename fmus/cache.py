@@ -75,6 +75,10 @@ def cache_entry(
 ) -> CacheEntry:
     """`cached_fmu` up to the compiler, for those who build several FMUs at a time.
 
+    Args:
+        system: the system to be built. fmi_version: 2 or 3. preset: its preset; None for the defaults.
+        protocol: how events are announced.
+
     Raises:
         ValueError, CompilerMissing: as `cached_fmu`.
     """
@@ -110,7 +114,11 @@ def _can_be_read(path: Path, _size: int, _modified: int) -> bool:
 
 
 def content_key(plan: Plan, targets: Sequence[Target]) -> str:
-    """Digest of all that decides the bytes of an FMU. The equations go in as CasADi's graph, of which the C follows."""
+    """Digest of all that decides the bytes of an FMU. The equations go in as CasADi's graph, of which the C follows.
+
+    Args:
+        plan: of the FMU, see `plan_fmu`. targets: platforms, each with its compiler.
+    """
     digest = hashlib.sha256()
     parts = [
         plan.equations.digest(),

@@ -42,6 +42,15 @@ def names_a_file(name: str) -> bool:
     return ".py:" in name or name.endswith(".py")
 
 
+def names_code(name: str) -> bool:
+    """Whether a name is meant as ``file.py:Class`` or ``package.module:Class``, and not as one of a registry.
+
+    Args:
+        name: of a model.
+    """
+    return ":" in name or names_a_file(name)
+
+
 def split_name(name: str) -> tuple[str, str]:
     """The path in ``path/to/file.py:Class``, and the class, empty where it is left out.
 

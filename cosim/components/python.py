@@ -45,11 +45,11 @@ class PythonSlave:
         self.model = model
         self.component = self
         self.counters = Counters()
-        self._inputs, self._parameters = slices(model.inputs), slices(model.parameters)
+        self._inputs, self._parameters = slices(model.inputs), slices(model.parameter_signals)
         fields = [name for name in model.telegram or () if name != "stamp"]
         telegram = [Signal(f"{EVENT}_{name}", UNKNOWN_UNIT, "input", "discrete") for name in fields]
         telegram += [] if model.telegram is None else [Signal(f"{EVENT}_time", "s", "input", "discrete")]
-        self._groups = model.inputs, model.outputs, model.parameters, tuple(telegram)
+        self._groups = model.inputs, model.outputs, model.parameter_signals, tuple(telegram)
         widths = [sum(signal.width for signal in group) for group in self._groups]
         self._ends = [0, *np.cumsum(widths).tolist()]
         self._values = np.array([x for group in self._groups for s in group for x in s.start_values])
@@ -225,7 +225,7 @@ class PythonSlave:
         if any(self._ends[2] < reference <= self._ends[3] for reference in vr):
             self._given = {
                 signal.name: self.model.as_given(signal, self._values[self._ends[2] :][self._parameters[signal.name]])
-                for signal in self.model.parameters
+                for signal in self.model.parameter_signals
             }
 
     setBoolean = setFloat64

@@ -6,6 +6,7 @@ The class has ``step(t, inputs, dt)``, perhaps ``balise(stamp, position, ...)``,
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from hashlib import sha256
@@ -58,12 +59,16 @@ class PythonModel:
         self.inputs = self._declared("inputs", "input")
         self.outputs = self._declared("outputs", "output")
         self.kinds: dict[str, type] = {}  # of the parameters, by name
-        self.parameters = self._parameters()
+        self.parameter_signals = self._parameters()
         self.telegram = self._telegram()
         self.direct = self._direct()
-        doubled = {s.name for s in self.inputs} & {s.name for s in (*self.outputs, *self.parameters)}
+        names = Counter(s.name for s in (*self.inputs, *self.outputs, *self.parameter_signals))
+        doubled = [name for name, count in names.items() if count > 1]
         if doubled:
-            raise self._refused(f"the name {min(doubled)!r} is taken twice")
+            raise self._refused(
+                f"the name {doubled[0]!r} is taken twice; inputs, outputs and arguments of the constructor need names "
+                f"of their own: start_{doubled[0]}, say"
+            )
         try:
             self.file = getsourcefile(self.cls)
         except (TypeError, OSError):

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import wraps
+from io import BytesIO
 from typing import Any, ParamSpec, TypeVar
 
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -37,6 +38,7 @@ ZONE_COLOUR = "#DCE9F2"
 ALARM_COLOUR = "#B00020"
 
 PANEL_SIZE = (8.2, 3.4)  # inches
+DPI = 130  # dots per inch
 
 RC: dict[str, Any] = {
     "font.family": "DejaVu Sans",  # the font that comes with matplotlib, so that pictures look the same everywhere
@@ -97,3 +99,21 @@ def new_figure(size: tuple[float, float] = PANEL_SIZE) -> Figure:
 def axes_or_new(ax: Axes | None, size: tuple[float, float] = PANEL_SIZE) -> Axes:
     """The axes given, or those of a new figure."""
     return ax if ax is not None else new_figure(size).add_subplot()
+
+
+def png(figure: Figure | SubFigure, dpi: int = DPI) -> bytes:
+    """A figure as PNG, without time stamps, so that equal figures are equal bytes.
+
+    Args:
+        figure: the figure, or a part of it.
+        dpi: resolution [1/inch].
+
+    Returns:
+        The picture, as the bytes of a file.
+    """
+    buffer = BytesIO()
+    metadata: dict[str, Any] = {"Software": None}
+    whole = figure.get_figure(root=True)
+    assert whole is not None
+    whole.savefig(buffer, format="png", dpi=dpi, metadata=metadata, facecolor="white")
+    return buffer.getvalue()

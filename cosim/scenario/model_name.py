@@ -15,7 +15,7 @@ from cosim.components.python_model import PythonModel, is_python_model
 from cosim.errors import ScenarioError, nearest
 from plant_models import SYSTEM
 from plant_models.registry import RegistryError, descends_from
-from plant_models.user_file import Expected, UserFileError, load_class, name_of, names_a_file
+from plant_models.user_file import Expected, UserFileError, load_class, name_of, names_code
 
 EXPECTED = Expected(
     "subclass of HybridSystem or class with step(t, inputs, dt)",
@@ -84,7 +84,7 @@ class ModelName(str):
         try:
             if str(self) in registry:
                 return registry[str(self)]
-            if ":" in self or names_a_file(self):
+            if names_code(self):
                 return load_class(self, EXPECTED, self.folder)
         except (RegistryError, UserFileError) as error:
             raise ScenarioError(f"{where}: {error}") from error
@@ -101,7 +101,7 @@ def settings_of(given: Any) -> dict[str, dict[str, Any]]:
         return {}
     if descends_from(given, SYSTEM):
         return {"options": dict(given.options)} if given.options else {}
-    parameters = {s.name: s.start for s in PythonModel(given, {}, "script").parameters}
+    parameters = {s.name: s.start for s in PythonModel(given, {}, "script").parameter_signals}
     return {"parameters": parameters} if parameters else {}
 
 
@@ -116,4 +116,4 @@ def _validated(given: Any, info: ValidationInfo) -> ModelName:
     return ModelName.of(given, (info.context or {}).get("folder"))
 
 
-Model = Annotated[ModelName, PlainValidator(_validated), PlainSerializer(str)]
+Model = Annotated[ModelName, PlainValidator(_validated), PlainSerializer(str, when_used="json")]

@@ -51,6 +51,9 @@ def make_system(table: ComponentTable, where: str) -> HybridSystem | None:
     Args:
         table: of the component. where: place for messages.
 
+    Args:
+        table: of the scenario. where: name of the scenario, for messages.
+
     Raises:
         ScenarioError: unknown model, option or preset.
     """
@@ -69,6 +72,22 @@ def make_system(table: ComponentTable, where: str) -> HybridSystem | None:
     return system
 
 
+def make_declared(table: ComponentTable, where: str) -> Any:
+    """What a component's model declares: a hybrid system or a model of plain Python, both with `inputs`, `outputs` and
+    `parameter_signals`; None for an FMU by path and for a recording.
+
+    Args:
+        table: of the component. where: place for messages.
+
+    Raises:
+        ScenarioError: the model cannot be had, or its declarations cannot be.
+    """
+    system = make_system(table, where)
+    if system is not None or (table.model or table.observer) is None:
+        return system
+    return PythonModel(model_of(table, where), table.options, where)
+
+
 def component_factories(
     tables: Mapping[str, ComponentTable],
     folder: Path,
@@ -84,7 +103,7 @@ def component_factories(
         tables: of the components. folder: paths are relative to it. where: place for messages.
         tell: told of FMUs that are built. span: start and stop of the run [s], which recordings must cover.
         tolerance: of the FMUs whose table says nothing else; see
-        `cosim.components.described.Described.choose_tolerance`.
+            `cosim.components.described.Described.choose_tolerance`.
 
     Raises:
         ScenarioError, FmuLoadError: a component cannot be made.
@@ -127,8 +146,7 @@ def python_component(name: str, table: ComponentTable, where: str) -> PythonComp
         raise ScenarioError(
             f"{where}: 'preset' and 'as' belong to hybrid systems; plain Python takes 'parameters' and 'options'."
         )
-    model = PythonModel(model_of(table, where), table.options, where)
-    return PythonComponent(name, model, str(table.model or table.observer))
+    return PythonComponent(name, make_declared(table, where), str(table.model or table.observer))
 
 
 def open_recording(
@@ -148,7 +166,11 @@ def open_recording(
 
 
 def left_out_note(name: str, recording: Recording) -> list[str]:
-    """Which columns of a recording are not there, if any."""
+    """Which columns of a recording are not there, if any.
+
+    Args:
+        name: of the component.
+    """
     columns = "; ".join(f"{column}: {why}" for column, why in recording.left_out.items())
     return [f"{name}: columns that cannot be played back are left out. {columns}."] if columns else []
 
@@ -165,23 +187,25 @@ def _made(model: type[HybridSystem], options: Mapping[str, Any], where: str) -> 
     if model.__module__.partition(".")[0] in OWN_PACKAGES:
         return model(**options)
     try:
-        system: HybridSystem = make(model, options)
+        made: HybridSystem = make(model, options)
     except UserFileError as error:
         raise ScenarioError(f"{where}: {error}") from error
-    return system
+    return made
 
 
 def _lasting(table: ComponentTable, system: HybridSystem) -> HybridSystem:
     """The first system of the same class and options in this process: what has been traced need not be traced for each
     run. An instance that a script gave may differ from others of its class, and lasts itself.
     """
-    if (table.model or table.observer or ModelName()).given is system:
-        return system
-    return _systems.setdefault((type(system), repr(sorted(table.options.items()))), system)
+    given = (table.model or table.observer or ModelName()).given is system
+    return system if given else _systems.setdefault((type(system), repr(sorted(table.options.items()))), system)
 
 
 def protocol_parameters(table: ComponentTable, component: Component, where: str) -> dict[str, float | str]:
     """What the table says about late events, as parameters of an FMU; a block was made with them.
+
+    Args:
+        where: name of the scenario, for messages.
 
     Raises:
         ScenarioError: the component has no such parameter.

@@ -15,7 +15,8 @@ from cosim.errors import RunError
 from plant_models.hybrid.units import UnitError, parse_unit
 
 if TYPE_CHECKING:
-    from cosim.coupling.plan import Plan, PlannedComponent
+    from cosim.coupling.plan import Plan
+    from cosim.coupling.planned import PlannedComponent
 
 PLAUSIBLE = {
     parse_unit(unit).exponents: limit
@@ -65,7 +66,7 @@ def explained_failure(error: Exception, plan: Plan, table: Any) -> str:
 
     Args:
         error: that ended the run. plan: that was run. table: rows by ``component.signal``, in the components' own
-        units.
+            units.
     """
     found = first_departure(plan, table) if isinstance(error, RunError) else None
     if found is None:

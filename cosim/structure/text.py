@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from textwrap import TextWrapper
+from typing import TYPE_CHECKING
 
-from cosim.structure.structure import Link, Part, Port, Structure
+from fmus.text_table import text_table
+
+if TYPE_CHECKING:
+    from cosim.structure.structure import Link, Part, Port, Structure
 
 DASH = "-"
 
@@ -23,6 +27,7 @@ def structure_text(structure: Structure, width: int | None = None) -> str:
         _section("Connections", _connections(structure)),
         _section("Groups", _groups(structure)),
         _section("Algebraic loops", _loops(structure)),
+        _section("Movement over a step, outermost stage first", _chains(structure)),
         _section("Balises", _balises(structure)),
         _section(
             "Algorithm", [f"{structure.algorithm}: {structure.reason}" if structure.reason else structure.algorithm]
@@ -30,17 +35,6 @@ def structure_text(structure: Structure, width: int | None = None) -> str:
         _section("Warnings", structure.warnings),
     ]
     return "\n\n".join(_broken(section, width) for section in sections if section)
-
-
-def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Aligned lines: headings, then rows; numbers in the first column stand on the right."""
-    everything = [list(headings), *map(list, rows)]
-    widths = [max(len(row[i]) for row in everything) for i in range(len(headings))]
-    return ["  ".join(_aligned(cell, widths[i], i) for i, cell in enumerate(row)).rstrip() for row in everything]
-
-
-def _aligned(cell: str, width: int, column: int) -> str:
-    return cell.rjust(width) if column == 0 and (cell.isdigit() or cell == "#") else cell.ljust(width)
 
 
 def _section(title: str, lines: Sequence[str]) -> str:
@@ -74,7 +68,7 @@ def _components(structure: Structure) -> list[str]:
         ]
         for number, part in enumerate(structure.parts, start=1)
     ]
-    return [*table(headings, rows), "", "inputs, outputs: connected of all"]
+    return [*text_table([headings, *rows], left=range(1, len(headings))), "", "inputs, outputs: connected of all"]
 
 
 def _used(ports: Sequence[Port]) -> str:
@@ -99,7 +93,7 @@ def _ports(structure: Structure) -> list[str]:
             rows.append(
                 [f"{part.name}.{port.name}", "output", port.unit or DASH, port.kind, _to(targets) + _direct(port)]
             )
-    return table(["signal", "causality", "unit", "type", ""], rows)
+    return text_table([["signal", "causality", "unit", "type", ""], *rows], left=range(5))
 
 
 def _is_end(end: tuple[str, str], part: Part, port: Port) -> bool:
@@ -131,7 +125,7 @@ def _connections(structure: Structure) -> list[str]:
         [".".join(link.source), f"-> {'.'.join(link.target)}", "clock, ticks at its own instant", ""]
         for link in structure.clocks
     ]
-    return table(["source", "   target", "value used", "conversion"], rows) if rows else ["none"]
+    return text_table([["source", "   target", "value used", "conversion"], *rows], left=range(4)) if rows else ["none"]
 
 
 def when(link: Link) -> str:
@@ -170,6 +164,11 @@ def _loops(structure: Structure) -> list[str]:
     return [" -> ".join(".".join(node) for node in loop) for loop in structure.loops] or ["none"]
 
 
+def _chains(structure: Structure) -> list[str]:
+    rows = [[part.name, " > ".join(part.chain)] for part in structure.parts if part.chain]
+    return text_table(rows, (0, 1)) if rows else []
+
+
 def _balises(structure: Structure) -> list[str]:
     balises = structure.balises
     if balises is None:
@@ -182,7 +181,7 @@ def _balises(structure: Structure) -> list[str]:
         ["timing", balises.timing],
     ]
     rows += [["odometer reading", balises.odometer]] if balises.odometer else []
-    return [f"{what.ljust(17)}{value}" for what, value in rows]
+    return text_table(rows, left=(0, 1))
 
 
 def _broken(section: str, width: int | None) -> str:

@@ -15,7 +15,8 @@ import numpy as np
 
 from cosim.balises.service import Row
 from cosim.components.component import Component
-from cosim.coupling.plan import Mover, PlannedComponent
+from cosim.coupling.chain import Mover
+from cosim.coupling.planned import PlannedComponent
 from cosim.errors import RunError
 from cosim.master.events.iteration import EventIteration
 from cosim.master.events.participant import Participant

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cosim.coupling.plan import Plan, PlannedComponent
+from cosim.coupling.plan import Plan
+from cosim.coupling.planned import PlannedComponent
 from cosim.master.interpolation.interpolators import make_interpolator
 from cosim.master.interpolation.line import Line, Method
 from fmus.fmi.types import FLOATING_TYPES

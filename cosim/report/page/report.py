@@ -18,9 +18,10 @@ from cosim.evaluation.phase_details import phase_details
 from cosim.evaluation.result_warnings import all_warnings
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
+from cosim.report.cost import cost_html, messages_html
+from cosim.report.error_table import html_table
 from cosim.report.figures.panels import PANELS, Panel, draw_all
 from cosim.report.figures.zooms import ZOOM_KEYS, Zoom, draw_zooms
-from cosim.report.page.cost import cost_html, messages_html
 from cosim.report.page.expectations import expectations_table, unmet_box
 from cosim.report.page.files import write_file, write_page
 from cosim.report.page.parts import (
@@ -37,7 +38,6 @@ from cosim.report.page.parts import (
     simple_table,
 )
 from cosim.report.page.phases import phases_html
-from cosim.report.page.table import html_table
 from cosim.report.page.verdict import verdict_facts
 from cosim.results.result import Result
 

@@ -27,7 +27,7 @@ from cosim.diagnostics.call_statistics import EARLY, EVERY, CallStatistics
 from cosim.diagnostics.call_text import Described
 from cosim.errors import OutputError
 from cosim.master.master import close
-from cosim.report.page.cost import cost_rows, cost_text
+from cosim.report.cost import cost_rows, cost_text
 from cosim.report.page.report import report_page
 
 LINE = re.compile(

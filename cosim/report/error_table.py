@@ -11,6 +11,7 @@ from cosim.evaluation.numbers import error_number, number
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.page.parts import grouped_table
+from fmus.text_table import text_table
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ def cells(entry: PhaseMetrics, chosen: Sequence[Column]) -> list[str]:
     return [texts[column] for column in chosen]
 
 
-def text_table(metrics: Sequence[PhaseMetrics], spec: ReportSpec) -> str:
+def error_text(metrics: Sequence[PhaseMetrics], spec: ReportSpec) -> str:
     """The errors as a table for a terminal.
 
     Args:
@@ -76,14 +77,7 @@ def text_table(metrics: Sequence[PhaseMetrics], spec: ReportSpec) -> str:
     chosen = columns(metrics)
     rows = [["observer", "phase", *(f"{SHORT[c]} [{c.unit}]" for c in chosen)]]
     rows += [[label(spec, m.observer), m.phase, *cells(m, chosen)] for m in metrics]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = [
-        "  ".join(
-            text.ljust(w) if i < 2 else text.rjust(w) for i, (text, w) in enumerate(zip(row, widths, strict=True))
-        )
-        for row in rows
-    ]
-    return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
+    return "\n".join(text_table(rows, (0, 1), heading=True))
 
 
 def html_table(metrics: Sequence[PhaseMetrics], spec: ReportSpec) -> str:

@@ -8,8 +8,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cosim.evaluation.metrics import PhaseMetrics
-from cosim.evaluation.numbers import DASH, error_number, number
-from cosim.studies.observer_scores import CertifiedGap, ObserverScore
+from cosim.evaluation.numbers import number
+from cosim.observer_benchmark.observer_scores import CertifiedGap, ObserverScore
+from fmus.text_table import text_table
 
 
 def main_row(score: ObserverScore) -> dict[str, Any]:
@@ -42,21 +43,6 @@ def certified(certificate: CertifiedGap | None) -> str | None:
     return f"{words[certificate.holds_expected]}/{words[certificate.holds_seen]}"
 
 
-def cell(value: Any) -> str:
-    """A cell of a table as text."""
-    if isinstance(value, str | int):
-        return str(value)
-    return DASH if value is None else error_number(value)
-
-
 def aligned(rows: Sequence[Mapping[str, str]]) -> str:
     """Rows as lines of equal width; the first column to the left, the others to the right."""
-    if not rows:
-        return ""
-    table = [list(rows[0]), *(list(row.values()) for row in rows)]
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    lines = [
-        "  ".join(text.rjust(w) if i else text.ljust(w) for i, (text, w) in enumerate(zip(row, widths, strict=True)))
-        for row in table
-    ]
-    return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
+    return "\n".join(text_table([list(rows[0]), *(list(row.values()) for row in rows)], heading=True)) if rows else ""

@@ -11,6 +11,7 @@ from cosim.evaluation.facts import list_entry, number_entry
 from cosim.evaluation.numbers import DASH, number
 from cosim.report.page.parts import paragraph, simple_table
 from cosim.results.result import Result
+from fmus.text_table import text_table
 
 KINDS = {
     "doStep": ("doStep",),
@@ -36,16 +37,7 @@ def cost_text(result: Result) -> str:
     rows = cost_rows(result)
     if not rows:
         return ""
-    lines = [["calls / ms", *KINDS, "messages"], *rows]
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    texts = [
-        "  ".join(
-            cell.rjust(width) if i else cell.ljust(width)
-            for i, (cell, width) in enumerate(zip(line, widths, strict=True))
-        )
-        for line in lines
-    ]
-    return "\n".join([texts[0].rstrip(), "-" * len(texts[0]), *(text.rstrip() for text in texts[1:])])
+    return "\n".join(text_table([["calls / ms", *KINDS, "messages"], *rows], heading=True))
 
 
 def cost_html(result: Result) -> list[str]:
