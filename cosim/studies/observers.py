@@ -12,8 +12,8 @@ from typing import Any
 from cosim.balises.recorded import read_layout
 from cosim.coupling.connection import Link
 from cosim.errors import CosimError, RunError, ScenarioError, nearest
+from cosim.evaluation.error_table import error_text
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.error_table import error_text
 from cosim.results.folder import write_results
 from cosim.results.load import load_result
 from cosim.results.result import Result
