@@ -20,9 +20,9 @@ from pydantic.fields import FieldInfo
 
 import fmu_observer
 from cosim import Outcome, Scenario
+from cosim.evaluation.metrics import phase_metrics
+from cosim.report.error_table import error_text
 from cosim.report.figures.main_picture import main_picture
-from cosim.report.metrics import phase_metrics
-from cosim.report.page.table import text_table
 from cosim.scenario import expectation_tables as expectations
 from cosim.scenario import schema, tables
 
@@ -93,7 +93,7 @@ def write_picture() -> None:
 def printed_table() -> str:
     """The table of the default run, two phases of it, as ``cosim run`` prints it."""
     outcome = default_run()
-    head, rule, *rows = text_table(phase_metrics(outcome.result, outcome.spec), outcome.spec).splitlines()
+    head, rule, *rows = error_text(phase_metrics(outcome.result, outcome.spec), outcome.spec).splitlines()
     chosen = [row for row in rows if any(f"  {phase}  " in row for phase in SHORTENED)]
     return "\n".join(["```text", head, rule, *chosen, "```", ""])
 

@@ -1,25 +1,28 @@
-"""What the train believes: observers, detectors, their certificates, and the FMU-style face over any of them.
+"""What the train believes: observers, detectors, their certificates, and the FMU-style interface over any of them.
 
-Importing this package costs nothing: the registry `OBSERVERS` is built when it is first asked for. It may use
-`plant_models`, never `fmus` or `cosim`.
+Importing this package costs nothing: observers are loaded when they are asked for. It may use `plant_models`, never
+`fmus` or `cosim`.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from plant_models import SYSTEM
+from plant_models.registry import Registry
 
 if TYPE_CHECKING:
-    from plant_models.hybrid import HybridSystem
+    from plant_models.hybrid.system import HybridSystem
 
-    OBSERVERS: dict[str, type[HybridSystem]]
+ROOMS = (
+    "fmu_observer.observers.train",
+    "fmu_observer.observers.sampled",
+    "fmu_observer.observers.continuous",
+    "fmu_observer.observers.discrete",
+    "fmu_observer.detection",
+)
+
+OBSERVERS: Registry[type[HybridSystem]] = Registry("observer", ROOMS, "fmu_observer.observers", SYSTEM)
+"""Observers and detectors: model name to class; options are constructor keywords."""
 
 __all__ = ["OBSERVERS"]
-
-
-def __getattr__(name: str) -> Any:
-    if name != "OBSERVERS":
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from fmu_observer import registry  # noqa: PLC0415 - imports CasADi; only for those who ask
-
-    globals()["OBSERVERS"] = registry.OBSERVERS
-    return registry.OBSERVERS

@@ -86,7 +86,7 @@ class VariableTable:
         outcomes: first of the counts of what became of events, see `OUTCOME_VARIABLES`; missing there too.
         derivatives: first of the derivatives of the continuous states.
         indicators: first of the event indicators: one for each state with dry friction, then one for each switching
-        function.
+            function.
         end: first value reference that is not used.
     """
 
@@ -119,12 +119,20 @@ class VariableTable:
 
 
 def referenced(items: Sequence[ItemOfTable], first: int, count: int = 1) -> Sequence[ItemOfTable]:
-    """Those that have `count` value references from `first` on, of what stands in the order of the variables."""
+    """Those that have `count` value references from `first` on, of what stands in the order of the variables.
+
+    Args:
+        items: in the order of the variables.
+    """
     return items[first - FIRST_REFERENCE : first - FIRST_REFERENCE + count]
 
 
 def exposed_inputs(system: HybridSystem) -> tuple[Signal, ...]:
-    """Inputs and event payloads, without the noises that the runtime draws itself."""
+    """Inputs and event payloads, without the noises that the runtime draws itself.
+
+    Args:
+        system: the hybrid system.
+    """
     return system.input_signals[: len(system.input_signals) - len(system.noises)]
 
 
@@ -146,7 +154,7 @@ def describe(
         model_name: name to show; None for the system's own.
         protocol: how it is told of triggered events; by default as is usual in the FMI version.
         model_exchange: whether it is a model exchange FMU as well; only a traceable system without communication events
-        can be.
+            can be.
 
     Raises:
         ValueError: the preset or the version of FMI is unknown, or the protocol is none of this version.

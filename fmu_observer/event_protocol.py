@@ -68,6 +68,9 @@ class EventProtocol:
     def counts(self, fmi_version: int) -> bool:
         """Whether events are announced by counts in this FMI version.
 
+        Args:
+            fmi_version: 2 or 3.
+
         Raises:
             ValueError: clocks are asked for in FMI 2, which has none.
         """

@@ -10,6 +10,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from fmus.batch.error import BatchError
+    from fmus.batch.members import Batch
     from fmus.build import build_fmu
     from fmus.cache import cached_fmu
     from fmus.content.generate import GenerationError
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "RECIPES",
+    "Batch",
+    "BatchError",
     "CompilationError",
     "CompilerMissing",
     "GenerationError",
@@ -31,6 +35,8 @@ __all__ = [
 
 _HOMES = {
     "RECIPES": "fmus.recipes",
+    "Batch": "fmus.batch.members",
+    "BatchError": "fmus.batch.error",
     "CompilationError": "fmus.toolchain.compile",
     "CompilerMissing": "fmus.toolchain.compile",
     "GenerationError": "fmus.content.generate",

@@ -91,7 +91,8 @@ def cache_entry(
     A system with an identity is traced only where its FMU was never asked for with this code and compiler.
 
     Args:
-        system: the hybrid system. fmi_version, preset, protocol: as for `cached_fmu`.
+        system: the hybrid system. fmi_version: 2 or 3. preset: its preset; None for the default.
+        protocol: how it is told of triggered events; None for the default.
 
     Returns:
         The place of the FMU, with a draft where it is not there, or not whole.
@@ -134,7 +135,11 @@ def _keep_content(system: HybridSystem, key: str | None, request: str, content: 
 
 
 def content_key(plan: Plan, targets: Sequence[Target]) -> str:
-    """Digest of all that decides the bytes of an FMU. The equations go in as CasADi's graph, of which the C follows."""
+    """Digest of all that decides the bytes of an FMU. The equations go in as CasADi's graph, of which the C follows.
+
+    Args:
+        plan: of the FMU, see `plan_fmu`. targets: platforms, each with its compiler.
+    """
     digest = hashlib.sha256()
     parts = [
         plan.equations.digest(),

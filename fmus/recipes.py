@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
+from importlib import import_module
 from inspect import Parameter, signature
-from sys import modules
 from typing import Any
 
 from fmu_observer import OBSERVERS
@@ -71,23 +71,22 @@ def recipe_options(name: str) -> dict[str, Any]:
     return dict.fromkeys(cls.option_choices) | named
 
 
-def by_room(registry: Mapping[str, type[HybridSystem]]) -> dict[str, list[str]]:
-    """Names of a registry, grouped by the room of the house a system lives in.
+def by_room(names: Iterable[str]) -> dict[str, list[str]]:
+    """Names of models, grouped by the room of the house a system lives in.
 
     Args:
-        registry: class by model name.
+        names: of `RECIPES`.
 
     Returns:
-        Names by the first line of the room's description; what the user registered comes last.
+        Names by the first line of the room's description; then those of installed packages and of this program.
     """
     rooms: dict[str, list[str]] = {}
-    own: list[str] = []
-    for name, cls in registry.items():
-        room = modules.get(cls.__module__.rpartition(".")[0])
-        shipped = room is not None and cls in getattr(room, "SYSTEMS", ())
-        words = (room.__doc__ or room.__name__).splitlines()[0].rstrip(".") if room is not None else ""
-        (rooms.setdefault(words, []) if shipped else own).append(name)
-    return rooms | ({"Registered here": own} if own else {})
+    for name in names:
+        registry = PLANTS if name in PLANTS else OBSERVERS
+        room = registry.room(name)
+        words = (import_module(room).__doc__ or room).splitlines()[0].rstrip(".") if room else registry.origin(name)
+        rooms.setdefault(words[0].upper() + words[1:], []).append(name)
+    return dict(sorted(rooms.items(), key=lambda item: item[0].startswith("Registered by")))
 
 
 def recipe_presets(name: str) -> tuple[list[str], str | None]:

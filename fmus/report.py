@@ -11,8 +11,8 @@ from pathlib import Path
 from fmpy.model_description import ModelDescription, ModelVariable
 from fmpy.validation import validate_fmu
 
-from fmus.check.binaries import LIBRARY_SUFFIXES, why_not_here
-from fmus.check.description import read_description
+from fmus.fmi.binaries import LIBRARY_SUFFIXES, why_not_here
+from fmus.fmi.description import read_description
 from fmus.toolchain.machine_code import platforms_of_library
 from fmus.toolchain.platforms import host_platform
 
@@ -80,13 +80,21 @@ def describe_file(path: Path) -> list[str]:
 
 
 def platforms_of(path: Path) -> list[str]:
-    """Names of the folders of an FMU that hold libraries."""
+    """Names of the folders of an FMU that hold libraries.
+
+    Args:
+        path: of the FMU.
+    """
     with zipfile.ZipFile(path) as archive:
         return _platforms(archive)
 
 
 def problems_of(path: Path) -> list[str]:
-    """Damaged files, libraries in the wrong folder, and what fmpy's validation finds; empty for a valid FMU."""
+    """Damaged files, libraries in the wrong folder, and what fmpy's validation finds; empty for a valid FMU.
+
+    Args:
+        path: of the FMU.
+    """
     with zipfile.ZipFile(path) as archive:
         problems = [*_damage(archive), *_strays(archive)]
     return problems + list(validate_fmu(str(path)))

@@ -1,11 +1,39 @@
-"""What a train does: hybrid systems in plain NumPy. Knows no FMI, no observer, no master."""
+"""What a train does: hybrid systems in plain NumPy. Knows no FMI, no observer, no master.
 
-from plant_models import benchmarks, railway
-from plant_models.hybrid import HybridSystem
-from plant_models.railway.control import Driver
-from plant_models.railway.sensors import BaliseReader, Gps, Odometer
-from plant_models.railway.vehicle import Locomotive, Train
+Importing this package costs nothing: plants are loaded when they are asked for.
+"""
 
-PLANTS: dict[str, type[HybridSystem]] = {plant.name: plant for plant in (*railway.SYSTEMS, *benchmarks.SYSTEMS)}
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from plant_models.registry import Registry, load
+
+if TYPE_CHECKING:
+    from plant_models.hybrid.system import HybridSystem
+    from plant_models.railway.control.driver import Driver
+    from plant_models.railway.sensors.balise_reader import BaliseReader
+    from plant_models.railway.sensors.gps import Gps
+    from plant_models.railway.sensors.odometer import Odometer
+    from plant_models.railway.vehicle.locomotive import Locomotive
+    from plant_models.railway.vehicle.train import Train
+
+ROOMS = (
+    "plant_models.railway.vehicle",
+    "plant_models.railway.sensors",
+    "plant_models.railway.control",
+    "plant_models.benchmarks",
+)
+SYSTEM = "plant_models.hybrid.system:HybridSystem"
+
+PLANTS: Registry[type[HybridSystem]] = Registry("plant", ROOMS, "plant_models.plants", SYSTEM)
+"""Plants, sensors and drivers: model name to class; options are constructor keywords."""
 
 __all__ = ["PLANTS", "BaliseReader", "Driver", "Gps", "Locomotive", "Odometer", "Train"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found = {member.target.partition(":")[2]: member.target for (member, *_) in PLANTS.members.values()}
+    return load(found[name])

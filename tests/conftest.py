@@ -5,6 +5,7 @@ integration.
 from __future__ import annotations
 
 import os
+from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -42,10 +43,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Mark the second tier as slow, and what opens a browser. In whole files a line that fits none of the tests is an
     error.
     """
-    lines = second_tier()
+    lines, by_file = second_tier(), defaultdict(list)
+    for line in lines:
+        by_file[line.partition("::")[0]].append(line)
     used = set()
     for item in items:
-        fitting = [beginning for beginning in lines if item.nodeid.startswith(beginning)]
+        name = item.nodeid
+        fitting = [beginning for beginning in by_file[name.partition("::")[0]] if name.startswith(beginning)]
         used |= set(fitting)
         if (fitting and lines[max(fitting, key=len)]) or item.get_closest_marker("browser"):
             item.add_marker(pytest.mark.slow)

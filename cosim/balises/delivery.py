@@ -6,17 +6,17 @@ cannot, and told too late where the run asks for that.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
 
 from cosim.balises.telegram import payload
-from cosim.components.component import TIME_TOLERANCE
 from cosim.components.described import EventPort
-from cosim.coupling.plan import PlannedComponent
+from cosim.coupling.planned import PlannedComponent
 from cosim.results.result import BaliseRecord
+from fmus.fmi.standard import TIME_TOLERANCE
 
 Timing = Literal["exact", "stale"]
 OUTCOMES = (
@@ -46,6 +46,10 @@ class Delivery:
     outcome: str = "told"
 
 
+StepThrough = Callable[[float, float, Sequence[BaliseRecord]], list[Delivery]]
+"""Steps a receiver from one time to another [s] through telegrams; what became of each."""
+
+
 @dataclass
 class Receiver:
     """A planned component that declares the balise event.
@@ -59,6 +63,7 @@ class Receiver:
         event: name of its event.
         timing: ``exact`` uses a telegram at its own instant; ``stale`` hands it over unshifted at the next
             communication point, as a master without events would (for comparison only).
+        compiled: the compiled stepper's way over a step with telegrams, where there is one.
     """
 
     planned: PlannedComponent
@@ -67,6 +72,7 @@ class Receiver:
     seen: dict[str, int] = field(default_factory=dict)
     backlog: list[BaliseRecord] = field(default_factory=list)
     arrived: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    compiled: StepThrough | None = None
     _open: list[Delivery] = field(default_factory=list)
     _announced: bool = False
 
@@ -87,11 +93,18 @@ class Receiver:
     def step(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
         """Step from `t` to `until` [s] with the prepared inputs through `telegrams`, in order of delivery.
 
+        Args:
+            t: where the component stands [s]. until: end of the step [s]. telegrams: delivered within the step.
+
         Afterwards `arrived` holds the outputs on reaching `until`, before anything was told there, shape (q,).
 
         Returns:
             What became of each telegram, in the same order.
         """
+        return (self.compiled or self.step_in_python)(t, until, telegrams)
+
+    def step_in_python(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
+        """As `step`, without the compiled stepper's way through a single telegram."""
         self.planned.send(t, until)
         self._open.clear()
         waiting, self.backlog = self.backlog, []

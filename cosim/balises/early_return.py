@@ -10,9 +10,9 @@ from cosim.balises.layout import InstantLayout, TrackLayout
 from cosim.balises.localiser import Localiser, Method
 from cosim.balises.plant_monitor import PlantMonitor
 from cosim.balises.telegram import Crossing
-from cosim.components.component import TIME_TOLERANCE
-from cosim.components.fmi3 import MAX_RETURNS_PER_STEP, FMI3Component
+from cosim.components.fmi3 import FMI3Component
 from cosim.errors import CouplingError
+from fmus.fmi.standard import MAX_RETURNS_PER_STEP, TIME_TOLERANCE
 
 
 class EarlyReturnLocaliser(Localiser):

@@ -8,7 +8,7 @@ import numpy as np
 
 from cosim.balises.plant_error import PlantError
 from cosim.components.component import Component
-from cosim.coupling.plan import PlannedComponent
+from cosim.coupling.planned import PlannedComponent
 
 
 class PlantMonitor:

@@ -8,7 +8,7 @@ from cosim.balises.hermite import HermiteStep, time_to_reach
 from cosim.balises.layout import InstantLayout, TrackLayout
 from cosim.balises.localiser import ACCELERATION_LIMIT, Localiser, Method
 from cosim.balises.telegram import Crossing
-from cosim.components.component import TIME_TOLERANCE
+from fmus.fmi.standard import TIME_TOLERANCE
 
 FINE_CUT = 1e-4
 """Half the length of the cut that takes the plant over a balise [s]; interpolation over it errs by 1e-8 s at walking

@@ -15,7 +15,6 @@ from cosim.balises.layout import InstantLayout
 from cosim.balises.localiser import Localiser, Method
 from cosim.balises.plant_monitor import PlantMonitor
 from cosim.balises.telegram import NO_OUTCOMES, Channel, Crossing
-from cosim.components.component import TIME_TOLERANCE
 from cosim.components.recording import RecordingComponent
 from cosim.errors import OutputError, ScenarioError
 from cosim.results.events_file import read_events
@@ -23,6 +22,7 @@ from cosim.results.folder import EVENTS
 from cosim.results.formats.telegram_csv import holds_telegrams, read_telegrams
 from cosim.results.load import load_result
 from cosim.results.result import BaliseRecord
+from fmus.fmi.standard import TIME_TOLERANCE
 
 
 @dataclass(frozen=True)

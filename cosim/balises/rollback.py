@@ -13,7 +13,7 @@ from cosim.balises.hermite import HermiteStep, Stretch
 from cosim.balises.layout import Balise, InstantLayout, TrackLayout
 from cosim.balises.localiser import ACCELERATION_LIMIT, Localiser, Method
 from cosim.balises.telegram import Crossing
-from cosim.components.component import TIME_TOLERANCE
+from fmus.fmi.standard import TIME_TOLERANCE
 
 ROOT_TOLERANCE = 1e-11
 """Crossing times are searched until they move by less than this [s]; a hundredth of the promised 1e-9 s."""

@@ -6,7 +6,7 @@ trajectory of the plant does not depend on whether anybody looks for balises (me
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from math import nan
@@ -18,10 +18,11 @@ from cosim.balises.delivery import Delivery, Receiver
 from cosim.balises.layout import InstantLayout
 from cosim.balises.localiser import Localiser
 from cosim.balises.telegram import Channel, Crossing, FalseTelegram, Mailbox
-from cosim.components.component import TIME_TOLERANCE
-from cosim.coupling.plan import Plan, PlannedComponent
+from cosim.coupling.chain import Mover, Position, Stage, around
+from cosim.coupling.plan import Plan
 from cosim.errors import CouplingError
 from cosim.results.result import BaliseRecord
+from fmus.fmi.standard import TIME_TOLERANCE
 
 Row = tuple[float, np.ndarray]
 Snapshot = tuple[Crossing, np.ndarray]
@@ -62,17 +63,20 @@ class BaliseService:
         return self.localiser.watch.component.name
 
     def attach(self, plan: Plan) -> None:
-        """Take over how the plant and the receivers are moved.
+        """Add the stages that find crossings on the way of the plant, and deliver telegrams on that of the receivers.
 
         Raises:
             CouplingError: a receiver is stepped before the watched plant, or is the plant itself.
         """
         self._plan = plan
         self._check_order()
-        self._plant: PlannedComponent = plan.find(self.plant)
-        self._plant.move = self._move_plant
+        self._plant = plan.find(self.plant)
+        self._plant.add_stage(
+            Stage(Position.BALISES, localiser_stage_text(self.localiser.method), move=lambda _: self._move_plant)
+        )
         for receiver in self.receivers:
-            receiver.planned.move = partial(self._move_receiver, receiver)
+            move = around(partial(self._move_receiver, receiver))
+            receiver.planned.add_stage(Stage(Position.BALISES, receiver_stage_text(receiver.timing), move=move))
         plan.services.append(self)
 
     # -- a step -----------------------------------------------------------------------------------------------------
@@ -87,7 +91,7 @@ class BaliseService:
     def _move_plant(self, t: float, until: float) -> None:
         self._snapshots += self.localiser.step(t, until)
 
-    def _move_receiver(self, receiver: Receiver, t: float, until: float) -> None:
+    def _move_receiver(self, receiver: Receiver, drive: Mover, t: float, until: float) -> None:
         """Step a receiver through what is delivered to it; what it needs of plant and odometer has been stepped
         before.
         """
@@ -96,9 +100,9 @@ class BaliseService:
         if self._telegrams or receiver.busy:
             self._told[receiver.planned.component.name] = receiver.step(t, until, self._telegrams or [])
         else:
-            receiver.planned.drive(t, until)
+            drive(t, until)
 
-    def holder(self, name: str) -> Callable[[float, float], None]:
+    def holder(self, name: str) -> Mover:
         """What to call instead of moving a receiver that waits: telegrams of that time are kept for its next step."""
 
         def hold(t: float, until: float) -> None:
@@ -280,3 +284,13 @@ class BaliseService:
                 )
             if order.index(name) < order.index(self.plant):
                 raise CouplingError(f"{name} is told of balises, so it must be stepped after the plant '{self.plant}'.")
+
+
+def localiser_stage_text(method: str) -> str:
+    """The stage of the watched plant in words; `method`: of localisation, or when it is chosen."""
+    return f"balise localiser ({method})"
+
+
+def receiver_stage_text(timing: str) -> str:
+    """The stage of a receiver in words; `timing`: ``exact`` or ``stale``."""
+    return f"balise receiver ({timing})"

@@ -6,6 +6,8 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fmus.text_table import text_table
+
 if TYPE_CHECKING:
     from cosim.baselines import Baseline, Regression
     from cosim.baselines.update import Update
@@ -19,14 +21,22 @@ def print_json(data: Any) -> None:
 
 
 def tell_comparison(found: Regression, verbose: bool) -> None:
-    """Print a comparison."""
+    """Print a comparison.
+
+    Args:
+        found: what the check found. verbose: all signals, not only those that differ.
+    """
     from cosim.comparison.text import comparison_text  # noqa: PLC0415 - NumPy only for those who ran
 
     print(comparison_text(found, verbose=verbose))
 
 
 def tell_change(update: Update, path: Path, as_json: bool) -> None:
-    """Print what was written."""
+    """Print what was written.
+
+    Args:
+        update: what was changed. path: of the baseline. as_json: print JSON.
+    """
     from cosim.baselines.call import Call  # noqa: PLC0415 - NumPy only for those who ran
 
     worst = Call.worst(update.before) if update.before is not None else []
@@ -53,9 +63,9 @@ def tell_header(baseline: Baseline) -> None:
         for name, value in entry.parameters.items():
             print(f"    {name} = {value}")
     print("  made with: " + (", ".join(f"{name} {value}" for name, value in header.versions.items()) or "not known"))
-    width = max((len(info.name) for info in header.signals), default=0)
-    for info in header.signals:
-        print(f"  {info.name:<{width}}  {_allowed(baseline, info.name)} {info.unit:<6}  {info.description}".rstrip())
+    rows = [[info.name, _allowed(baseline, info.name), info.unit, info.description] for info in header.signals]
+    for line in text_table(rows, left=range(4)):
+        print(f"  {line}")
     for pattern in header.tolerances.ignore:
         print(f"  ignored: {pattern}")
     for note in baseline.notes:
@@ -66,4 +76,4 @@ def _allowed(baseline: Baseline, name: str) -> str:
     from cosim.baselines.draft import value_range  # noqa: PLC0415 - NumPy only for those who look
 
     allowed = baseline.tolerances.for_signal(name).value_for(value_range(baseline.result.table[name]))
-    return f"+- {allowed:<9.3g}"
+    return f"+- {allowed:.3g}"

@@ -7,14 +7,20 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from cosim.scenario import Scenario, shipped_scenarios
-from cosim.ssp.names import is_package
+from cosim.scenario.includes import shipped_scenarios
+from cosim.scenario.package_names import is_package
+from cosim.simulation.scenario import Scenario
+from fmus.text_table import text_table
 
 KINDS = ("scenarios", "models", "observers", "all")
 
 
 def register(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Args:
+        commands: subparsers of the program.
+    """
     parser = commands.add_parser(
         "list", help="list what ships", description="Scenarios, plants and observers with their sources."
     )
@@ -24,7 +30,11 @@ def register(commands: Any) -> None:
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Print the lists."""
+    """Print the lists.
+
+    Args:
+        options: of the command line.
+    """
     if is_package(options.what):
         return _execute_package(options)
     data = {kind: entries for kind, entries in catalogue().items() if options.what in (kind, "all")}
@@ -33,14 +43,15 @@ def execute(options: argparse.Namespace) -> int:
         return 0
     for kind, entries in data.items():
         print(f"{kind}:")
-        width = max(map(len, entries), default=0)
         for room, names in _rooms(kind, entries).items():
             if room:
                 print(f"\n  # {room}")
+            rows = []
             for name in names:
-                print(f"  {name:<{width}}  {entries[name]['description']}")
-                for line in _details(kind, name, entries[name]):
-                    print(f"  {'':<{width}}  {line}")
+                entry = entries[name]
+                rows += [[name, entry["description"]], *(["", line] for line in _details(kind, name, entry))]
+            for line in text_table(rows, left=(0, 1)):
+                print(f"  {line}")
         print()
     return 0
 
@@ -49,9 +60,9 @@ def _rooms(kind: str, entries: Mapping[str, Any]) -> dict[str, list[str]]:
     """Names by the room they live in; scenarios live in none."""
     if kind == "scenarios":
         return {"": list(entries)}
-    from fmus.recipes import RECIPES, by_room  # noqa: PLC0415 - CasADi is loaded only by those who list
+    from fmus.recipes import by_room  # noqa: PLC0415 - CasADi is loaded only by those who list
 
-    return by_room({name: RECIPES[name] for name in entries})
+    return by_room(entries)
 
 
 def _details(kind: str, name: str, entry: Mapping[str, Any]) -> list[str]:
@@ -88,10 +99,9 @@ def _execute_package(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps({"variants": variants}, indent=2))
         return 0
-    width = max(map(len, variants))
     print("variants:")
-    for name, title in variants.items():
-        print(f"  {name:<{width}}  {title}")
+    for line in text_table(list(variants.items()), left=(0, 1)):
+        print(f"  {line}")
     return 0
 
 

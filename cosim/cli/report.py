@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from cosim.errors import ComparisonError, nearest
 
 if TYPE_CHECKING:
-    from cosim.report.spec import ReportSpec
+    from cosim.evaluation.spec import ReportSpec
     from cosim.results.result import Result
 
 OVERLAY = "overlay.html"
@@ -21,7 +21,11 @@ DONE = 0
 
 
 def register(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Args:
+        commands: subparsers of the program.
+    """
     description = (
         "Make the report of a results folder again, or lay several results over each other on one page: the first is "
         "what the "
@@ -53,8 +57,12 @@ def register(commands: Any) -> None:
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Read, draw and write; nothing in the results is changed."""
-    from cosim.report.stored_spec import is_guessed, spec_of  # noqa: PLC0415 - NumPy is loaded only by those who ask
+    """Read, draw and write; nothing in the results is changed.
+
+    Args:
+        options: of the command line.
+    """
+    from cosim.evaluation.stored_spec import is_guessed, spec_of  # noqa: PLC0415 - NumPy is loaded only by those who ask
     from cosim.results.load import load_result  # noqa: PLC0415
 
     paths = [Path(text) for text in options.results]

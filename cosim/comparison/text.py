@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from math import isnan
 
 from cosim.comparison.verdict import Comparison, Finding, SignalComparison
+from fmus.text_table import text_table
 
 HEAD = ("signal", "unit", "max error", "at [s]", "allowed", "shift [s]", "outside", "verdict")
 SPAN = ("starts_early", "starts_late", "ends_early", "ends_late", "gap")
@@ -80,16 +81,7 @@ def _headline(comparison: Comparison) -> str:
 
 
 def _table(signals: Sequence[SignalComparison]) -> list[str]:
-    rows = [HEAD, *(_row(signal) for signal in signals)]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = []
-    for row in rows:
-        cells = [
-            cell.ljust(w) if k in (0, 1, 7) else cell.rjust(w)
-            for k, (cell, w) in enumerate(zip(row, widths, strict=True))
-        ]
-        lines.append("  ".join(cells).rstrip())
-    return [lines[0], "-" * max(map(len, lines)), *lines[1:]]
+    return text_table([HEAD, *(_row(signal) for signal in signals)], left=(0, 1, 7), heading=True)
 
 
 def _row(signal: SignalComparison) -> tuple[str, ...]:

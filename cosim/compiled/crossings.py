@@ -18,8 +18,8 @@ from cosim.balises.service import BaliseService
 from cosim.compiled.journal import Call
 from cosim.compiled.notifying import Telling
 from cosim.compiled.program import CPassed, Program
-from cosim.components.component import NEVER
 from cosim.coupling.plan import Plan
+from fmus.fmi.standard import NEVER
 
 AT_MOST = 256
 """Crossings in one stretch."""

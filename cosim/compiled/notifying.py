@@ -17,9 +17,10 @@ from cosim.balises.delivery import OUTCOMES, Delivery, Receiver, snapped
 from cosim.balises.telegram import PAYLOAD
 from cosim.compiled.program import Program
 from cosim.compiled.recorded_returns import Answer
-from cosim.components.component import NEVER, Component
+from cosim.components.component import Component
 from cosim.results.result import BaliseRecord
 from fmu_observer.event_protocol import OUTCOME_VARIABLES
+from fmus.fmi.standard import NEVER
 
 FUNCTIONS = ("fmi3EnterEventMode", "fmi3SetClock", "fmi3SetFloat64", "fmi3UpdateDiscreteStates", "fmi3EnterStepMode")
 FIELDS = ("position", "location_accuracy", "odometer_reading", "delivered_at", "stamp")  # in the order of `stepper.h`
@@ -52,7 +53,7 @@ class Telling:
     Args:
         receiver: see `can_be_told`. place: of its component in the plan. program: the plan in C. library: the stepper.
         answering: context in which slaves give answers and nothing calls the stepper. idle: whether it may be called
-        now.
+            now.
     """
 
     def __init__(
@@ -91,7 +92,7 @@ class Telling:
         for i, name in enumerate(self._counts):
             self.telegram.count_ranks[i] = OUTCOMES.index(name) if name in OUTCOMES else -1
         self._times = (ctypes.c_double * 3)()
-        self._call, self._slowly = library.stepper_tell, receiver.step
+        self._call, self._slowly = library.stepper_tell, receiver.step_in_python
         self._arguments = program.address, place, ctypes.addressof(self.telegram), ctypes.addressof(self._times)
 
     def step(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:

@@ -16,12 +16,13 @@ import numpy as np
 from cosim.compiled.journal import Call, CJournal, Journal
 from cosim.compiled.recorded_returns import Answer
 from cosim.components.component import Component
-from cosim.components.elements import Element
-from cosim.coupling.plan import Plan, PlannedComponent
+from cosim.coupling.plan import Plan
+from cosim.coupling.planned import PlannedComponent
 from cosim.errors import CosimError
 from cosim.master.axis import TimeAxis
 from cosim.process.last_call import LAST_CALL
-from fmus.ports import c_type, getter_type, size
+from fmus.fmi.elements import Element
+from fmus.fmi.types import c_type, getter_type, size
 
 KINDS = (
     "Float64",

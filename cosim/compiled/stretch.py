@@ -9,9 +9,8 @@ meets: then the Python stepper finishes the step from where it stands.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from functools import partial
 from time import perf_counter
 from typing import Any
@@ -22,13 +21,17 @@ from cosim.compiled.library import load_stepper
 from cosim.compiled.notifying import Telling, can_be_told
 from cosim.compiled.program import NotCompilable, Program, Stop
 from cosim.compiled.recorded_returns import Answer, answered
-from cosim.components.component import NEVER, TIME_TOLERANCE, Component
-from cosim.coupling.plan import Mover, Plan, PlannedComponent
+from cosim.components.component import Component
+from cosim.coupling.chain import COMPILED_STAGE_TEXT, Mover, Position, Stage
+from cosim.coupling.plan import Plan
+from cosim.coupling.planned import PlannedComponent
 from cosim.master.axis import TimeAxis
 from cosim.master.control.control import StepControl
 from cosim.master.control.fixed import FixedStep
+from cosim.master.stepper import Stretch
 from cosim.master.system import NO_ROWS, Row, System
 from cosim.results.recorder import Recorder
+from fmus.fmi.standard import NEVER, TIME_TOLERANCE
 from fmus.toolchain.compile import CompilationError, CompilerMissing
 
 LONGEST = 4096
@@ -46,24 +49,6 @@ WITHIN = frozenset({Stop.REFUSED, Stop.WRITE, Stop.STEP, Stop.READ, Stop.CROSSED
 
 STEPPED = frozenset({Stop.STEP, Stop.READ, Stop.CROSSED})
 """That one has been called to do the step."""
-
-Finish = Callable[[], Sequence[Row]]
-
-
-@dataclass(frozen=True)
-class Stretch:
-    """What a stretch did.
-
-    Args:
-        done: steps done and recorded.
-        finish: does what is left of the next step, or all of it, in Python and returns its event rows; None where the
-            next step may be the stepper's again.
-        suspect: a value of the last row is not finite.
-    """
-
-    done: int
-    finish: Finish | None = None
-    suspect: bool = False
 
 
 class CompiledStepper:
@@ -191,7 +176,7 @@ class CompiledStepper:
 
     def _quicken(self, place: int, step: PlannedComponent) -> None:
         """In the steps that are Python's a component still moves by one call into the stepper."""
-        component, advance, drive = step.component, step.advance, step.drive
+        component = step.component
         call, address = self._library.stepper_move, self._program.address
 
         def move(slowly: Mover, t: float, until: float, reads: bool) -> None:
@@ -208,13 +193,12 @@ class CompiledStepper:
             else:
                 self._answered_move(slowly, t, until)
 
-        def quick_drive(t: float, until: float) -> None:
-            move(drive, t, until, reads=True)
+        def quickly(reads: bool, slowly: Mover) -> Mover:
+            return lambda t, until: move(slowly, t, until, reads)
 
-        if step.move == drive:
-            step.move = quick_drive
-        step.drive = quick_drive  # type: ignore[method-assign]
-        step.advance = lambda t, until: move(advance, t, until, reads=False)  # type: ignore[method-assign]
+        step.add_stage(
+            Stage(Position.COMPILED, COMPILED_STAGE_TEXT, drive=partial(quickly, True), advance=partial(quickly, False))
+        )
 
     def _watch_balises(self) -> Crossings | None:
         """The stepper knows of the balises; receivers that allow it are stepped through a telegram by one call into
@@ -231,7 +215,7 @@ class CompiledStepper:
             if can_be_told(receiver, place, self._program):
                 idle = lambda: not self._answering  # noqa: E731 - one word of state
                 tellings[place] = Telling(receiver, place, self._program, self._library, self._answered, idle)
-                receiver.step = tellings[place].step  # type: ignore[method-assign]
+                receiver.compiled = tellings[place].step
         return Crossings(self._program, self.plan, service, tellings)
 
     def _answered_move(self, move: Mover, t: float, until: float) -> None:
@@ -301,9 +285,9 @@ def _check(control: StepControl, system: System) -> None:
     if system.events is not None:
         raise NotCompilable("events of components are passed on to others")
     for step in system.plan.steps:
-        if _owner(step.inputs.send) is not None:
+        if step.inputs.gated:
             raise NotCompilable(f"inputs of {step.component.name} are sent by something in Python")
-        if _owner(step.move) not in (step, system.balises):
+        if any(stage.position not in (Position.BALISES, Position.COMPILED) for stage in step.stages):
             raise NotCompilable(f"{step.component.name} is moved by something in Python")
         if step.inputs.non_numeric is not None:
             raise NotCompilable(
@@ -317,8 +301,3 @@ def _check(control: StepControl, system: System) -> None:
             raise NotCompilable(f"inputs of {step.component.name} follow lines between communication points")
         if step.substeps != 1:
             raise NotCompilable(f"{step.component.name} takes {step.substeps} steps for one")
-
-
-def _owner(move: Any) -> Any:
-    """Whose method it is, bound or as a part."""
-    return getattr(move.func if isinstance(move, partial) else move, "__self__", None)

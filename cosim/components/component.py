@@ -17,12 +17,10 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription
 
-from cosim.components.capabilities import tool_warning
 from cosim.components.derivatives import directional_derivative, make_derivative_writer
 from cosim.components.described import Described, EventPort
 from cosim.components.start_values import StartValue, refusal, typed_value, typed_values
 from cosim.components.surroundings import Surroundings
-from cosim.components.values import element_reader, element_writer, exact_reader, exact_writer, write_start
 from cosim.diagnostics.call_statistics import CallStatistics, count_methods, new_call_statistics
 from cosim.diagnostics.log_choice import LogSwitch, log_switch, switch_log
 from cosim.diagnostics.messages import LogChoice, MessageLog
@@ -30,16 +28,14 @@ from cosim.diagnostics.native_log import forget
 from cosim.errors import CouplingError, RunError
 from cosim.process.last_call import LAST_CALL, READ, STEP, WRITE
 from fmu_observer.event_protocol import OUTCOME_VARIABLES
-from fmus.exact_ports import Values
+from fmus.fmi.capabilities import tool_warning
+from fmus.fmi.exact_ports import Values
+from fmus.fmi.standard import FATAL, NEVER
+from fmus.fmi.values import element_reader, element_writer, exact_reader, exact_writer, write_start
 
-TIME_TOLERANCE = 1e-9
-"""Communication times closer than this are the same [s]; a billionth of a second is above rounding at 1e5 s."""
-
-NEVER = math.inf
 NOT_PREPARED: Callable[[], None] | None = None
 Step = Callable[[float, float], Any]
 Refused = Callable[[FMICallException, float, float], None]
-FATAL = 4  # FMI status: the slave must not be called again
 WITHOUT_STATES = "without it: algorithm gauss-seidel or jacobi, control fixed, no balise method rollback"
 NAMES_SHOWN = 6
 
@@ -247,7 +243,7 @@ class Component(Described):
             event: one of `events`.
             t: current time of the component [s].
             stamp: when the event happened [s]: at or before `t`, or within the coming step where the component takes
-            stamps.
+                stamps.
             payload: fields by name; fields the component does not declare are dropped.
 
         Where `event_needs_step` says so, only the last event told before a step happens, and it happens in that step.

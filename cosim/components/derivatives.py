@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cosim.components.elements import Layout, described, layout
-from cosim.components.values import signs
 from cosim.errors import CouplingError
-from fmus.ports import FLOATING_TYPES, is_native
+from fmus.fmi.elements import Layout, described, layout
+from fmus.fmi.ports import is_native
+from fmus.fmi.types import FLOATING_TYPES
+from fmus.fmi.values import signs
 
 if TYPE_CHECKING:
     from cosim.components.component import Component

@@ -8,20 +8,14 @@ from dataclasses import dataclass
 
 from fmpy.model_description import ModelDescription, ModelVariable
 
-from cosim.components.capabilities import read_capabilities
-from cosim.components.elements import Element, Variables, described, elements_of
-from cosim.components.units import Units
 from cosim.errors import CouplingError, nearest
-from fmus.check.description import declared_tolerance
+from fmus.fmi.capabilities import read_capabilities
+from fmus.fmi.description import declared_tolerance
+from fmus.fmi.elements import Element, Variables, described, elements_of
+from fmus.fmi.standard import OWN_TOOL
+from fmus.fmi.types import NUMERIC_TYPES
+from fmus.fmi.units import Units
 from plant_models.hybrid.units import Unit, UnitError
-
-NUMERIC_TYPES = frozenset(
-    {"Real", "Integer", "Boolean", "Enumeration", "Float64", "Float32"}
-    | {f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)}
-)
-"""Types whose values a table of numbers can hold. Integers beyond 2**53 are rounded in it; see `exact_reader`."""
-
-OWN_TOOL = "fmu-observer"
 
 
 @dataclass(frozen=True)

@@ -18,13 +18,13 @@ from fmpy.model_description import ModelDescription
 from cosim.components.component import Component
 from cosim.components.described import EventPort
 from cosim.components.start_values import typed_value
-from cosim.components.values import negative
 from cosim.diagnostics.native_log import fmi1_callbacks
 from cosim.errors import CouplingError
-from fmus.exact_ports import Values
-from fmus.native_calls import prepared_call
+from fmus.fmi.exact_ports import Values
+from fmus.fmi.native_calls import prepared_call
+from fmus.fmi.standard import DISCARD, PENDING
+from fmus.fmi.values import negative
 
-DISCARD, PENDING = 2, 5
 TRUE = b"\x01"
 NOTHING = {"String": "", "Boolean": False}
 """What a variable without a declared start value is taken for; else 0."""

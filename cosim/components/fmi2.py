@@ -14,10 +14,11 @@ from fmpy.fmi2 import (
     fmi2Terminated,
 )
 
-from cosim.components.component import TIME_TOLERANCE, Component
+from cosim.components.component import Component
 from cosim.components.described import EventPort
 from cosim.diagnostics.native_log import fmi2_callbacks
-from fmus.native_calls import prepared_call
+from fmus.fmi.native_calls import prepared_call
+from fmus.fmi.standard import TIME_TOLERANCE
 
 
 class FMI2Component(Component):

@@ -10,22 +10,19 @@ from typing import Any
 
 from fmpy.model_description import ModelDescription, ModelVariable
 
-from cosim.components.clocks import ClockSchedule
-from cosim.components.component import NEVER, TIME_TOLERANCE, Component
+from cosim.components.component import Component
 from cosim.components.described import EventPort
-from cosim.components.intermediate import IntermediateUpdate
-from cosim.components.interruption import EventMet
-from cosim.components.quick_calls import quicken
 from cosim.components.start_values import StartValue
 from cosim.components.structure import STRUCTURAL, resize, structural_value
 from cosim.errors import RunError
 from cosim.process.last_call import STEP
-from fmus.exact_ports import make_exact_writer
-from fmus.native_calls import prepared_call
-
-DISCARD = 2  # FMI status
-MAX_EVENT_ITERATIONS = 100
-MAX_RETURNS_PER_STEP = 10_000
+from fmus.fmi.clocks import ClockSchedule
+from fmus.fmi.exact_ports import make_exact_writer
+from fmus.fmi.intermediate import IntermediateUpdate
+from fmus.fmi.interruption import EventMet
+from fmus.fmi.native_calls import prepared_call
+from fmus.fmi.quick_calls import quicken
+from fmus.fmi.standard import DISCARD, MAX_EVENT_ITERATIONS, MAX_RETURNS_PER_STEP, NEVER, TIME_TOLERANCE
 
 
 class FMI3Component(Component):

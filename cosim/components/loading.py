@@ -15,7 +15,6 @@ from fmpy.model_description import ModelDescription
 
 from cosim.components.component import Component
 from cosim.components.fmi1 import FMI1Component
-from cosim.components.fmi1_library import FMU1SlaveRepaired
 from cosim.components.fmi2 import FMI2Component
 from cosim.components.fmi3 import FMI3Component
 from cosim.components.shared_libraries import refuse_foreign_libraries
@@ -24,9 +23,11 @@ from cosim.errors import FmuLoadError
 from cosim.process.last_call import LAST_CALL
 from cosim.process.sentinel import guard_exit
 from fmu_observer.block import make_block
-from fmus.check.archive import MAX_UNPACKED_BYTES, Archive, NotAnFmuError, open_archive
-from fmus.check.description import negated_aliases
-from fmus.check.library import CO_SIMULATION
+from fmus.fmi.archive import MAX_UNPACKED_BYTES, Archive, NotAnFmuError, open_archive
+from fmus.fmi.binaries import platform_folder
+from fmus.fmi.description import negated_aliases
+from fmus.fmi.fmi1_library import FMU1SlaveRepaired
+from fmus.fmi.standard import CO_SIMULATION, fmi_version
 from plant_models.hybrid import HybridSystem
 
 VERSIONS = ("1.0", "2.0", "3.0")
@@ -76,8 +77,8 @@ def load_fmu(path: str | Path, name: str, tolerance: float | str | None = None) 
     finally:
         os.chdir(here)  # fmpy changes it while it loads, and leaves it so when it fails
         changed = before.put_back()
-    more = {"negated": negated_aliases(folder)} if _version(description) == 1 else {}
-    component: Component = COMPONENTS[_version(description)](
+    more = {"negated": negated_aliases(folder)} if fmi_version(description) == 1 else {}
+    component: Component = COMPONENTS[fmi_version(description)](
         name,
         slave,
         description,
@@ -120,8 +121,8 @@ def describe_fmu(path: str | Path, name: str) -> Component:
         FmuLoadError: as for `read_description`.
     """
     description = read_description(path, name)
-    more = {"negated": negated_aliases(Path(path))} if _version(description) == 1 else {}
-    component: Component = COMPONENTS[_version(description)](name, None, description, source=str(path), **more)
+    more = {"negated": negated_aliases(Path(path))} if fmi_version(description) == 1 else {}
+    component: Component = COMPONENTS[fmi_version(description)](name, None, description, source=str(path), **more)
     return component
 
 
@@ -133,22 +134,17 @@ def _open(path: Path, name: str) -> Archive:
 
 
 def load_block(system: HybridSystem, name: str, fmi_version: Literal[2, 3] = 3, **arguments: Any) -> Component:
-    """A Python block as a component; further arguments as for `fmu_observer.block.Face`."""
+    """A Python block as a component; further arguments as for `fmu_observer.block.FMIInterface`."""
     block = make_block(system, fmi_version, instance_name=name, **arguments)
     source = system.source or type(system).__qualname__
-    face = COMPONENTS[_version(block.model_description)]
+    face = COMPONENTS[fmi_version]
     component: Component = face(name, block, block.model_description, source=source, kind="block")
     return component
 
 
-def _version(description: ModelDescription) -> int:
-    return int(str(description.fmiVersion)[0])
-
-
 def _library(folder: Path, description: ModelDescription) -> Path:
-    place = fmpy.platform_tuple if _version(description) == 3 else fmpy.platform
     name = f"{description.coSimulation.modelIdentifier}{fmpy.sharedLibraryExtension}"
-    return folder / "binaries" / str(place) / name
+    return folder / "binaries" / platform_folder(description) / name
 
 
 def _slave(folder: Path, description: ModelDescription, name: str) -> Any:
@@ -158,4 +154,4 @@ def _slave(folder: Path, description: ModelDescription, name: str) -> Any:
         "unzipDirectory": str(folder),
         "instanceName": name,
     }
-    return SLAVES[_version(description)](**arguments)
+    return SLAVES[fmi_version(description)](**arguments)

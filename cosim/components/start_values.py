@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from fmpy.model_description import ModelVariable
 
-from cosim.components.elements import described
 from cosim.errors import nearest
-from fmus.ports import CTYPES, FLOATING_TYPES, size
+from fmus.fmi.elements import described
+from fmus.fmi.types import CTYPES, FLOATING_TYPES, size
 
 StartValue = float | int | bool | str | bytes | Sequence[Any]
 

@@ -9,7 +9,7 @@ from fmpy.model_description import ModelDescription, ModelVariable
 
 from cosim.components.start_values import refusal, typed_value
 from cosim.errors import CouplingError
-from fmus.check.sense import shape_fault
+from fmus.fmi.sense import shape_fault
 
 STRUCTURAL = "structuralParameter"
 

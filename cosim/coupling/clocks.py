@@ -9,9 +9,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from cosim.components.component import Component
-from cosim.components.elements import described
 from cosim.coupling.connection import Link, split_name
 from cosim.errors import CouplingError
+from fmus.fmi.elements import described
 
 CLOCK, TRIGGERED = "Clock", "triggered"
 

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from fmpy.model_description import ModelVariable
 
 from cosim.components.component import Component
-from cosim.components.described import NUMERIC_TYPES
-from cosim.components.elements import Element, described, elements_of
 from cosim.coupling.transformation import Transformation
 from cosim.errors import CouplingError, nearest
-from fmus.ports import FLOATING_TYPES, getter_type
+from fmus.fmi.elements import Element, described, elements_of
+from fmus.fmi.types import FLOATING_TYPES, NUMERIC_TYPES, getter_type
 from plant_models.hybrid.units import UnitError, conversion
 
 Link = tuple[str, str] | tuple[str, str, Transformation]
@@ -38,9 +37,9 @@ class Connection:
 
     Args:
         source: (component, output). target: (component, input). factor, offset: unit conversion and linear
-        transformation.
+            transformation.
         table: (source, target) values of a discrete signal, where it is mapped; a value without an entry passes
-        unchanged.
+            unchanged.
         exact: whether the value travels as it is instead of as a double.
         source_array, target_array: the array that the source or target is an element of, or an empty name.
     """

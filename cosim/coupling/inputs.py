@@ -30,7 +30,7 @@ class Inputs:
         buffer: what `send` writes, shape (m,).
         send: writes `buffer` to the component.
         tables: for an input whose values are mapped, its place -> {source: target}; a value without an entry passes
-        unchanged.
+            unchanged.
         non_numeric: inputs that are no numbers, or integers beyond doubles, gathered and sent with the others; or None.
 
     `gather` takes what holds for a step: of held signals the value at its start. `gather_now` takes what the sources
@@ -55,6 +55,7 @@ class Inputs:
         self.tables = dict(tables or {})
         self.places, self._signals, self._count = sources.copy(), tuple(signals), len(values) // 2
         self._values, self.non_numeric = values, non_numeric
+        self.gated = False
         self.gather, self.gather_now = self._gathering(self.places), self._gathering(sources)
         if non_numeric is not None:
             self.gather, self.send = _both(self.gather, non_numeric.gather), _both(self.send, non_numeric.send)
@@ -71,6 +72,14 @@ class Inputs:
     def held(self) -> np.ndarray:
         """Mask of the inputs whose signal is held over a step, shape (m,)."""
         return np.asarray(self.places >= self._count)
+
+    def gate(self, send: Callable[[], None]) -> None:
+        """From now on a gate sends, and decides which inputs.
+
+        Args:
+            send: writes what the gate lets pass of `buffer`.
+        """
+        self.gated, self.send = True, send
 
     def hold(self, signals: Set[Signal]) -> None:
         """These signals are held over a step."""

@@ -7,49 +7,22 @@ from the two by index. The stepper executes the plan; nothing is looked up in a 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
 
 from cosim.components.component import Component
-from cosim.components.described import NUMERIC_TYPES
 from cosim.coupling.clocks import ClockConnection
 from cosim.coupling.connection import Connection, local_sources
-from cosim.coupling.inputs import Inputs, connected_inputs
+from cosim.coupling.inputs import connected_inputs
 from cosim.coupling.instants import Signal
 from cosim.coupling.non_numeric import non_numeric_cells, non_numeric_inputs, with_non_numeric
+from cosim.coupling.planned import InputInterpolator, PlannedComponent
 from cosim.errors import CouplingError, nearest
 from cosim.results.result import SignalInfo
-
-Mover = Callable[[float, float], None]
-
-
-class InputInterpolator(Protocol):
-    """Lets inputs follow a line during a step (`cosim.master.interpolation`)."""
-
-    @property
-    def name(self) -> str:
-        """How the component is told."""
-
-    def begin(self) -> None:
-        """A step begins: what is held over it was true where its source stands now."""
-
-    def prepare(self, until: float, *, ends_known: bool | np.ndarray = False) -> None:
-        """Gather the inputs for a step to `until` [s]."""
-
-    def send(self, t: float, until: float) -> None:
-        """Tell of the line for a step from `t` to `until` [s]."""
-
-    def forget(self, jumped: np.ndarray) -> None:
-        """Values of the plan that jumped, as a mask of shape (n,): no line of an input leads over it."""
-
-    def save(self) -> Any:
-        """What a step changes."""
-
-    def restore(self, state: Any) -> None:
-        """Return to what was saved."""
+from fmus.fmi.types import NUMERIC_TYPES
 
 
 class Service(Protocol):
@@ -63,86 +36,6 @@ class Service(Protocol):
 
 
 FLOATING_TYPES = frozenset({"Real", "Float64", "Float32"})
-
-
-@dataclass
-class PlannedComponent:
-    """One component in the plan.
-
-    Args:
-        component: what is stepped.
-        outputs: slice of `values` with its outputs, a view of shape (q,).
-        read: reads the outputs into `values`.
-        inputs: its connected inputs.
-        columns: where the view lies in `values`.
-        continuous: mask of the outputs that may be interpolated between communication points, shape (q,).
-        move: how it gets from one time to another [s] once its inputs are gathered; `drive`, unless a service takes it
-            over (the watched plant is stepped by its localiser, a receiver through the telegrams that reach it).
-        interpolator: tells the component of lines that its inputs follow; None where they are held.
-        substeps: number of steps that the component takes for one of the master's.
-    """
-
-    component: Component
-    outputs: np.ndarray
-    read: Callable[[], None]
-    inputs: Inputs
-    columns: slice
-    continuous: np.ndarray
-    move: Mover = field(init=False)
-    interpolator: InputInterpolator | None = field(default=None, init=False)
-    substeps: int = field(default=1, init=False)
-
-    def __post_init__(self) -> None:
-        self.move = self.drive
-
-    def prepare(self, t: float, until: float, *, ends_known: bool | np.ndarray = False) -> None:
-        """Gather the inputs for a step from `t` to `until` [s].
-
-        Args:
-            ends_known: `values` are those of `until`, wherever the components stand (a step that is iterated); for all
-                inputs or for each, shape (m,).
-        """
-        if self.interpolator is None:
-            self.inputs.gather()
-        else:
-            self.interpolator.prepare(until, ends_known=ends_known)
-
-    def send(self, t: float, until: float) -> None:
-        """Send the prepared inputs for a step from `t` to `until` [s]."""
-        if self.interpolator is None:
-            self.inputs.send()
-        else:
-            self.interpolator.send(t, until)
-
-    def advance(self, t: float, until: float) -> None:
-        """Advance with the prepared inputs, in so many steps as the component wants; times in [s]."""
-        if self.substeps == 1:
-            self.send(t, until)
-            self.component.advance(t, until)
-            return
-        begin = t
-        for i in range(1, self.substeps + 1):
-            end = until if i == self.substeps else t + (until - t) * i / self.substeps
-            self.send(begin, end)
-            self.component.advance(begin, end)
-            if self.component.terminated:
-                return
-            begin = end
-
-    def drive(self, t: float, until: float) -> None:
-        """Send the prepared inputs, advance, read outputs; times in [s]."""
-        self.advance(t, until)
-        self.read()
-
-    def write(self) -> None:
-        """Send what the sources of the connected inputs say now."""
-        self.inputs.gather_now()
-        self.inputs.send()
-
-    def step(self, t: float, until: float) -> None:
-        """Prepare the inputs and move from `t` to `until` [s]."""
-        self.prepare(t, until)
-        self.move(t, until)
 
 
 @dataclass

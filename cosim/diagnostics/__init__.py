@@ -1,1 +1,1 @@
-"""Diagnostics: the structure of a run as text and picture, what the FMUs log, what each component is called for."""
+"""Diagnostics: messages of the FMUs, the call log, what each component is called for. Knows no component."""

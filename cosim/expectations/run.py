@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cosim.evaluation.spec import ReportSpec
 from cosim.expectations.judged import given
 from cosim.expectations.window import Window, window_of
-from cosim.report.spec import ReportSpec
 from cosim.results.result import Result
 
 

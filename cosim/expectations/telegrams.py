@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from cosim.evaluation.event_counts import USED
 from cosim.expectations.judged import Judged
 from cosim.expectations.run import Run, span
 from cosim.expectations.window import Window
-from cosim.report.event_counts import USED
 from cosim.results.result import BaliseRecord
 
 if TYPE_CHECKING:

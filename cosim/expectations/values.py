@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cosim.evaluation.metrics import error_size, instants
 from cosim.expectations.judged import Judged, at, given, with_unit
 from cosim.expectations.run import NotRecordedError, Run, span
 from cosim.expectations.window import Window
-from cosim.report.metrics import error_size, instants
 
 if TYPE_CHECKING:
     from cosim.scenario.expectation_tables import DifferenceExpectation, ErrorExpectation, SignalExpectation

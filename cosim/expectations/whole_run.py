@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from cosim.evaluation.facts import list_entry, mapping_entry, number_entry
 from cosim.expectations.judged import Judged
 from cosim.expectations.run import NotRecordedError, Run
-from cosim.report.facts import list_entry, mapping_entry, number_entry
 
 if TYPE_CHECKING:
     from cosim.scenario.expectation_tables import CertificateExpectation, WarningsExpectation

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cosim.evaluation.metrics import FEWEST_INSTANTS
 from cosim.expectations.judged import given
-from cosim.report.metrics import FEWEST_INSTANTS
 from cosim.results.result import Result
 
 ROUNDING = 1e-9  # relative; times closer than this are the same

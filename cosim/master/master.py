@@ -13,8 +13,6 @@ from time import perf_counter
 import numpy as np
 
 from cosim.balises.service import BaliseService
-from cosim.compiled.choice import Choice, Wanted, choose_stepper
-from cosim.components.component import TIME_TOLERANCE
 from cosim.coupling.plan import Plan
 from cosim.errors import RunError
 from cosim.master.algorithms.algorithm import Algorithm
@@ -25,10 +23,12 @@ from cosim.master.control.fixed import FixedStep
 from cosim.master.events.choose import Events
 from cosim.master.finite import make_finite_check
 from cosim.master.initialisation import initialise
+from cosim.master.stepper import ChooseStepper, StepperChoice, python_stepper
 from cosim.master.system import Row, System
 from cosim.process.last_call import LAST_CALL
 from cosim.results.recorder import Recorder
 from cosim.results.result import SignalInfo
+from fmus.fmi.standard import TIME_TOLERANCE
 
 PROGRESS_INTERVAL = 64
 
@@ -53,7 +53,7 @@ class Master:
         algorithm: makes the algorithm for the plan; Gauss-Seidel by default.
         control: makes the step control for the system; fixed steps by default.
         recorder: makes the recorder for signals and an expected number of rows.
-        stepper: who executes the plan: ``python``, ``compiled``, or ``auto`` for the compiled one wherever it can.
+        stepper: chooses who executes the plan, Python by default; `cosim.compiled.choice` knows the other one.
         events: of the components: ``propagate`` them to others at the same instant, or leave them ``local``.
 
     `between_steps` is called between two steps, or stretches of the compiled stepper; it may raise KeyboardInterrupt.
@@ -73,7 +73,7 @@ class Master:
         progress: Callable[[float], None] | None = None,
         algorithm: Callable[[Plan], Algorithm] = GaussSeidel,
         control: Callable[[System], StepControl] = FixedStep,
-        stepper: Wanted = "python",
+        stepper: ChooseStepper = python_stepper,
         recorder: Callable[[Sequence[SignalInfo], int], Recorder] = Recorder,
         events: Events = "propagate",
     ) -> None:
@@ -87,18 +87,29 @@ class Master:
         self.ended_early: str | None = None
         self._progress = progress
         self._all_finite = make_finite_check(plan.values)
-        self.stepper = Choice(stepper)
+        self._stepper: StepperChoice | None = None
+        self._choose_stepper = stepper
         self.between_steps: Callable[[], None] | None = None
 
-    def choose_stepper(self) -> None:
-        """Choose who executes the plan; `run` does so where nobody did before. After it no component may be
-        instantiated anew.
+    def choose_stepper(self) -> StepperChoice:
+        """Choose who executes the plan, where nobody did before; `run` does so too.
+
+        After it no component may be instantiated anew.
+
+        Returns:
+            The choice.
 
         Raises:
             CouplingError: the compiled stepper is demanded and cannot be had; why.
         """
-        if not self.stepper.is_made:
-            self.stepper = choose_stepper(self.stepper.wanted, self.control, self.axis)
+        if self._stepper is None:
+            self._stepper = self._choose_stepper(self.control, self.axis)
+        return self._stepper
+
+    @property
+    def stepper(self) -> StepperChoice:
+        """Who executes the plan; see `choose_stepper`."""
+        return self.choose_stepper()
 
     def run(self) -> None:
         """Initialise and step to the end.
@@ -107,7 +118,7 @@ class Master:
             CouplingError: as for `choose_stepper`.
             RunError: a component failed; what was recorded so far is kept.
         """
-        self.choose_stepper()
+        compiled = self.stepper.compiled
         begin = perf_counter()
         try:
             self.exchange_rounds = initialise(self.plan, self.axis.start, self.axis.stop)
@@ -123,8 +134,8 @@ class Master:
         finally:
             LAST_CALL.call[0] = 0
             self.timing.stepping = perf_counter() - begin - self.timing.recording
-            if self.stepper.compiled is not None:
-                self.stepper.compiled.close()
+            if compiled is not None:
+                compiled.close()
             self.system.algorithm.close()
 
     # -- stepping ---------------------------------------------------------------------------------------------------

@@ -1,1 +1,1 @@
-"""Reports of runs: metrics, tables, figures and a page. Imported one by one, since the figures load matplotlib."""
+"""Reports of runs: figures, tables and pages of what `cosim.evaluation` found. The figures load matplotlib."""

@@ -10,15 +10,15 @@ from typing import Literal
 
 import numpy as np
 
-from cosim.report.corrections import corrections
-from cosim.report.event_counts import accepted_stamps
-from cosim.report.facts import number_entry
+from cosim.evaluation.corrections import corrections
+from cosim.evaluation.event_counts import accepted_stamps
+from cosim.evaluation.facts import number_entry
+from cosim.evaluation.indicators import on_intervals
+from cosim.evaluation.metrics import FEWEST_INSTANTS, error_size, instants
+from cosim.evaluation.numbers import number
+from cosim.evaluation.roles import Quantity, estimate, estimation_error, label
+from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.scales import error_scale
-from cosim.report.indicators import on_intervals
-from cosim.report.metrics import FEWEST_INSTANTS, error_size, instants
-from cosim.report.numbers import number
-from cosim.report.roles import Quantity, estimate, estimation_error, label
-from cosim.report.spec import ReportSpec
 from cosim.results.result import BaliseRecord, Result
 
 FEWEST_ROWS = 3  # below these there is nothing to enlarge

@@ -61,7 +61,11 @@ class Realised:
 
 
 def intended(table: ComponentTable, system: HybridSystem) -> Backend:
-    """How a shipped model will run, as far as that is known before its FMU is built."""
+    """How a shipped model will run, as far as that is known before its FMU is built.
+
+    Args:
+        table: of the component. system: the system of the component.
+    """
     if table.backend is not None:
         return table.backend
     return NATIVE if system.traceable and _missing_compiler() is None else IN_PYTHON
@@ -90,7 +94,11 @@ def realise(requests: Mapping[str, Request], tell: Tell) -> Realised:
 
 
 def cannot_build(where: str, system: HybridSystem, fault: Exception) -> FmuLoadError:
-    """The error for an FMU that cannot be built; `where` is the place for the message."""
+    """The error for an FMU that cannot be built; `where` is the place for the message.
+
+    Args:
+        system: the system of the component. fault: why it was not built.
+    """
     return FmuLoadError(f"{where}: cannot build the FMU of {system.name}: {fault}")
 
 

@@ -61,6 +61,9 @@ class Choice:
 def find_receivers(table: BalisesTable, components: Mapping[str, Component], plant: str, where: str) -> list[str]:
     """Names of the components that are told of balises: those listed, or all but the plant that declare the event.
 
+    Args:
+        table: of the balises. where: name of the scenario, for messages.
+
     Raises:
         ScenarioError: one that is listed does not declare the event.
     """
@@ -79,6 +82,9 @@ def find_receivers(table: BalisesTable, components: Mapping[str, Component], pla
 def watched_plant(table: BalisesTable, components: Mapping[str, Component], where: str) -> str:
     """Name of the component whose position finds the balises; of recorded telegrams, for which none is needed, of a
     recording.
+
+    Args:
+        table: of the balises. components: by name. where: name of the scenario, for messages.
 
     Raises:
         ScenarioError: position and speed are not of one component, or are neither outputs nor locals.
@@ -199,7 +205,13 @@ def _why_unknown(method: Method, report: ProbeReport | None, position: str, tole
 def make_service(
     table: BalisesTable, layout: Layout, plan: Plan, plant: str, receivers: Sequence[str], choice: Choice
 ) -> BaliseService:
-    """Everything about balises for the master."""
+    """Everything about balises for the master.
+
+    Args:
+        table: of the scenario. layout: of the balises. plan: prepared, components instantiated.
+        plant: component whose position is watched. receivers: components that take telegrams.
+        choice: how crossings are found, and why.
+    """
     planned = plan.find(plant)
     first = planned.columns.start
     watch = PlantMonitor(planned, 0, 0)  # where telegrams are recorded nobody looks at them

@@ -51,6 +51,9 @@ def expected_gap(layout: Layout, table: BalisesTable, start: float) -> ExpectedG
     """The longest gap between the stamps of two balises, as far as layout and scenario tell before the run.
 
     A constant latency does not count: what arrives late is used at its stamp.
+
+    Args:
+        table: of the scenario. start: begin of the run [s].
     """
     if isinstance(layout, RecordedLayout):
         gaps = np.diff([start, *layout.instants[layout.instants > start]])
@@ -77,7 +80,8 @@ def check_certificates(
 
     Args:
         components: tables of the balise receivers by name. gap: what to expect. mode: ``warn``, ``require`` or
-        ``ignore``.
+            ``ignore``.
+        where: name of the scenario, for messages.
 
     Returns:
         Certificates by component as plain data, and warnings.

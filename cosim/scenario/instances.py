@@ -9,9 +9,9 @@ from pathlib import Path
 
 from fmpy.model_description import ModelDescription
 
-from cosim.components.capabilities import read_capabilities
 from cosim.components.loading import read_description
 from cosim.errors import CouplingError
+from fmus.fmi.capabilities import read_capabilities
 
 
 def check_instances(files: Mapping[str, Path], where: str) -> None:

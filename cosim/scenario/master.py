@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 
 from cosim.balises.service import BaliseService
+from cosim.compiled.choice import choose_stepper
 from cosim.components.component import Component
 from cosim.coupling.connection import Connection
 from cosim.coupling.graph import Group, execution_groups
@@ -54,7 +55,7 @@ def make_master(
         progress,
         algorithm=lambda plan: make_algorithm(table.master, plan, choice),
         control=_control(table.master),
-        stepper=table.master.stepper,
+        stepper=partial(choose_stepper, table.master.stepper),
         recorder=partial(Recorder, every=table.master.record_every, memory=1e6 * table.master.record_memory),
         events=table.master.events,
     )
@@ -111,7 +112,11 @@ def stepping_groups(
 
 
 def idle_settings(table: MasterTable) -> list[str]:
-    """What the user set that has no effect beside the other settings, in words."""
+    """What the user set that has no effect beside the other settings, in words.
+
+    Args:
+        table: of the scenario.
+    """
     needs = {
         "threads": ("algorithm", "jacobi", table.algorithm == "jacobi" or table.threads == 1),
         "tolerance": ("control", "doubling", table.control == "doubling"),

@@ -13,19 +13,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cosim.balises.service import BaliseService
-from cosim.components.capabilities import tool_warning
 from cosim.components.component import Component
 from cosim.components.fmi3 import FMI3Component
+from cosim.components.logged_slave import log_calls
 from cosim.components.start_values import StartValue
 from cosim.components.surroundings import SurroundingsOfSteps
 from cosim.coupling.clocks import connect_clocks
 from cosim.coupling.connection import Connection, connect
 from cosim.coupling.plan import Plan, make_plan
 from cosim.diagnostics.call_log import CallLog
-from cosim.diagnostics.divergence import explained_failure
-from cosim.diagnostics.logged_slave import log_calls
 from cosim.diagnostics.messages import in_order
 from cosim.errors import CosimError
+from cosim.evaluation.result_warnings import result_warnings
+from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.expectations.check import check_expectations
 from cosim.expectations.judge import judge
 from cosim.master.algorithms.choose import AlgorithmChoice, choose_algorithm
@@ -34,8 +34,6 @@ from cosim.master.interpolation.draw import draw_lines
 from cosim.master.master import Master, close
 from cosim.process.interruption import Interruption
 from cosim.process.sentinel import limited_calls
-from cosim.report.result_warnings import result_warnings
-from cosim.report.spec import Phase, ReportSpec
 from cosim.results.recorder import Recorder
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 from cosim.results.si import InFormerUnits, in_si
@@ -54,7 +52,9 @@ from cosim.scenario.roles import ROLES, check_roles, inferred_roles, signals_to_
 from cosim.scenario.schema import ScenarioTable, step_count
 from cosim.scenario.starts import start_values
 from cosim.scenario.summary import first_summary, run_summary
-from fmus.check.sense import doubled_names
+from cosim.structure.divergence import explained_failure
+from fmus.fmi.capabilities import tool_warning
+from fmus.fmi.sense import doubled_names
 from plant_models.hybrid.units import Unit
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def run_scenario(
         table: validated scenario. name: its name. folder: start of relative paths. where: place for messages.
         progress: called with the time reached and the end [s].
         warn: told of everything doubtful as soon as it is known, before the run where it can be; by default the log
-        ``cosim``.
+            ``cosim``.
         call_log: where calls are logged, where the scenario asks for that; by default `CALL_LOG` in the working folder.
         building: told of FMUs that are built before the run, as they are done; by default the log, as information.
         stream: the folder that rows are written to as they come; None to keep them in memory.

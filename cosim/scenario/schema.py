@@ -11,7 +11,6 @@ from typing import Any, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
-from cosim.components.component import TIME_TOLERANCE
 from cosim.errors import ScenarioError, nearest
 from cosim.scenario.expectation_tables import EXPECTATIONS, ExpectationItem
 from cosim.scenario.tables import (
@@ -28,6 +27,7 @@ from cosim.scenario.tables import (
     Table,
     Tolerance,
 )
+from fmus.fmi.standard import TIME_TOLERANCE
 
 
 class ScenarioTable(Table):
@@ -72,6 +72,9 @@ MAX_STEPS = 1e12
 
 def step_count(start: float, stop: float, step: float) -> int:
     """Number of communication steps.
+
+    Args:
+        start: begin of the run [s]. stop: end of the run [s].
 
     Raises:
         ValueError: the step is not positive, the horizon is empty, or the step does not divide it.

@@ -8,15 +8,19 @@ from typing import Any
 from fmpy.model_description import ModelVariable
 
 from cosim.components.component import Component
-from cosim.components.described import NUMERIC_TYPES
 from cosim.components.start_values import StartValue, refusal, typed_value, typed_values
 from cosim.components.structure import STRUCTURAL
 from cosim.errors import CouplingError
 from cosim.scenario.schema import ScenarioTable
+from fmus.fmi.types import NUMERIC_TYPES
 
 
 def given_values(table: ScenarioTable) -> dict[str, list[str]]:
-    """Names of the variables whose start values the scenario gives, by component."""
+    """Names of the variables whose start values the scenario gives, by component.
+
+    Args:
+        table: of the scenario.
+    """
     return {name: list(component.parameters) for name, component in table.components.items()}
 
 

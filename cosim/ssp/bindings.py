@@ -102,7 +102,7 @@ class _Applying:
         points = [p for p in _targets(self.nets.elements[path], path, name) if self.exists(p)]
         for point in points:
             arrived = given.arrives(self.unit(point))
-            if point.path in self.nets.faces:
+            if point.path in self.nets.interfaces:
                 self.set(given, arrived, point)
             else:
                 self.spread(given, arrived, point)
@@ -122,27 +122,29 @@ class _Applying:
     def set(self, given: Given, pipe: Pipe, point: Point) -> None:
         """Set one variable of one component."""
         parameter, node = given.parameter, given.node
-        face, name = self.nets.faces[point.path], self.variable(point)
-        kind, family = face.variables[name].type, FAMILIES[face.variables[name].type]
+        interface, name = self.nets.interfaces[point.path], self.variable(point)
+        kind, family = interface.variables[name].type, FAMILIES[interface.variables[name].type]
         if parameter.type.family not in ACCEPTED.get(family, set()):
             fail(node, f"parameter {parameter.name!r} is a {parameter.type.name}, {point} is a {kind}.")
         values = [_value(text, parameter, pipe, node) for text in parameter.values]
         if family == "Enumeration":
-            _check_items(values, face.items(name), point, node)
+            _check_items(values, interface.items(name), point, node)
         self.starts.setdefault(point.path, {})[point.name + point.suffix] = values if parameter.array else values[0]
 
     def exists(self, point: Point) -> bool:
         """Whether the component has this variable, or an array of this name as variables of their own."""
-        return point.path not in self.nets.faces or self.variable(point) in self.nets.faces[point.path].variables
+        return (
+            point.path not in self.nets.interfaces or self.variable(point) in self.nets.interfaces[point.path].variables
+        )
 
     def variable(self, point: Point) -> str:
         """Name of a variable that says what the point is."""
-        return point.name if point.name in self.nets.faces[point.path].variables else f"{point.name}[1]"
+        return point.name if point.name in self.nets.interfaces[point.path].variables else f"{point.name}[1]"
 
     def unit(self, point: Point) -> NamedUnit | None:
         """The unit in which a value is set: the FMU's own, whatever the connector shows."""
-        if point.path in self.nets.faces:
-            return self.nets.faces[point.path].unit(self.variable(point))
+        if point.path in self.nets.interfaces:
+            return self.nets.interfaces[point.path].unit(self.variable(point))
         return self.nets.unit(point)
 
     def nothing(self, name: str, path: Path) -> str:
@@ -152,7 +154,7 @@ class _Applying:
     def names(self, path: Path) -> list[str]:
         """Everything a parameter of this element can be called."""
         element = self.nets.elements[path]
-        names = list(self.nets.faces[path].variables if path in self.nets.faces else element.connectors)
+        names = list(self.nets.interfaces[path].variables if path in self.nets.interfaces else element.connectors)
         if isinstance(element, SystemElement):
             names += [f"{child}.{inner}" for child in element.elements for inner in self.names((*path, child))]
         return names

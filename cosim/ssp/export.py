@@ -26,7 +26,7 @@ from cosim.scenario.tables import ComponentTable
 from cosim.ssp.annotation import DIGEST, digest, write_extras
 from cosim.ssp.common import FAMILIES, INTEGER, REAL
 from cosim.ssp.document import VERSIONS, Node
-from cosim.ssp.faces import Face
+from cosim.ssp.interfaces import Interface
 from cosim.ssp.package import DEFAULT_VARIANT
 from cosim.ssp.reader import READS_BALISES, Reader, is_told_by_counts, make_reader
 from cosim.ssp.write import TOOL, Definitions, add_connector, add_parameter, child, root_of, text_of
@@ -45,13 +45,14 @@ class Part:
     """A component on its way into a package.
 
     Args:
-        table: of the scenario. fmu: its FMU. member: name of that in the package. face: what it says of its variables.
+        table: of the scenario. fmu: its FMU. member: name of that in the package. interface: what it says of its
+            variables.
     """
 
     table: ComponentTable
     fmu: Path
     member: str
-    face: Face
+    interface: Interface
 
 
 def export_package(table: ScenarioTable, name: str, folder: Path, where: str, path: Path, version: str) -> Path:
@@ -142,13 +143,17 @@ class _Exporter:
                 why,
             )
             return None
-        faces = {name: part.face for name, part in self.parts.items()}
+        interfaces = {name: part.interface for name, part in self.parts.items()}
         taken = {link[1] for link in parse_connections(self.table.connections, self.where)}
         newest = max(
-            (3 for face in faces.values() if is_told_by_counts(face) and face.description.fmiVersion[0] == "3"),
+            (
+                3
+                for interface in interfaces.values()
+                if is_told_by_counts(interface) and interface.description.fmiVersion[0] == "3"
+            ),
             default=2,
         )
-        return make_reader(balises, layout, faces, taken, newest)
+        return make_reader(balises, layout, interfaces, taken, newest)
 
     def part(self, name: str, component: ComponentTable) -> Part:
         """A component with its FMU, which is built where it is a model of this package."""
@@ -167,15 +172,15 @@ class _Exporter:
             # A master that knows no event mode can tell an FMU of events by counts only.
             counts = None if self.table.balises is None else EventProtocol("counts")
             fmu = native_fmu(system, version, component.preset, place, counts if system.triggered_events else None)
-        face = Face(self.checked(fmu, name, component), f"component {name!r}")
-        if self.version == "1.0" and face.description.fmiVersion.startswith("3"):
+        interface = Interface(self.checked(fmu, name, component), f"component {name!r}")
+        if self.version == "1.0" and interface.description.fmiVersion.startswith("3"):
             raise ScenarioError(
                 f"{place}: {fmu.name} is an FMU of FMI 3.0, which SSP 1.0 does not know; export with version 2.0."
             )
         content = fmu.read_bytes()
         member = next((m for m, known in self.files.items() if known == content), f"resources/{name}.fmu")
         self.files[member] = content
-        return Part(component, fmu, member, face)
+        return Part(component, fmu, member, interface)
 
     def checked(self, fmu: Path, name: str, table: ComponentTable) -> ModelDescription:
         """The description of an FMU, arrays as its structural parameters make them, once its parameters fit."""
@@ -190,11 +195,11 @@ class _Exporter:
     def add_component(self, parent: Node, name: str, part: Part, more: Mapping[str, Any]) -> None:
         """A component with its connectors, parameters and origin, and what else its annotation says."""
         node = child(parent, "ssd", "Component", name=name, type="application/x-fmu-sharedlibrary", source=part.member)
-        variables = [v for v in part.face.variables.values() if v.causality in ("input", "output")]
+        variables = [v for v in part.interface.variables.values() if v.causality in ("input", "output")]
         if variables:
             connectors = child(node, "ssd", "Connectors")
             for variable in variables:
-                unit, items = part.face.unit(variable.name), part.face.items(variable.name)
+                unit, items = part.interface.unit(variable.name), part.interface.items(variable.name)
                 add_connector(connectors, variable, self.definitions, unit, items)
         values = self.parameter_file(name, part)
         if values is not None:
@@ -206,53 +211,59 @@ class _Exporter:
     def parameter_file(self, name: str, part: Part) -> bytes | None:
         """The parameter set of a component, or None where it has none."""
         late = {k: getattr(part.table, k) for k in sorted(part.table.model_fields_set & LATE_PARAMETERS)}
-        given = {k: v for k, v in late.items() if k in part.face.variables} | part.table.parameters
+        given = {k: v for k, v in late.items() if k in part.interface.variables} | part.table.parameters
         if not given:
             return None
         root = root_of("ssv", "ParameterSet", self.version, name=name, generationTool=TOOL)
         parameters = child(root, "ssv", "Parameters")
         for key, value in given.items():
-            for variable, values, shape in self.assignments(name, part.face, key, value):
-                self.add_parameter(parameters, part.face, variable, values, shape)
+            for variable, values, shape in self.assignments(name, part.interface, key, value):
+                self.add_parameter(parameters, part.interface, variable, values, shape)
         return text_of(root)
 
-    def assignments(self, name: str, face: Face, key: str, value: Any) -> list[tuple[str, list[Any], list[int]]]:
+    def assignments(
+        self, name: str, interface: Interface, key: str, value: Any
+    ) -> list[tuple[str, list[Any], list[int]]]:
         """Variables with values and shape that one key of `parameters` stands for."""
         shape: list[int] = []
         values = [value]
         while values and isinstance(values[0], list):
             shape.append(len(values[0]))
             values = [v for row in values for v in row]
-        split = [v for v in face.variables if v.startswith(f"{key}[")]
-        if key in face.variables:
+        split = [v for v in interface.variables if v.startswith(f"{key}[")]
+        if key in interface.variables:
             return [(key, values, shape)]
-        if key.rpartition("[")[0] in face.variables:
+        if key.rpartition("[")[0] in interface.variables:
             what = "an element of an array; SSP sets whole arrays only, so give all values"
             raise ScenarioError(f"{self.where}: components.{name}.parameters: {key!r} is {what}.")
         if not split:
-            hint = nearest(key, face.variables)
+            hint = nearest(key, interface.variables)
             raise ScenarioError(f"{self.where}: components.{name}.parameters: {name} has no variable {key!r}; {hint}")
         if not shape:
             return [(v, values, []) for v in split]
         return [(f"{key}[{i}]", [v], []) for i, v in enumerate(values, start=1)]
 
-    def add_parameter(self, parent: Node, face: Face, name: str, values: list[Any], shape: Sequence[int]) -> None:
+    def add_parameter(
+        self, parent: Node, interface: Interface, name: str, values: list[Any], shape: Sequence[int]
+    ) -> None:
         """One parameter in the words of SSP: a number, an item by its name.
 
         Numbers are in the unit of the variable, which the standard takes where none is written; a Float64 with a unit
         is not read by OMSimulator (November 2025).
         """
-        if name not in face.variables:
-            raise ScenarioError(f"{self.where}: {face.what} has no variable {name!r}; {nearest(name, face.variables)}")
-        kind = str(face.variables[name].type)
-        if kind == "Enumeration" and not face.items(name):
+        if name not in interface.variables:
+            raise ScenarioError(
+                f"{self.where}: {interface.what} has no variable {name!r}; {nearest(name, interface.variables)}"
+            )
+        kind = str(interface.variables[name].type)
+        if kind == "Enumeration" and not interface.items(name):
             kind = "Integer"
         elif kind == "Enumeration":
-            names = {number: item for item, number in face.items(name).items()}
+            names = {number: item for item, number in interface.items(name).items()}
             values = [v if isinstance(v, str) else names.get(int(v), v) for v in values]
         if shape and self.version == "1.0":
             raise ScenarioError(
-                f"{self.where}: {face.what}: {name} is an array, which SSP 1.0 does not know; use version 2.0."
+                f"{self.where}: {interface.what}: {name} is an array, which SSP 1.0 does not know; use version 2.0."
             )
         add_parameter(parent, name, kind, values, shape)
 
@@ -279,7 +290,7 @@ class _Exporter:
             raise ScenarioError(
                 f"{self.where}: connections: no component {component!r}; {nearest(component, self.parts)}"
             )
-        variables = self.parts[component].face.variables
+        variables = self.parts[component].interface.variables
         known = [v for v, variable in variables.items() if variable.causality == causality]
         found = ELEMENT_OF_ARRAY.fullmatch(signal)
         if signal in known:
@@ -296,9 +307,9 @@ class _Exporter:
     def add_transformation(self, node: Node, source: str, target: str, given: Any) -> None:
         """What a connection does to its values: linear on real numbers, tables on the others."""
         component, _, signal = target.partition(".")
-        face = self.parts[component].face
-        name = signal if signal in face.variables else signal.rpartition("[")[0]
-        family, values = FAMILIES[face.variables[name].type], dict(given.table)
+        interface = self.parts[component].interface
+        name = signal if signal in interface.variables else signal.rpartition("[")[0]
+        family, values = FAMILIES[interface.variables[name].type], dict(given.table)
         if family == REAL:
             if (given.factor, given.offset) != (1.0, 0.0):
                 child(node, "ssc", "LinearTransformation", factor=repr(given.factor), offset=repr(given.offset))
@@ -320,7 +331,7 @@ class _Exporter:
     def item_numbers(self, name: str) -> list[float]:
         """Numbers of the items that an enumeration can have."""
         component, _, signal = name.partition(".")
-        return [float(number) for number in self.parts[component].face.items(signal).values()]
+        return [float(number) for number in self.parts[component].interface.items(signal).values()]
 
     def extras(self) -> Mapping[str, Any]:
         """What SSP has no words for, and a file that goes with it."""

@@ -10,12 +10,12 @@ from typing import Any
 
 from cosim.errors import ScenarioError, nearest
 from cosim.scenario.models import LATE_PARAMETERS
+from cosim.scenario.package_names import split_variant
 from cosim.ssp.annotation import DIGEST, digest
 from cosim.ssp.bindings import start_values
 from cosim.ssp.document import fail
 from cosim.ssp.lapses import Lapses
 from cosim.ssp.model import ComponentElement, Structure
-from cosim.ssp.names import split_variant
 from cosim.ssp.nets import Chain, Nets, Path, flat_names
 from cosim.ssp.package import DEFAULT_VARIANT, Package, Unpacked
 from cosim.ssp.pipe import Pipe, by_items, numeric, simplest
@@ -62,6 +62,9 @@ def load_package(name: str, strict: bool = False) -> Loaded:
 def list_variants(name: str) -> dict[str, str]:
     """The structures in an SSP: their names as ``#NAME`` takes them, the default one first, and the titles within them.
 
+    Args:
+        name: of the member.
+
     Raises:
         CosimError: one of them cannot be read.
     """
@@ -72,6 +75,9 @@ def list_variants(name: str) -> dict[str, str]:
 
 def find_variant(package: Package, variant: str) -> str:
     """The member that a variant's name means: its file name, with its ending or without, or the name written within it.
+
+    Args:
+        package: the open package.
 
     Raises:
         ScenarioError: there is none.
@@ -91,15 +97,18 @@ def find_variant(package: Package, variant: str) -> str:
 def load_structure(structure: Structure, package: Package) -> Loaded:
     """The scenario of one system structure.
 
+    Args:
+        package: the open package.
+
     Raises:
         CosimError: something in it cannot be carried out.
     """
     nets = Nets(structure.system, package.lapses)
-    if not nets.faces:
+    if not nets.interfaces:
         fail(structure.system.node, "the system holds no component; there is nothing to run.")
     starts = start_values(nets, package.lapses)
     loaded = Loaded({}, package.unpacked)
-    names = flat_names([path for path in nets.faces if not _takes_our_place(nets, path, structure)])
+    names = flat_names([path for path in nets.interfaces if not _takes_our_place(nets, path, structure)])
     tables = loaded.tables
     tables |= {"title": structure.name, "description": structure.description}
     if not structure.extras:
@@ -142,7 +151,7 @@ def _takes_our_place(nets: Nets, path: Path, structure: Structure) -> bool:
 
 def _experiment(structure: Structure, nets: Nets, tables: Mapping[str, Any]) -> dict[str, float]:
     """Start, stop and step, as far as they are known: from the structure, from annotations, or else from the FMUs."""
-    experiments = [face.description.defaultExperiment for face in nets.faces.values()]
+    experiments = [interface.description.defaultExperiment for interface in nets.interfaces.values()]
     times = {
         k: [t for e in experiments if (t := _finite(getattr(e, k, None))) is not None] for k in ("stopTime", "stepSize")
     }
@@ -177,17 +186,19 @@ def _connection(chain: Chain, nets: Nets, names: Mapping[Path, str]) -> str | di
     target = f"{names[sink.path]}.{sink.name}{sink.suffix}"
     if not any(hop.suppress or hop.step is not None for hop in chain.hops) and _shows_own_units(chain, nets):
         return f"{source} -> {target}"
-    own = nets.faces[root.path].unit(root.name)
+    own = nets.interfaces[root.path].unit(root.name)
     pipe = Pipe(own).through(nets.unit(root), False, None, chain.hops[0].node)
     for hop in chain.hops:
         pipe = pipe.through(nets.unit(hop.target), hop.suppress, hop.step, hop.node)
-    pipe = pipe.through(nets.faces[sink.path].unit(sink.name), False, None, last)
+    pipe = pipe.through(nets.interfaces[sink.path].unit(sink.name), False, None, last)
     return {"from": source, "to": target, "units": "ignore"} | _effect(pipe, chain, nets)
 
 
 def _shows_own_units(chain: Chain, nets: Nets) -> bool:
     """Whether both ends are in the units of their FMUs, so that the connection converts as any other does."""
-    ends = ((point, nets.faces[point.path].unit(point.name), nets.unit(point)) for point in (chain.root, chain.sink))
+    ends = (
+        (point, nets.interfaces[point.path].unit(point.name), nets.unit(point)) for point in (chain.root, chain.sink)
+    )
     return all((own is None and shown is None) or (own and shown and own.unit == shown.unit) for _, own, shown in ends)
 
 
@@ -196,7 +207,7 @@ def _effect(pipe: Pipe, chain: Chain, nets: Nets) -> dict[str, Any]:
     if not pipe.maps:
         return {"factor": pipe.factor, "offset": pipe.offset}
     node, kinds = chain.hops[-1].node, {step.kind for step in pipe.maps}
-    source, target = (nets.faces[point.path].items(point.name) for point in (chain.root, chain.sink))
+    source, target = (nets.interfaces[point.path].items(point.name) for point in (chain.root, chain.sink))
     if kinds == {"Enumeration"}:
         table = by_items(pipe.maps, source, target, node)
         domain = frozenset(map(float, source.values()))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from cosim.errors import nearest
 from cosim.ssp.common import NamedUnit, Step
 from cosim.ssp.document import Node, fail
-from cosim.ssp.faces import Face, face_of
+from cosim.ssp.interfaces import Interface, interface_of
 from cosim.ssp.lapses import Lapses
 from cosim.ssp.model import ComponentElement, Connector, DictionaryReference, Element, End, SystemElement, Wire
 
@@ -123,12 +123,12 @@ class Nets:
     def __init__(self, root: SystemElement, lapses: Lapses) -> None:
         self.root = root
         self.elements: dict[Path, Element] = dict(_walk(root, ()))
-        self.faces: dict[Path, Face] = {
-            p: face_of(e, lapses) for p, e in self.elements.items() if isinstance(e, ComponentElement)
+        self.interfaces: dict[Path, Interface] = {
+            p: interface_of(e, lapses) for p, e in self.elements.items() if isinstance(e, ComponentElement)
         }
-        for path, face in self.faces.items():
+        for path, interface in self.interfaces.items():
             for connector in self.elements[path].connectors.values():
-                face.check(connector)
+                interface.check(connector)
         self.dictionaries = self._dictionaries()
         self.incoming: dict[Point, Hop] = {}
         for path, element in self.elements.items():
@@ -142,18 +142,26 @@ class Nets:
         return self.elements[point.path].connectors[point.name]
 
     def kind(self, point: Point) -> str:
-        """Kind of a connector; what an FMU's unspecified connector is, its variable says."""
+        """Kind of a connector; what an FMU's unspecified connector is, its variable says.
+
+        Args:
+            point: end of a connection.
+        """
         kind = self.connector(point).kind
-        if kind == "unspecified" and point.path in self.faces:
-            return str(self.faces[point.path].variables[point.name].causality)
+        if kind == "unspecified" and point.path in self.interfaces:
+            return str(self.interfaces[point.path].variables[point.name].causality)
         return kind
 
     def unit(self, point: Point) -> NamedUnit | None:
-        """Unit of a connector, its own or that of the FMU's variable."""
+        """Unit of a connector, its own or that of the FMU's variable.
+
+        Args:
+            point: end of a connection.
+        """
         own = self.connector(point).type
         if own is not None and own.unit is not None:
             return own.unit
-        return self.faces[point.path].unit(point.name) if point.path in self.faces else None
+        return self.interfaces[point.path].unit(point.name) if point.path in self.interfaces else None
 
     def _dictionaries(self) -> dict[tuple[Path, str, str], list[Point]]:
         """Connectors that stand for each entry of each dictionary."""
@@ -218,7 +226,7 @@ class Nets:
             fail(hop.node, f"{hop.target} has two sources, {other.source} and {hop.source}; remove one connection.")
 
     def _is_sink(self, point: Point) -> bool:
-        return point.path in self.faces and self.kind(point) in SINKS
+        return point.path in self.interfaces and self.kind(point) in SINKS
 
     def _chain(self, sink: Point) -> Chain:
         hops: list[Hop] = []
@@ -229,7 +237,7 @@ class Nets:
             if point in seen:
                 fail(hop.node, f"the connections to {sink} lead in a circle through {point}; no component drives it.")
             seen.add(point)
-            if point.path in self.faces:
+            if point.path in self.interfaces:
                 break
         return Chain(point, tuple(hops))
 
@@ -267,6 +275,9 @@ def _walk(element: Element, path: Path) -> Iterator[tuple[Path, Element]]:
 def flat_names(paths: Iterable[Path]) -> dict[Path, str]:
     """A legal, unique component name for each path: its parts joined by ``__``, other characters than letters, digits
     and ``_`` replaced.
+
+    Args:
+        paths: of components.
     """
     names: dict[Path, str] = {}
     for path in paths:

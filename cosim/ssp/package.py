@@ -20,7 +20,7 @@ from urllib.parse import unquote, urlsplit
 from cosim.errors import ScenarioError, nearest
 from cosim.ssp.document import Node, fail
 from cosim.ssp.lapses import Lapses
-from fmus.check.archive import MAX_UNPACKED_BYTES, NotAnFmuError, demand_harmless
+from fmus.fmi.archive import MAX_UNPACKED_BYTES, NotAnFmuError, demand_harmless
 
 DEFAULT_VARIANT = "SystemStructure.ssd"
 MAX_XML_BYTES = 64 * 1024**2
@@ -85,6 +85,9 @@ class Package:
     def read(self, name: str) -> bytes:
         """The content of a member that is XML.
 
+        Args:
+            name: of the element.
+
         Raises:
             ScenarioError: it is too large or damaged.
         """
@@ -97,6 +100,9 @@ class Package:
 
     def file(self, name: str) -> Path:
         """A member as a file, unpacked once.
+
+        Args:
+            name: of the element.
 
         Raises:
             ScenarioError: it is damaged.

@@ -15,7 +15,7 @@ from cosim.balises.layout import TrackLayout
 from cosim.scenario.balise_service import BALISE_EVENT
 from cosim.scenario.tables import BalisesTable, ComponentTable
 from cosim.ssp.common import FAMILIES, INTEGER
-from cosim.ssp.faces import Face
+from cosim.ssp.interfaces import Interface
 from plant_models.railway.track.balise_layout import UNUSED
 
 NAME = "balise_reader"
@@ -41,22 +41,24 @@ class Reader:
 
 
 def make_reader(
-    table: BalisesTable, layout: TrackLayout, faces: Mapping[str, Face], taken: set[str], version: int
+    table: BalisesTable, layout: TrackLayout, interfaces: Mapping[str, Interface], taken: set[str], version: int
 ) -> Reader | None:
     """The reader that a system needs, or None where it has no observer that is told by counts.
 
     Args:
-        table: of the balises. layout: where they lie. faces: of all components.
+        table: of the balises. layout: where they lie. interfaces: of all components.
         taken: inputs that have a source, as ``component.input``. version: of FMI.
     """
     told = [
-        n for n, face in faces.items() if is_told_by_counts(face) and (table.receivers is None or n in table.receivers)
+        n
+        for n, interface in interfaces.items()
+        if is_told_by_counts(interface) and (table.receivers is None or n in table.receivers)
     ]
     told = [n for n in told if not {f"{n}.{BALISE_EVENT}_{field}" for field in TOLD} & taken]
     if not told or table.position is None or table.speed is None:
         return None
     name = NAME
-    while name in faces:
+    while name in interfaces:
         name += "_"
     links = [f"{table.position} -> {name}.position", f"{table.speed} -> {name}.speed"]
     links += [f"{name}.{BALISE_EVENT}_{field} -> {n}.{BALISE_EVENT}_{field}" for n in told for field in TOLD]
@@ -76,8 +78,12 @@ def _track(table: BalisesTable, places: list[float]) -> tuple[dict[str, Any], di
     }
 
 
-def is_told_by_counts(face: Face) -> bool:
-    """Whether an FMU takes balises as a count, an instant and a position."""
-    inputs = {v.name: FAMILIES[str(v.type)] for v in face.variables.values() if v.causality == "input"}
+def is_told_by_counts(interface: Interface) -> bool:
+    """Whether an FMU takes balises as a count, an instant and a position.
+
+    Args:
+        interface: of a component's FMU.
+    """
+    inputs = {v.name: FAMILIES[str(v.type)] for v in interface.variables.values() if v.causality == "input"}
     fields = [f"{BALISE_EVENT}_{field}" for field in TOLD]
     return all(field in inputs for field in fields) and inputs[fields[0]] == INTEGER

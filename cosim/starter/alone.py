@@ -7,13 +7,12 @@ from typing import Any
 
 from fmpy.model_description import DefaultExperiment, ModelVariable
 
-from cosim.components.described import NUMERIC_TYPES
 from cosim.errors import CosimError
 from cosim.scenario.schema import step_count
 from cosim.scenario.starts import start_values
 from cosim.starter.look import NAME, Look, number
 from cosim.starter.toml_lines import LISTED, comment, entry, one_line
-from fmus.ports import FLOATING_TYPES
+from fmus.fmi.types import FLOATING_TYPES, NUMERIC_TYPES
 
 STOP, STEP, STEPS = 10.0, 0.01, 1000
 

@@ -12,11 +12,11 @@ from typing import Any
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from cosim.components.component import Component
-from cosim.components.described import NUMERIC_TYPES
-from cosim.components.elements import elements_of
 from cosim.components.loading import describe_fmu, read_description, runs_here
 from cosim.errors import FmuLoadError
 from cosim.starter.guess import Signal
+from fmus.fmi.elements import elements_of
+from fmus.fmi.types import NUMERIC_TYPES
 from plant_models.hybrid.units import UnitError
 
 NAME = "fmu"
@@ -31,8 +31,7 @@ class Look:
     Args:
         path: of the file. component: to be asked for variables and units; it cannot be stepped.
         inputs, outputs, parameters, hidden: numeric scalars, and the elements of short arrays; hidden ones are local
-        variables,
-            which may be read like outputs.
+            variables, which may be read like outputs.
         unread: inputs and outputs that no connection of numbers can reach (texts, clocks, long arrays), a line each.
         runs_here: whether it has a library for this platform.
     """

@@ -13,6 +13,7 @@ from typing import Any
 import tomli_w
 
 from cosim.starter.guess import Guess, Signal
+from fmus.text_table import text_table
 
 WIDTH = 118
 PLAIN_NAME = re.compile(r"[A-Za-z_][\w.]*(\[\d+(,\d+)*\])?", re.ASCII)
@@ -55,12 +56,8 @@ def guessed(guess: Guess) -> str:
 
 def listing(title: str, signals: Sequence[Signal]) -> list[str]:
     """Variables with unit and description, as comment."""
-    width = max((len(one_line(s.name)) for s in signals[:LISTED]), default=0)
-    lines = [f"# {title} ({len(signals)}):"]
-    for s in signals[:LISTED]:
-        lines.append(
-            f"#   {one_line(s.name):<{width}}  [{one_line(s.unit or '-')}]  {one_line(s.description)}".rstrip()
-        )
+    rows = [[one_line(s.name), f"[{one_line(s.unit or '-')}]  {one_line(s.description)}"] for s in signals[:LISTED]]
+    lines = [f"# {title} ({len(signals)}):", *(f"#   {line}" for line in text_table(rows, left=(0, 1)))]
     more = len(signals) - LISTED
     return lines + ([f"#   ... and {more} more, see: cosim info"] if more > 0 else [])
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from cosim.components.capabilities import read_capabilities
 from cosim.scenario.schema import step_count
 from cosim.starter.guess import Guess, fits
 from cosim.starter.look import Look, number
 from cosim.starter.roles import PlantRoles
 from cosim.starter.toml_lines import Link, comment, entry, guessed, one_line
 from fmu_observer import OBSERVERS
+from fmus.fmi.capabilities import read_capabilities
 
 PLANT, OBSERVER = "plant", "observer"
 DEFAULT_OBSERVER = "takagi_sugeno_cdo"

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from cosim.report.metrics import judged_size, within
-from cosim.report.roles import Quantity, estimation_error
-from cosim.report.spec import Phase
+from cosim.evaluation.metrics import judged_size, within
+from cosim.evaluation.roles import Quantity, estimation_error
+from cosim.evaluation.spec import Phase
 from cosim.scenario.outcome import Outcome
 
 Measure = Callable[[Outcome], float]

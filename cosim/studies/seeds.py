@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from math import isnan
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cosim.errors import RunError
-from cosim.report.metrics import phase_metrics
-from cosim.report.spec import ReportSpec
-from cosim.scenario import Scenario
+from cosim.evaluation.metrics import phase_metrics
+from cosim.evaluation.spec import ReportSpec
+from fmus.text_table import text_table
+
+if TYPE_CHECKING:
+    from cosim.simulation.scenario import Scenario
 
 QUARTILES = (25.0, 50.0, 75.0)
 
@@ -56,16 +59,11 @@ class SeedStudy:
 
     def text(self) -> str:
         """A plain-text table."""
+        rows = [["observer", "phase", "quartile", "median", "quartile", "independent", "published"]]
+        for observer, phase, *sizes in (row.values() for row in self.rows()):
+            rows.append([observer, phase, *("-" if size is None else f"{size:.4f}" for size in sizes)])
         head = f"Maximal speed error over {len(self.seeds)} balise seeds [m/s]"
-        lines = [
-            head,
-            f"{'observer':<26}{'phase':<16}{'quartile':>10}{'median':>10}{'quartile':>10}{'independent':>13}{'published':>11}",
-        ]
-        for row in self.rows():
-            numbers = "".join(f"{row[k]:>10.4f}" for k in ("lower quartile", "median", "upper quartile"))
-            references = "".join(_cell(row[k], w) for k, w in (("independent", 13), ("published", 11)))
-            lines.append(f"{row['observer']:<26}{row['phase']:<16}{numbers}{references}")
-        return "\n".join(lines)
+        return "\n".join([head, *text_table(rows, left=(0, 1))])
 
     def to_data(self) -> dict[str, Any]:
         """Plain data."""
@@ -96,7 +94,3 @@ def seed_study(scenario: Scenario, seeds: Iterable[int], tell: Callable[[int, in
                 study.errors.setdefault((row.observer, row.phase), []).append(row.speed.max_abs)
     assert study is not None
     return study
-
-
-def _cell(value: float | None, width: int) -> str:
-    return f"{'-':>{width}}" if value is None else f"{value:>{width}.4f}"

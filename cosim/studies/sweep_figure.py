@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from cosim.components.described import Described
+from cosim.drawing.style import OBSERVER_LINES, axes_or_new, styled
 from cosim.errors import CosimError, OutputError, nearest
-from cosim.report.figures.style import OBSERVER_LINES, axes_or_new, styled
 from cosim.scenario.structure import describe_component
 from cosim.studies.measures import setting_text, with_unit
 from plant_models.hybrid.units import UnitError

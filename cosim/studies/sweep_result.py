@@ -10,17 +10,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cosim.errors import ComparisonError, OutputError
-from cosim.report.numbers import number as number_text
+from cosim.evaluation.numbers import number as number_text
 from cosim.results.load import load_result
 from cosim.results.result import Result
 from cosim.scenario.outcome import Outcome
-from cosim.scenario.scenario import Scenario
 from cosim.studies.measures import measure_unit, setting_text, with_unit
+from fmus.text_table import text_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from cosim.comparison.verdict import Comparison
+    from cosim.simulation.scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -114,8 +115,7 @@ class SweepResult:
         shown = [setting_text] * (1 + len(self.names)) + [partial(number_text, digits=4)] * len(self.measures)
         heads = ["run", *self.names, *(with_unit(name, self.unit(name)) for name in self.measures)]
         cells = [heads, *([show(row[name]) for name, show in zip(names, shown, strict=True)] for row in rows)]
-        widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-        lines = ["  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True)) for line in cells]
+        lines = text_table(cells, left=())
         lines += [f"run {run.number} failed: {run.failure}" for run in self.failed]
         lines += [f"run {run.number}: {fault}" for run in self.runs for fault in run.faults]
         return "\n".join(lines)

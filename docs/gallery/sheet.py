@@ -17,6 +17,8 @@ from typing import Any
 import matplotlib as mpl
 from PIL import Image
 
+from fmus.text_table import text_table
+
 mpl.use("Agg")
 
 SAME = 1e-2
@@ -97,7 +99,7 @@ class Sheet:
             figure: a matplotlib figure, or None for a table alone.
         """
         self.out.mkdir(parents=True, exist_ok=True)
-        print(f"{self.title} ({self.source})\n\n{text_table(self.lines)}")
+        print(f"{self.title} ({self.source})\n\n{sheet_text(self.lines)}")
         content = {"title": self.title, "source": self.source, "figure": figure is not None}
         content["lines"] = [asdict(line) for line in self.lines]
         (self.out / f"{self.name}.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
@@ -109,14 +111,12 @@ class Sheet:
             smaller.save(path, optimize=True)
 
 
-def text_table(lines: list[Line]) -> str:
+def sheet_text(lines: list[Line]) -> str:
     """The lines as aligned text, reasons below."""
     rows = [("quantity", "unit", "published", "measured")]
     rows += [(line.quantity, line.unit, shown(line.published), shown(line.measured)) for line in lines]
-    widths = [max(len(row[i]) for row in rows) for i in range(4)]
-    text = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
     reasons = dict.fromkeys(line.why for line in lines if line.why)
-    return "\n".join([text[0], "-" * len(text[0]), *text[1:], *(f"- {reason}" for reason in reasons)])
+    return "\n".join([*text_table(rows, left=range(4), heading=True), *(f"- {reason}" for reason in reasons)])
 
 
 def shown(value: float | str | None) -> str:

@@ -141,13 +141,12 @@ class Conditions:
 @contextmanager
 def _known(systems: Iterable[HybridSystem]) -> Iterator[None]:
     """Let scenarios find the systems by name, as blocks."""
-    before = dict(plant_models.PLANTS)
     plant_models.PLANTS.update({system.name: type(system) for system in systems})
     try:
         yield
     finally:
-        plant_models.PLANTS.clear()
-        plant_models.PLANTS.update(before)
+        for system in systems:
+            del plant_models.PLANTS[system.name]
 
 
 def _silent(_warning: str) -> None:

@@ -223,9 +223,7 @@ def draw(results: Mapping[Any, list[Telegram]], path: Path = PICTURE) -> None:
 
 def main(arguments: list[str]) -> None:
     """Print the tables and draw the picture."""
-    from fmu_observer.observers.train import SYSTEMS  # noqa: PLC0415
-
-    results = study(arguments or [system.name for system in SYSTEMS])
+    results = study(arguments or [name for name in OBSERVERS if OBSERVERS.room(name).endswith(".train")])
     print(tables(results))
     if not arguments:
         draw(results)

@@ -82,7 +82,11 @@ class Events:
             self.listener(text % values)
 
     def restore_past(self, records: Sequence[Record]) -> None:
-        """Take over what happened so far, where the policy needs it."""
+        """Take over what happened so far, where the policy needs it.
+
+        Args:
+            records: what happened, in order of time.
+        """
         remembers = bool(self._names) and self.late_policy == "replay"
         self.journal = Journal(self.protocol[1], records) if remembers else None
 

@@ -1,4 +1,4 @@
-"""The FMI 2 face of a block: the calls of fmpy's `FMU2Slave`, events by count, stamp and payload."""
+"""The FMI 2 interface of a block: the calls of fmpy's `FMU2Slave`, events by count, stamp and payload."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from typing import Any
 
 from fmpy.fmi2 import FMU2Slave, fmi2LastSuccessfulTime, fmi2Terminated
 
-from fmu_observer.block.face import FMI_WARNING, WARNINGS, Face, refused
+from fmu_observer.block.interface import FMI_WARNING, WARNINGS, FMIInterface, refused
 from fmu_observer.block.variables import BlockError, Role
 
 WHOLE: tuple[Role, ...] = ("count", "integer_output", "outcome", "policy")
 
 
-class FMI2Block(Face, FMU2Slave):
+class FMI2Block(FMIInterface, FMU2Slave):
     """A hybrid system with the call surface of an FMI 2.0 co-simulation slave.
 
     An event: set the payload, ``<event>_time`` (unset: the start of the step) and raise ``<event>_count`` by one before
     `doStep`; a stamp inside the step is hit exactly, one after it waits, one before it goes by the late policy.
-    Arguments as for `Face`.
+    Arguments as for `FMIInterface`.
     """
 
     fmi_version = 2
@@ -27,7 +27,11 @@ class FMI2Block(Face, FMU2Slave):
     # -- life -------------------------------------------------------------------------------------------------------
 
     def instantiate(self, visible: bool = False, callbacks: Any = None, loggingOn: bool = False) -> None:
-        """Start values; the logger among the callbacks hears what is wrong with events."""
+        """Start values; the logger among the callbacks hears what is wrong with events.
+
+        Args:
+            visible: without effect, there is nothing to see. loggingOn: whether the importer wants log messages.
+        """
         self.instance.reset()
         logger: Any = getattr(callbacks, "logger", None)
         name = self.instanceName.encode()
@@ -43,7 +47,12 @@ class FMI2Block(Face, FMU2Slave):
     def setupExperiment(
         self, tolerance: float | None = None, startTime: float = 0.0, stopTime: float | None = None
     ) -> None:
-        """Fix the start time [s]."""
+        """Fix the start time [s].
+
+        Args:
+            tolerance: without effect: the integration step is a parameter. startTime: [s].
+            stopTime: end of the run [s], without effect.
+        """
         self.instance.require("instantiated")
         self.instance.set_up(startTime)
 
@@ -62,7 +71,12 @@ class FMI2Block(Face, FMU2Slave):
         communicationStepSize: float,
         noSetFMUStatePriorToCurrentPoint: bool = True,
     ) -> None:
-        """Advance by one communication step [s], through the events announced since the last one."""
+        """Advance by one communication step [s], through the events announced since the last one.
+
+        Args:
+            currentCommunicationPoint: start of the step [s]. communicationStepSize: its length [s], above zero.
+            noSetFMUStatePriorToCurrentPoint: as in FMI: no state of an earlier time will be set.
+        """
         self.instance.step(currentCommunicationPoint, communicationStepSize)
 
     def cancelStep(self) -> None:
@@ -70,14 +84,22 @@ class FMI2Block(Face, FMU2Slave):
 
     @refused
     def getRealStatus(self, kind: int) -> float:
-        """The last successful time [s]."""
+        """The last successful time [s].
+
+        Args:
+            kind: FMI's number of the status.
+        """
         if kind != fmi2LastSuccessfulTime:
             raise BlockError(f"status {kind} is not a real one; only fmi2LastSuccessfulTime is known.")
         return self.instance.runtime.t
 
     @refused
     def getBooleanStatus(self, kind: int) -> bool:
-        """Whether the run should end: after a discarded step, until one succeeds."""
+        """Whether the run should end: after a discarded step, until one succeeds.
+
+        Args:
+            kind: FMI's number of the status.
+        """
         if kind != fmi2Terminated:
             raise BlockError(f"status {kind} is not a Boolean one; only fmi2Terminated is known.")
         return self.instance.discarded
@@ -86,30 +108,54 @@ class FMI2Block(Face, FMU2Slave):
 
     @refused
     def getReal(self, vr: Sequence[int]) -> list[float]:
-        """Values of Real variables."""
+        """Values of Real variables.
+
+        Args:
+            vr: value references.
+        """
         return self.instance.get(vr)
 
     @refused
     def setReal(self, vr: Sequence[int], value: Sequence[float]) -> None:
-        """Set Real variables."""
+        """Set Real variables.
+
+        Args:
+            vr: value references.
+        """
         self.instance.set(vr, value)
 
     @refused
     def getInteger(self, vr: Sequence[int]) -> list[int]:
-        """Values of event counts, integer outputs, counts of outcomes and the late policy."""
+        """Values of event counts, integer outputs, counts of outcomes and the late policy.
+
+        Args:
+            vr: value references.
+        """
         return self.instance.get_whole(vr, WHOLE)
 
     @refused
     def setInteger(self, vr: Sequence[int], value: Sequence[int]) -> None:
-        """Set event counts, or the late policy."""
+        """Set event counts, or the late policy.
+
+        Args:
+            vr: value references.
+        """
         self.instance.set_whole(vr, value, WHOLE)
 
     def fmi2SetReal(self, _component: object, vr: Iterable[int], _n: int, values: Iterable[float]) -> None:
-        """The low-level setter used by fmpy's `Input`."""
+        """The low-level setter used by fmpy's `Input`.
+
+        Args:
+            vr: value references.
+        """
         self.setReal(list(vr), list(values))
 
     def fmi2SetInteger(self, _component: object, vr: Iterable[int], _n: int, values: Iterable[int]) -> None:
-        """The low-level setter used by fmpy's `Input`."""
+        """The low-level setter used by fmpy's `Input`.
+
+        Args:
+            vr: value references.
+        """
         self.setInteger(list(vr), list(values))
 
     @refused
@@ -125,8 +171,8 @@ class FMI2Block(Face, FMU2Slave):
 
     # -- saved states: FMI 2 spells them so; fmpy knows both spellings ------------------------------------------------
 
-    getFMUstate = Face.getFMUState
-    setFMUstate = Face.setFMUState
-    freeFMUstate = Face.freeFMUState
-    serializeFMUstate = Face.serializeFMUState
-    deSerializeFMUstate = Face.deserializeFMUState
+    getFMUstate = FMIInterface.getFMUState
+    setFMUstate = FMIInterface.setFMUState
+    freeFMUstate = FMIInterface.freeFMUState
+    serializeFMUstate = FMIInterface.serializeFMUState
+    deSerializeFMUstate = FMIInterface.deserializeFMUState

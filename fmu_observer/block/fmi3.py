@@ -1,4 +1,4 @@
-"""The FMI 3 face of a block: the calls of fmpy's `FMU3Slave`, event mode and triggered input clocks included."""
+"""The FMI 3 interface of a block: the calls of fmpy's `FMU3Slave`, event mode and triggered input clocks included."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from typing import Any
 
 from fmpy.fmi3 import FMU3Slave
 
-from fmu_observer.block.face import FMI_WARNING, WARNINGS, Face, refused
+from fmu_observer.block.interface import FMI_WARNING, WARNINGS, FMIInterface, refused
 from fmu_observer.block.variables import BlockError, Mode, Role
 
 INT32: tuple[Role, ...] = ("count", "integer_output", "outcome")
 INT64: tuple[Role, ...] = ("policy",)
 
 
-class FMI3Block(Face, FMU3Slave):
+class FMI3Block(FMIInterface, FMU3Slave):
     """A hybrid system with the call surface of an FMI 3.0 co-simulation slave.
 
     An event: `enterEventMode`, `setClock`, payload and, where it happened earlier, ``<event>_time`` by `setFloat64`,
     `updateDiscreteStates`, `enterStepMode`; with ``announcement="counts"`` as in FMI 2, and event mode has nothing to
     do. A block on which `instantiate` was never called (fmpy's `simulate_fmu` does not) uses event mode as soon as its
-    caller does. Arguments as for `Face`.
+    caller does. Arguments as for `FMIInterface`.
     """
 
     fmi_version = 3
@@ -41,7 +41,14 @@ class FMI3Block(Face, FMU3Slave):
         intermediateUpdate: Any = None,
         requiredIntermediateVariables: Any = None,
     ) -> None:
-        """Start values; `eventModeUsed` and `earlyReturnAllowed` as in FMI 3."""
+        """Start values; `eventModeUsed` and `earlyReturnAllowed` as in FMI 3.
+
+        Args:
+            visible: without effect, there is nothing to see. loggingOn: whether the importer wants log messages.
+            logMessage: called with what is wrong with events.
+            intermediateUpdate: without effect: blocks call nobody within a step.
+            requiredIntermediateVariables: without effect: blocks call nobody within a step.
+        """
         self.instance.reset()
         self.instance.events.listener = (
             None if logMessage is None else lambda text: logMessage(None, FMI_WARNING, WARNINGS, text.encode())
@@ -53,6 +60,9 @@ class FMI3Block(Face, FMU3Slave):
     def setDebugLogging(self, loggingOn: bool, categories: Sequence[str]) -> None:
         """Nothing to switch: what is wrong is raised, or logged by Python's `logging`. Unknown categories are
         refused.
+
+        Args:
+            loggingOn: whether the importer wants log messages.
         """
         known = [category.name for category in self.model_description.logCategories]
         for name in categories:
@@ -63,7 +73,12 @@ class FMI3Block(Face, FMU3Slave):
     def enterInitializationMode(
         self, tolerance: float | None = None, startTime: float = 0.0, stopTime: float | None = None
     ) -> None:
-        """Begin initialisation at `startTime` [s]."""
+        """Begin initialisation at `startTime` [s].
+
+        Args:
+            tolerance: without effect: the integration step is a parameter.
+            stopTime: end of the run [s], without effect.
+        """
         self.instance.require("instantiated")
         self.instance.set_up(startTime)
         self.instance.mode = "initialization"
@@ -91,7 +106,11 @@ class FMI3Block(Face, FMU3Slave):
 
     @refused
     def setClock(self, vr: Sequence[int], values: Sequence[bool]) -> None:
-        """Activate triggered input clocks; the events happen in `updateDiscreteStates`."""
+        """Activate triggered input clocks; the events happen in `updateDiscreteStates`.
+
+        Args:
+            vr: value references.
+        """
         self.instance.require("event")
         numbers = [self.instance.variables.clock_number(reference) for reference in vr]
         for number, value in zip(numbers, values, strict=True):
@@ -99,7 +118,11 @@ class FMI3Block(Face, FMU3Slave):
 
     @refused
     def getClock(self, vr: Sequence[int]) -> list[bool]:
-        """Whether clocks are active."""
+        """Whether clocks are active.
+
+        Args:
+            vr: value references.
+        """
         self.instance.require_alive()
         return [self.instance.variables.clock_number(reference) in self.instance.events.active for reference in vr]
 
@@ -127,6 +150,10 @@ class FMI3Block(Face, FMU3Slave):
         """Advance by one communication step [s], or, where early return is allowed, to the first periodic instant
         inside it.
 
+        Args:
+            currentCommunicationPoint: start of the step [s]. communicationStepSize: its length [s], above zero.
+            noSetFMUStatePriorToCurrentPoint: as in FMI: no state of an earlier time will be set.
+
         Returns:
             (eventHandlingNeeded, terminateSimulation, earlyReturn, lastSuccessfulTime).
         """
@@ -137,38 +164,66 @@ class FMI3Block(Face, FMU3Slave):
 
     @refused
     def getFloat64(self, vr: Sequence[int], nValues: int | None = None) -> list[float]:
-        """Values of Float64 variables."""
+        """Values of Float64 variables.
+
+        Args:
+            vr: value references. nValues: how many values are expected; None for one a reference.
+        """
         return self.instance.get(vr)
 
     @refused
     def setFloat64(self, vr: Sequence[int], values: Sequence[float]) -> None:
-        """Set Float64 variables."""
+        """Set Float64 variables.
+
+        Args:
+            vr: value references.
+        """
         self.instance.set(vr, values)
 
     @refused
     def getInt32(self, vr: Sequence[int], nValues: int | None = None) -> list[int]:
-        """Values of event counts, integer outputs and counts of outcomes."""
+        """Values of event counts, integer outputs and counts of outcomes.
+
+        Args:
+            vr: value references. nValues: how many values are expected; None for one a reference.
+        """
         return self.instance.get_whole(vr, INT32)
 
     @refused
     def setInt32(self, vr: Sequence[int], values: Sequence[int]) -> None:
-        """Set event counts."""
+        """Set event counts.
+
+        Args:
+            vr: value references.
+        """
         self.instance.set_whole(vr, values, INT32)
 
     @refused
     def getInt64(self, vr: Sequence[int], nValues: int | None = None) -> list[int]:
-        """The number of the late policy."""
+        """The number of the late policy.
+
+        Args:
+            vr: value references. nValues: how many values are expected; None for one a reference.
+        """
         return self.instance.get_whole(vr, INT64)
 
     @refused
     def setInt64(self, vr: Sequence[int], values: Sequence[int]) -> None:
-        """Set the late policy by its number."""
+        """Set the late policy by its number.
+
+        Args:
+            vr: value references.
+        """
         self.instance.set_whole(vr, values, INT64)
 
     def fmi3SetFloat64(
         self, _component: object, vr: Iterable[int], _n: int, values: Iterable[float], _n_values: int
     ) -> None:
-        """The low-level setter used by fmpy's `Input`."""
+        """The low-level setter used by fmpy's `Input`.
+
+        Args:
+            vr: value references.
+        """
         self.setFloat64(list(vr), list(values))
 
     @refused

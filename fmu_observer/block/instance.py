@@ -1,7 +1,7 @@
 """The instance behind a block: a runtime with its events, its variables by value reference, and the mode of its life.
 
-Both FMI faces (`fmi2`, `fmi3`) drive this one; it knows value references and modes, and nothing of fmpy's classes. What
-it refuses it refuses with a reason; the face adds the name, the call and the time.
+Both FMI interfaces (`fmi2`, `fmi3`) drive this one; it knows value references and modes, and nothing of fmpy's classes.
+What it refuses it refuses with a reason; the interface adds the name, the call and the time.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ POLICY_NUMBERS = ", ".join(f"{i} ({name})" for i, name in enumerate(LATE_POLICIE
 
 
 class Instance:
-    """One running copy of a hybrid system behind an FMI face.
+    """One running copy of a hybrid system behind an FMI interface.
 
     Args:
         system: the hybrid system.
@@ -66,6 +66,9 @@ class Instance:
     def get(self, references: Sequence[int]) -> list[float]:
         """Values of Float64 / Real variables by value reference.
 
+        Args:
+            references: value references.
+
         Raises:
             BlockError: a value reference is unknown or of another type, or the block has been freed.
         """
@@ -76,6 +79,9 @@ class Instance:
 
     def set(self, references: Sequence[int], values: Sequence[float]) -> None:
         """Set Float64 / Real variables by value reference; nothing is set unless everything may be.
+
+        Args:
+            references: value references.
 
         Raises:
             BlockError: a value reference is unknown, or the variable cannot be set in this mode.
@@ -90,6 +96,9 @@ class Instance:
     def get_whole(self, references: Sequence[int], roles: Sequence[Role]) -> list[int]:
         """Values of whole numbers that have one of these roles.
 
+        Args:
+            references: value references.
+
         Raises:
             BlockError: a value reference is unknown or of another type, or a value is no whole number of 32 bits.
         """
@@ -100,6 +109,9 @@ class Instance:
 
     def set_whole(self, references: Sequence[int], values: Sequence[int], roles: Sequence[Role]) -> None:
         """Set whole numbers that have one of these roles; nothing is set unless everything may be.
+
+        Args:
+            references: value references.
 
         Raises:
             BlockError: a value reference is unknown or of another type, the variable cannot be set now, or not to this

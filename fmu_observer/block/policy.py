@@ -39,7 +39,11 @@ class Counters:
     ignored: int = 0
 
     def judged(self, verdict: int) -> bool:
-        """Count an event by what the model made of it; whether it took effect."""
+        """Count an event by what the model made of it; whether it took effect.
+
+        Args:
+            verdict: number that the model wrote, see `plant_models.hybrid`.
+        """
         self.accepted += verdict != IGNORED
         self.doubted += verdict == DOUBTED
         self.ignored += verdict == IGNORED
@@ -47,7 +51,11 @@ class Counters:
 
 
 def advance(runtime: Runtime, journal: Journal | None, until: float) -> None:
-    """Advance a runtime to `until` [s], and remember it; nothing where it is there already."""
+    """Advance a runtime to `until` [s], and remember it; nothing where it is there already.
+
+    Args:
+        journal: what was remembered so far; None where nothing is remembered.
+    """
     if until > runtime.t:
         if journal is not None:
             journal.append(runtime, until)
@@ -58,6 +66,9 @@ def jump(runtime: Runtime, journal: Journal | None, event: Stamped) -> int:
     """Let a runtime jump now, and remember it; returns the verdict on the event.
 
     The payload is there for the time of the jump; what was set in `u` stays.
+
+    Args:
+        journal: what was remembered so far; None where nothing is remembered.
     """
     if journal is not None:
         journal.append(runtime, runtime.t, event)
@@ -70,7 +81,11 @@ def jump(runtime: Runtime, journal: Journal | None, event: Stamped) -> int:
 
 
 def communicate(runtime: Runtime, journal: Journal | None) -> None:
-    """A communication step ends now; remember it where that means something."""
+    """A communication step ends now; remember it where that means something.
+
+    Args:
+        runtime: the system in time. journal: what was remembered so far; None where nothing is remembered.
+    """
     if runtime.system.communication_events:
         if journal is not None:
             journal.append(runtime, runtime.t)

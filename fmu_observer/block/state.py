@@ -117,6 +117,9 @@ def deserialize(content: bytes, shape: Shape) -> BlockState:
 def check_owner(token: str, expected: str) -> None:
     """Refuse the state of another model.
 
+    Args:
+        token: of the model that the state comes from. expected: of this model.
+
     Raises:
         BlockError: the tokens differ.
     """

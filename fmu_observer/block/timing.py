@@ -58,6 +58,9 @@ class Timing:
     def plain_step(self, p: Sequence[float] | np.ndarray) -> float:
         """Communication steps up to this [s] are far from the bound, so that nobody needs to count; 0 where that is not
         sure.
+
+        Args:
+            p: values of the parameters, shape (k,).
         """
         shortest = min(float(p[i]) for i in (self.step_position, *(period for period, _ in self._periodic)))
         return (

@@ -195,7 +195,11 @@ class Variables:
         return place.index
 
     def have_role(self, references: Sequence[int], role: Role) -> bool:
-        """Whether all these variables have one role."""
+        """Whether all these variables have one role.
+
+        Args:
+            references: value references.
+        """
         return all(self.place(reference).role == role for reference in references)
 
 

@@ -103,6 +103,9 @@ def aperiodic_limit(vertices: tuple[GapError, ...], horizon: float, switching: b
 
     By bisection: a function that covers a set of gaps covers every smaller one. With `switching` see
     `certify_sampled_error`.
+
+    Args:
+        vertices: error equations of the vertices.
     """
     bound = min(first_unstable_gap(vertices, horizon), horizon)
     if bound == horizon and common_decrease(vertices, horizon, switching).margin > MARGIN:

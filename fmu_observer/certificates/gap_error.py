@@ -1,7 +1,7 @@
 """How an estimation error moves from one sample to the next, exactly: what every kind of sampled error has in common.
 
 An error equation says what flows between samples and how it starts after one; the transition over a gap is one matrix
-exponential, no bound and no approximation. The search for certificates (`aperiodic`) sees this face only.
+exponential, no bound and no approximation. The search for certificates (`aperiodic`) sees this interface only.
 """
 
 from __future__ import annotations
@@ -45,7 +45,11 @@ class GapError(ABC):
         return np.asarray(rate ** np.arange(self.size))
 
     def comparable(self, other: GapError) -> bool:
-        """Whether the components of both are the same, so that one Lyapunov function can be asked of both."""
+        """Whether the components of both are the same, so that one Lyapunov function can be asked of both.
+
+        Args:
+            other: the error equation to compare with.
+        """
         return type(self) is type(other) and self.size == other.size
 
     @abstractmethod
@@ -83,7 +87,11 @@ class GeneratorError(GapError):
 
     @abstractmethod
     def close(self, exponentials: np.ndarray) -> np.ndarray:
-        """Exponentials of shape (count, N, N) as transitions of shape (count, n, n)."""
+        """Exponentials of shape (count, N, N) as transitions of shape (count, n, n).
+
+        Args:
+            exponentials: of the generator, see `GapError`.
+        """
 
     def transition(self, gap: float) -> np.ndarray:
         """Error just before the next sample from the error just before this one, Phi(gap), shape (n, n)."""

@@ -120,7 +120,11 @@ class ImpulsiveError(GeneratorError):
         return np.asarray(rate ** np.asarray(self.levels, dtype=float)[self._pivots])
 
     def comparable(self, other: GapError) -> bool:
-        """Whether both resets read the same of zeta."""
+        """Whether both resets read the same of zeta.
+
+        Args:
+            other: the error equation to compare with.
+        """
         return (
             isinstance(other, ImpulsiveError)
             and self.kept.shape == other.kept.shape
@@ -128,7 +132,11 @@ class ImpulsiveError(GeneratorError):
         )
 
     def close(self, exponentials: np.ndarray) -> np.ndarray:
-        """Exponentials of shape (count, N, N) as transitions ``V exp U`` of shape (count, n, n)."""
+        """Exponentials of shape (count, N, N) as transitions ``V exp U`` of shape (count, n, n).
+
+        Args:
+            exponentials: of the generator, see `GapError`.
+        """
         return np.asarray(self.kept @ exponentials @ self.spread)
 
     @property

@@ -45,7 +45,11 @@ class Condition:
         return Condition(self.M[chosen], self.N[chosen], self.w[chosen])
 
     def joined(self, other: Condition) -> Condition:
-        """Both together."""
+        """Both together.
+
+        Args:
+            other: of the same components.
+        """
         pairs = ((self.M, other.M), (self.N, other.N), (self.w, other.w))
         return Condition(*(np.concatenate(pair) for pair in pairs))
 
@@ -53,6 +57,9 @@ class Condition:
 def transition_condition(matrices: np.ndarray, weights: Array = 1.0) -> Condition:
     """``(F' P F - P) / weight < 0`` for transitions of shape (count, n, n) and weights of shape (count,) or a
     number.
+
+    Args:
+        matrices: transitions F, shape (count, n, n).
     """
     scale = 1.0 / np.broadcast_to(np.asarray(weights, dtype=float), (len(matrices),))
     return Condition(0.5 * scale[:, None, None] * matrices, matrices, scale)
@@ -64,14 +71,22 @@ def flow_condition(matrix: np.ndarray) -> Condition:
 
 
 def inequalities(condition: Condition, P: np.ndarray) -> np.ndarray:
-    """Left-hand side of every inequality at P, shape (count, n, n)."""
+    """Left-hand side of every inequality at P, shape (count, n, n).
+
+    Args:
+        condition: inequalities in P.
+    """
     half = np.swapaxes(condition.M, 1, 2) @ P @ condition.N
     values = half + np.swapaxes(half, 1, 2) - condition.w[:, None, None] * P
     return np.asarray(values)
 
 
 def decrease(condition: Condition, P: np.ndarray) -> np.ndarray:
-    """Largest eigenvalue of every inequality at P, shape (count,); all negative when P is a Lyapunov matrix."""
+    """Largest eigenvalue of every inequality at P, shape (count,); all negative when P is a Lyapunov matrix.
+
+    Args:
+        condition: inequalities in P.
+    """
     return np.asarray(np.linalg.eigvalsh(inequalities(condition, P))[:, -1])
 
 

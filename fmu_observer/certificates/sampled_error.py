@@ -65,7 +65,11 @@ class SampledError(GeneratorError):
         return matrix
 
     def close(self, exponentials: np.ndarray) -> np.ndarray:
-        """Exponentials of shape (count, n + 1, n + 1) as transitions of shape (count, n, n)."""
+        """Exponentials of shape (count, n + 1, n + 1) as transitions of shape (count, n, n).
+
+        Args:
+            exponentials: of the generator, see `GapError`.
+        """
         n = self.size
         closed = exponentials[:, :n, :n].copy()
         closed[:, :, 0] += exponentials[:, :n, n]  # the innovation starts as the first error component

@@ -142,7 +142,11 @@ def bound_table(thetas: Sequence[float] = THETAS, lipschitz: float = 0.0) -> tup
 
 
 def bound_text(rows: Sequence[BoundRow]) -> str:
-    """The table as plain text, one line a gain, all gaps in seconds."""
+    """The table as plain text, one line a gain, all gaps in seconds.
+
+    Args:
+        rows: one for each gain.
+    """
     head = (
         f"{'theta':>6} {'(1.52)':>8} {'(3.32)':>8} {'(3.67)':>8} {'(3.87)':>8} {'mixed gaps':>11} {'constant gap':>13}"
     )

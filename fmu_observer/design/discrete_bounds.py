@@ -59,6 +59,10 @@ def transition_lipschitz(model: ObserverModel, period: float, scale: float) -> f
 
     ``exp(mu T) (exp(rho T) - 1)`` by Gronwall's lemma, mu the logarithmic norm of A_c and rho the constant of ``phi``
     about its centre.
+
+    Args:
+        model: the plant as the observer knows it. period: sampling period [s].
+        scale: of the coordinates, ``x_i / scale^i``.
     """
     centre = centre_of(model)
     A = scaled(centre, scale)
@@ -74,6 +78,9 @@ def discrete_bound(model: ObserverModel, gain: np.ndarray, period: float) -> Dis
 
     ``e+ = (A_d - L C) e + g`` with ``|g| <= lipschitz |e|`` decays when the loop gain is below one (small-gain theorem;
     quadratic stability for norm-bounded uncertainty asks the same).
+
+    Args:
+        model: the plant as the observer knows it.
     """
     closed = expm(centre_of(model) * period) - gain @ model.C
     radius = float(np.abs(np.linalg.eigvals(closed)).max())

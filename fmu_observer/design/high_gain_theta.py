@@ -14,7 +14,11 @@ THETAS = np.geomspace(1.0, 1e4, 4001)
 
 
 def binomial_gain(order: int) -> np.ndarray:
-    """Shape K of the gain with all poles of ``A - K C`` at -1, shape (n,): (2, 1), (3, 3, 1), ..."""
+    """Shape K of the gain with all poles of ``A - K C`` at -1, shape (n,): (2, 1), (3, 3, 1), ...
+
+    Args:
+        order: number of states of the chain.
+    """
     return np.asarray(np.poly(-np.ones(order))[1:])
 
 
@@ -50,6 +54,9 @@ def theta_from_lipschitz(model: ObserverModel, K: np.ndarray) -> float:
 def theta_from_slopes(model: ObserverModel, K: np.ndarray) -> float:
     """The same with the slopes of phi instead of one constant: smaller, because damping and coupling shrink with theta
     [1/s].
+
+    Args:
+        model: the plant as the observer knows it. K: gain of the linear part, shape (n,).
 
     Returns:
         The smallest theta of a fine grid from which on ``theta > 2 lmax(P) |inv(S) slope S|``; inf without slopes or

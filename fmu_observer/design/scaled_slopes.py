@@ -12,13 +12,20 @@ from fmu_observer.models import ObserverModel
 
 
 def powers(scale: float, order: int) -> np.ndarray:
-    """Sizes of the states, ``s^0 ... s^(n-1)``, shape (n,)."""
+    """Sizes of the states, ``s^0 ... s^(n-1)``, shape (n,).
+
+    Args:
+        scale: of the coordinates, ``x_i / scale^i``. order: number of states of the chain.
+    """
     return np.asarray(scale ** np.arange(order, dtype=float))
 
 
 def scaled(matrix: np.ndarray, scale: float) -> np.ndarray:
     """``inv(S) M S`` with ``S = diag(1, s, ..., s^(n-1))``: a matrix of the flow in scaled coordinates, shape (n,
     n).
+
+    Args:
+        scale: of the coordinates, ``x_i / scale^i``.
     """
     sizes = powers(scale, len(matrix))
     return np.asarray(matrix * sizes[None, :] / sizes[:, None])

@@ -56,7 +56,11 @@ def placed_gains(model: TakagiSugenoModel, poles: np.ndarray) -> np.ndarray:
 
 
 def vertex_errors(model: TakagiSugenoModel, gains: np.ndarray) -> list[np.ndarray]:
-    """``A_i - K_i C`` in the model's scaled coordinates, N matrices of shape (n, n)."""
+    """``A_i - K_i C`` in the model's scaled coordinates, N matrices of shape (n, n).
+
+    Args:
+        gains: of all vertices.
+    """
     T = np.asarray(model.scaling)
     return [(A - K @ model.C) * T[:, None] / T for A, K in zip(model.A, gains, strict=True)]
 
@@ -84,7 +88,7 @@ def designed_gains(model: TakagiSugenoModel, decay: float = 1.0) -> np.ndarray:
 
     Args:
         model: N vertices; all its measurements count as continuous. decay: rate at which the error shall decay at least
-        [1/s].
+            [1/s].
 
     Returns:
         Gains of shape (N, n, q) in SI units, their inequality recomputed.

@@ -61,6 +61,9 @@ def scaled_thau_bound(model: ObserverModel, gain: np.ndarray, scale: float = 1.0
 def best_thau_bound(model: ObserverModel, gain: np.ndarray) -> ThauBound:
     """The bound in the coordinates, of a geometric grid of scales, in which it leaves the largest factor over the
     constant.
+
+    Args:
+        model: the plant as the observer knows it. gain: shape (n, q).
     """
     bounds = [scaled_thau_bound(model, gain, float(s)) for s in SCALES]
     return max(bounds, key=lambda b: b.valid / max(b.lipschitz, 1e-12))

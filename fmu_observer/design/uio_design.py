@@ -57,7 +57,11 @@ def uio_matrices(mass: float, drag_slope: float) -> tuple[np.ndarray, np.ndarray
 
 
 def discretise(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
-    """Zero-order-hold discretisation: ``A_d`` of shape (n, n) and ``B_d`` of shape (n,) for a period [s]."""
+    """Zero-order-hold discretisation: ``A_d`` of shape (n, n) and ``B_d`` of shape (n,) for a period [s].
+
+    Args:
+        A: shape (n, n). B: shape (n, m).
+    """
     n = len(B)
     block = np.zeros((n + 1, n + 1))
     block[:n, :n], block[:n, n] = A, B

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from plant_models.railway.adhesion import POLACH_DRY, POLACH_WET, PolachCurve
+from plant_models.railway.adhesion.polach import POLACH_DRY, POLACH_WET, PolachCurve
 
 KMH = 3.6  # km/h in one m/s
 MAP_SPEEDS = tuple(
@@ -80,6 +80,9 @@ def degraded_map() -> AdhesionMap:
 def published_map(degraded: bool) -> AdhesionMap:
     """Table 4.5 as printed on the speeds of `MAP_SPEEDS`: linear between its six speeds, constant outside 5 to 50
     km/h.
+
+    Args:
+        degraded: True for wet rail, False for dry.
     """
     speeds = np.array([5.0, 10.0, 20.0, 30.0, 40.0, 50.0]) / KMH
     slips = (0.304, 0.20, 0.144, 0.12, 0.096, 0.072) if degraded else (0.10, 0.08, 0.048, 0.04, 0.032, 0.032)

@@ -33,6 +33,9 @@ def slip_filter_derivative(filtered: Array, slip: Array, time_constant: Array) -
     """Derivative of the filtered slip [1/s]: first order, driven by the slip limited to [-1, 1].
 
     The limit [ours] bounds the memory of a wheel lock, where the guarded ratio reaches ``-v / floor``.
+
+    Args:
+        time_constant: of the filter [s].
     """
     return (np.clip(slip, -1.0, 1.0) - filtered) / time_constant
 
@@ -42,6 +45,9 @@ def indicator_level(filtered: Array, odometer: Array, speed: Array, threshold: A
 
     Judged only when the wheel or the train moves faster than `min_speed` [m/s]. Either suffices, else a locked wheel
     (odometer zero) under a moving train would count as nominal.
+
+    Args:
+        speed: of the train [m/s].
     """
     moving = np.maximum(np.abs(odometer), np.abs(speed)) > min_speed
     return np.where(moving, np.where(np.abs(filtered) > threshold, DEGRADED, NOMINAL), NOMINAL)

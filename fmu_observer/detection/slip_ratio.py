@@ -36,10 +36,18 @@ def odometer_slip(odometer: Array, speed: Array, floor: Array) -> Array:
 
 
 def odometer_slip_from_speed_slip(speed_slip_ratio: Array) -> Array:
-    """(3.49) from (3.13): ``l / (1 + l)`` [1], for a turning wheel (l > -1) and speeds above the guards."""
+    """(3.49) from (3.13): ``l / (1 + l)`` [1], for a turning wheel (l > -1) and speeds above the guards.
+
+    Args:
+        speed_slip_ratio: ``(r w - v) / v`` [1].
+    """
     return speed_slip_ratio / (1.0 + speed_slip_ratio)
 
 
 def speed_slip_from_odometer_slip(odometer_slip_ratio: Array) -> Array:
-    """(3.13) from (3.49): ``l / (1 - l)`` [1], for a moving train (l < 1) and speeds above the guards."""
+    """(3.13) from (3.49): ``l / (1 - l)`` [1], for a moving train (l < 1) and speeds above the guards.
+
+    Args:
+        odometer_slip_ratio: ``(r w - v) / (r w)`` [1].
+    """
     return odometer_slip_ratio / (1.0 - odometer_slip_ratio)

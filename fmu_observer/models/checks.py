@@ -23,6 +23,9 @@ CAUSALITIES = {
 def check_identifiers(where: str, **names: object) -> None:
     """Name and event of a model are identifiers.
 
+    Args:
+        where: what is checked, for the message. names: by what they are.
+
     Raises:
         ValueError: one is not; the message says which.
     """
@@ -66,7 +69,7 @@ def checked_matrix(where: str, name: str, value: object, shape: tuple[int, ...],
 
     Args:
         where: for the message. name: of the matrix. value: what was given. shape: what is expected. reason: why that
-        shape.
+            shape.
 
     Raises:
         ValueError: it holds something else than finite numbers, or has another shape.
@@ -84,6 +87,9 @@ def checked_matrix(where: str, name: str, value: object, shape: tuple[int, ...],
 
 def check_numbers(where: str, positive: Mapping[str, float], not_negative: Mapping[str, float] | None = None) -> None:
     """Periods and bounds are numbers that make sense.
+
+    Args:
+        where: what is checked, for the message. positive: numbers by name. not_negative: numbers by name.
 
     Raises:
         ValueError: one is not finite, or too small; the message says which.

@@ -62,6 +62,9 @@ def transition(model: ObserverModel, x: Array, u: Array, period: Array) -> Array
 def transition_jacobian(model: ObserverModel) -> Callable[[Array, Array, Array], Array]:
     """Exact Jacobian of `transition` by x: a function of (x, u, period) that returns shape (n, n); also on traced
     symbols.
+
+    Args:
+        model: the plant as the observer knows it.
     """
     m = len(model.inputs)
     jacobian = exact_jacobian(lambda x, known: transition(model, x, known[:m], known[m]), model.order, m + 1)

@@ -8,7 +8,11 @@ from fmu_observer.models.model import ObserverModel
 
 
 def start_of(model: ObserverModel) -> np.ndarray:
-    """Start of the estimates, shape (n,)."""
+    """Start of the estimates, shape (n,).
+
+    Args:
+        model: the plant as the observer knows it.
+    """
     return np.array([float(s.start_values[0]) for s in model.states])
 
 

@@ -28,6 +28,9 @@ def require_linear(model: ObserverModel, observer: str, instead: str) -> None:
 def require_single_output(model: ObserverModel, observer: str) -> None:
     """The model has one measurement.
 
+    Args:
+        observer: name of the observer, for the message.
+
     Raises:
         ValueError: it has several or none.
     """
@@ -43,6 +46,9 @@ def require_triangular_chain(model: ObserverModel, observer: str) -> None:
     """A is the shift matrix, the first state is measured, and phi_i depends on x_1 ... x_i only: Bouchama 2024, (1.10).
 
     The last is read off the exact Jacobian of phi at a few states.
+
+    Args:
+        model: the plant as the observer knows it. observer: name of the observer, for the message.
 
     Raises:
         ValueError: one of them is not so; the message says which.

@@ -51,6 +51,9 @@ class Premise:
     def share(self, value: Array) -> Array:
         """Membership of the upper bound, ``(f - low) / (high - low)`` limited to [0, 1]; the lower bound has the
         rest.
+
+        Args:
+            value: of the premise.
         """
         return np.clip((value - self.low) / (self.high - self.low), 0.0, 1.0)
 
@@ -69,10 +72,11 @@ class TakagiSugenoModel:
 
     Args:
         name: identifier. description: one line. source: where the equations come from.
-        states: scalar `state` signals named by the quantity; their starts are the observer's starts.
-        inputs: scalar `input_signal`s, the known inputs u.
-        sampled: scalar `input_signal`s y1 that arrive at `event`; an observer calls them ``<event>_<name>``.
-        continuous: scalar `input_signal`s y2 that are there always; an observer calls them ``measured_<name>``.
+        states: scalar signals by `state` named by the quantity; their starts are the observer's starts.
+        inputs: scalar signals by `input_signal`, the known inputs u.
+        sampled: scalar signals by `input_signal` y1 that arrive at `event`; an observer calls them ``<event>_<name>``.
+        continuous: scalar signals by `input_signal` y2 that are there always; an observer calls them
+        ``measured_<name>``.
         premises: p of them. A: shape (2**p, n, n). B: shape (2**p, n, m).
         C_sampled: C1, shape (q1, n). C_continuous: C2, shape (q2, n).
         D: how the noise v enters y2, shape (q2, nv); None for the identity.
@@ -170,7 +174,11 @@ class TakagiSugenoModel:
         return tuple(weights)
 
     def outside(self, values: tuple[Array, ...]) -> Array:
-        """1 where some premise is outside its bounds, else 0."""
+        """1 where some premise is outside its bounds, else 0.
+
+        Args:
+            values: of the premises.
+        """
         flags = [p.outside(value) for p, value in zip(self.premises, values, strict=True)]
         worst: Array = 0.0
         for flag in flags:
@@ -178,7 +186,11 @@ class TakagiSugenoModel:
         return worst
 
     def blend(self, weights: tuple[Array, ...], x: Array, u: Array) -> Array:
-        """``sum_i h_i (A_i x + B_i u)``, shape (n,)."""
+        """``sum_i h_i (A_i x + B_i u)``, shape (n,).
+
+        Args:
+            weights: of the vertices, sum 1.
+        """
         total = 0.0 * x
         for weight, A, B in zip(weights, self.A, self.B, strict=True):
             linear = A @ x
@@ -194,7 +206,7 @@ class TakagiSugenoModel:
 
         Args:
             x: estimate, shape (n,). sampled: y1 of shape (q1,), or None to keep what the estimate says. continuous: y2,
-            likewise.
+                likewise.
 
         Returns:
             ``x + C^+ (y - C x)``, shape (n,); where rows of C pick states, these are replaced.

@@ -134,7 +134,11 @@ def observability(
 
 
 def observability_gramian(system: MeasuredSystem, pattern: SamplePattern) -> np.ndarray:
-    """W over a pattern in the units of the states, shape (n, n); from the last stretch back to the first."""
+    """W over a pattern in the units of the states, shape (n, n); from the last stretch back to the first.
+
+    Args:
+        system: A and C with scales.
+    """
     assert isinstance(system.C_continuous, np.ndarray)
     assert isinstance(system.C_sampled, np.ndarray)
     continuous, sampled = system.C_continuous.T @ system.C_continuous, system.C_sampled.T @ system.C_sampled

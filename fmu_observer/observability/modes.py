@@ -104,7 +104,12 @@ def unobservable_modes(system: MeasuredSystem, tolerance: float = RANK_TOLERANCE
 
 
 def undetectable_modes(system: MeasuredSystem, tolerance: float = RANK_TOLERANCE) -> list[Mode]:
-    """The unobservable modes that do not decay by themselves: no observer can make their error vanish."""
+    """The unobservable modes that do not decay by themselves: no observer can make their error vanish.
+
+    Args:
+        system: A and C with scales.
+        tolerance: below which a singular value counts as zero, relative to the largest.
+    """
     return [mode for mode in unobservable_modes(system, tolerance) if not mode.decays]
 
 
@@ -127,7 +132,11 @@ def require_detectable(system: MeasuredSystem) -> None:
 
 
 def unobservable_basis(A: np.ndarray, C: np.ndarray, tolerance: float = RANK_TOLERANCE) -> np.ndarray:
-    """Orthonormal basis of the unobservable subspace, the largest A-invariant one in the kernel of C, shape (n, k)."""
+    """Orthonormal basis of the unobservable subspace, the largest A-invariant one in the kernel of C, shape (n, k).
+
+    Args:
+        tolerance: below which a singular value counts as zero, relative to the largest.
+    """
     basis, inner, seen = np.eye(len(A)), A, C
     size = _norm(C)
     while basis.shape[1]:

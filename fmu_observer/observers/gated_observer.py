@@ -33,14 +33,14 @@ class GatedObserver(HybridSystem):
     The contract:
 
     1. A subclass declares the event `balise` with the payload `balise_position`, and the position it believes is the
-      state
-       `position_state`. It writes `update` in place of `jump`, and sees there its own states only.
+       state `position_state`. It writes `update` in place of `jump`, and sees there its own states only.
     2. The gate's memory stands behind all states, its parameters behind all parameters, and the payload of the event
-      gets
-       `balise_location_accuracy`. What became of a telegram is the event's `verdict`.
+       gets `balise_location_accuracy`. What became of a telegram is the event's `verdict`.
     3. `odometer_of`, `own_bound` and `listens` say what the gate may know more of the observer, `gate_start` what
-      `gate` is where
-       nobody sets it: `REJECT`, unless true telegrams are doubted in the shipped scenarios.
+       `gate` is where nobody sets it: `REJECT`, unless true telegrams are doubted in the shipped scenarios.
+
+    Args:
+        options: of the observer, see its `option_choices`.
     """
 
     position_state: int = 0
@@ -120,5 +120,9 @@ def _judged(event: TriggeredEvent) -> TriggeredEvent:
 
 
 def is_gate_parameter(signal: Signal) -> bool:
-    """Whether a parameter is one of the gate, which no question of stability depends on."""
+    """Whether a parameter is one of the gate, which no question of stability depends on.
+
+    Args:
+        signal: a parameter.
+    """
     return signal.name in {s.name for s in GATE_PARAMETERS}

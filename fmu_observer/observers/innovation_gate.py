@@ -86,7 +86,7 @@ class Told(NamedTuple):
     Args:
         position: told [m]. accuracy: of the place of the balise, either way [m]. estimate: believed position [m].
         bound: of the estimate's own error, where the observer has one [m]. odometer: reading [m/s]; None where there is
-        none.
+            none.
         t: stamp [s].
     """
 
@@ -109,7 +109,12 @@ class Judgement(NamedTuple):
 
 
 def gate_limit(before: GateMemory, told: Told, p: Any) -> Array:
-    """Innovation beyond which a position is doubted [m]."""
+    """Innovation beyond which a position is doubted [m].
+
+    Args:
+        before: memory of the gate before the telegram. told: the telegram and what the observer knows then.
+        p: parameters, as in `HybridSystem.flow`.
+    """
     way = np.abs(told.estimate - before.reference)
     granted = _granted(way, told.accuracy, p)
     return granted + told.bound + p.gate_spread * before.recent

@@ -38,17 +38,14 @@ class ModelObserver(HybridSystem):
     The contract:
 
     1. A subclass sets `timing`: measurements are ``continuous`` inputs ``measured_<y>``; or such inputs read at a
-      ``periodic``
-       event `sampling`; or the payload ``<event>_<y>`` of a triggered ``event``, the model's own.
+       ``periodic`` event `sampling`; or the payload ``<event>_<y>`` of a triggered ``event``, the model's own.
     2. The state begins with the estimates ``estimated_<x>``, n of them, which flow; behind them stand `extra_states`,
-      continuous
-       too, then `extra_memory`. Where `discrete` is set the estimates are memory and stand behind `extra_states`. A
-       subclass sets both before ``super().__init__``.
+       continuous too, then `extra_memory`. Where `discrete` is set the estimates are memory and stand behind
+       `extra_states`. A subclass sets both before ``super().__init__``.
     3. It writes `flow` or `jump` or both, and `condition_of`, the existence or stability condition for the gains in
-      use.
+       use.
     4. Gains are parameters (`gain_parameter`), so they can be changed in an FMU; their starts come from a design rule
-      that the
-       subclass names. Matrices are flat, row by row; `as_matrix` restores them.
+       that the subclass names. Matrices are flat, row by row; `as_matrix` restores them.
     5. Outputs are the estimates under the names of the model's states.
 
     Args:
@@ -112,7 +109,11 @@ class ModelObserver(HybridSystem):
         return stacked(tuple(getattr(u, f"{prefix}{s.name}") for s in self.model.measurements))
 
     def gain_parameter(self, name: str, start: np.ndarray, description: str, unit: str = "1") -> Signal:
-        """A gain as a parameter, flat, row by row; a single number where it has only one element and one dimension."""
+        """A gain as a parameter, flat, row by row; a single number where it has only one element and one dimension.
+
+        Args:
+            start: default, shape (n, q). unit: SI, as FMI writes units.
+        """
         values = np.asarray(start, dtype=float)
         if values.ndim == 0:
             return parameter(name, unit, float(values), description)

@@ -96,6 +96,9 @@ class SignalDifferentiator(HybridSystem):
         L bounds its derivative n + 1. `unit_sine_rate` is the largest rate [rad/s] of a sine of amplitude 1 that is
         within L, and ``chatter_i = L h^(n+1-i)`` the size of the error of derivative i that a time h between
         evaluations leaves.
+
+        Args:
+            preset: name of a preset that gives the parameters; None for the defaults.
         """
         p = self.unpack_parameters(parameter_values(self, parameters, preset, "to judge"))
         bound, h, n = float(p.bound), self.interval(p), self.order
@@ -116,7 +119,11 @@ class SignalDifferentiator(HybridSystem):
 
 
 def rate_unit(unit: str, order: int) -> str:
-    """Unit of a derivative of a signal; negative orders are integrals."""
+    """Unit of a derivative of a signal; negative orders are integrals.
+
+    Args:
+        unit: SI, as FMI writes units. order: number of states of the chain.
+    """
     if order == 0:
         return unit
     power = "" if abs(order) == 1 else str(abs(order))

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from fmus.check.checks import derivatives, events, instances, life, model, state, steps
 from fmus.check.context import Context
 from fmus.check.findings import Finding, Outcome, Verdict
-from fmus.check.library import CO_SIMULATION, MODEL_EXCHANGE
+from fmus.fmi.standard import CO_SIMULATION, MODEL_EXCHANGE
 
 NOTE, LIMIT, DISTRUST = Verdict.NOTE, Verdict.LIMIT, Verdict.DISTRUST
 

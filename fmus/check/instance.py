@@ -20,14 +20,15 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.model_description import ModelDescription, ModelVariable
 
-from fmus.check.description import declared_tolerance
-from fmus.check.library import fmi_version, load
+from fmus.fmi.description import declared_tolerance
+from fmus.fmi.library import load
+from fmus.fmi.ports import make_reader, make_writer
+from fmus.fmi.standard import FATAL, fmi_version
+from fmus.fmi.types import NUMERIC_TYPES
 from fmus.plain import one_line
-from fmus.ports import make_reader, make_writer
 
 LOADING = "loading the library"
 INSTANTIATING = "instantiate"
-FATAL = 4  # FMI status: the instance must not be called again
 MESSAGES_KEPT = 20
 OWN_MISTAKES = (
     TypeError,
@@ -39,12 +40,6 @@ OWN_MISTAKES = (
     ctypes.ArgumentError,
 )
 """What wrong calls end with, whatever FMU is called."""
-
-NUMERIC_TYPES = frozenset(
-    {"Real", "Integer", "Boolean", "Enumeration", "Float64", "Float32"}
-    | {f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)}
-)
-REAL_TYPES = frozenset({"Real", "Float64", "Float32"})
 
 
 def element_names(variable: ModelVariable) -> list[str]:

@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 
 from fmus.check.instance import FmuInstance
-from fmus.check.library import MODEL_EXCHANGE
-
-MAX_EVENT_ITERATIONS = 100
+from fmus.fmi.standard import MAX_EVENT_ITERATIONS, MODEL_EXCHANGE
 
 
 class FmuModel(FmuInstance):
@@ -45,7 +43,11 @@ class FmuModel(FmuInstance):
         self.guarded("enterContinuousTimeMode", self.slave.enterContinuousTimeMode)
 
     def set_time(self, t: float) -> None:
-        """The independent variable [s]."""
+        """The independent variable [s].
+
+        Args:
+            t: time at which it happened [s].
+        """
         self.guarded("setTime", lambda: self.slave.setTime(t))
 
     def states(self) -> np.ndarray:

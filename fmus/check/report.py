@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from fmus.check.archive import INTERFACES
 from fmus.check.findings import Verdict
 from fmus.check.run import CheckReport
+from fmus.fmi.archive import INTERFACES
 from fmus.plain import plain
 
 BULLET = "  - "

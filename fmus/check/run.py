@@ -11,16 +11,17 @@ from time import perf_counter
 
 from fmpy.model_description import ModelDescription
 
-from fmus.check.archive import Archive, NotAnFmuError, open_archive
 from fmus.check.bench import end_of_experiment
 from fmus.check.catalogue import CATALOGUE
 from fmus.check.checks.static import platforms, validation
 from fmus.check.findings import Class, Finding, Verdict, class_of
-from fmus.check.instance import INSTANTIATING, LOADING, NUMERIC_TYPES
+from fmus.check.instance import INSTANTIATING, LOADING
 from fmus.check.isolated import run_isolated
 from fmus.check.job import Job
-from fmus.check.library import CO_SIMULATION, SCHEDULED_EXECUTION
 from fmus.check.trust import what_to_trust
+from fmus.fmi.archive import Archive, NotAnFmuError, open_archive
+from fmus.fmi.standard import CO_SIMULATION, SCHEDULED_EXECUTION
+from fmus.fmi.types import NUMERIC_TYPES
 
 TIMEOUT = 30.0
 DEFAULT_STEP = 0.01
@@ -146,7 +147,11 @@ def check_count(archive: Archive) -> int:
 
 
 def default_step(description: ModelDescription) -> float:
-    """The communication step to check with [s]."""
+    """The communication step to check with [s].
+
+    Args:
+        description: model description of the FMU.
+    """
     experiment = description.defaultExperiment
     if experiment is None:
         return DEFAULT_STEP

@@ -10,15 +10,8 @@ from typing import Any
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import fmi2Discard, fmi2Terminated
 
-from fmus.check.instance import FATAL, FmuInstance
-from fmus.check.library import CO_SIMULATION
-
-TIME_TOLERANCE = 1e-9
-"""Communication times closer than this are the same [s]."""
-
-MAX_EVENT_ITERATIONS = 100
-MAX_RETURNS_PER_STEP = 10_000
-STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
+from fmus.check.instance import FmuInstance
+from fmus.fmi.standard import CO_SIMULATION, FATAL, MAX_EVENT_ITERATIONS, MAX_RETURNS_PER_STEP, STATUS, TIME_TOLERANCE
 
 
 @dataclass(frozen=True)
@@ -67,7 +60,11 @@ class FmuSlave(FmuInstance):
         ]
 
     def enter_initialization(self, start_time: float, stop_time: float) -> None:
-        """Begin initialisation; times in [s]."""
+        """Begin initialisation; times in [s].
+
+        Args:
+            start_time: [s]. stop_time: [s], without effect.
+        """
         self._next_event = math.inf
         self._enter_initialization(start_time, stop_time)
 

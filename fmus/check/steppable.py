@@ -20,8 +20,7 @@ class Steppable(Protocol):
     """A co-simulation component, from instantiation to the end.
 
     1. `instantiate`, `set_start`, `enter_initialization`, readers and writers, `exit_initialization`, then `advance` in
-      turn,
-       `terminate`, `free`. `reset` leads back to the state after `instantiate`.
+       turn, `terminate`, `free`. `reset` leads back to the state after `instantiate`.
     2. `save`, `restore` and `release` exist where `can_save` says so.
     3. Each call raises one of `FAILURES` where the slave refuses or throws.
     """
@@ -54,10 +53,18 @@ class Steppable(Protocol):
         """Back to the state after `instantiate`."""
 
     def set_start(self, name: str, value: float) -> None:
-        """Set a variable before initialisation."""
+        """Set a variable before initialisation.
+
+        Args:
+            name: of the class.
+        """
 
     def enter_initialization(self, start_time: float, stop_time: float) -> None:
-        """Begin initialisation; times in [s]."""
+        """Begin initialisation; times in [s].
+
+        Args:
+            start_time: [s]. stop_time: [s], without effect.
+        """
 
     def exit_initialization(self) -> None:
         """End initialisation, discrete states settled."""
@@ -87,4 +94,8 @@ class Steppable(Protocol):
         """Free the instance and its library; never raises."""
 
     def failure(self, reason: str, t: float | None = None) -> Exception:
-        """An error of this component, one of `FAILURES`."""
+        """An error of this component, one of `FAILURES`.
+
+        Args:
+            t: time at which it happened [s].
+        """

@@ -17,10 +17,10 @@ from typing import Any, NoReturn
 
 from fmus.check.catalogue import CATALOGUE, REPEATED, Check
 from fmus.check.context import Context
-from fmus.check.description import read_description
 from fmus.check.findings import Finding, Outcome, Verdict, failed
 from fmus.check.instance import SlaveError
 from fmus.check.job import Job
+from fmus.fmi.description import read_description
 
 BY_HAND = "check this by hand"
 DIFFERS = "not run, because equal runs differ"
@@ -85,7 +85,11 @@ def findings(
 
 
 def unrun(name: str, basis: str) -> Finding:
-    """The finding of a check that could not run because another one failed."""
+    """The finding of a check that could not run because another one failed.
+
+    Args:
+        name: of the class.
+    """
     return Finding(name, Verdict.SKIPPED, f"not run, because '{basis}' failed")
 
 

@@ -17,6 +17,7 @@ from fmus.cli import build as build_cli
 from fmus.cli.failures import EXPECTED, words
 from fmus.cli.signals import BROKEN_PIPE, forget_output, interruptible
 from fmus.plain import plain
+from fmus.text_table import text_table
 
 OK, PROBLEMS, FAILED = 0, 1, 2
 
@@ -68,14 +69,15 @@ def _parser() -> argparse.ArgumentParser:
 
 def _list(_options: argparse.Namespace) -> int:
     recipes = import_module("fmus.recipes")
-    width = max(map(len, recipes.RECIPES))
     for room, names in recipes.by_room(recipes.RECIPES).items():
         print(f"# {room}")
+        rows = []
         for name in names:
-            print(f"{name:<{width}} {_first_line(recipes.RECIPES[name].description)}")
-            for line in _choices(name):
-                print(f"{'':{width}}   {line}")
-        print()
+            rows += [
+                [name, _first_line(recipes.RECIPES[name].description)],
+                *(["", f"  {line}"] for line in _choices(name)),
+            ]
+        print("\n".join(text_table(rows, left=(0, 1))), end="\n\n")
     return OK
 
 

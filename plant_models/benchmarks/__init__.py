@@ -1,9 +1,5 @@
 """The small academic plants on which observers are shown."""
 
-from plant_models.benchmarks.e1 import TriangularisablePlant
-from plant_models.benchmarks.e2 import NonTriangularisablePlant
-from plant_models.benchmarks.pendulum import Pendulum
+from plant_models.registry import lazy_names
 
-SYSTEMS = (Pendulum, TriangularisablePlant, NonTriangularisablePlant)
-
-__all__ = ["SYSTEMS", "NonTriangularisablePlant", "Pendulum", "TriangularisablePlant"]
+__getattr__ = lazy_names(__name__)

@@ -63,7 +63,7 @@ def step(
 
     Args:
         t: time at the start [s]. h: step [s]. x: state, shape (n,). u: inputs held over the step, shape (m,). p: shape
-        (k,).
+            (k,).
         jacobian: exact derivatives of `effective_flow`, needed by ``rosenbrock``; see `tracing`.
 
     Returns:
@@ -103,7 +103,12 @@ def step(
 
 
 def rk4_step(derivative: Derivative, t: Array, h: Array, x: Array) -> Array:
-    """The classical Runge-Kutta step of order 4."""
+    """The classical Runge-Kutta step of order 4.
+
+    Args:
+        derivative: of time [s] and state. t: start of the step [s]. h: its length [s].
+        x: state at `t`, shape (n,) or (n, members).
+    """
     k1 = derivative(t, x)
     k2 = derivative(t + 0.5 * h, x + 0.5 * h * k1)
     k3 = derivative(t + 0.5 * h, x + 0.5 * h * k2)
@@ -141,7 +146,7 @@ def rosenbrock_step(
     Args:
         derivative, jacobian: of the flow with dry friction resolved. t: time at the start [s]. h: step [s].
         x: continuous states, shape (nc,). at_rest: 1 for states at rest under dry friction, else 0, shape (nc,); None
-        without.
+            without.
         stiff: 1 for states treated implicitly, else 0, shape (nc,); None for all.
     """
     implicit = 1.0 if stiff is None else stiff
@@ -180,6 +185,11 @@ def damped_step(by_state: Array, move: Array, missing: Array, h: Array, x: Array
 
     The update adds a multiple of `missing` in every column, so that what the flow conserves, momentum above all, stays
     conserved.
+
+    Args:
+        by_state: Jacobian of the flow, shape (n, n).
+        h: length of the step [s].
+        x: state at its start, shape (n,). flow: derivative there, shape (n,).
     """
     length = move @ move
     steeper = by_state + np.outer(missing, move) / np.where(length == 0.0, 1.0, length)

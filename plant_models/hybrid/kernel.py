@@ -1,8 +1,8 @@
 """Kernels: how the functions of a hybrid system are evaluated at run time.
 
 A kernel works in place on three arrays (state, inputs, parameters). `TracedKernel` calls CasADi functions through
-preset buffers, `NumpyKernel` calls the Python functions themselves; both have the same face and `runtime` cannot tell
-them apart.
+preset buffers, `NumpyKernel` calls the Python functions themselves; both have the same interface and `runtime` cannot
+tell them apart.
 """
 
 from __future__ import annotations
@@ -109,7 +109,11 @@ class NumpyKernel(_Arrays):
 
 
 class TracedKernel(_Arrays):
-    """Evaluation by traced CasADi functions through preset buffers (a few microseconds a call, no allocation)."""
+    """Evaluation by traced CasADi functions through preset buffers (a few microseconds a call, no allocation).
+
+    Args:
+        system: traced once, when the kernel is made.
+    """
 
     def __init__(self, system: HybridSystem) -> None:
         super().__init__(system)

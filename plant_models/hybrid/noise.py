@@ -50,6 +50,10 @@ def uniform_pair(seed: int, signal: int, index: int) -> tuple[float, float]:
 
 
 def standard_normal(seed: int, signal: int, index: int) -> float:
-    """A standard normal number by Box and Muller from the two uniform numbers of `uniform_pair`."""
+    """A standard normal number by Box and Muller from the two uniform numbers of `uniform_pair`.
+
+    Args:
+        seed: of the run. signal: number of the noise signal. index: number of the draw, from 0.
+    """
     first, second = uniform_pair(seed, signal, index)
     return math.sqrt(-2.0 * math.log(first)) * math.cos(2.0 * math.pi * second)

@@ -41,7 +41,11 @@ def within_bounds(signals: Sequence[Signal], p: Any) -> dict[str, Any]:
 
 
 def named_parameters(system: HybridSystem, text: str) -> list[int]:
-    """Positions in `p` of the parameters that a text names, in the order of the parameters."""
+    """Positions in `p` of the parameters that a text names, in the order of the parameters.
+
+    Args:
+        system: whose parameters are meant.
+    """
     return [
         i
         for i, name in enumerate(scalar_names(system.parameter_signals))

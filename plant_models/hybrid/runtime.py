@@ -1,7 +1,7 @@
 """Runtime: a hybrid system moving through time, events included.
 
 This is the reference for the C runtime: the same grid, the same order of events, the same numbers. It knows no FMI; the
-block (package `fmu_observer`) puts that face on it.
+block (package `fmu_observer`) puts that interface on it.
 """
 
 from __future__ import annotations
@@ -40,8 +40,7 @@ class Runtime:
     2. `advance(t_end)` integrates on the absolute grid ``t0 + k * internal_step``, so that splitting a step changes
        nothing, and hits every periodic instant in ``(t, t_end]`` exactly, in the declared order.
     3. `start(t0)` fires the periodic events that are due at ``t0``, then the communication events; `communicate()`
-      fires these
-       at the end of a communication step.
+       fires these at the end of a communication step.
     4. `trigger(event)` jumps now, with the payload that stands in `u`.
     5. `snapshot` / `restore` are exact: what follows a restore is bit-identical to what followed the snapshot.
 

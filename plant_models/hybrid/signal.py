@@ -93,12 +93,22 @@ class Signal:
 
 
 def state(name: str, unit: str, start: Start = 0.0, description: str = "", *, size: int | None = None) -> Signal:
-    """A continuous state: flows between events, may jump at them."""
+    """A continuous state: flows between events, may jump at them.
+
+    Args:
+        name: of the signal. unit: SI, as FMI writes units (``m/s2``). start: initial value; a sequence for vectors.
+        description: one line. size: number of elements of a vector, None for a scalar.
+    """
     return Signal(name, unit, "local", "continuous", start, description=description, size=size)
 
 
 def memory(name: str, unit: str, start: Start = 0.0, description: str = "", *, size: int | None = None) -> Signal:
-    """A discrete state: constant between events, changes only in jumps."""
+    """A discrete state: constant between events, changes only in jumps.
+
+    Args:
+        name: of the signal. unit: SI, as FMI writes units (``m/s2``). start: initial value; a sequence for vectors.
+        description: one line. size: number of elements of a vector, None for a scalar.
+    """
     return Signal(name, unit, "local", "discrete", start, description=description, size=size)
 
 
@@ -112,7 +122,13 @@ def input_signal(
     variability: Variability = "continuous",
     display_unit: str | None = None,
 ) -> Signal:
-    """An input; `start` is used while nothing is connected to it."""
+    """An input; `start` is used while nothing is connected to it.
+
+    Args:
+        name: of the signal. unit: SI, as FMI writes units (``m/s2``).
+        description: one line. size: number of elements of a vector, None for a scalar.
+        variability: FMI's word, ``continuous`` or ``discrete``. display_unit: for the user's edge, such as ``km/h``.
+    """
     return Signal(name, unit, "input", variability, start, None, None, description, size, display_unit)
 
 
@@ -126,7 +142,13 @@ def output_signal(
     size: int | None = None,
     integer: bool = False,
 ) -> Signal:
-    """An output, computed from time, state, input and parameters."""
+    """An output, computed from time, state, input and parameters.
+
+    Args:
+        name: of the signal. unit: SI, as FMI writes units (``m/s2``). description: one line.
+        variability: FMI's word. display_unit: for the user's edge. size: number of elements, None for a scalar.
+        integer: whether the FMU shows it as an integer variable.
+    """
     return Signal(name, unit, "output", variability, 0.0, None, None, description, size, display_unit, integer)
 
 
@@ -142,7 +164,13 @@ def parameter(
     size: int | None = None,
     display_unit: str | None = None,
 ) -> Signal:
-    """A parameter: fixed after initialisation, or tunable between steps."""
+    """A parameter: fixed after initialisation, or tunable between steps.
+
+    Args:
+        name: of the signal. unit: SI, as FMI writes units. start: default. description: one line.
+        min, max: bounds, refused beyond them; None for none. variability: ``fixed`` or ``tunable``.
+        size: number of elements, None for a scalar. display_unit: for the user's edge.
+    """
     return Signal(name, unit, "parameter", variability, start, min, max, description, size, display_unit)
 
 

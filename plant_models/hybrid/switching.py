@@ -25,7 +25,11 @@ class Trial(Protocol):
 
 
 def divided_step(kernel: Trial, t: float, h: float) -> None:
-    """Advance by one internal step of length `h` [s] from `t` [s], divided where switches change."""
+    """Advance by one internal step of length `h` [s] from `t` [s], divided where switches change.
+
+    Args:
+        kernel: one step that may fail where a switch changes.
+    """
     end = t + h
     divisions = 0
     while kernel.attempt(t, h) and divisions < MOST_SWITCHES:

@@ -51,24 +51,20 @@ class HybridSystem:
     3. ``x`` is an array of shape (n,) (or (n, members) in a batch): the continuous states first, then the memory.
        ``u`` and ``p`` are named tuples of the inputs (with event payloads and noises) and of the parameters.
     4. `flow` returns the derivatives of the continuous states, shape (nc,); `jump` returns the whole new ``x``, shape
-      (n,);
-       `output` returns a dictionary with every declared output.
+       (n,); `output` returns a dictionary with every declared output.
     5. Dry friction is declared, not regularised: a state named in `frictions` feels a resistance of magnitude
        `friction(...)` against its sign. The integrator lets it stop exactly at zero and stay there while the flow is
        smaller than the friction.
     6. Equations that change at a place or an instant are declared too: `switchings` names switching functions,
-      `switching(...)`
-       computes them, and `flow`, `friction` and `output` ask `switches(...)` on which side of each they are. The
-       integrator holds the sides during a step and ends it where one changes its sign: the edge is an exact event, seen
-       by no stage early.
+       `switching(...)` computes them, and `flow`, `friction` and `output` ask `switches(...)` on which side of each
+       they are. The integrator holds the sides during a step and ends it where one changes its sign: the edge is an
+       exact event, seen by no stage early.
     7. Numbers that shape the equations themselves (an order, a mode) are constructor arguments, listed in `options`.
     8. A vector parameter that an exported model reads from a file of its own is listed in `resources`.
     9. Where only some states are stiff, `stiff` names all of these and `rosenbrock` treats them alone implicitly. The
-      step
-       keeps its order; with all states that carry a conserved sum among them, momentum say, it stays conserved.
+       step keeps its order; with all states that carry a conserved sum among them, momentum say, it stays conserved.
     10. Time does not run with parameters that break one of the `requirements`: bounds to be kept (`within_bounds`), or
-      what
-        several must fulfil together. They are checked before time runs, so they are about fixed parameters.
+        what several must fulfil together. They are checked before time runs, so they are about fixed parameters.
     11. A system that cannot be traced says ``traceable = False`` and may then use any Python.
     """
 
@@ -184,6 +180,9 @@ class HybridSystem:
     def unpack_inputs(self, values: Array, held_switches: Array | None = None) -> Any:
         """Named tuple `u` from the flat array, shape (m,) or (m, members), with the switches that an integration step
         holds.
+
+        Args:
+            held_switches: values of the switches, shape (k,); None where the system has none.
         """
         return self._input_type(*_split(values, self.input_signals), held_switches)
 
@@ -230,7 +229,11 @@ class HybridSystem:
         return values
 
     def state_derivative(self, t: Array, x: Array, u: Array, p: Array, held_switches: Array | None = None) -> Array:
-        """`flow` on flat arrays: derivatives of the continuous states, shape (nc,)."""
+        """`flow` on flat arrays: derivatives of the continuous states, shape (nc,).
+
+        Args:
+            held_switches: see `unpack_inputs`.
+        """
         derivative = self.flow(t, x, self.unpack_inputs(u, held_switches), self.unpack_parameters(p))
         return self._checked("flow()", derivative, self.continuous_count)
 
@@ -257,7 +260,11 @@ class HybridSystem:
         return self._checked(f"jump({event!r})", after, self.state_count)
 
     def friction_vector(self, t: Array, x: Array, u: Array, p: Array, held_switches: Array | None = None) -> Array:
-        """`friction` on flat arrays, shape (len(frictions),)."""
+        """`friction` on flat arrays, shape (len(frictions),).
+
+        Args:
+            held_switches: see `unpack_inputs`.
+        """
         return self.friction(t, x, self.unpack_inputs(u, held_switches), self.unpack_parameters(p))
 
     def switching_vector(self, t: Array, x: Array, u: Array, p: Array) -> Array:

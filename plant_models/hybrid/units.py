@@ -107,6 +107,9 @@ def conversion(source: Unit, target: Unit) -> tuple[float, float]:
 
     Angles in rad are treated as pure numbers, as SI does.
 
+    Args:
+        source, target: units with their factors, offsets and exponents of the SI base units.
+
     Raises:
         UnitError: the units measure different things, or one of them nothing: its factor is zero or not finite.
     """

@@ -25,7 +25,7 @@ class ContinuousPart:
 
     Args:
         system: the hybrid system. preset: its preset; None for the default one. parameters: values that replace the
-        preset's.
+            preset's.
         memory: values at which discrete states are held; by default their starts.
 
     Raises:
@@ -135,6 +135,9 @@ def filled(starts: Mapping[str, float], values: Values | None, what: str) -> np.
 
 def known(name: str, names: Iterable[str], what: str) -> str:
     """The name itself.
+
+    Args:
+        what: kind of thing, for the message.
 
     Raises:
         ValueError: it is not among `names`; the nearest ones are given.

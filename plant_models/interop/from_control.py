@@ -44,6 +44,12 @@ class ControlSystem(HybridSystem):
     A continuous one flows. A discrete one steps at ``start + sample_offset + k * sample_period``: there it reads its
     inputs, puts out ``y[k]``, which is held until the next instant, and moves on to ``x[k+1]``, which is what its
     states then hold.
+
+    Args:
+        update, read: state and output equations as functions of `t`, `x`, `u`, `params`.
+        name, description, source: of the system. states, inputs, outputs, parameters: its signals.
+        constants: parameters that are no numbers and are passed as they are.
+        sample_period: [s], 0 for a continuous system. method: of integration. internal_step: [s].
     """
 
     def __init__(

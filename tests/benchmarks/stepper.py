@@ -12,6 +12,7 @@ import ctypes
 import subprocess
 import sys
 import tempfile
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -22,6 +23,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from test_fmus.build import linear_fmu
 
+from cosim.compiled.choice import choose_stepper
 from cosim.components.loading import load_fmu
 from cosim.coupling.connection import connect
 from cosim.coupling.plan import Plan, make_plan
@@ -69,7 +71,7 @@ def chain(folder: Path, count: int) -> Plan:
 def by_master(folder: Path, count: int, steps: int, stepper: Any) -> float:
     """Seconds per communication step."""
     plan = chain(folder, count)
-    master = Master(plan, TimeAxis(0.0, STEP, steps), stepper=stepper)
+    master = Master(plan, TimeAxis(0.0, STEP, steps), stepper=partial(choose_stepper, stepper))
     try:
         master.run()
     finally:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from cosim.coupling.strong import strong_groups
-from cosim.diagnostics.structure import Balises, Link, Part, Port, Structure
+from cosim.structure.structure import Balises, Link, Part, Port, Structure
 
 
 def structure_of(

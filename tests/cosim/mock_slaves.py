@@ -274,7 +274,7 @@ class EventMode(Mock):
 
 
 class FMI2(Mock):
-    """Mixin: the FMI 2 face."""
+    """Mixin: the FMI 2 interface."""
 
     version = 2
 
@@ -291,8 +291,8 @@ class FMI2(Mock):
 
 def component(slave: Mock, name: str = "mock") -> Component:
     """A mock as the master sees it."""
-    face = FMI2Component if slave.version == 2 else FMI3Component
-    return face(name, slave, slave.model_description)
+    interface = FMI2Component if slave.version == 2 else FMI3Component
+    return interface(name, slave, slave.model_description)
 
 
 def started(slave: Mock, name: str = "mock", t0: float = 0.0) -> Component:

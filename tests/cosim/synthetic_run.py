@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.report.spec import Phase, ReportSpec
+from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 
 ZONES = ((10.0, 20.0), (40.0, 50.0), (70.0, 80.0))

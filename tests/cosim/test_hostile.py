@@ -19,8 +19,7 @@ from test_fmus.events import DEEDS, hostile_fmu
 
 from cosim import CosimError, Scenario, load_result
 from cosim.cli import main
-from cosim.compiled import library
-from cosim.compiled.library import cached_library
+from cosim.compiled.library import stepper_library
 from cosim.components import surroundings
 from cosim.components.fmi2 import FMI2Component
 from cosim.process import sentinel, watch
@@ -359,10 +358,10 @@ def test_a_damaged_stepper_in_the_cache_is_built_again(tmp_path: Path, monkeypat
         (folder / name).write_bytes(b"a library" * 1000)
         return folder / name
 
-    monkeypatch.setattr(library, "compile_library", compiled)
-    path = cached_library(find_compiler(), tmp_path)
-    assert cached_library(find_compiler(), tmp_path) == path
+    monkeypatch.setattr("fmus.toolchain.cached_library.compile_library", compiled)
+    path = stepper_library(find_compiler(), tmp_path)
+    assert stepper_library(find_compiler(), tmp_path) == path
     assert len(built) == 1
     path.write_bytes(path.read_bytes()[:5000])
-    assert len(cached_library(find_compiler(), tmp_path).read_bytes()) == 9000
+    assert len(stepper_library(find_compiler(), tmp_path).read_bytes()) == 9000
     assert len(built) == 2

@@ -1,4 +1,4 @@
-"""Small hybrid systems for the tests of the block, and a handle that drives either FMI face, or the runtime, by
+"""Small hybrid systems for the tests of the block, and a handle that drives either FMI interface, or the runtime, by
 names.
 """
 
@@ -133,7 +133,7 @@ class Explosion(HybridSystem):
 
 
 class Driven:
-    """A block driven by the names of its variables, the same way through either face.
+    """A block driven by the names of its variables, the same way through either interface.
 
     An event is told with its stamp: in FMI 3 at once, in FMI 2 with the next step.
     """

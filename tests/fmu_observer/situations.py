@@ -114,15 +114,13 @@ def _known(model: Any) -> np.ndarray:
 
 def _motion(model: Any, start: np.ndarray) -> Callable[[float], np.ndarray]:
     u = _known(model)
-    solution = solve_ivp(
-        lambda _t, x: np.asarray(model.flow(x, u), dtype=float),
-        (0.0, HORIZON),
-        start,
-        rtol=1e-10,
-        atol=1e-12,
-        dense_output=True,
-    )
-    return lambda t: np.asarray(solution.sol(t))
+
+    @cache  # solved when it is first asked for: situations are made while tests are collected
+    def solution() -> Any:
+        flow = lambda _t, x: np.asarray(model.flow(x, u), dtype=float)  # noqa: E731
+        return solve_ivp(flow, (0.0, HORIZON), start, rtol=1e-10, atol=1e-12, dense_output=True).sol
+
+    return lambda t: np.asarray(solution()(t))
 
 
 def _named(signals: Sequence[Signal], values: Any, prefix: str = "") -> Values:

@@ -1,4 +1,6 @@
-"""Stepping: the FMI 2 face, the FMI 3 face and the bare runtime agree bit for bit, however a step is split."""
+"""Stepping: the FMI 2 interface, the FMI 3 interface and the bare runtime agree bit for bit, however a step is
+split.
+"""
 
 from __future__ import annotations
 

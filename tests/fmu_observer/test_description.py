@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,8 @@ import pytest
 from block_systems import SWING, Doorman, Swing
 from fmpy.model_description import ModelDescription, ModelVariable
 
-from fmu_observer import OBSERVERS
-from fmu_observer.description import STAMP_NOW, VariableTable, can_exchange, describe, exposed_inputs, referenced
+from fmu_observer import OBSERVERS, description
+from fmu_observer.description import STAMP_NOW, VariableTable, can_exchange, exposed_inputs, referenced
 from fmu_observer.event_protocol import EventProtocol
 from plant_models import PLANTS
 from plant_models.hybrid import CommunicationEvent, HybridSystem, output_signal, parameter, scalar_names, state
@@ -19,6 +20,9 @@ from plant_models.hybrid.units import parse_unit
 
 BOTH = pytest.mark.parametrize("version", [2, 3])
 SHIPPED: list[HybridSystem] = [cls() for cls in (*PLANTS.values(), *OBSERVERS.values())]
+
+describe = cache(description.describe)
+"""Once for each system, version and options: it traces the system."""
 
 # name, causality, variability, initial, unit, start
 TABLE = [

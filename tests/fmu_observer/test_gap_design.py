@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -14,26 +16,27 @@ from scipy.linalg import expm
 from fmu_observer import OBSERVERS
 from fmu_observer.certificates import SampledError
 from fmu_observer.design.certified_gains import rounded_down
-from fmu_observer.design.gap_aware import (
+from fmu_observer.design.noise_amplification import noise_amplification
+from fmu_observer.observers.train import DifferentiatorCdo, MultirateCdo, TrainObserver
+from fmu_observer.tuning.gap_aware import (
     GainDesign,
     balise_gaps,
     design_adaptive,
     design_high_gain,
     design_takagi_sugeno,
 )
-from fmu_observer.design.noise_amplification import noise_amplification
-from fmu_observer.observers.train import DifferentiatorCdo, MultirateCdo, TrainObserver
 
 TRACK = (100.0, (5.0, 14.0))
-DESIGNS = {
-    "high gain": design_high_gain(*TRACK),
-    "balises": design_takagi_sugeno(*TRACK),
-    "odometer": design_takagi_sugeno(*TRACK, trust="odometer"),
+DESIGNS: dict[str, Callable[[], GainDesign]] = {
+    "high gain": cache(lambda: design_high_gain(*TRACK)),
+    "balises": cache(lambda: design_takagi_sugeno(*TRACK)),
+    "odometer": cache(lambda: design_takagi_sugeno(*TRACK, trust="odometer")),
 }
 
 
-@pytest.mark.parametrize("design", DESIGNS.values(), ids=DESIGNS)
-def test_a_design_is_certified_with_its_margin_by_the_observer_itself(design: GainDesign) -> None:
+@pytest.mark.parametrize("make", DESIGNS.values(), ids=DESIGNS)
+def test_a_design_is_certified_with_its_margin_by_the_observer_itself(make: Callable[[], GainDesign]) -> None:
+    design = make()
     observer: TrainObserver = OBSERVERS[design.observer]()  # type: ignore[assignment]
     assert design.gaps.longest == pytest.approx(20.0)
     assert observer.certify(1.1 * design.gaps.longest, design.parameters).holds
@@ -42,7 +45,7 @@ def test_a_design_is_certified_with_its_margin_by_the_observer_itself(design: Ga
 
 
 def test_the_largest_theta_is_taken() -> None:
-    theta = DESIGNS["high gain"].parameters["theta"]
+    theta = DESIGNS["high gain"]().parameters["theta"]
     assert theta == pytest.approx(4.0 / 22.0, rel=0.01)  # three digits, and what the drag takes
     assert not OBSERVERS["differentiator_cdo"]().certify(22.0, {"theta": 1.02 * theta}).holds  # type: ignore[attr-defined]
     assert design_high_gain(*TRACK, observer=MultirateCdo()).parameters == {"theta_2": theta}
@@ -58,18 +61,19 @@ def test_another_shape_of_gain_has_another_limit() -> None:
 
 
 def test_both_families_say_what_they_cost() -> None:
-    balises, odometer = DESIGNS["balises"].noise, DESIGNS["odometer"].noise
+    balises, odometer = DESIGNS["balises"]().noise, DESIGNS["odometer"]().noise
     assert balises.slip == 0.0
     assert odometer.slip == pytest.approx(1.0, rel=1e-6)
     assert odometer.speed == 0.0 < balises.speed
-    assert "1 m/s of odometer slip 1 m/s" in DESIGNS["odometer"].explain()
-    assert "Gaps up to 20 s occur, certified are 22.12 s" in DESIGNS["high gain"].explain()
+    assert "1 m/s of odometer slip 1 m/s" in DESIGNS["odometer"]().explain()
+    assert "Gaps up to 20 s occur, certified are 22.12 s" in DESIGNS["high gain"]().explain()
 
 
-@pytest.mark.parametrize("design", DESIGNS.values(), ids=DESIGNS)
+@pytest.mark.parametrize("make", DESIGNS.values(), ids=DESIGNS)
 @settings(max_examples=10, deadline=None)
 @given(relative=st.lists(st.floats(0.05, 1.0), min_size=4, max_size=12), seed=st.integers(0, 99))
-def test_a_certified_design_never_diverges(design: GainDesign, relative: list[float], seed: int) -> None:
+def test_a_certified_design_never_diverges(make: Callable[[], GainDesign], relative: list[float], seed: int) -> None:
+    design = make()
     motion = SteadyMotion(speed=10.0)
     bench = in_step(OBSERVERS[design.observer](), motion)  # type: ignore[arg-type]
     bench.set("p", {n: v for name, v in design.parameters.items() for n, v in _scalars(bench.system, name, v)})
@@ -103,7 +107,7 @@ def test_an_adapting_rule_is_certified_for_every_change_of_speed() -> None:
     assert OBSERVERS["adaptive_gain_cdo"]().certify(22.0, design.parameters).holds  # type: ignore[attr-defined]
     assert design.parameters["assumed_acceleration"] == 0.7
     assert design.parameters["theta_max"] == pytest.approx(design.parameters["ratio"] * 14.0 / 100.0)
-    assert design.parameters["theta_max"] > 1.5 * DESIGNS["high gain"].parameters["theta"]
+    assert design.parameters["theta_max"] > 1.5 * DESIGNS["high gain"]().parameters["theta"]
 
 
 def test_spacings_that_differ_are_part_of_what_is_assumed() -> None:

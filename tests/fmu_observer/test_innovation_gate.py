@@ -19,13 +19,13 @@ from fmu_observer import OBSERVERS
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.innovation_gate import OFF, REJECT, WARN, GateMemory, Judgement, Told, judge
 from fmu_observer.observers.sampled import ExponentialGain, HeldInnovation, HybridImpulsive, OutputPredictor
-from fmu_observer.observers.train import SYSTEMS
 from plant_models.hybrid import NumpyKernel, Runtime, scalar_names
 from plant_models.hybrid.event import DOUBTED, IGNORED, USED
 
 MOTION, GAP = SteadyMotion(speed=14.0), 0.3
 GENERIC = (ExponentialGain, HeldInnovation, HybridImpulsive, OutputPredictor)
 # one of each is traced once
+SYSTEMS = [OBSERVERS[name] for name in OBSERVERS if OBSERVERS.room(name).endswith(".train")]
 MAKERS: dict[str, Callable[[], GatedObserver]] = {system.name: cache(system) for system in SYSTEMS}
 MAKERS |= {f"{g.name} of freight_train": cache(partial(g, model="freight_train")) for g in GENERIC}
 MAKERS["general_takagi_sugeno_cdo"] = cache(OBSERVERS["general_takagi_sugeno_cdo"])  # type: ignore[arg-type]

@@ -6,13 +6,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from exchange_importer import Exchange
-from fmpy import extract, read_model_description
+from exchange_importer import Exchange, description_of
+from fmpy import extract
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi3 import FMU3Slave
 
@@ -268,7 +269,8 @@ OF_EACH_KIND = {
     "exponential_gain",
     "slip_indicator",
 }
-"""Both faces of FMI stand on one model code, so every shipped system is tested as FMI 3.0, and as FMI 2.0 one of each
+"""Both interfaces of FMI stand on one model code, so every shipped system is tested as FMI 3.0, and as FMI 2.0 one of
+each
 kind: stiff with dry friction, sampled, noisy, with memory, with events of its own and from outside, with a sliding
 mode, with matrices."""
 
@@ -292,8 +294,9 @@ def _shipped_as_fmi2(callspec: Any) -> set[str]:
     return {callspec.params.get("name"), callspec.params.get("system_name")} & set(SHIPPED)
 
 
+@cache
 def make_system(name: str) -> HybridSystem:
-    """A small system of this file, or one that ships."""
+    """A small system of this file, or one that ships: one object in a process, so that it is traced once."""
     return SMALL[name]() if name in SMALL else recipe(name)
 
 
@@ -324,7 +327,7 @@ class Component:
     """One FMU instance, FMI 2 or FMI 3, driven by names; `log` holds its messages."""
 
     def __init__(self, fmu: Path, folder: Path) -> None:
-        self.description = read_model_description(str(fmu), validate=False)
+        self.description = description_of(fmu)
         self.version = int(self.description.fmiVersion[0])
         self.by_name = {v.name: v for v in self.description.modelVariables}
         self.log: list[str] = []

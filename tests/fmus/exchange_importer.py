@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from ctypes import POINTER, c_double, cast
 from dataclasses import dataclass, field
+from functools import cache
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ import numpy as np
 from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Model, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi3 import FMU3Model
+from fmpy.model_description import ModelDescription
 from scipy.integrate import DOP853, RK45, Radau
 
 SOLVERS: dict[str, Any] = {"DOP853": DOP853, "RK45": RK45, "Radau": Radau}
@@ -43,11 +45,17 @@ class Told:
     stamp: float | None = None
 
 
+@cache
+def description_of(fmu: Path) -> ModelDescription:
+    """As fmpy reads it, once in a process; FMUs of the tests are not written a second time."""
+    return read_model_description(str(fmu), validate=False)
+
+
 class Exchange:
     """One model exchange instance, FMI 2 or FMI 3, driven by names; `log` holds its messages."""
 
     def __init__(self, fmu: Path, folder: Path, logging: bool = False) -> None:
-        self.description = read_model_description(str(fmu), validate=False)
+        self.description = description_of(fmu)
         self.version = int(self.description.fmiVersion[0])
         self.by_name = {v.name: v for v in self.description.modelVariables}
         self.log: list[str] = []

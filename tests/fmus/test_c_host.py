@@ -66,10 +66,13 @@ def with_driver(w: Wiring, model: Callable[..., Unpacked], version: int) -> Wiri
 
 
 def wire(
-    model: Callable[..., Unpacked], face: str, observers: dict[str, tuple[str, dict[str, float]]], driver: bool = True
+    model: Callable[..., Unpacked],
+    interface: str,
+    observers: dict[str, tuple[str, dict[str, float]]],
+    driver: bool = True,
 ) -> Wiring:
     """Train, odometer, reader, observers by name (model and parameters) and driver."""
-    version, announcement = FACES[face]
+    version, announcement = FACES[interface]
     w = Wiring()
     w.slave("train", model("locomotive", version, preset="chapter_3_four_axles"))
     w.slave("odometer", model("odometer", version))
@@ -143,11 +146,11 @@ def at_points(outcome: cosim.Outcome, name: str, times: np.ndarray) -> np.ndarra
     return np.asarray(outcome[name])[rows]
 
 
-@pytest.mark.parametrize("face", FACES)
+@pytest.mark.parametrize("interface", FACES)
 def test_the_loop_in_c_is_the_loop_of_the_master(
-    face: str, loop: Path, model: Callable[..., Unpacked], master: Callable[[str], cosim.Outcome], tmp_path: Path
+    interface: str, loop: Path, model: Callable[..., Unpacked], master: Callable[[str], cosim.Outcome], tmp_path: Path
 ) -> None:
-    table = carried_out(loop, wire(model, face, S2), tmp_path)
+    table = carried_out(loop, wire(model, interface, S2), tmp_path)
     rows = announced(table)
     assert len(rows) > 130
     assert table["reader.lost_count"].max() == 0.0
@@ -183,24 +186,27 @@ def test_observers_beside_each_other_are_what_each_is_alone(
         "second": ("takagi_sugeno_cdo", {**TRAIN, "mass": 95e3}),
         "cascade": ("multirate_cdo", {}),
     }
-    for face in ("fmi2", "fmi3-clocks"):
-        together = carried_out(loop, wire(model, face, observers), tmp_path, "together", 2500)
+    for interface in ("fmi2", "fmi3-clocks"):
+        together = carried_out(loop, wire(model, interface, observers), tmp_path, "together", 2500)
         for name, observer in observers.items():
-            alone = carried_out(loop, wire(model, face, {name: observer}), tmp_path, name, 2500)
+            alone = carried_out(loop, wire(model, interface, {name: observer}), tmp_path, name, 2500)
             for column in alone.dtype.names or ():
-                np.testing.assert_array_equal(together[column], alone[column], err_msg=f"{face} {column}")
+                np.testing.assert_array_equal(together[column], alone[column], err_msg=f"{interface} {column}")
         assert np.abs(together["first.speed"] - together["second.speed"]).max() > 1e-3
 
 
 def test_a_thread_each_gives_the_same_bytes(loop: Path, model: Callable[..., Unpacked], tmp_path: Path) -> None:
-    faces = ("fmi2", "fmi3-clocks", "fmi2")
-    files = [wire(model, face, S2).write(tmp_path / f"{i}.txt", 0.0, STEP, 3000) for i, face in enumerate(faces)]
+    interfaces = ("fmi2", "fmi3-clocks", "fmi2")
+    files = [
+        wire(model, interface, S2).write(tmp_path / f"{i}.txt", 0.0, STEP, 3000)
+        for i, interface in enumerate(interfaces)
+    ]
     arguments: list[str] = []
     for i, file in enumerate(files):
         run([str(loop), str(file), str(tmp_path / f"alone_{i}.csv")])
         arguments += [str(file), str(tmp_path / f"thread_{i}.csv")]
     run([str(loop), *arguments])
-    for i in range(len(faces)):
+    for i in range(len(interfaces)):
         assert (tmp_path / f"thread_{i}.csv").read_bytes() == (tmp_path / f"alone_{i}.csv").read_bytes()
 
 

@@ -15,10 +15,10 @@ import pytest
 from lying_fmus import description
 
 from fmus.check import Class, check_fmu
-from fmus.check import archive as archives
-from fmus.check.archive import NotAnFmuError, open_archive
 from fmus.check.checks.static import platforms
 from fmus.cli import main
+from fmus.fmi import archive as archives
+from fmus.fmi.archive import NotAnFmuError, open_archive
 
 LIBRARY = f"binaries/{fmpy.platform}/liar{fmpy.sharedLibraryExtension}"
 

@@ -17,10 +17,10 @@ from lying_fmus import build, description
 from test_fmus.typed import expected, typed_fmu
 
 from fmus.check import Class, Verdict, check_fmu
-from fmus.check.archive import open_archive
 from fmus.check.bench import END, Bench, end_of_experiment
 from fmus.check.instance import FmuInstance
 from fmus.check.slave import FmuSlave
+from fmus.fmi.archive import open_archive
 
 pytestmark = pytest.mark.compiler
 

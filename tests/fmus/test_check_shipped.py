@@ -8,9 +8,9 @@ import pytest
 
 from fmus import RECIPES, cached_fmu, recipe
 from fmus.check import Class, Verdict, check_fmu
-from fmus.check.archive import open_archive
 from fmus.check.probe import probe
 from fmus.check.slave import FmuSlave
+from fmus.fmi.archive import open_archive
 
 pytestmark = pytest.mark.compiler
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 from xml.etree.ElementTree import ParseError, fromstring
 
@@ -37,15 +39,26 @@ VARIABLE = (
 )
 
 
+@cache
+def _description(system: HybridSystem, version: Any) -> ModelDescription:
+    return describe(system, version, model_exchange=can_exchange(system))
+
+
+@cache
+def _both(system: HybridSystem, version: Any) -> tuple[ModelDescription, ModelDescription]:
+    written = _description(system, version)
+    with TemporaryDirectory() as folder:
+        file = Path(folder, "modelDescription.xml")
+        file.write_text(model_description_xml(written, [MAIN_SOURCE]), encoding="utf-8")
+        return written, read_model_description(
+            str(file), validate=True, validate_variable_names=True, validate_model_structure=True
+        )
+
+
 @pytest.fixture
-def both(system: HybridSystem, version: Any, tmp_path: Path) -> tuple[ModelDescription, ModelDescription]:
+def both(system: HybridSystem, version: Any) -> tuple[ModelDescription, ModelDescription]:
     """A description, and what fmpy reads from its XML (validated against the schema)."""
-    written = describe(system, version, model_exchange=can_exchange(system))
-    file = tmp_path / "modelDescription.xml"
-    file.write_text(model_description_xml(written, [MAIN_SOURCE]), encoding="utf-8")
-    return written, read_model_description(
-        str(file), validate=True, validate_variable_names=True, validate_model_structure=True
-    )
+    return _both(system, version)
 
 
 def test_head_and_capabilities(both: tuple[ModelDescription, ModelDescription]) -> None:
@@ -72,9 +85,7 @@ def test_head_and_capabilities(both: tuple[ModelDescription, ModelDescription]) 
 
 def test_what_fmpy_does_not_read(system: HybridSystem, version: Any) -> None:
     """Directional derivatives (FMI 3 spells them in the plural) and `reinit`, from the XML itself."""
-    root = fromstring(
-        model_description_xml(describe(system, version, model_exchange=can_exchange(system)), [MAIN_SOURCE])
-    )
+    root = fromstring(model_description_xml(_description(system, version), [MAIN_SOURCE]))
     flag = "providesDirectionalDerivative" + ("s" if version == 3 else "")
     kinds = ("ModelExchange", "CoSimulation") if can_exchange(system) else ("CoSimulation",)
     assert [root.find(tag).get(flag) for tag in kinds] == ["true"] * len(kinds)  # type: ignore[union-attr]

@@ -33,7 +33,7 @@ def test_a_system_of_ones_own_is_listed_last(capsys: Output, monkeypatch: pytest
     own = type("Own", (RECIPES["odometer"],), {"name": "own_odometer"})
     monkeypatch.setitem(plant_models.PLANTS, "own_odometer", own)
     assert main(["list"]) == 0
-    assert capsys.readouterr().out.split("# ")[-1].startswith("Registered here\nown_odometer")
+    assert capsys.readouterr().out.split("# ")[-1].startswith("Registered by this program\nown_odometer")
 
 
 @pytest.mark.compiler

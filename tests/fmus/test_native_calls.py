@@ -19,7 +19,7 @@ from fmpy.fmi3 import FMU3Slave
 from lying_fmus import build
 
 from fmus import build_fmu, recipe
-from fmus.native_calls import prepared_call
+from fmus.fmi.native_calls import prepared_call
 
 pytestmark = pytest.mark.compiler
 FORCE, POSITION, SPEED = 1, 2, 3

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cosim.coupling.plan import Plan, PlannedComponent
+from cosim.coupling.plan import Plan
+from cosim.coupling.planned import PlannedComponent
 from cosim.master.algorithms.algorithm import Algorithm
 from cosim.master.algorithms.links import plan_links
 from cosim.master.algorithms.loop import IteratedLoop

@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
-from cosim.coupling.plan import Plan, PlannedComponent
+from cosim.coupling.plan import Plan
+from cosim.coupling.planned import PlannedComponent
 from cosim.master.algorithms.algorithm import Algorithm
 
 
@@ -67,7 +68,7 @@ def _may_run_apart(step: PlannedComponent) -> bool:
     """Only the plain step of a sealed library: it touches nothing but its own instance and its own part of the
     values.
     """
-    return step.component.kind != "block" and step.move == step.drive
+    return step.component.kind != "block" and not step.taken_over
 
 
 def _failure(move: Callable[[float, float], None], t: float, until: float) -> Exception | None:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.coupling.plan import Plan, PlannedComponent
+from cosim.coupling.plan import Plan
+from cosim.coupling.planned import PlannedComponent
 
 
 @dataclass(frozen=True)
@@ -16,7 +17,7 @@ class Link:
 
     Args:
         text: ``a.y -> b.u``. column: of the source within the values. source, target: places of the components in the
-        plan.
+            plan.
         place: of the input among the connected inputs of its component.
         held: whether the value is that of the start of a step.
     """

@@ -113,7 +113,7 @@ class IteratedLoop:
     def _iterate(self, t: float, until: float, start: Start) -> None:
         residuals: list[float] = []
         z = self._search(t, until, start, self._plan.values[self._columns], residuals)
-        if any(step.move != step.drive for step in self.steps):
+        if any(step.taken_over for step in self.steps):
             services = [(service, service.save_within()) for service in self._plan.services]
             self._restore(start)
             self._search(t, until, replace(start, services=services), z, residuals)

@@ -14,7 +14,7 @@ from cosim.components.derivatives import directional_derivative
 from cosim.coupling.feedthrough import declared_feedthrough
 from cosim.coupling.plan import Plan
 from cosim.master.algorithms.links import Link
-from fmus.ports import FLOATING_TYPES
+from fmus.fmi.types import FLOATING_TYPES
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Sensitivity:
 
     Args:
         plan: the plan. members: places of the loop's components. links: of the plan. interface: columns fed back, shape
-        (n,).
+            (n,).
 
     `usable` says whether every component through which something passes at once declares directional derivatives.
     """

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from cosim.components.component import TIME_TOLERANCE
 from cosim.errors import CouplingError, RunError
 from cosim.master.control.control import StepControl
 from cosim.master.system import Checkpoint, Row, System
+from fmus.fmi.standard import TIME_TOLERANCE
 
 SAFETY = 0.5
 """A longer step is tried where its expected error is below this share of the tolerance."""

@@ -8,46 +8,53 @@ its own inputs.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
-from cosim.components.component import TIME_TOLERANCE
-from cosim.coupling.plan import Plan, PlannedComponent
+from cosim.coupling.chain import Mover, Position, Preparer, Stage, around
+from cosim.coupling.plan import Plan
+from cosim.coupling.planned import PlannedComponent
 from cosim.errors import CouplingError
 from cosim.master.axis import TimeAxis
+from fmus.fmi.standard import TIME_TOLERANCE
 
 
-class SlowMover:
-    """Steps a component over every n-th communication point only.
+class SlowRate:
+    """The stage at `Position.RATE`: steps a component over every n-th communication point only.
 
     Args:
-        planned: the component, whose `prepare` and `move` are taken over.
+        planned: the component.
         every: number of communication steps that make one of its own.
         axis: communication points; at the last one it is stepped whatever is left.
     """
 
     def __init__(self, planned: PlannedComponent, every: int, axis: TimeAxis) -> None:
-        self._planned, self._every, self._axis = planned, every, axis
-        self._prepare, self._move = planned.prepare, planned.move
-        planned.prepare = self.prepare  # type: ignore[method-assign]
-        planned.move = self.move
+        self._component, self._every, self._axis = planned.component, every, axis
+        prepare = partial(partial, self._prepare)
+        planned.add_stage(Stage(Position.RATE, rate_stage_text(every), prepare=prepare, move=around(self._move)))
         planned.continuous[:] = False
 
-    def prepare(self, t: float, until: float, *, ends_known: bool | np.ndarray = False) -> None:
+    def _prepare(self, inner: Preparer, t: float, until: float, *, ends_known: bool | np.ndarray = False) -> None:
         """Gather the inputs at the end of its own step only: until then the last ones hold."""
         if self._is_due(until):
-            self._prepare(self._planned.component.time, until, ends_known=ends_known)
+            inner(self._component.time, until, ends_known=ends_known)
 
-    def move(self, t: float, until: float) -> None:
+    def _move(self, inner: Mover, t: float, until: float) -> None:
         """Take its own step where it is over at `until` [s]."""
         if self._is_due(until):
-            self._move(self._planned.component.time, until)
+            inner(self._component.time, until)
 
     def _is_due(self, until: float) -> bool:
         axis = self._axis
         k = round((until - axis.start) / axis.step)
         on_grid = abs(axis[k] - until) <= TIME_TOLERANCE
         return on_grid and (k % self._every == 0 or k == axis.count)
+
+
+def rate_stage_text(every: int) -> str:
+    """The stage of a component that is stepped every n-th communication step, in words."""
+    return f"1 step for {every} communication steps"
 
 
 def set_rates(
@@ -81,4 +88,4 @@ def set_rates(
                 f"vary its "
                 "step for the rest; change 'stop', 'step' or 'every'."
             )
-        SlowMover(planned, count, axis)
+        SlowRate(planned, count, axis)

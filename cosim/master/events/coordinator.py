@@ -14,13 +14,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cosim.balises.service import Row
-from cosim.components.component import TIME_TOLERANCE, Component
-from cosim.components.interruption import EventMet
-from cosim.coupling.plan import Mover, PlannedComponent
+from cosim.components.component import Component
+from cosim.coupling.chain import Mover
+from cosim.coupling.planned import PlannedComponent
 from cosim.errors import RunError
 from cosim.master.events.iteration import EventIteration
 from cosim.master.events.participant import Participant
 from cosim.master.events.stride import Span, Stride
+from fmus.fmi.interruption import EventMet
+from fmus.fmi.standard import TIME_TOLERANCE
 
 if TYPE_CHECKING:
     from cosim.master.system import Checkpoint, System

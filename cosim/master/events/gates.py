@@ -13,7 +13,7 @@ from fmpy.model_description import ModelVariable
 
 from cosim.components.component import Component
 from cosim.coupling.inputs import Inputs
-from fmus.ports import FLOATING_TYPES
+from fmus.fmi.types import FLOATING_TYPES
 
 Send = Callable[[], None]
 
@@ -24,7 +24,7 @@ class Gate:
     Args:
         component: with Event Mode. inputs: its connected inputs; `gather` stays as it is.
         events_pass: discrete inputs are sent in Event Mode; otherwise in Step Mode like the others, and clocked ones
-        never.
+            never.
     """
 
     def __init__(self, component: Component, inputs: Inputs, *, events_pass: bool = True) -> None:
@@ -45,7 +45,7 @@ class Gate:
         ]
         self._sent: tuple[object, ...] = ()
         self._sent_clocked: dict[int, bytes] = {}
-        inputs.send = self._send_at_first
+        inputs.gate(self._send_at_first)
 
     @property
     def listens(self) -> bool:
@@ -54,7 +54,7 @@ class Gate:
 
     def open(self) -> None:
         """The component runs: from now on Step Mode takes continuous inputs only."""
-        self._inputs.send = self._send_flowing
+        self._inputs.gate(self._send_flowing)
 
     def changed(self) -> bool:
         """Whether gathered discrete inputs differ from what the component knows."""

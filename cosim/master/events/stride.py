@@ -4,11 +4,11 @@ component.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
-from cosim.components.component import TIME_TOLERANCE
-from cosim.coupling.plan import Mover, PlannedComponent
+from cosim.coupling.chain import Mover, Position, Stage, around, unchanged
+from cosim.coupling.planned import PlannedComponent
+from fmus.fmi.standard import TIME_TOLERANCE
 
 
 @dataclass
@@ -23,40 +23,36 @@ class Span:
 
 
 class Stride:
-    """Takes over how a planned component moves.
+    """The stage at `Position.EVENTS` of a planned component.
 
-    One that takes whole communication steps only waits for the last part of the step. One that has gone past an event,
-    and could not be taken back, waits where it is until the others have come there.
+    A component that takes whole communication steps only waits for the last part of the step. One that has gone past
+    an event, and could not be taken back, waits where it is until the others have come there.
 
     Args:
         planned: the component. span: the step under way.
-        hold: told of the parts that a waiting component does not take.
+        hold: called with the parts [s] that a waiting component does not take; None where nobody asks.
     """
 
-    def __init__(
-        self, planned: PlannedComponent, span: Span, hold: Callable[[float, float], None] | None = None
-    ) -> None:
+    def __init__(self, planned: PlannedComponent, span: Span, hold: Mover | None = None) -> None:
         self._component, self._span, self._hold = planned.component, span, hold
         self._whole = not planned.component.can_vary_step
-        self._move: Mover = planned.move
-        planned.move = self.move
-        if self._whole:
-            self._drive: Mover = planned.drive
-            planned.drive = self.drive  # type: ignore[method-assign]
+        drive = around(self._drive) if self._whole else unchanged
+        text = event_stage_text(whole=self._whole)
+        planned.add_stage(Stage(Position.EVENTS, text, move=around(self._move), drive=drive))
 
-    def move(self, t: float, until: float) -> None:
+    def _move(self, inner: Mover, t: float, until: float) -> None:
         """From `t` to `until` [s], where it takes part in that."""
         start = self._start(t, until)
         if start is not None:
-            self._move(start, until)
+            inner(start, until)
         elif self._hold is not None and self._whole:
             self._hold(t, until)
 
-    def drive(self, t: float, until: float) -> None:
-        """The same, without what a service adds."""
+    def _drive(self, inner: Mover, t: float, until: float) -> None:
+        """The same without telling anybody of the parts that are not taken."""
         start = self._start(t, until)
         if start is not None:
-            self._drive(start, until)
+            inner(start, until)
 
     def _start(self, t: float, until: float) -> float | None:
         """Where its way to `until` begins [s]; None where it does not go there now."""
@@ -66,3 +62,8 @@ class Stride:
         if not self._whole:
             return t
         return stands if self._span.end - until <= TIME_TOLERANCE else None
+
+
+def event_stage_text(*, whole: bool) -> str:
+    """The stage in words; `whole`: the component takes whole communication steps only."""
+    return "event stop (whole steps only)" if whole else "event stop"

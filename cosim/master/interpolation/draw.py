@@ -6,10 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cosim.coupling.plan import Plan, PlannedComponent
+from cosim.coupling.plan import Plan
+from cosim.coupling.planned import PlannedComponent
 from cosim.master.interpolation.interpolators import make_interpolator
 from cosim.master.interpolation.line import Line, Method
-from fmus.ports import FLOATING_TYPES
+from fmus.fmi.types import FLOATING_TYPES
 
 
 def draw_lines(plan: Plan, method: Method) -> Mapping[str, str]:

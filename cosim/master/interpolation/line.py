@@ -12,7 +12,8 @@ from typing import Literal
 
 import numpy as np
 
-from cosim.components.component import TIME_TOLERANCE, Component
+from cosim.components.component import Component
+from fmus.fmi.standard import TIME_TOLERANCE
 
 Method = Literal["interpolate", "extrapolate"]
 

@@ -15,10 +15,10 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from cosim.comparison.verdict import Curves, Finding, SignalComparison
+from cosim.drawing.style import ALARM_COLOUR, axes_or_new, new_figure, styled
+from cosim.evaluation.numbers import number
 from cosim.report.figures.drawing import curve, legend_above, thin
 from cosim.report.figures.scales import bounded, value_limits
-from cosim.report.figures.style import ALARM_COLOUR, axes_or_new, new_figure, styled
-from cosim.report.numbers import number
 
 WIDTH, HEIGHT = 7.2, 6.6  # inches, of the whole picture
 TUBE_COLOUR, RESULT_COLOUR = "#F0C36D", "#0072B2"

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from cosim.report.event_counts import accepted_stamps
+from cosim.drawing.style import ALARM_COLOUR, ZONE_COLOUR
+from cosim.evaluation.event_counts import accepted_stamps
+from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.scales import curve_size
-from cosim.report.figures.style import ALARM_COLOUR, ZONE_COLOUR
-from cosim.report.spec import ReportSpec
 from cosim.results.result import Result
 
 BUCKETS = 1500  # more points than a picture has columns add nothing but time and bytes

@@ -10,13 +10,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, NullLocator
 
+from cosim.drawing.style import WILD_LINE, axes_or_new, observer_line, styled
+from cosim.evaluation.metrics import error_size
+from cosim.evaluation.numbers import error_number, number
+from cosim.evaluation.roles import Quantity, estimation_error, label
+from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.drawing import balise_ticks, curve, legend_above, mark_evaluation, shade_zones, time_axis
 from cosim.report.figures.scales import ErrorScale, error_scale, running_maximum
-from cosim.report.figures.style import WILD_LINE, axes_or_new, observer_line, styled
-from cosim.report.metrics import error_size
-from cosim.report.numbers import error_number, number
-from cosim.report.roles import Quantity, estimation_error, label
-from cosim.report.spec import ReportSpec
 from cosim.results.result import Result
 
 WINDOWS = 180  # of the logarithmic figure in a run
@@ -56,7 +56,7 @@ class ErrorCurve:
 
     Args:
         time: [s], shape (rows,). error: shape (rows,). settled: rows after the start-up, which set the scale, shape
-        (rows,).
+            (rows,).
         line: colour, dashes, width. text: for the legend.
     """
 

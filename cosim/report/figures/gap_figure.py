@@ -7,13 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.axes import Axes
 
-from cosim.report.event_counts import accepted_stamps
-from cosim.report.facts import mapping_entry, number_entry
+from cosim.drawing.style import axes_or_new, observer_line, styled
+from cosim.evaluation.event_counts import accepted_stamps
+from cosim.evaluation.facts import mapping_entry, number_entry
+from cosim.evaluation.numbers import number
+from cosim.evaluation.roles import label
+from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.drawing import legend_above, shade_zones, time_axis
-from cosim.report.figures.style import axes_or_new, observer_line, styled
-from cosim.report.numbers import number
-from cosim.report.roles import label
-from cosim.report.spec import ReportSpec
 from cosim.results.result import Result
 
 SHOWN = 3.0  # limits above this many largest gaps are named, not drawn

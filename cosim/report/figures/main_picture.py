@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
+from cosim.drawing.style import new_figure, styled
+from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.drawing import legend_above
 from cosim.report.figures.panels import PANELS, Panel
-from cosim.report.figures.style import new_figure, styled
-from cosim.report.spec import ReportSpec
 from cosim.results.result import Result
 
 MAIN_PANELS = ("speed", "speed_error", "slip", "gaps")

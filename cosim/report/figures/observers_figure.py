@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cosim.report.figures.style import axes_or_new, new_figure, observer_line, styled
+from cosim.drawing.style import axes_or_new, new_figure, observer_line, styled
 
 if TYPE_CHECKING:
-    from cosim.studies.observer_scores import ObserverScore
+    from cosim.observer_benchmark.observer_scores import ObserverScore
 
 MARKERS = "osD^vP*Xph"
 """A shape for each observer beside its colour."""

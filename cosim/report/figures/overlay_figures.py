@@ -10,13 +10,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from cosim.drawing.style import TRUE_LINE, new_figure, png, run_line, styled
+from cosim.evaluation.roles import Quantity, estimate, estimation_error, label, recorded
 from cosim.report.figures.drawing import curve, legend_above, mark_evaluation, shade_zones, thin
 from cosim.report.figures.error_figures import ErrorCurve, draw_errors
-from cosim.report.figures.panels import png
 from cosim.report.figures.scales import bounded, value_limits
-from cosim.report.figures.style import TRUE_LINE, new_figure, run_line, styled
 from cosim.report.overlay.runs import Run, observers_of, one_each
-from cosim.report.roles import Quantity, estimate, estimation_error, label, recorded
 from cosim.results.result import Result
 
 WIDTH, FIRST_PANEL, NEXT_PANEL = 8.2, 3.3, 2.2  # inches

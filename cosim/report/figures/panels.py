@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from io import BytesIO
-from typing import Any
 
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure, SubFigure
 
+from cosim.drawing.style import png
+from cosim.evaluation.roles import estimate, estimation_error, recorded
+from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.error_figures import position_error_figure, speed_error_figure
 from cosim.report.figures.gap_figure import gap_figure, sampling_gaps
 from cosim.report.figures.run_figures import adhesion_figure, slip_figure, speed_figure
-from cosim.report.roles import estimate, estimation_error, recorded
-from cosim.report.spec import ReportSpec
 from cosim.results.result import Result
-
-DPI = 130
 
 
 @dataclass(frozen=True)
@@ -105,20 +101,6 @@ PANELS: tuple[Panel, ...] = (
         _has_gaps,
     ),
 )
-
-
-def png(figure: Figure | SubFigure, dpi: int = DPI) -> bytes:
-    """A figure as PNG, without time stamps, so that equal figures are equal bytes.
-
-    Args:
-        figure: the figure, or a part of it. dpi: resolution [1/inch].
-    """
-    buffer = BytesIO()
-    metadata: dict[str, Any] = {"Software": None}
-    whole = figure.get_figure(root=True)
-    assert whole is not None
-    whole.savefig(buffer, format="png", dpi=dpi, metadata=metadata, facecolor="white")
-    return buffer.getvalue()
 
 
 def draw_all(result: Result, spec: ReportSpec) -> dict[Panel, bytes]:

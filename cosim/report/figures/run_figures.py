@@ -8,9 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
-from cosim.report.figures.drawing import curve, is_noisy, is_wild, legend_above, shade_zones, time_axis
-from cosim.report.figures.scales import bounded, value_limits
-from cosim.report.figures.style import (
+from cosim.drawing.style import (
     NOISY_LINE,
     ODOMETER_LINE,
     REFERENCE_LINE,
@@ -21,9 +19,11 @@ from cosim.report.figures.style import (
     observer_line,
     styled,
 )
-from cosim.report.indicators import on_intervals
-from cosim.report.roles import estimate, label, recorded
-from cosim.report.spec import ReportSpec
+from cosim.evaluation.indicators import on_intervals
+from cosim.evaluation.roles import estimate, label, recorded
+from cosim.evaluation.spec import ReportSpec
+from cosim.report.figures.drawing import curve, is_noisy, is_wild, legend_above, shade_zones, time_axis
+from cosim.report.figures.scales import bounded, value_limits
 from cosim.results.result import Result
 
 KMH = 3.6  # km/h in a m/s

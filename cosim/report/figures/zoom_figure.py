@@ -10,11 +10,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from cosim.drawing.style import ALARM_COLOUR, ZONE_COLOUR, new_figure, observer_line, styled
+from cosim.evaluation.roles import estimate, estimation_error, label, recorded
+from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.drawing import FAR, legend_above
 from cosim.report.figures.scales import BOUND, bounded, error_scale
-from cosim.report.figures.style import ALARM_COLOUR, ZONE_COLOUR, new_figure, observer_line, styled
-from cosim.report.roles import estimate, estimation_error, label, recorded
-from cosim.report.spec import ReportSpec
 from cosim.report.zoom_windows import ZoomWindow
 from cosim.results.result import BaliseRecord, Result
 

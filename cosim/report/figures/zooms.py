@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cosim.report.figures.panels import png
+from cosim.drawing.style import png
+from cosim.evaluation.numbers import number
+from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.zoom_figure import zoom_figure
-from cosim.report.numbers import number
-from cosim.report.spec import ReportSpec
 from cosim.report.zoom_windows import MOST, ZoomWindow, notable_windows
 from cosim.results.result import Result
 

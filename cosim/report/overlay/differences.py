@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cosim.report.event_counts import count_events
-from cosim.report.facts import list_entry, mapping_entry
-from cosim.report.numbers import DASH, number
+from cosim.evaluation.event_counts import count_events
+from cosim.evaluation.facts import list_entry, mapping_entry
+from cosim.evaluation.numbers import DASH, number
+from cosim.evaluation.roles import phases
 from cosim.report.overlay.runs import Run
-from cosim.report.roles import phases
 from cosim.results.result import BaliseRecord, Result
 
 COMPONENT_ENTRIES = {"kind": "kind", "fmi_version": "FMI version", "model": "model", "preset": "preset", "guid": "GUID"}

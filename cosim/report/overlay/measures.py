@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import isfinite, isnan
 
-from cosim.report.metrics import PhaseMetrics, phase_metrics
-from cosim.report.numbers import DASH, error_number, number
+from cosim.evaluation.metrics import PhaseMetrics, phase_metrics
+from cosim.evaluation.numbers import DASH, error_number, number
+from cosim.evaluation.phase_details import phase_details
+from cosim.evaluation.roles import label, phases
+from cosim.report.error_table import MEASURED
 from cosim.report.overlay.runs import Run, observers_of, one_each
 from cosim.report.page.phases import COLUMNS
-from cosim.report.page.table import MEASURED
-from cosim.report.phase_details import phase_details
-from cosim.report.roles import label, phases
 
 Values = tuple[float | None, ...]
 

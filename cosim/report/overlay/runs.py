@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from cosim.errors import ComparisonError
-from cosim.report.spec import Phase, ReportSpec
+from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.results.result import Result
 
 MOST_RUNS = 12  # that anybody can tell apart in a figure
@@ -32,7 +32,7 @@ def make_runs(results: Sequence[Result], specs: Sequence[ReportSpec], labels: Se
 
     Args:
         results: the runs, the first one is what the others are compared with. specs: roles of each. labels: text for
-        each.
+            each.
 
     Raises:
         ComparisonError: other numbers of results, roles and labels; a label twice; a run without rows; too many runs.

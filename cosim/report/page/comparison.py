@@ -14,10 +14,10 @@ from math import inf, isfinite
 from pathlib import Path
 
 from cosim.comparison.verdict import Comparison, Finding, SignalComparison
+from cosim.drawing.style import png
 from cosim.errors import OutputError
+from cosim.evaluation.numbers import DASH, number
 from cosim.report.figures.comparison_figure import comparison_picture
-from cosim.report.figures.panels import png
-from cosim.report.numbers import DASH, number
 from cosim.report.page.parts import box, bullets, chapters, facts, page, paragraph, picture, scrolling
 from cosim.results.summary_file import jsonable
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 
+from cosim.evaluation.facts import list_entry
 from cosim.expectations.judged import Judged
-from cosim.report.facts import list_entry
 from cosim.report.page.parts import box, bullets, scrolling
 from cosim.results.result import Result
 

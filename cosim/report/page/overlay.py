@@ -10,9 +10,10 @@ from math import isfinite
 from pathlib import Path
 
 from cosim.errors import OutputError
-from cosim.report.facts import number_entry
+from cosim.evaluation.facts import number_entry
+from cosim.evaluation.numbers import DASH, error_number, number
+from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.overlay_figures import OverlayPicture, changing_signals, draw_overlays
-from cosim.report.numbers import DASH, error_number, number
 from cosim.report.overlay.differences import differences, layout_note
 from cosim.report.overlay.measures import DETAIL_HEADINGS, ERROR_HEADINGS, Measured, cell, detailed, headings, measured
 from cosim.report.overlay.runs import Run, make_runs
@@ -30,7 +31,6 @@ from cosim.report.page.parts import (
     simple_table,
 )
 from cosim.report.page.verdict import Fact
-from cosim.report.spec import ReportSpec
 from cosim.results.result import Result
 
 PAGE, FIGURES = "overlay.html", "figures"

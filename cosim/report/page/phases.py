@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import groupby
 
-from cosim.report.numbers import DASH, error_number
+from cosim.evaluation.numbers import DASH, error_number
+from cosim.evaluation.phase_details import PhaseDetails
+from cosim.evaluation.roles import label
+from cosim.evaluation.spec import ReportSpec
 from cosim.report.page.parts import grouped_table, paragraph
-from cosim.report.phase_details import PhaseDetails
-from cosim.report.roles import label
-from cosim.report.spec import ReportSpec
 
 COLUMNS: dict[str, tuple[str, float]] = {  # field: heading with unit, factor to that unit
     "slip": ("Slip error, rms [%]", 100.0),

@@ -9,14 +9,19 @@ from html import escape
 from pathlib import Path
 
 from cosim.errors import OutputError
-from cosim.report.event_counts import count_events, outcome_columns
-from cosim.report.facts import list_entry, mapping_entry, statement
+from cosim.evaluation.event_counts import count_events, outcome_columns
+from cosim.evaluation.facts import list_entry, mapping_entry, statement
+from cosim.evaluation.indicators import indicator_statistics
+from cosim.evaluation.metrics import phase_metrics
+from cosim.evaluation.numbers import DASH, number
+from cosim.evaluation.phase_details import phase_details
+from cosim.evaluation.result_warnings import all_warnings
+from cosim.evaluation.roles import label
+from cosim.evaluation.spec import ReportSpec
+from cosim.report.cost import cost_html, messages_html
+from cosim.report.error_table import html_table
 from cosim.report.figures.panels import PANELS, Panel, draw_all
 from cosim.report.figures.zooms import ZOOM_KEYS, Zoom, draw_zooms
-from cosim.report.indicators import indicator_statistics
-from cosim.report.metrics import phase_metrics
-from cosim.report.numbers import DASH, number
-from cosim.report.page.cost import cost_html, messages_html
 from cosim.report.page.expectations import expectations_table, unmet_box
 from cosim.report.page.files import write_file, write_page
 from cosim.report.page.parts import (
@@ -33,12 +38,7 @@ from cosim.report.page.parts import (
     simple_table,
 )
 from cosim.report.page.phases import phases_html
-from cosim.report.page.table import html_table
 from cosim.report.page.verdict import verdict_facts
-from cosim.report.phase_details import phase_details
-from cosim.report.result_warnings import all_warnings
-from cosim.report.roles import label
-from cosim.report.spec import ReportSpec
 from cosim.results.result import Result
 
 PAGE, FIGURES = "report.html", "figures"

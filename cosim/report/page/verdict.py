@@ -6,13 +6,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cosim.report.event_counts import count_events
-from cosim.report.facts import list_entry, mapping_entry, number_entry
-from cosim.report.metrics import judged_size
-from cosim.report.numbers import DASH, error_number, number
-from cosim.report.result_warnings import all_warnings, result_warnings
-from cosim.report.roles import Quantity, estimation_error, label
-from cosim.report.spec import ReportSpec
+from cosim.evaluation.event_counts import count_events
+from cosim.evaluation.facts import list_entry, mapping_entry, number_entry
+from cosim.evaluation.metrics import judged_size
+from cosim.evaluation.numbers import DASH, error_number, number
+from cosim.evaluation.result_warnings import all_warnings, result_warnings
+from cosim.evaluation.roles import Quantity, estimation_error, label
+from cosim.evaluation.spec import ReportSpec
 from cosim.results.result import Result
 
 Fact = tuple[str, str, str, str]

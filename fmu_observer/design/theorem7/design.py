@@ -74,6 +74,9 @@ class Theorem7Design:
 class InfeasibleDesign(ValueError):  # noqa: N818 - what it is, not an "Error" of the program
     """Theorem 7 has no solution for what was asked.
 
+    Args:
+        message: what was tried and why it cannot be.
+
     Attributes:
         nearest_eta: largest decay found feasible at the gap asked for [1/s]; None when none is, down to a thousandth.
         nearest_gap: longest gap found feasible at the decay asked for [s]; None likewise.

@@ -124,6 +124,7 @@ def inequalities(problem: Theorem7Problem, unknowns: Unknowns, performance: bool
 
     Args:
         performance: with the attenuation of noise and disturbance; without it only the decay of the error is asked for.
+        problem: sizes, vertices and gaps. unknowns: matrices in the form of the solver or of NumPy.
     """
     phases = {"start": ", start of the gap", "end": ", end of the gap"} if problem.two_vertex else {"whole": ""}
     return {

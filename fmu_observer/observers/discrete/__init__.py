@@ -1,18 +1,5 @@
 """Observers that live at the samples only."""
 
-from fmu_observer.observers.discrete.discrete_luenberger import DiscreteLuenberger
-from fmu_observer.observers.discrete.extended_kalman_filter import ExtendedKalmanFilter
-from fmu_observer.observers.discrete.extended_luenberger import ExtendedLuenberger
-from fmu_observer.observers.discrete.implicit_differentiator import ImplicitDifferentiator
-from fmu_observer.observers.discrete.kalman_filter import KalmanFilter
+from plant_models.registry import lazy_names
 
-SYSTEMS = (ImplicitDifferentiator, DiscreteLuenberger, KalmanFilter, ExtendedLuenberger, ExtendedKalmanFilter)
-
-__all__ = [
-    "SYSTEMS",
-    "DiscreteLuenberger",
-    "ExtendedKalmanFilter",
-    "ExtendedLuenberger",
-    "ImplicitDifferentiator",
-    "KalmanFilter",
-]
+__getattr__ = lazy_names(__name__)

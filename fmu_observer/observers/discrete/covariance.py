@@ -8,7 +8,11 @@ from plant_models.hybrid.system import Array
 
 
 def flattened(matrix: Array) -> list[Array]:
-    """Entries row by row, as scalars."""
+    """Entries row by row, as scalars.
+
+    Args:
+        matrix: shape (n, n).
+    """
     rows, columns = matrix.shape
     return [matrix[i, j] for i in range(rows) for j in range(columns)]
 
@@ -25,7 +29,7 @@ def corrected(x: Array, P: Array, innovation: Array, C: np.ndarray, RN: Array) -
 
     Args:
         x: prediction, shape (n,). P: its covariance, shape (n, n). innovation: ``y - C x``, shape (q,). C: shape (q,
-        n).
+            n).
         RN: covariance of the measurements, shape (q, q).
 
     Returns:

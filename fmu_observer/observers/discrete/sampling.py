@@ -19,7 +19,11 @@ PRIMED = memory("primed", "1", 0.0, "1 after the first sample")
 
 
 def primed_memory(*signals: Signal) -> tuple[Signal, ...]:
-    """Memory of an observer, with the mark of the first sample behind it."""
+    """Memory of an observer, with the mark of the first sample behind it.
+
+    Args:
+        signals: memory of the observer itself.
+    """
     return (*signals, PRIMED)
 
 

@@ -76,6 +76,9 @@ def per_measurement(model: ObserverModel, name: str, description: str, kind: Cal
     """A state (or memory, by `kind`) per measurement: a scalar with its unit, or a vector, with the unit if they share
     one.
 
+    Args:
+        name: of the signal. description: one line.
+
     Raises:
         ValueError: the model has no measurement.
     """
@@ -88,6 +91,9 @@ def per_measurement(model: ObserverModel, name: str, description: str, kind: Cal
 
 def check_chain(model: ObserverModel, who: str) -> int:
     """Width of the chain of a model in the normal form that high-gain observers need.
+
+    Args:
+        who: name of the observer, for the message.
 
     Returns:
         Number of states in a block, which is the number of measurements.

@@ -205,7 +205,11 @@ class GeneralTakagiSugenoCdo(GatedObserver):
         return replace(found, observer=self.name, preset=chosen, parameters=values, lyapunov_matrix=P)
 
     def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
-        """Whether every vertex error decays for infinitely frequent samples: ``A_i - K_i1 C1 - K_i2 C2`` is Hurwitz."""
+        """Whether every vertex error decays for infinitely frequent samples: ``A_i - K_i1 C1 - K_i2 C2`` is Hurwitz.
+
+        Args:
+            preset: name of a preset that gives the parameters; None for the defaults.
+        """
         limits = [error.continuous_limit for error in self.vertex_errors(parameters, preset)]
         abscissas = [float(np.linalg.eigvals(limit).real.max()) for limit in limits if limit is not None]
         return Condition(

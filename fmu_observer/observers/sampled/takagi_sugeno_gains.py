@@ -59,7 +59,11 @@ class TakagiSugenoGains:
         return values
 
     def arrays(self, model: TakagiSugenoModel) -> tuple[np.ndarray, np.ndarray]:
-        """K_i1 of shape (N, n, q1) and K_i2 of shape (N, n, q2)."""
+        """K_i1 of shape (N, n, q1) and K_i2 of shape (N, n, q2).
+
+        Args:
+            model: the plant as the observer knows it.
+        """
         shape = (model.vertices, model.order, -1)
         return np.reshape(np.asarray(self.sampled, dtype=float), shape), _continuous(self.continuous, shape)
 

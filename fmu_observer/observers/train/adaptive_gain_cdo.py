@@ -40,15 +40,27 @@ class EffortStage:
     stability_parameters: tuple[str, ...] = ()
 
     def adhesion(self, z: Array, u: Any, p: Any) -> Array:
-        """The effort [N]."""
+        """The effort [N].
+
+        Args:
+            z: states of the stage. u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
+        """
         return u.effort
 
     def flow(self, z: Array, u: Any, p: Any) -> tuple[Array, ...]:
-        """No states."""
+        """No states.
+
+        Args:
+            z: states of the stage. u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
+        """
         return ()
 
     def sampled(self, z: Array, u: Any) -> tuple[Array, ...]:
-        """No states."""
+        """No states.
+
+        Args:
+            z: states of the stage. u: inputs, as in `HybridSystem.flow`.
+        """
         return ()
 
 

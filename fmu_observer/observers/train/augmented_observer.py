@@ -76,6 +76,9 @@ class AugmentedTrainObserver(TrainObserver):
     What is certified: any sequence of balise gaps up to the one asked for while there are no fixes; and where both
     sensors are used, any sequence of fixes and balises in any order with gaps up to `fix_period`, which is what happens
     while fixes come. The change from one of the two regimes to the other is taken to be rare.
+
+    Args:
+        options: of the observer, see its `option_choices`.
     """
 
     frictions = (SPEED.name,)

@@ -31,6 +31,9 @@ class HighGainTrainObserver(TrainObserver):
 
     With K = (2, 1) and no drag it is stable for constant gaps below ``5.0 / theta``, and for any mixture of gaps up to
     ``4.0 / theta`` (independently measured): theta must fit the longest gap.
+
+    Args:
+        options: of the observer, see its `option_choices`.
     """
 
     first_stage_states: tuple[Signal, ...] = ()
@@ -82,7 +85,11 @@ class HighGainTrainObserver(TrainObserver):
         return vector(x[0], x[1], x[0] - u.balise_position, *rest)
 
     def alternative(self, max_gap: float, certify: Callable[[Mapping[str, Value]], Certificate]) -> str | None:
-        """The largest theta that is certified."""
+        """The largest theta that is certified.
+
+        Args:
+            max_gap: longest gap between two balises [s].
+        """
         gains = certified_gains(max_gap, lambda theta: {self.theta_name: theta}, certify)
         return (
             None

@@ -159,7 +159,11 @@ class TakagiSugenoCdo(TrainObserver):
         return certify_sampled_error(vertices, max_gap, model, switching=not frozen)
 
     def alternative(self, max_gap: float, certify: Callable[[Mapping[str, Value]], Certificate]) -> str | None:
-        """A decay that is consistent with the balise gains in use, else the largest high gain that is certified."""
+        """A decay that is consistent with the balise gains in use, else the largest high gain that is certified.
+
+        Args:
+            max_gap: longest gap between two balises [s].
+        """
         consistent = round(dict(certify({}).parameters)["balise_gain_position[1]"], 1)
         if consistent > 0.0 and certify({"innovation_decay": consistent}).holds:
             return f"innovation_decay = {consistent:g} is certified for {max_gap:.3g} s"

@@ -61,14 +61,17 @@ class TrainObserver(GatedObserver, GapCertified):
     The contract:
 
     1. A subclass sets `estimator_states` (continuous), `estimator_memory`, `estimator_parameters` and
-      `estimator_events`;
-       the state is laid out as estimator states, filtered slip, memory, and the memory of the gate (`GatedObserver`).
+       `estimator_events`; the state is laid out as estimator states, filtered slip, memory, and the memory of the gate
+       (`GatedObserver`).
     2. It writes `estimator_flow` (derivatives of the estimator states), `estimate`, `update` and `error_certificate`.
     3. `certify` answers whether the very gains in use are stable for balise gaps up to a given length.
     4. Where the speed is a state, the Davis constant and a negative adhesion force (a brake) are dry friction: they
-      stop the
-       observed train and hold it, and never push it backwards. For a speed above zero that is the thesis's equation.
+       stop the observed train and hold it, and never push it backwards. For a speed above zero that is the thesis's
+       equation.
     5. Estimates start at position 0 and speed 1 m/s, the deliberately wrong start of the thesis.
+
+    Args:
+        options: of the observer, see its `option_choices`.
     """
 
     estimator_states: tuple[Signal, ...] = ()
@@ -165,7 +168,11 @@ class TrainObserver(GatedObserver, GapCertified):
         return self.alternative(max_gap, lambda gains: self.certify(max_gap, {**(parameters or {}), **gains}, preset))
 
     def alternative(self, max_gap: float, certify: Callable[[Mapping[str, Value]], Certificate]) -> str | None:
-        """Clause that names certified gains for a gap [s], or None; `certify` judges changes to the values in use."""
+        """Clause that names certified gains for a gap [s], or None; `certify` judges changes to the values in use.
+
+        Args:
+            max_gap: longest gap between two balises [s].
+        """
         return None
 
     # -- internals --------------------------------------------------------------------------------------------------

@@ -28,13 +28,25 @@ class WheelStage(Protocol):
     stability_parameters: tuple[str, ...]
 
     def adhesion(self, z: Array, u: Any, p: Any) -> Array:
-        """Adhesion force [N]."""
+        """Adhesion force [N].
+
+        Args:
+            u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
+        """
 
     def flow(self, z: Array, u: Any, p: Any) -> tuple[Array, ...]:
-        """Derivatives of the stage's states."""
+        """Derivatives of the stage's states.
+
+        Args:
+            u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
+        """
 
     def sampled(self, z: Array, u: Any) -> tuple[Array, ...]:
-        """The stage's states after an odometer sample."""
+        """The stage's states after an odometer sample.
+
+        Args:
+            u: inputs, as in `HybridSystem.flow`.
+        """
 
 
 class DifferentiatorStage:
@@ -56,11 +68,19 @@ class DifferentiatorStage:
     stability_parameters: tuple[str, ...] = ()
 
     def adhesion(self, z: Array, u: Any, p: Any) -> Array:
-        """``F_ad = effort - (J / r) Z1`` [N], (3.22)."""
+        """``F_ad = effort - (J / r) Z1`` [N], (3.22).
+
+        Args:
+            u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
+        """
         return u.effort - p.n_axles * p.wheel_inertia / p.wheel_radius * z[4]
 
     def flow(self, z: Array, u: Any, p: Any) -> tuple[Array, ...]:
-        """The filtering differentiator of the wheel rate ``y / r``, (3.18)."""
+        """The filtering differentiator of the wheel rate ``y / r``, (3.18).
+
+        Args:
+            u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
+        """
         filters, rates = [z[0], z[1], z[2]], [z[3], z[4]]
         dw, dz = filtering_differentiator_flow(
             filters, rates, u.odometer / p.wheel_radius, p.jerk_bound / p.wheel_radius
@@ -68,7 +88,11 @@ class DifferentiatorStage:
         return (*dw, *dz)
 
     def sampled(self, z: Array, u: Any) -> tuple[Array, ...]:
-        """Nothing is sampled."""
+        """Nothing is sampled.
+
+        Args:
+            u: inputs, as in `HybridSystem.flow`.
+        """
         return tuple(z[i] for i in range(5))
 
 
@@ -95,17 +119,29 @@ class MultirateStage:
     stability_parameters: tuple[str, ...] = ("theta_1", "wheel_high_gain", "odometer_period")
 
     def adhesion(self, z: Array, u: Any, p: Any) -> Array:
-        """``F_ad = -(J / r^2) z2`` [N]."""
+        """``F_ad = -(J / r^2) z2`` [N].
+
+        Args:
+            u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
+        """
         return -p.n_axles * p.wheel_inertia / p.wheel_radius**2 * z[1]
 
     def flow(self, z: Array, u: Any, p: Any) -> tuple[Array, ...]:
-        """``r w``, its deceleration by adhesion, and the decaying innovation."""
+        """``r w``, its deceleration by adhesion, and the decaying innovation.
+
+        Args:
+            u: inputs, as in `HybridSystem.flow`. p: parameters, as in `HybridSystem.flow`.
+        """
         on_speed, on_adhesion = correction(p.theta_1, p.wheel_high_gain, z[2])
         driven = p.wheel_radius**2 / (p.n_axles * p.wheel_inertia) * u.effort
         return z[1] + driven - on_speed, -on_adhesion, innovation_decay(p.theta_1, p.wheel_high_gain, z[2])
 
     def sampled(self, z: Array, u: Any) -> tuple[Array, ...]:
-        """The innovation is set anew."""
+        """The innovation is set anew.
+
+        Args:
+            u: inputs, as in `HybridSystem.flow`.
+        """
         return z[0], z[1], z[0] - u.odometer
 
 

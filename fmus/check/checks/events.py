@@ -16,8 +16,9 @@ from fmus.check.bench import WARM_UP_STEPS, Bench
 from fmus.check.checks.life import listed, not_finite
 from fmus.check.context import Context
 from fmus.check.findings import Outcome, failed, limited, passed, skipped
-from fmus.check.instance import REAL_TYPES, FmuInstance
+from fmus.check.instance import FmuInstance
 from fmus.check.slave import FmuSlave
+from fmus.fmi.types import FLOATING_TYPES
 
 PAYLOAD = "give what comes with an event a value that makes sense"
 NONE = "declares neither a triggered input clock nor a counted event"
@@ -44,8 +45,8 @@ def counted_events(instance: FmuInstance) -> list[str]:
         name
         for name in names
         if f"{name}_time" in inputs
-        and variables[f"{name}_count"].type not in REAL_TYPES
-        and variables[f"{name}_time"].type in REAL_TYPES
+        and variables[f"{name}_count"].type not in FLOATING_TYPES
+        and variables[f"{name}_time"].type in FLOATING_TYPES
     ]
 
 

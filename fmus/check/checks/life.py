@@ -14,8 +14,9 @@ from fmus.check.behaviour import difference, repeatable
 from fmus.check.bench import SLOW_STEPS, WARM_UP_STEPS
 from fmus.check.context import Context
 from fmus.check.findings import Outcome, Verdict, failed, limited, noted, passed, skipped
-from fmus.check.instance import REAL_TYPES, FmuInstance, SlaveError
-from fmus.check.library import functions_of_capabilities
+from fmus.check.instance import FmuInstance, SlaveError
+from fmus.fmi.library import functions_of_capabilities
+from fmus.fmi.types import FLOATING_TYPES
 
 SHARE_OF_BUDGET = 0.4
 TIMED_STEPS = 200
@@ -233,4 +234,4 @@ def listed(names: Sequence[str]) -> str:
 def real_names(instance: FmuInstance, causality: str) -> list[str]:
     """Names of its scalar continuous real variables of one causality."""
     found = (instance.variables[n] for n in instance.names(causality))
-    return [v.name for v in found if v.type in REAL_TYPES and v.variability in (None, "continuous")]
+    return [v.name for v in found if v.type in FLOATING_TYPES and v.variability in (None, "continuous")]

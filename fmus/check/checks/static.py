@@ -6,8 +6,8 @@ import warnings
 
 from fmpy.validation import validate_fmu
 
-from fmus.check.archive import Archive
 from fmus.check.findings import Outcome, noted, passed
+from fmus.fmi.archive import Archive
 
 SHOWN = 3
 

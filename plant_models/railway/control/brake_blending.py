@@ -42,6 +42,11 @@ def building_up(built_up: Array, asked: Array, build_up_time: Array, release_tim
 
 
 def built_up_after(built_up: Array, asked: Array, period: Array, build_up_time: Array, release_time: Array) -> Array:
-    """Force [N] to which `building_up` leads within a period [s] of constant demand, exactly."""
+    """Force [N] to which `building_up` leads within a period [s] of constant demand, exactly.
+
+    Args:
+        built_up: force at the start of the period [N]. asked: demanded force [N].
+        build_up_time, release_time: from none to full force and back [s].
+    """
     time = np.where(asked > built_up, build_up_time, release_time)
     return asked + np.exp(-period / time) * (built_up - asked)

@@ -41,6 +41,9 @@ def next_level(
     """Adhesion level and the time [s] for which the condition has been nominal.
 
     Degraded at once, nominal again only after `recovery_time` [s] of nominal reports.
+
+    Args:
+        quiet_time: since the last degraded report [s]. period: between two calls [s].
     """
     degraded = holds(condition > 1.5)
     quiet = either(degraded, 0.0, np.minimum(quiet_time + period, recovery_time))
@@ -52,15 +55,16 @@ def next_mode(s: Situation, p: Any) -> Array:
     """Mode for the coming period.
 
     1. Between traction and brake the sign of the wanted force decides, but only when the reference accelerates that
-      way, or the
-       error has left `error_band`; in between the train coasts.
+       way, or the error has left `error_band`; in between the train coasts.
     2. A brake is electric until the reference decelerates by `service_deceleration`, the speed falls to where the
-      electric
-       brake fades, the coupler is pressed beyond its soft limit, or the adhesion is degraded: then air is used, on all
-       wheels of the train, until the brake ends (an air brake is not released and applied again for small changes).
+       electric brake fades, the coupler is pressed beyond its soft limit, or the adhesion is degraded: then air is
+       used, on all wheels of the train, until the brake ends (an air brake is not released and applied again for small
+       changes).
     3. Air and electric brake are combined where the train runs faster than the reference by `combined_error`, or more
-      is
-       wanted than the air brake has; that ends at half the error and 80 % of the force.
+       is wanted than the air brake has; that ends at half the error and 80 % of the force.
+
+    Args:
+        s: what is known at the start of the period. p: parameters of the controller.
     """
     braking = _brakes(s, p)
     both = _asks_for_both(s, p)

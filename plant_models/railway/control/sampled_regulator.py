@@ -38,15 +38,27 @@ def pole_placement(bandwidth: Array, mass: Array, period: Array) -> RegulatorGai
 
 
 def tracking_integral(gains: RegulatorGains, force: Array, feedforward: Array, error: Array) -> Array:
-    """Integral [N] with which a regulator would have asked for just this force: what an inactive one holds."""
+    """Integral [N] with which a regulator would have asked for just this force: what an inactive one holds.
+
+    Args:
+        gains: of the regulator. feedforward: force [N]. error: reference minus speed [m/s].
+    """
     return force - feedforward - gains.proportional * error
 
 
 def wanted_force(gains: RegulatorGains, integral: Array, feedforward: Array, error: Array) -> Array:
-    """Force asked for [N], before limits. error: reference minus speed [m/s]."""
+    """Force asked for [N], before limits. error: reference minus speed [m/s].
+
+    Args:
+        gains: of the regulator. integral: its integral [N]. feedforward: force [N].
+    """
     return feedforward + gains.proportional * error + integral
 
 
 def next_integral(gains: RegulatorGains, integral: Array, error: Array, cut_off: Array) -> Array:
-    """Integral [N] for the next period. cut_off: limited minus wanted force [N], 0 between the limits."""
+    """Integral [N] for the next period. cut_off: limited minus wanted force [N], 0 between the limits.
+
+    Args:
+        gains: of the regulator. integral: that of this period [N]. error: reference minus speed [m/s].
+    """
     return integral + gains.integral * error + gains.tracking * cut_off

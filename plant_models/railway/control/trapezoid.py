@@ -38,19 +38,31 @@ class Trapezoid:
         return v / a, held / v, v / d
 
     def speed(self, elapsed: Array) -> Array:
-        """Speed [m/s] at a time since the departure [s]."""
+        """Speed [m/s] at a time since the departure [s].
+
+        Args:
+            elapsed: time since the departure [s].
+        """
         rising = self.acceleration * elapsed
         falling = self.deceleration * (sum(self.durations) - elapsed)
         return np.maximum(np.minimum(np.minimum(rising, self.peak), falling), 0.0)
 
     def phase(self, elapsed: Array) -> Array:
-        """0 before the departure, 1 accelerating, 2 holding, 3 braking, 4 arrived."""
+        """0 before the departure, 1 accelerating, 2 holding, 3 braking, 4 arrived.
+
+        Args:
+            elapsed: time since the departure [s].
+        """
         up, hold, down = self.durations
         later = [np.where(elapsed >= instant, 1.0, 0.0) for instant in (0.0, up, up + hold, up + hold + down)]
         return later[0] + later[1] + later[2] + later[3]
 
     def position(self, elapsed: Array) -> Array:
-        """Distance run [m]."""
+        """Distance run [m].
+
+        Args:
+            elapsed: time since the departure [s].
+        """
         up, hold, down = self.durations
         rising = np.clip(elapsed, 0.0, up)
         held = np.clip(elapsed - up, 0.0, hold)

@@ -29,7 +29,11 @@ class HermiteCubic(NamedTuple):
 
     @classmethod
     def of(cls, h: Array, p0: Array, v0: Array, p1: Array, v1: Array) -> HermiteCubic:
-        """From positions [m] and speeds [m/s] at both ends of a step of length `h` [s]."""
+        """From positions [m] and speeds [m/s] at both ends of a step of length `h` [s].
+
+        Args:
+            h: length of the step [s]. p0, v0: position [m] and speed [m/s] at its start. p1, v1: at its end.
+        """
         rise = p1 - p0
         return cls(p0, h * v0, 3.0 * rise - h * (2.0 * v0 + v1), h * (v0 + v1) - 2.0 * rise)
 
@@ -58,7 +62,7 @@ class HermiteCubic(NamedTuple):
 
         Args:
             target: position [m], reached between the ends of the bracket. direction: 1 where it is reached upwards, -1
-            downwards. low, high: the bracket.
+                downwards. low, high: the bracket.
         """
         distance = target - self.p0
         s = 0.5 * (low + high)

@@ -30,11 +30,18 @@ class BaliseLayout(Protocol):
     parameters: tuple[Signal, ...]
 
     def count(self, before: Array, after: Array, direction: Array, p: Any) -> Array:
-        """Number of balises passed from one position to another [m] in a direction."""
+        """Number of balises passed from one position to another [m] in a direction.
+
+        Args:
+            before, after: positions [m]. direction: 1 forwards, -1 backwards. p: parameters of the plant.
+        """
 
     def next(self, position: Array, direction: Array, p: Any) -> Array:
         """Position of the first balise beyond a position [m] in a direction; `UNUSED` or more, by magnitude, where none
         is.
+
+        Args:
+            p: parameters of the plant.
         """
 
 
@@ -88,7 +95,7 @@ class Positions:
         size: number of entries.
         positions: start values [m], no more than `size`.
         told_apart: number of crossings in a stretch up to which entries at one place are recognised; beyond it each one
-        counts.
+            counts.
 
     Raises:
         ValueError: there are too many positions, one is not finite, or they do not increase.

@@ -85,7 +85,11 @@ class Track:
         return inside
 
     def requirements(self, p: Any) -> dict[str, Array]:
-        """What the ends of the zones must fulfil, see `HybridSystem.requirements`."""
+        """What the ends of the zones must fulfil, see `HybridSystem.requirements`.
+
+        Args:
+            p: parameters of the plant.
+        """
         starts, ends, zones = p.zone_from, p.zone_to, range(self.zone_count)
         used = [np.where(starts[i] == 0.0, np.where(ends[i] == 0.0, 0.0, 1.0), 1.0) for i in zones]
         needed: dict[str, Array] = {}
@@ -104,7 +108,11 @@ class Track:
         return needed
 
     def gradient(self, position: Array, p: Any) -> Array:
-        """Sine of the slope angle at the position [m], positive uphill [1]."""
+        """Sine of the slope angle at the position [m], positive uphill [1].
+
+        Args:
+            p: parameters of the plant.
+        """
         read = piecewise_linear if self.gradient_shape == "linear" else piecewise_constant
         return read(position, p.gradient_position, p.gradient)
 

@@ -1,8 +1,5 @@
 """What rolls: the single-mass train, the multi-vehicle train, and the forces on them."""
 
-from plant_models.railway.vehicle.locomotive import Locomotive
-from plant_models.railway.vehicle.train import Train
+from plant_models.registry import lazy_names
 
-SYSTEMS = (Locomotive, Train)
-
-__all__ = ["SYSTEMS", "Locomotive", "Train"]
+__getattr__ = lazy_names(__name__)

@@ -45,7 +45,7 @@ def filling(cylinder: Array, pipe: Array, p: Any) -> Array:
 
     Args:
         cylinder: pressure in the cylinder [Pa]. pipe: pressure in the pipe at the vehicle [Pa]. p: with
-        `BRAKE_PARAMETERS`.
+            `BRAKE_PARAMETERS`.
 
     Source: limits Bouchama 2024, section 4.1; the time constants are ours: 95 % after 4 s, empty but for 0.4 bar after
     17 s, inside the 3-5 s and 15-20 s that the passenger setting of the UIC brake allows.
@@ -97,11 +97,19 @@ class BrakePipe:
         self.event = PeriodicEvent("brake_reading", period, period, description="The brake demand is read")
 
     def shifted(self, readings: list[Array], integral: Array, p: Any) -> list[Array]:
-        """The register after a new reading: of a demand with this integral [s] over the last period."""
+        """The register after a new reading: of a demand with this integral [s] over the last period.
+
+        Args:
+            p: parameters of the train.
+        """
         return [integral / p.brake_sample_period, *readings[:-1]]
 
     def pressure(self, demand: Array, readings: list[Array], vehicle: int, p: Any) -> Array:
-        """Pressure in the pipe [Pa] at a vehicle, 0 is the first one, for the demand [1] at the first one now."""
+        """Pressure in the pipe [Pa] at a vehicle, 0 is the first one, for the demand [1] at the first one now.
+
+        Args:
+            p: parameters of the train.
+        """
         there = limited(demand) if vehicle == 0 else readings[vehicle * self.delay_samples - 1]
         return p.pipe_pressure_released - there * p.pipe_depression_full
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
 from plant_models.hybrid.system import Array
-from plant_models.railway.adhesion import ADHESION_LAWS
+from plant_models.railway.adhesion.law import ADHESION_LAWS
 from plant_models.railway.track.track import GradientShape, Track, ZoneAxis
 from plant_models.railway.vehicle.coupler import COUPLER_PARAMETERS, coupler_force
 from plant_models.railway.vehicle.pneumatic_brake import BRAKE_PARAMETERS, BrakePipe, brake_force, filling, limited
@@ -143,7 +143,11 @@ class Train(HybridSystem):
         )
 
     def rolling(self, speed: float, wheel_radius: float = 0.575) -> dict[str, float]:
-        """Start values by name of a train that rolls as one at `speed` [m/s], its wheels without slip [m]."""
+        """Start values by name of a train that rolls as one at `speed` [m/s], its wheels without slip [m].
+
+        Args:
+            wheel_radius: of all wheels [m].
+        """
         starts = {"train_speed": speed, **{f"wagon_velocity[{i + 1}]": speed for i in range(self.wagons)}}
         return starts | {f"axle_rate[{k + 1}]": speed / wheel_radius for k in range(self.axles)}
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from plant_models.hybrid.system import Array
-from plant_models.railway.adhesion import AdhesionLaw
+from plant_models.railway.adhesion.law import AdhesionLaw
 
 
 class Wheelset(NamedTuple):

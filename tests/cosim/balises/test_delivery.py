@@ -17,8 +17,8 @@ from mock_slaves import FMI2, EventMode, Mock, component, variable
 import fmu_observer
 from cosim.balises.layout import InstantLayout
 from cosim.balises.telegram import Channel
-from cosim.components.capabilities import read_capabilities
 from cosim.components.component import Component
+from fmus.fmi.capabilities import read_capabilities
 
 H = 0.1
 PERFECT = Channel()
@@ -121,7 +121,9 @@ def test_rows_of_a_late_telegram_stand_at_its_delivery(version: int) -> None:
 
 
 def test_the_observer_before_a_balise_is_shown_before_it_and_after_it_after_it() -> None:
-    """The same rows for both faces: FMI 2 is told beforehand, so the row before is looked up ahead and taken back."""
+    """The same rows for both interfaces: FMI 2 is told beforehand, so the row before is looked up ahead and taken
+    back.
+    """
     first, second = (driven(observer(version), INSTANTS) for version in (3, 2))
     for name in FINAL:
         np.testing.assert_allclose(first[name], second[name], rtol=1e-12, atol=1e-12)

@@ -13,10 +13,10 @@ from mock_slaves import FMI2, Mock, Train, component, started, variable
 from test_fmus.build import linear_fmu
 
 import cosim
-from cosim.components.capabilities import Capabilities, read_capabilities, tool_warning
 from cosim.components.loading import load_fmu, read_description
 from cosim.errors import CosimError, CouplingError, RunError
 from fmus.check.probe import probe
+from fmus.fmi.capabilities import Capabilities, read_capabilities, tool_warning
 
 LAG: dict[str, Any] = {"A": [[-1.0]], "B": [[1.0]], "C": [[1.0]], "D": [[0.5]], "inputs": ["u"], "outputs": ["y"]}
 

@@ -68,18 +68,18 @@ def test_a_start_value_the_slave_refuses_is_a_run_error_with_the_value() -> None
 
 
 @pytest.mark.parametrize("step", ["instantiate", "enterInitializationMode", "exitInitializationMode"])
-@pytest.mark.parametrize("face", [Mock, FMI2])
-def test_a_life_that_fails_says_where(step: str, face: type[Mock]) -> None:
+@pytest.mark.parametrize("interface", [Mock, FMI2])
+def test_a_life_that_fails_says_where(step: str, interface: type[Mock]) -> None:
     def refuse(_self: Any, **_: Any) -> None:
         raise FMICallException(step, ERROR)
 
-    slave = type("Broken", (face,), {step: refuse})()
+    slave = type("Broken", (interface,), {step: refuse})()
     with pytest.raises(RunError, match=f"Component 'mock'.*{step} failed"):
         started(slave)
 
 
 class Train2(FMI2, Train):
-    """FMI 2 face."""
+    """FMI 2 interface."""
 
 
 class Clock(EventMode):

@@ -15,12 +15,12 @@ from mock_slaves import FMI2, Mock, component, read, variable
 from test_fmus.typed import ARRAYS, LONGEST, MOODS, expected, typed_fmu
 
 from cosim.components.component import Component
-from cosim.components.elements import elements_of, layout
 from cosim.components.loading import load_fmu
 from cosim.components.start_values import typed_values
 from cosim.errors import CouplingError, RunError
-from fmus.exact_ports import make_exact_reader
-from fmus.ports import make_reader
+from fmus.fmi.elements import elements_of, layout
+from fmus.fmi.exact_ports import make_exact_reader
+from fmus.fmi.ports import make_reader
 
 INTEGERS = {
     f"{sign}int{bits}": (0 if sign else -(2 ** (bits - 1)), 2 ** (bits - (not sign)) - 1)
@@ -307,7 +307,7 @@ class Kinds(Mock):
 
 
 class Kinds2(FMI2, Kinds):
-    """The same with an FMI 2 face."""
+    """The same with an FMI 2 interface."""
 
 
 @pytest.mark.parametrize(

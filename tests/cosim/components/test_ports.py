@@ -9,7 +9,7 @@ import pytest
 from coupled_runs import Pushed, block
 from mock_slaves import FMI2, Mock, component, variable
 
-from fmus.ports import make_reader, make_writer
+from fmus.fmi.ports import make_reader, make_writer
 
 
 class Mixed(Mock):
@@ -23,7 +23,7 @@ class Mixed(Mock):
 
 
 class Mixed2(FMI2, Mixed):
-    """The same with an FMI 2 face."""
+    """The same with an FMI 2 interface."""
 
 
 @pytest.mark.parametrize("slave", [Mixed(), Mixed2()])

@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from test_fmus.events import INSTANTS, integrator_fmu, timed_fmu, triggered_fmu
 
 from cosim import Scenario
-from cosim.components.component import NEVER
 from cosim.components.recording import RecordingComponent
 from cosim.components.recording_data import Recording, make_recording
 from cosim.errors import CosimError, CouplingError, ScenarioError
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 from fmus.check.probe import probe
+from fmus.fmi.standard import NEVER
 
 
 def result_of(time: Any, **columns: Any) -> Result:

@@ -197,7 +197,7 @@ class Parrot(Mock):
 
 
 class Parrot2(FMI2, Parrot):
-    """The same with an FMI 2 face."""
+    """The same with an FMI 2 interface."""
 
     first: ClassVar[str] = "second"  # type: ignore[misc]
 

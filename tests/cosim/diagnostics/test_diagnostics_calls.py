@@ -21,13 +21,13 @@ from test_fmus.typed import typed_fmu
 from cosim import Scenario
 from cosim.cli import main
 from cosim.components.loading import load_fmu
+from cosim.components.logged_slave import log_calls
 from cosim.diagnostics.call_log import HEADER, CallLog
 from cosim.diagnostics.call_statistics import EARLY, EVERY, CallStatistics
 from cosim.diagnostics.call_text import Described
-from cosim.diagnostics.logged_slave import log_calls
 from cosim.errors import OutputError
 from cosim.master.master import close
-from cosim.report.page.cost import cost_rows, cost_text
+from cosim.report.cost import cost_rows, cost_text
 from cosim.report.page.report import report_page
 
 LINE = re.compile(

@@ -16,12 +16,12 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.transforms import Bbox
 
-from cosim.diagnostics import picture
-from cosim.diagnostics.layout import EVENT_PORT, lay_out
-from cosim.diagnostics.picture import COLOURS, box_size, forward_curves, structure_figure, text_width, wires_of
-from cosim.diagnostics.shapes import Box, Layout, Wire
-from cosim.diagnostics.structure import Balises, Link, Structure
 from cosim.errors import OutputError
+from cosim.structure import picture
+from cosim.structure.layout import EVENT_PORT, lay_out
+from cosim.structure.picture import COLOURS, box_size, forward_curves, structure_figure, text_width, wires_of
+from cosim.structure.shapes import Box, Layout, Wire
+from cosim.structure.structure import Balises, Link, Structure
 
 EDGE = 1e-6
 TOUCH = 0.6  # pixels; text boxes are rounded to whole ones

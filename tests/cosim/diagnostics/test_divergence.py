@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import plant_models
 from cosim import Scenario
-from cosim.diagnostics.divergence import _for_good
+from cosim.structure.divergence import _for_good
 from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
 
 

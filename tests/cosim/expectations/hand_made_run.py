@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from cosim.evaluation.spec import ReportSpec
 from cosim.expectations import Judged, judge
-from cosim.report.spec import ReportSpec
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 from cosim.scenario.outcome import Outcome
 from cosim.scenario.schema import parse_scenario

@@ -16,9 +16,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cosim.errors import UnmetError
+from cosim.evaluation.spec import ReportSpec
 from cosim.expectations import Judged
 from cosim.expectations.indicators import first_on
-from cosim.report.spec import ReportSpec
 from cosim.results.folder import read_results, write_results
 from cosim.results.result import Result, SignalInfo
 from cosim.scenario.outcome import Outcome

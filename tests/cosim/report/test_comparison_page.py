@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 
 from cosim.comparison.compare import compare_results
 from cosim.comparison.verdict import Comparison, Curves, EventComparison, Finding, SignalComparison
+from cosim.drawing.style import new_figure, png
 from cosim.errors import OutputError
 from cosim.report.figures.comparison_figure import (
     comparison_error_figure,
@@ -26,8 +27,6 @@ from cosim.report.figures.comparison_figure import (
     comparison_picture,
     worst_window,
 )
-from cosim.report.figures.panels import png
-from cosim.report.figures.style import new_figure
 from cosim.report.page.comparison import comparison_page, draw_pictures, write_comparison, write_page, write_pictures
 from cosim.results.result import Result, SignalInfo
 

@@ -8,8 +8,7 @@ from pathlib import Path
 import browser
 import pytest
 
-from cosim.report.figures.panels import png
-from cosim.report.figures.style import new_figure
+from cosim.drawing.style import new_figure, png
 
 pytestmark = pytest.mark.browser
 

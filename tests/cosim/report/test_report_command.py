@@ -12,8 +12,8 @@ from small_scenarios import small
 
 from cosim.cli import main
 from cosim.cli.report import _labels as default_labels
-from cosim.report.spec import ReportSpec
-from cosim.report.stored_spec import spec_of
+from cosim.evaluation.spec import ReportSpec
+from cosim.evaluation.stored_spec import spec_of
 from cosim.results.load import load_result
 from cosim.results.summary_file import jsonable
 

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from synthetic_run import OBSERVERS, synthetic_result, synthetic_spec
 
-from cosim.report.event_counts import accepted_stamps, count_events
+from cosim.evaluation.event_counts import accepted_stamps, count_events
+from cosim.evaluation.indicators import indicator_statistics, on_intervals
+from cosim.evaluation.metrics import error_size, phase_metrics
+from cosim.evaluation.numbers import error_number, number
+from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.report.figures.scales import error_scale, running_maximum, value_limits
-from cosim.report.indicators import indicator_statistics, on_intervals
-from cosim.report.metrics import error_size, phase_metrics
-from cosim.report.numbers import error_number, number
-from cosim.report.spec import Phase, ReportSpec
 from cosim.results.result import BaliseRecord, Result
 
 EXACT = 1e-12  # closed forms, up to the rounding of some thousand sums

@@ -16,7 +16,10 @@ import pytest
 from matplotlib.colors import to_hex
 from synthetic_run import OBSERVERS, synthetic_result, synthetic_spec
 
+from cosim.drawing.style import run_line
 from cosim.errors import ComparisonError, OutputError
+from cosim.evaluation.metrics import phase_metrics
+from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.report.figures.overlay_figures import (
     changing_signals,
     error_overlay,
@@ -24,14 +27,11 @@ from cosim.report.figures.overlay_figures import (
     signal_figure,
     true_speed_figure,
 )
-from cosim.report.figures.style import run_line
-from cosim.report.metrics import phase_metrics
 from cosim.report.overlay.differences import differences, layout_note
 from cosim.report.overlay.measures import cell, difference, measured
 from cosim.report.overlay.runs import MOST_RUNS, Run, make_runs
 from cosim.report.page import overlay
 from cosim.report.page.overlay import overlay_page, write_overlay
-from cosim.report.spec import Phase, ReportSpec
 from cosim.results.result import Result
 
 SPEC = synthetic_spec()

@@ -17,18 +17,18 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from synthetic_run import OBSERVERS, ZONES, synthetic_result, synthetic_spec
 
+from cosim.drawing.style import new_figure, observer_line, png
 from cosim.errors import OutputError
+from cosim.evaluation.metrics import phase_metrics
+from cosim.evaluation.spec import ReportSpec
+from cosim.report.error_table import error_text
 from cosim.report.figures.drawing import thin
 from cosim.report.figures.gap_figure import certified_gaps, sampling_gaps
 from cosim.report.figures.main_picture import main_picture
-from cosim.report.figures.panels import PANELS, Panel, draw_all, png
-from cosim.report.figures.style import new_figure, observer_line
+from cosim.report.figures.panels import PANELS, Panel, draw_all
 from cosim.report.figures.zooms import ZOOM_KEYS
-from cosim.report.metrics import phase_metrics
 from cosim.report.page.parts import folded
 from cosim.report.page.report import report_page, write_report
-from cosim.report.page.table import text_table
-from cosim.report.spec import ReportSpec
 from cosim.results.folder import read_results, write_results
 from cosim.results.result import Result
 
@@ -204,7 +204,7 @@ def test_certified_gaps_name_their_observers(result: Result) -> None:
 
 
 def test_text_table_is_aligned_and_shows_published_numbers(result: Result) -> None:
-    lines = text_table(phase_metrics(result, synthetic_spec()), synthetic_spec()).splitlines()
+    lines = error_text(phase_metrics(result, synthetic_spec()), synthetic_spec()).splitlines()
     assert len({len(line) for line in lines}) == 1
     assert len(lines) == 2 + 4 * 3
     assert "max |v| [m/s]" in lines[0]

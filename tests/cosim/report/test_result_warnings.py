@@ -13,15 +13,15 @@ from hypothesis import strategies as st
 from small_scenarios import small
 from synthetic_run import OBSERVERS, synthetic_result, synthetic_spec
 
-from cosim.report.event_counts import count_events, outcome_columns
-from cosim.report.metrics import FEWEST_INSTANTS, error_size, instants, phase_metrics
+from cosim.evaluation.event_counts import count_events, outcome_columns
+from cosim.evaluation.metrics import FEWEST_INSTANTS, error_size, instants, phase_metrics
+from cosim.evaluation.phase_details import phase_details
+from cosim.evaluation.result_warnings import result_warnings
+from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.report.overlay.measures import measured
 from cosim.report.overlay.runs import make_runs
 from cosim.report.page.report import report_page
 from cosim.report.page.verdict import verdict_facts
-from cosim.report.phase_details import phase_details
-from cosim.report.result_warnings import result_warnings
-from cosim.report.spec import Phase, ReportSpec
 from cosim.results.result import BaliseRecord, Result
 from cosim.scenario.outcome import Outcome
 from cosim.studies.measures import error_measures

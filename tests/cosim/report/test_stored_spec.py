@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from synthetic_run import OBSERVERS, synthetic_result, synthetic_spec
 
-from cosim.report.spec import ReportSpec
-from cosim.report.stored_spec import is_guessed, spec_of
+from cosim.evaluation.spec import ReportSpec
+from cosim.evaluation.stored_spec import is_guessed, spec_of
 from cosim.results.folder import read_results, write_results
 from cosim.results.result import Result
 from cosim.results.summary_file import jsonable

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from matplotlib.colors import to_hex
 from synthetic_run import OBSERVERS, synthetic_result, synthetic_spec
 
-from cosim.report.corrections import corrections, event_rows
+from cosim.evaluation.corrections import corrections, event_rows
+from cosim.evaluation.phase_details import phase_details
+from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.report.figures.zoom_figure import zoom_figure
 from cosim.report.figures.zooms import draw_zooms
 from cosim.report.page.phases import phases_html
-from cosim.report.phase_details import phase_details
-from cosim.report.spec import Phase, ReportSpec
 from cosim.report.zoom_windows import MOST, ZoomWindow, notable_windows
 from cosim.results.result import BaliseRecord, Result
 

@@ -75,8 +75,8 @@ def test_an_observer_given_what_the_plant_was_given_is_the_one_inside_it(
     """A loop of driver, mass and observer; then mass and observer in one, beside what was recorded of the loop:
     1e-11.
     """
-    monkeypatch.setattr(plant_models, "PLANTS", plant_models.PLANTS | {"mass": Mass})
-    monkeypatch.setattr(fmu_observer, "OBSERVERS", fmu_observer.OBSERVERS | {"together": Together})
+    monkeypatch.setitem(plant_models.PLANTS, "mass", Mass)
+    monkeypatch.setitem(fmu_observer.OBSERVERS, "together", Together)
     block = {"as": "block3"}
     loop = Scenario(stop=2.0, step=0.02, certificates="ignore", master={"algorithm": algorithm})
     loop.add("observer", observer="takagi_sugeno_cdo", parameters={"estimated_speed": 9.0}, **block)

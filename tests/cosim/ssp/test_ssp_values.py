@@ -120,9 +120,9 @@ def structure(folder: Path, tail: str, unit: str = "m/s") -> Path:
     """A ramp and an adder, connected; `tail` is what stands behind the system."""
     elements = "".join(
         f'<ssd:Component name="{name}" '
-        f'source="resources/{name}.fmu"><ssd:Connectors>{connector(*face)}</ssd:Connectors>'
+        f'source="resources/{name}.fmu"><ssd:Connectors>{connector(*interface)}</ssd:Connectors>'
         "</ssd:Component>"
-        for name, face in (("ramp", ("speed", "output", unit)), ("sum", ("u", "input", "m/s")))
+        for name, interface in (("ramp", ("speed", "output", unit)), ("sum", ("u", "input", "m/s")))
     )
     wires = f"<ssd:Connections>{wire('ramp.speed', 'sum.u')}</ssd:Connections>"
     text = ssd(f"<ssd:Elements>{elements}</ssd:Elements>{wires}", tail=tail)

@@ -18,6 +18,7 @@ from test_fmus.masses import Chain, Cut, cuts
 
 from cosim.components.component import Component
 from cosim.components.loading import load_block, load_fmu
+from cosim.coupling.chain import Position, Stage
 from cosim.coupling.connection import connect
 from cosim.coupling.graph import execution_groups
 from cosim.errors import CouplingError, RunError
@@ -246,7 +247,7 @@ def test_what_somebody_took_over_is_moved_by_the_calling_thread_after_the_others
         parts[name] = component(slave, name)
     master = prepare(parts, [], 0.1, 1, {"algorithm": "jacobi", "threads": 2})
     for step in (master.plan.find("watched"), master.plan.find("receiver")):
-        step.move = lambda t, until, step=step: step.drive(t, until)  # type: ignore[misc]
+        step.add_stage(Stage(Position.BALISES, "somebody"))
     master.run()
     close(master.plan)
     assert seen == [("free", False), ("receiver", True), ("watched", True)]

@@ -27,13 +27,13 @@ from test_fmus.events import (
 )
 
 import cosim
-from cosim.components.clocks import Rhythm
 from cosim.components.loading import load_fmu
 from cosim.coupling.clocks import connect_clocks
 from cosim.coupling.connection import connect
 from cosim.errors import CouplingError, RunError
 from cosim.master.master import close
-from fmus.check.description import read_description
+from fmus.fmi.clocks import Rhythm
+from fmus.fmi.description import read_description
 
 ULPS = 1e-14
 """A few roundings of times of about 1 s."""

@@ -1,0 +1,1 @@
+"""What all pictures share: colours, dashes, fonts and the canvas."""

@@ -1,0 +1,47 @@
+"""Numbers as people read them. Standard library only."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+DASH = "–"
+
+
+def number(value: object, digits: int = 3) -> str:
+    """A number with a few significant digits and no more exponent than it needs.
+
+    Args:
+        value: the number; None and NaN give a dash, infinity gives its sign; anything else is shown as its text.
+        digits: significant digits.
+    """
+    if value is None:
+        return DASH
+    if isinstance(value, (bool, str)) or not isinstance(value, (int, float)):
+        return str(value)
+    if math.isnan(value):
+        return DASH
+    if math.isinf(value):
+        return "∞" if value > 0 else "-∞"
+    return _finite(float(value), digits)
+
+
+def _finite(value: float, digits: int) -> str:
+    if value == 0:
+        return "0"
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    if not -5 < int(exponent) < 6:
+        return f"{mantissa}e{int(exponent)}"
+    return f"{float(f'{mantissa}e{exponent}'):.{max(digits - 1 - int(exponent), 0)}f}"
+
+
+def error_number(value: float | None, digits: int = 3) -> str:
+    """A size of an error: as `number`, but an infinite one reads ``diverged``."""
+    return "diverged" if value is not None and math.isinf(value) else number(value, digits)
+
+
+def cell(value: Any) -> str:
+    """A cell of a table as text."""
+    if isinstance(value, str | int):
+        return str(value)
+    return DASH if value is None else error_number(value)

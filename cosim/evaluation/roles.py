@@ -1,0 +1,58 @@
+"""Signals by the role they play: what a report asks of a result, None where it was not recorded. Imports NumPy only."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from cosim.evaluation.spec import Phase, ReportSpec
+from cosim.results.result import Result
+
+Quantity = Literal["speed", "position"]
+
+
+def recorded(result: Result, name: str | None) -> np.ndarray | None:
+    """Values of a signal, shape (rows,), or None where `name` is None or was not recorded."""
+    return result[name] if name is not None and name in (result.table.dtype.names or ()) else None
+
+
+def estimate(result: Result, observer: str, signal: str) -> np.ndarray | None:
+    """What an observer said of a quantity, shape (rows,), or None where it was not recorded."""
+    return recorded(result, f"{observer}.{signal}")
+
+
+def estimation_error(result: Result, spec: ReportSpec, observer: str, quantity: Quantity) -> np.ndarray | None:
+    """Estimate minus true value: speed [m/s] or position [m], shape (rows,), or None where one of them was not
+    recorded.
+    """
+    true = recorded(result, spec.true_speed if quantity == "speed" else spec.true_position)
+    believed = estimate(result, observer, quantity)
+    if true is None or believed is None:
+        return None
+    with np.errstate(invalid="ignore", over="ignore"):  # inf - inf: the caller treats NaN as diverged
+        return np.asarray(believed - true)
+
+
+def coupler_force(result: Result, signal: str | None) -> np.ndarray | None:
+    """Force in the first coupler beside a signal of the same component [N], shape (rows,), or None where there is none.
+
+    Args:
+        result: the run. signal: any signal of the component, ``component.signal``.
+    """
+    component = "" if signal is None else signal.rpartition(".")[0]
+    name = f"{component}.coupler_force"
+    first = recorded(result, name)
+    return recorded(result, f"{name}[1]") if first is None else first
+
+
+def label(spec: ReportSpec, observer: str) -> str:
+    """Text to show for an observer."""
+    return spec.labels.get(observer, observer)
+
+
+def phases(result: Result, spec: ReportSpec) -> list[Phase]:
+    """The phases to be judged; the whole run where the specification names none."""
+    if spec.phases or not len(result.time):
+        return list(spec.phases)
+    return [Phase("whole run", float(result.time[0]), float(result.time[-1]))]

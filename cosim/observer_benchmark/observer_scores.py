@@ -1,0 +1,205 @@
+"""What one observer is worth in one run: errors by phase and at balises, slip indications, certificate, telegrams,
+cost.
+
+Reads results; runs nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from cosim.evaluation.event_counts import USED
+from cosim.evaluation.indicators import IndicatorStatistics, indicator_statistics, on_intervals
+from cosim.evaluation.metrics import PhaseMetrics, phase_metrics
+from cosim.evaluation.roles import Quantity, estimate, estimation_error
+from cosim.evaluation.spec import Phase, ReportSpec
+from cosim.results.result import BaliseRecord, Result
+from cosim.results.summary_file import jsonable
+from fmus.fmi.standard import TIME_TOLERANCE
+
+WHOLE = "whole run"
+DIVERGED = 1000.0
+"""No train is as fast [m/s]: an estimate that is off by more has diverged."""
+
+
+@dataclass(frozen=True)
+class ErrorAtBalises:
+    """Errors just before telegrams are used: how far the estimate had drifted.
+
+    Args:
+        count: telegrams. mean: signed. rms, max_abs: of the same errors, in the unit of the error.
+    """
+
+    count: int
+    mean: float
+    rms: float
+    max_abs: float
+
+
+@dataclass(frozen=True)
+class CertifiedGap:
+    """What the gains are certified for, beside the gaps of the run.
+
+    Args:
+        limit: gaps that vary are certified up to here [s]; None where that is not known.
+        expected: longest gap to expect before the run [s], None where it cannot be known. seen: longest that occurred
+            [s].
+    """
+
+    limit: float | None
+    expected: float | None
+    seen: float | None
+
+    @property
+    def holds_expected(self) -> bool | None:
+        """Whether it covers what was to be expected."""
+        return None if self.limit is None or self.expected is None else self.expected <= self.limit
+
+    @property
+    def holds_seen(self) -> bool | None:
+        """Whether it covers what occurred."""
+        return None if self.limit is None or self.seen is None else self.seen <= self.limit
+
+
+@dataclass(frozen=True)
+class ObserverScore:
+    """One observer in a benchmark.
+
+    Args:
+        name: of the observer. label: to show. model: shipped observer or FMU.
+        origin: ``scenario`` where the scenario says how it is set, else ``defaults``.
+        settings: what was assumed of it, in words.
+        failure: why there are no numbers, or why they end early; None where all is well.
+        whole: errors over the whole evaluated run. phases: in each phase of the scenario.
+        speed_at_balises, position_at_balises: errors just before telegrams are used [m/s], [m].
+        indicator: what the slip indicator said. false_alarms: indications that began outside the low-adhesion zones.
+        certificate: limits; None where the observer offers no certificate, or where there are no balises.
+        telegrams: what became of them, by outcome. costs: per communication step, one for each repetition [us].
+        kind: ``FMU`` or ``block``.
+        in_loop: whether it acts on the train in the scenario.
+    """
+
+    name: str
+    label: str
+    model: str
+    origin: str
+    settings: tuple[str, ...] = ()
+    failure: str | None = None
+    whole: PhaseMetrics | None = None
+    phases: tuple[PhaseMetrics, ...] = ()
+    speed_at_balises: ErrorAtBalises | None = None
+    position_at_balises: ErrorAtBalises | None = None
+    indicator: IndicatorStatistics | None = None
+    false_alarms: int | None = None
+    certificate: CertifiedGap | None = None
+    telegrams: Mapping[str, int] = field(default_factory=dict)
+    costs: tuple[float, ...] = ()
+    kind: str = ""
+    in_loop: bool = False
+
+    @property
+    def cost(self) -> float | None:
+        """Median cost per communication step [us]."""
+        return float(np.median(self.costs)) if self.costs else None
+
+    @property
+    def speed_rms(self) -> float | None:
+        """Root mean square of the speed error over the whole evaluated run [m/s]."""
+        return None if self.whole is None or self.whole.speed is None else self.whole.speed.rms
+
+    def to_data(self) -> dict[str, Any]:
+        """Plain data."""
+        data: dict[str, Any] = jsonable(self)
+        data["cost_us"] = self.cost
+        if self.certificate is not None:
+            data["certificate"] |= {
+                "holds_expected": self.certificate.holds_expected,
+                "holds_seen": self.certificate.holds_seen,
+            }
+        return data
+
+
+def measured(result: Result, spec: ReportSpec, name: str) -> dict[str, Any]:
+    """Errors, indications and telegrams of one observer, as arguments of `ObserverScore`.
+
+    Args:
+        result: the run. spec: roles; `name` is one of its observers.
+    """
+    time = result.time
+    if not len(time):
+        return {}
+    whole = Phase(WHOLE, float(time[0]), float(time[-1]))
+    alone = ReportSpec(**{**vars(spec), "observers": [name], "phases": [whole]})
+    own = ReportSpec(**{**vars(spec), "observers": [name]})
+    found: dict[str, Any] = {
+        "whole": phase_metrics(result, alone)[0],
+        "phases": tuple(phase_metrics(result, own)) if spec.phases else (),
+        "speed_at_balises": error_at_balises(result, spec, name, "speed"),
+        "position_at_balises": error_at_balises(result, spec, name, "position"),
+        "telegrams": telegram_outcomes(result.events, name),
+    }
+    statistics = indicator_statistics(result, own)
+    if statistics:
+        found |= {"indicator": statistics[0], "false_alarms": false_alarms(result, spec, name)}
+    return found
+
+
+def error_at_balises(result: Result, spec: ReportSpec, name: str, quantity: Quantity) -> ErrorAtBalises | None:
+    """Errors of an observer on the row before each telegram that it used, from `evaluate_after` on; None without any.
+
+    A row pair of the same time stands at each delivery, before and after; of an observer that could not be stopped
+    there the last row before it counts.
+    """
+    error = estimation_error(result, spec, name, quantity)
+    times = [
+        e.delivered_at for e in result.events if e.outcomes.get(name) in USED and e.delivered_at >= spec.evaluate_after
+    ]
+    if error is None or not times:
+        return None
+    rows = np.searchsorted(result.time, np.array(times) - TIME_TOLERANCE)
+    rows = np.where(result.time[np.minimum(rows, len(error) - 1)] > np.array(times) + TIME_TOLERANCE, rows - 1, rows)
+    errors = error[np.clip(rows, 0, len(error) - 1)]
+    if not np.all(np.isfinite(errors)):
+        return ErrorAtBalises(len(errors), inf, inf, inf)
+    largest = float(np.max(np.abs(errors)))
+    scale = largest or 1.0  # so that the square of a diverged estimate does not overflow
+    rms = scale * float(np.sqrt(np.mean((errors / scale) ** 2)))
+    return ErrorAtBalises(len(errors), float(np.mean(errors)), rms, largest)
+
+
+def divergence(whole: PhaseMetrics | None) -> str | None:
+    """Why the numbers of an observer mean nothing although it ran to the end, in words, or None."""
+    speed = None if whole is None else whole.speed
+    if speed is None or not speed.max_abs > DIVERGED:
+        return None
+    return f"diverged: its speed error reached {speed.max_abs:.3g} m/s"
+
+
+def false_alarms(result: Result, spec: ReportSpec, name: str) -> int | None:
+    """How often the slip indicator came on outside the low-adhesion zones; None where no zones are known."""
+    values = estimate(result, name, "slip_indicator")
+    if values is None or not spec.zones:
+        return None
+    begun = [a for a, _ in on_intervals(result.time, values) if a >= spec.evaluate_after]
+    return sum(not any(start <= a <= end for start, end in spec.zones) for a in begun)
+
+
+def telegram_outcomes(events: Sequence[BaliseRecord], name: str) -> dict[str, int]:
+    """What became of the telegrams at one receiver, by outcome."""
+    counts: dict[str, int] = {}
+    for event in events:
+        outcome = event.outcomes.get(name)
+        if outcome is not None:
+            counts[outcome] = counts.get(outcome, 0) + 1
+    return counts
+
+
+def longest_gap(events: Sequence[BaliseRecord], start: float) -> float | None:
+    """Longest time between two balises that were told, or from the start to the first one [s]; None without any."""
+    stamps = sorted(e.stamp for e in events if e.kind == "true")
+    return float(np.diff([start, *stamps]).max()) if stamps else None

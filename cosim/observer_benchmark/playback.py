@@ -1,0 +1,263 @@
+"""A scenario in two halves: the plant side, to be recorded once, and observers that listen to the recording. Runs
+nothing.
+
+Plant side is every component that is no observer, what observers listen to, and whatever acts on those: an observer in
+the loop belongs to it too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import fmu_observer
+from cosim.coupling.connection import Link
+from cosim.errors import ScenarioError
+from cosim.scenario.balise_service import BALISE_EVENT
+from cosim.scenario.connections import parse_connections
+from cosim.scenario.models import make_system
+from cosim.scenario.roles import ROLES, roles_of_balises
+from cosim.scenario.schema import ScenarioTable
+from cosim.scenario.structure import describe_component
+from cosim.scenario.tables import ComponentTable
+from cosim.simulation.scenario import Scenario
+from fmu_observer.observers.train.train_observer import TrainObserver
+
+ESTIMATES = ("position", "speed")
+PLAYED_MASTER = ("algorithm", "inputs", "events", "stepper", "record_memory")
+"""Keys of the master table that matter to an observer that only listens: when its inputs reach it, and how."""
+
+
+@dataclass(frozen=True)
+class Sides:
+    """What is what in a scenario.
+
+    Args:
+        table: the scenario.
+        observers: names of those that estimate position or speed of the train. plant: names of the plant side.
+        links: all connections.
+    """
+
+    table: ScenarioTable
+    observers: tuple[str, ...]
+    plant: tuple[str, ...]
+    links: tuple[Link, ...]
+
+    @property
+    def in_loop(self) -> tuple[str, ...]:
+        """Observers that act on the train."""
+        return tuple(name for name in self.observers if name in self.plant)
+
+    def sources(self, name: str) -> dict[str, Link]:
+        """Where the inputs of a component come from."""
+        return {target.partition(".")[2]: link for link in self.links if (target := link[1]).partition(".")[0] == name}
+
+    def template(self) -> dict[str, Link]:
+        """Where an input of this name comes from in this scenario: as for its observers, else as for the plant side."""
+        found: dict[str, Link] = {}
+        odometer = self.table.report.odometer or (
+            self.table.balises.odometer if self.table.balises is not None else None
+        )
+        for name in (*self.observers, *self.plant):
+            for signal, link in self.sources(name).items():
+                if link[0].partition(".")[0] in self.plant:
+                    found.setdefault(signal, link)
+        if odometer is not None:
+            found.setdefault("odometer", (odometer, "odometer"))
+        return found
+
+
+def find_sides(scenario: Scenario) -> Sides:
+    """Tell the plant side of a scenario from its observers.
+
+    Raises:
+        CosimError: a component cannot be made, or a connection cannot be read.
+    """
+    table = scenario.table()
+    links = tuple(parse_connections(table.connections, scenario.where))
+    plant = None if table.balises is None else (table.balises.position or "").partition(".")[0]
+    observers = tuple(name for name in table.components if name != plant and _is_observer(scenario, table, name))
+    roots = [n for n, t in table.components.items() if n not in observers and t.observer is None]
+    roots += [link[0].partition(".")[0] for link in links if link[1].partition(".")[0] in observers]
+    return Sides(table, observers, _ancestors(roots, links, table.components), links)
+
+
+def _is_observer(scenario: Scenario, table: ScenarioTable, name: str) -> bool:
+    """Named as one in the report, or an estimator of position or speed: shipped, or an FMU that is told of balises."""
+    component, where = table.components[name], f"{scenario.where}: components.{name}"
+    if name in (table.report.observers or []):
+        return True
+    if component.observer is not None:
+        system = make_system(component, where)
+        return system is not None and any(signal.name in ESTIMATES for signal in system.outputs)
+    if component.fmu is None:
+        return False
+    described = describe_component(name, component, scenario.folder, where)
+    return BALISE_EVENT in described.events and any(n in described.names("output") for n in ESTIMATES)
+
+
+def _ancestors(roots: Iterable[str], links: Iterable[Link], components: Iterable[str]) -> tuple[str, ...]:
+    """These components and all that act on them, in the order of the scenario."""
+    before: dict[str, set[str]] = {}
+    for link in links:
+        before.setdefault(link[1].partition(".")[0], set()).add(link[0].partition(".")[0])
+    found, open_ = set(roots), list(roots)
+    while open_:
+        new = before.get(open_.pop(), set()) - found
+        found |= new
+        open_ += new
+    return tuple(name for name in components if name in found)
+
+
+# -- the two halves
+# -----------------------------------------------------------------------------------------------------
+
+
+def recording_scenario(scenario: Scenario, sides: Sides) -> Scenario:
+    """The plant side alone, everything recorded that an observer listens to."""
+    data = _table(sides.table)
+    heard = _heard(sides)
+    data["components"] = {name: _recorded(data["components"][name], heard.get(name, set())) for name in sides.plant}
+    kept = [link for link in sides.links if {link[0].partition(".")[0], link[1].partition(".")[0]} <= set(sides.plant)]
+    data["connections"] = [connection(link, link[1]) for link in kept]
+    data["master"] = data.get("master", {}) | {"record_every": 1}
+    data |= {"certificates": "ignore", "expect": []}
+    if sides.table.balises is not None and sides.table.balises.receivers is not None:
+        data["balises"]["receivers"] = [name for name in sides.table.balises.receivers if name in sides.plant]
+    data["report"] = _roles(sides.table, sides.in_loop)
+    return _scenario(scenario, data)
+
+
+def playback_scenario(
+    scenario: Scenario, sides: Sides, folder: Path, name: str, observer: ComponentTable, sources: Mapping[str, Link]
+) -> Scenario:
+    """One observer beside the recording.
+
+    Args:
+        scenario: that was recorded. sides: of it. folder: with the results of the plant side.
+        name: of the observer; not that of a component of the plant side it listens to. observer: its table.
+        sources: where its inputs come from.
+    """
+    table = sides.table
+    report, balises = _roles(table, [name]), table.balises
+    used = [link[0] for link in sources.values()] + [value for value in report.values() if isinstance(value, str)]
+    watched = {} if balises is None else {k: v for k in ("position", "speed") if (v := getattr(balises, k)) is not None}
+    used += watched.values()
+    wanted = dict.fromkeys(signal.partition(".")[0] for signal in used)
+    if name in wanted and name in sides.in_loop:
+        raise ScenarioError(f"{name}: listens to itself; a recording cannot take its place.")
+    components: dict[str, Any] = {n: {"recording": str(folder.resolve()), "component": n} for n in wanted if n != name}
+    master = {key: value for key, value in _table(table.master).items() if key in PLAYED_MASTER}
+    if master.get("algorithm") == "iterate":
+        del master["algorithm"]  # there is no loop any more
+    data: dict[str, Any] = {
+        "title": f"{table.title}: {observer.label or name}",
+        "start": table.start,
+        "stop": table.stop,
+        "step": table.step,
+        "certificates": "ignore",
+        "components": components | {name: _table(observer)},
+        "connections": [connection(link, f"{name}.{signal}") for signal, link in sources.items()],
+        "master": master,
+        "report": report,
+    }
+    if balises is not None:
+        data["balises"] = {
+            **watched,
+            "timing": balises.timing,
+            "layout": "recorded",
+            "file": str(folder.resolve()),
+        }
+    return _scenario(scenario, data)
+
+
+def connection(link: Link, target: str) -> str | dict[str, Any]:
+    """A connection as it stands in a scenario, to this target."""
+    if len(link) == 2:
+        return f"{link[0]} -> {target}"
+    given = link[2]
+    return {
+        "from": link[0],
+        "to": target,
+        "factor": given.factor,
+        "offset": given.offset,
+        "units": "convert" if given.convert_units else "ignore",
+        "values": [list(pair) for pair in given.table],
+    }
+
+
+def _heard(sides: Sides) -> dict[str, set[str]]:
+    """Signals that observers listen to, by component."""
+    heard: dict[str, set[str]] = {}
+    for link in sides.links:
+        source, _, signal = link[0].partition(".")
+        if link[1].partition(".")[0] in sides.observers:
+            heard.setdefault(source, set()).add(signal)
+    return heard
+
+
+def _recorded(component: dict[str, Any], signals: set[str]) -> dict[str, Any]:
+    record = component.get("record", [])
+    return component | {"record": [*record, *sorted(signals - set(record))]}
+
+
+def _roles(table: ScenarioTable, observers: Iterable[str]) -> dict[str, Any]:
+    """The report table for these observers, without what is told of others."""
+    kept = {*ROLES, "phases", "zones", "evaluate_after"}
+    given = {key: value for key, value in _table(table.report).items() if key in kept}
+    given = {key: value for key, value in given.items() if key not in ROLES or value is not None}
+    given = roles_of_balises(table.balises) | given
+    return given | {"observers": list(observers)}
+
+
+def _scenario(scenario: Scenario, data: dict[str, Any]) -> Scenario:
+    return Scenario(folder=scenario.folder, where=scenario.where, **data)
+
+
+def _table(table: Any) -> dict[str, Any]:
+    data: dict[str, Any] = table.model_dump(by_alias=True, exclude_unset=True)
+    return data
+
+
+# -- observers
+# ----------------------------------------------------------------------------------------------------------
+
+FACTS = ("mass", "davis_a", "davis_b", "davis_c", "wheel_radius", "wheel_inertia", "n_axles")
+"""What every train observer is told of the train."""
+
+
+def train_observers() -> dict[str, type[TrainObserver]]:
+    """The shipped train observers by name."""
+    return {
+        n: kind
+        for n, kind in fmu_observer.OBSERVERS.items()
+        if isinstance(kind, type) and issubclass(kind, TrainObserver)
+    }
+
+
+def known_facts(sides: Sides) -> dict[str, tuple[float, str]]:
+    """What the scenario says of the train that an observer should know too: value, and who says so.
+
+    What its own observers were told in agreement comes first; then parameters and preset of the plant.
+    """
+    found: dict[str, tuple[float, str]] = {}
+    for fact in FACTS:
+        told = [sides.table.components[n].parameters.get(fact) for n in sides.observers]
+        values = {value for value in told if isinstance(value, int | float) and not isinstance(value, bool)}
+        if len(values) == 1 and None not in told:
+            found[fact] = float(values.pop()), "as for the observers of the scenario"
+    plant = "" if sides.table.balises is None else (sides.table.balises.position or "").partition(".")[0]
+    plant = plant or (sides.table.report.true_speed or "").partition(".")[0]
+    if plant in sides.table.components:
+        for fact, value in _plant_facts(sides.table.components[plant]).items():
+            found.setdefault(fact, (value, f"as for {plant}"))
+    return found
+
+
+def _plant_facts(table: ComponentTable) -> dict[str, float]:
+    system = make_system(table, "")
+    preset: Mapping[str, Any] = {} if system is None or table.preset is None else system.presets[table.preset]
+    given = {**preset, **table.parameters}
+    return {fact: float(given[fact]) for fact in FACTS if isinstance(given.get(fact), int | float)}

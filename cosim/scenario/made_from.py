@@ -1,0 +1,159 @@
+"""Writing ``made_from``: the scenario, the files it uses and the manifest. Touches only the results folder it is
+given.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from cosim.errors import OutputError
+from cosim.results.folder import check_writable
+from cosim.results.summary_file import jsonable
+from cosim.scenario.manifest import FILES, FORMAT, MADE_FROM, MANIFEST, SCENARIO, sha256
+from cosim.scenario.origin import ForeignFile, Origin, stamp
+from cosim.scenario.paths import map_paths
+from cosim.scenario.save import plain
+from cosim.scenario.summary import versions
+
+FILES_UP_TO = 50e6
+"""Files of others up to this size are copied into the results [bytes]."""
+
+HEADER = (
+    "# The scenario of these results, with what it included and what was overridden. cosim rerun runs it again.\n\n"
+)
+UNHASHED = ("summary", "messages", "report", "calls")
+Seal = Callable[[Mapping[str, Path], Mapping[str, Any]], None]
+
+
+@contextmanager
+def renewed(directory: str | Path, origin: Origin | None, files_up_to: float = FILES_UP_TO) -> Iterator[Seal]:
+    """``made_from`` is exchanged with the results: prepared before, put in place after, the former one back on a
+    failure.
+
+    Args:
+        directory: the results folder. origin: of the results; None where it is not known: a former ``made_from`` goes.
+        files_up_to: files of others up to this size are copied [bytes].
+
+    Yields:
+        A function to be called once the results are written, with their paths by kind and their summary.
+
+    Raises:
+        OutputError: the folder cannot be written.
+    """
+    folder = check_writable(directory)
+    place = folder / MADE_FROM
+    if place.exists() and not (place / MANIFEST).is_file():
+        what = f"its {MADE_FROM} is not that of a run"
+        raise OutputError(f"Results cannot be written to {folder}: {what}. Choose another output folder.")
+    try:
+        with tempfile.TemporaryDirectory(dir=folder, prefix=f".{MADE_FROM}-") as scratch:
+            new, former = Path(scratch) / "new", Path(scratch) / "former"
+            manifest = None if origin is None else _prepare(origin, new, files_up_to)
+            if place.exists():
+                place.rename(former)
+            try:
+                yield lambda paths, summary: None if manifest is None else _seal(manifest, new, paths, summary)
+                if manifest is not None:
+                    new.rename(place)
+            except BaseException:
+                if former.exists():
+                    former.rename(place)
+                raise
+    except OutputError:
+        raise
+    except OSError as error:
+        raise OutputError(
+            f"Results could not be written to {folder}: {error.strerror or error} ({error.filename})."
+        ) from error
+
+
+def _prepare(origin: Origin, new: Path, files_up_to: float) -> dict[str, Any]:
+    """Scenario and files; what is known of them before the results are."""
+    new.mkdir()
+    copies: dict[str, str] = {}
+    files = [_keep(foreign, origin, new, files_up_to, copies) for foreign in origin.files]
+    data = plain(origin.table.model_dump(by_alias=True, exclude_unset=True))
+    data = map_paths(
+        data, lambda path: copies.get(str((origin.folder / path).resolve()), str((origin.folder / path).resolve()))
+    )
+    (new / SCENARIO).write_text(HEADER + tomli_w.dumps(data), encoding="utf-8")
+    return {
+        "format": FORMAT,
+        "scenario": {"name": origin.name, "from": origin.where, "file": SCENARIO, "sha256": sha256(new / SCENARIO)},
+        "asked_by": "script" if origin.command is None else origin.command,
+        "seeds": _seeds(data),
+        "files": files,
+    }
+
+
+def _keep(
+    foreign: ForeignFile, origin: Origin, new: Path, files_up_to: float, copies: dict[str, str]
+) -> dict[str, Any]:
+    """Copy the parts of a file that are small enough; one that was copied already is named again."""
+    name = f"{FILES}/{foreign.owner}" + (f"/{foreign.path.name}" if foreign.path.is_dir() else "")
+    entry: dict[str, Any] = {"key": foreign.key, "path": str(foreign.path), "parts": []}
+    parts = foreign.parts if foreign.path.exists() else [foreign.path]
+    known = copies.get(str(foreign.path))
+    folder = name if known is None else known if foreign.path.is_dir() else known.rpartition("/")[0]
+    entry["parts"] = [_keep_part(path, f"{folder}/{path.name}", origin, new, files_up_to) for path in parts]
+    if all(part["copy"] is not None for part in entry["parts"]):
+        copies[str(foreign.path)] = folder if foreign.path.is_dir() else f"{folder}/{foreign.path.name}"
+    else:  # all of it or nothing
+        why = next(part["why"] for part in entry["parts"] if part["copy"] is None)
+        entry["parts"] = [part | {"copy": None, "why": part["why"] or why} for part in entry["parts"]]
+    return entry
+
+
+def _keep_part(path: Path, copy: str, origin: Origin, new: Path, files_up_to: float) -> dict[str, Any]:
+    part: dict[str, Any] = {"path": str(path), "copy": None, "sha256": None, "size": None, "why": None}
+    try:
+        seen = stamp(path)
+        part |= {"size": seen[0]}
+        if origin.stamps.get(str(path), seen) != seen:
+            part["note"] = "it was changed after the run had begun"
+        if seen[0] > files_up_to:
+            return part | {
+                "sha256": sha256(path),
+                "why": f"{seen[0] / 1e6:.3g} MB are more than {files_up_to / 1e6:.3g} MB",
+            }
+        target = new / copy
+        if not target.exists():
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(path, target)
+        return part | {"sha256": sha256(target), "copy": copy}
+    except OSError as error:  # the results matter more than where they come from
+        (new / copy).unlink(missing_ok=True)
+        return part | {"why": f"{error.strerror or error}"}
+
+
+def _seal(manifest: dict[str, Any], new: Path, paths: Mapping[str, Path], summary: Mapping[str, Any]) -> None:
+    """Add what is known of the results and write the manifest."""
+    results = {p.name: {"sha256": sha256(p), "size": p.stat().st_size} for k, p in paths.items() if k not in UNHASHED}
+    components = [
+        {k: c.get(k) for k in ("name", "kind", "model", "fmi_version", "guid")} for c in summary.get("components", ())
+    ]
+    content = manifest | {
+        "written": datetime.now(UTC).isoformat(timespec="seconds"),
+        "versions": summary.get("versions") or versions(),
+        "components": components,
+        "results": results,
+    }
+    text = json.dumps(jsonable(content), indent=2, ensure_ascii=False, allow_nan=False)
+    (new / MANIFEST).write_text(text + "\n", encoding="utf-8")
+
+
+def _seeds(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Every seed that the scenario gives; those it leaves to their defaults are in the versions of the packages."""
+    seeds = {f"balises.{k}": v for k, v in data.get("balises", {}).items() if "seed" in k}
+    for name, component in data["components"].items():
+        seeds |= {f"{name}.{k}": v for k, v in component.get("parameters", {}).items() if "seed" in k}
+    return seeds

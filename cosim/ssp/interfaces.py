@@ -1,0 +1,113 @@
+"""Faces: what the FMU of a component says of its variables, as far as connections and parameters need it. Loads no
+library.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from fmpy.model_description import ModelDescription, ModelVariable
+
+from cosim.components.loading import read_description
+from cosim.errors import FmuLoadError, nearest
+from cosim.ssp.common import FAMILIES, NamedUnit
+from cosim.ssp.document import Node, fail
+from cosim.ssp.lapses import Lapses
+from cosim.ssp.model import ComponentElement, Connector
+from fmus.fmi.sense import doubled_names
+from plant_models.hybrid.units import BASE_SYMBOLS, Unit, UnitError, parse_unit
+
+
+class Interface:
+    """The variables of an FMU.
+
+    Args:
+        description: its model description. what: its name for messages.
+    """
+
+    def __init__(self, description: ModelDescription, what: str) -> None:
+        self.description, self.what = description, what
+        self.variables: dict[str, ModelVariable] = {v.name: v for v in description.modelVariables}
+        self._units = {u.name: u for u in description.unitDefinitions}
+
+    def variable(self, name: str, node: Node) -> ModelVariable:
+        """The variable of this name, or of the array it is an element of.
+
+        Args:
+            node: element of the document.
+
+        Raises:
+            ScenarioError: there is none; the nearest names are suggested.
+        """
+        if name not in self.variables:
+            fail(node, f"{self.what} has no variable {name!r}; {nearest(name, self.variables)}")
+        return self.variables[name]
+
+    def unit(self, name: str) -> NamedUnit | None:
+        """The unit of a variable, or None where it has none or one that cannot be understood."""
+        variable = self.variables[name]
+        declared = variable.declaredType
+        unit_name = variable.unit or getattr(declared, "unit", None)
+        if not unit_name:
+            return None
+        try:
+            unit = self._defined(unit_name) or parse_unit(unit_name)
+        except UnitError:
+            return None
+        own = variable.relativeQuantity
+        relative = getattr(declared, "relativeQuantity", False) if own is None else own
+        return NamedUnit(unit_name, replace(unit, offset=0.0) if relative else unit)
+
+    def items(self, name: str) -> dict[str, int]:
+        """Items of an enumeration by name; empty for another type."""
+        return {i.name: int(i.value) for i in getattr(self.variables[name].declaredType, "items", None) or []}
+
+    def check(self, connector: Connector) -> None:
+        """A connector of the component must be a variable of the FMU, of its kind and type.
+
+        Raises:
+            ScenarioError: it is not.
+        """
+        variable = self.variable(connector.name, connector.node)
+        kind, causality = connector.kind, variable.causality or "local"
+        if self.description.fmiVersion.startswith("1") and kind not in ("input", "output"):
+            causality = kind  # FMI 1.0 has other words for the rest
+        if kind not in ("unspecified", causality):
+            fail(
+                connector.node,
+                f"connector {connector.name!r} is of kind {kind!r}, the variable of {self.what} has causality "
+                f"{causality!r}.",
+            )
+        if connector.type is not None and connector.type.family != FAMILIES[variable.type]:
+            fail(
+                connector.node,
+                f"connector {connector.name!r} is of type {connector.type.name}, the variable of {self.what} of type "
+                f"{variable.type}.",
+            )
+
+    def _defined(self, unit_name: str) -> Unit | None:
+        base: Any = getattr(self._units.get(unit_name), "baseUnit", None)
+        if base is None:
+            return None
+        powers = tuple(int(getattr(base, symbol) or 0) for symbol in BASE_SYMBOLS)
+        return Unit(powers, 1.0 if base.factor is None else float(base.factor), float(base.offset or 0.0))
+
+
+def interface_of(element: ComponentElement, lapses: Lapses) -> Interface:
+    """The interface of a component's FMU.
+
+    Args:
+        element: the component. lapses: told of names that it gives twice.
+
+    Raises:
+        ScenarioError: its file is no FMU that can be read.
+    """
+    try:
+        description = read_description(element.fmu, element.name)
+    except FmuLoadError as error:
+        fail(element.node, str(error).replace(str(element.fmu), element.member))
+    doubled = doubled_names(description)
+    if doubled is not None:
+        lapses.forgive(element.node, f"{element.member}: {doubled}")
+    return Interface(description, f"component {element.name!r} ({element.member})")

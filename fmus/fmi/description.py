@@ -1,0 +1,156 @@
+"""Model descriptions: as fmpy reads them, with what fmpy leaves out of FMI 1.0 and 3.0 added."""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from fmpy import read_model_description
+from fmpy.model_description import ModelDescription, ModelVariable, Unknown, ValidationError
+
+FILE = "modelDescription.xml"
+LEFT_OUT = {
+    "providesDirectionalDerivatives": "providesDirectionalDerivative",
+    "providesAdjointDerivatives": "providesAdjointDerivatives",
+}
+"""Attributes of FMI 3.0 by their name in fmpy 0.3.32, which looks for the name of FMI 2.0 and finds nothing."""
+
+ELEMENTS = {"CoSimulation": "coSimulation", "ModelExchange": "modelExchange"}
+TRUE = {"true", "1"}
+CLOCK_ATTRIBUTES: dict[str, Any] = {
+    "priority": int,
+    "intervalDecimal": float,
+    "shiftDecimal": float,
+    "resolution": int,
+    "intervalCounter": int,
+    "shiftCounter": int,
+    "supportsFraction": TRUE.__contains__,
+    "canBeDeactivated": TRUE.__contains__,
+}
+
+FLAGS_OF_FMI_1 = (
+    "canHandleVariableCommunicationStepSize",
+    "canInterpolateInputs",
+    "canRunAsynchronuously",
+    "canBeInstantiatedOnlyOncePerProcess",
+    "canNotUseMemoryManagementFunctions",
+)
+
+
+def read_description(source: Path) -> ModelDescription:
+    """The model description of an FMU file or of the folder it was unpacked into; not validated.
+
+    Args:
+        source: the user's file.
+
+    Raises:
+        Exception: whatever a broken file makes the parsers throw.
+    """
+    description = read_model_description(str(source), validate=False)
+    version = str(description.fmiVersion)
+    if version.startswith("1"):
+        _complete_fmi_1(description, ElementTree.fromstring(_text(source)))
+    if version.startswith("3"):
+        root = ElementTree.fromstring(_text(source))
+        for tag, held in ELEMENTS.items():
+            element, interface = root.find(tag), getattr(description, held)
+            if element is not None and interface is not None:
+                for written, name in LEFT_OUT.items():
+                    setattr(interface, name, element.get(written) in TRUE)
+        variables = {v.name: v for v in description.modelVariables}
+        for entry in root.iterfind("ModelVariables/*[@intermediateUpdate]"):
+            variables[entry.get("name")].intermediateUpdate = entry.get("intermediateUpdate") in TRUE
+        for entry in root.iterfind("ModelVariables/Clock"):
+            _complete_clock(variables[entry.get("name")], entry)
+    return description
+
+
+def why_unreadable(source: Path, error: Exception) -> str:
+    """Why a model description could not be read: what the schema of the standard says first, else what the parser
+    threw.
+
+    Args:
+        source: the user's file.
+    """
+    try:
+        read_model_description(str(source), validate=True)
+    except ValidationError as found:
+        lines = [line.removeprefix("- ") for line in str(found).splitlines() if line.startswith("- ")]
+        return lines[0].rstrip(".") if lines else str(error)
+    except Exception:  # as before, with nothing learnt from the schema
+        pass
+    if isinstance(error, (KeyError, TypeError, AttributeError)):  # of the parser, on its way through the entries
+        return f"an attribute is missing, or a reference leads nowhere: {type(error).__name__} {error}"
+    return str(error)
+
+
+def _complete_clock(clock: ModelVariable, entry: ElementTree.Element) -> None:
+    """The attributes of a clock, which fmpy 0.3.32 knows and does not read."""
+    for name, convert in CLOCK_ATTRIBUTES.items():
+        text = entry.get(name)
+        if text is not None:
+            setattr(clock, name, convert(text))
+
+
+def declared_tolerance(description: ModelDescription) -> float | None:
+    """Relative tolerance of the default experiment; None where none is declared, or no positive number.
+
+    Args:
+        description: model description of the FMU.
+    """
+    experiment = description.defaultExperiment
+    try:
+        tolerance = math.nan if experiment is None or experiment.tolerance is None else float(experiment.tolerance)
+    except ValueError:
+        return None
+    return tolerance if 0.0 < tolerance < math.inf else None
+
+
+def negated_aliases(source: Path) -> frozenset[str]:
+    """Names of the variables of an FMI 1.0 FMU whose slave holds the value with the other sign; fmpy does not read
+    it.
+
+    Args:
+        source: the user's file.
+    """
+    root = ElementTree.fromstring(_text(source))
+    entries = root.iterfind("ModelVariables/ScalarVariable")
+    return frozenset(entry.get("name", "") for entry in entries if entry.get("alias") == "negatedAlias")
+
+
+def _complete_fmi_1(description: ModelDescription, root: ElementTree.Element) -> None:
+    """Capabilities and direct dependencies of FMI 1.0 co-simulation, which fmpy leaves out."""
+    interface = description.coSimulation
+    found = root.find("Implementation/*/Capabilities")
+    if interface is not None:
+        interface.needsExecutionTool = root.find("Implementation/CoSimulation_Tool") is not None
+        if found is not None:
+            for name in FLAGS_OF_FMI_1:
+                setattr(interface, name, found.get(name) in TRUE)
+            interface.maxOutputDerivativeOrder = int(found.get("maxOutputDerivativeOrder", "0"))
+    entries = {entry.get("name"): entry for entry in root.iterfind("ModelVariables/ScalarVariable")}
+    by_name: dict[Any, ModelVariable] = {v.name: v for v in description.modelVariables}
+    description.outputs = [
+        Unknown(index=i, variable=v, dependencies=_direct(entries[v.name], by_name), sourceline=v.sourceline)
+        for i, v in enumerate(description.modelVariables, 1)
+        if v.causality == "output"
+    ]
+
+
+def _direct(entry: ElementTree.Element, variables: dict[Any, ModelVariable]) -> list[ModelVariable] | None:
+    """The inputs an output of FMI 1.0 depends on directly, None where it does not say."""
+    element = entry.find("DirectDependency")
+    if element is None:
+        return None
+    names = [(name.text or "").strip() for name in element.iterfind("Name")]
+    return [variables[name] for name in names if name in variables]
+
+
+def _text(source: Path) -> bytes:
+    if source.is_dir():
+        return (source / FILE).read_bytes()
+    with zipfile.ZipFile(source) as archive:
+        return archive.read(FILE)

@@ -1,0 +1,113 @@
+"""Libraries: fmpy's slave and model classes over a shared library that may lack functions, and which ones it must have.
+
+fmpy refuses a library that lacks any function of the standard. Here a missing one is noted, and fails when it is
+called.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import inspect
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from fmpy.fmi2 import FMU2Model, FMU2Slave
+from fmpy.fmi3 import FMU3Model, FMU3ScheduledExecution, FMU3Slave
+from fmpy.model_description import ModelDescription
+
+from fmus.fmi.standard import CO_SIMULATION, MODEL_EXCHANGE, SCHEDULED_EXECUTION, fmi_version
+
+FACES: dict[tuple[int, str], type] = {
+    (2, CO_SIMULATION): FMU2Slave,
+    (2, MODEL_EXCHANGE): FMU2Model,
+    (3, CO_SIMULATION): FMU3Slave,
+    (3, MODEL_EXCHANGE): FMU3Model,
+    (3, SCHEDULED_EXECUTION): FMU3ScheduledExecution,
+}
+
+CAPABILITY_FUNCTIONS = {
+    "canGetAndSetFMUstate": ("GetFMUstate", "SetFMUstate", "FreeFMUstate"),
+    "canSerializeFMUstate": ("SerializedFMUstateSize", "SerializeFMUstate", "DeSerializeFMUstate"),
+    "providesDirectionalDerivative": ("GetDirectionalDerivative",),
+    "providesAdjointDerivatives": ("GetAdjointDerivative",),
+    "canInterpolateInputs": ("SetRealInputDerivatives",),
+    "hasEventMode": ("EnterEventMode", "UpdateDiscreteStates", "EnterStepMode"),
+}
+"""Functions that belong to a capability, in FMI 2 spelling; case is ignored."""
+
+
+def functions_of(version: int, interface: str) -> list[str]:
+    """Names of the C functions that an interface type has in the standard."""
+    return [name for name, _ in inspect.getmembers(FACES[version, interface]) if name.startswith(f"fmi{version}")]
+
+
+def functions_of_capabilities(description: ModelDescription, interface: str) -> Iterator[tuple[str, str]]:
+    """Pairs of a declared capability and a C function that it needs, names in lower case.
+
+    Args:
+        description: model description of the FMU.
+    """
+    declared = getattr(description, interface)
+    for capability, functions in CAPABILITY_FUNCTIONS.items():
+        if getattr(declared, capability, False):
+            yield from ((capability, f"fmi{fmi_version(description)}{name}".lower()) for name in functions)
+
+
+def load(folder: Path, description: ModelDescription, interface: str, name: str) -> Any:
+    """An object with fmpy's call surface over the library of an unpacked FMU; not yet instantiated.
+
+    Args:
+        folder: where the FMU was unpacked.
+        description: its model description.
+        interface: ``coSimulation`` or ``modelExchange``.
+        name: instance name.
+
+    Raises:
+        Exception: the library cannot be loaded.
+    """
+    face = _tolerant(FACES[fmi_version(description), interface])
+    identifier = getattr(description, interface).modelIdentifier
+    return face(guid=description.guid, modelIdentifier=identifier, unzipDirectory=str(folder), instanceName=name)
+
+
+class MissingFunctionError(RuntimeError):
+    """A function of the standard was called that the library does not export."""
+
+
+class _Missing:
+    """Stands where a function should be; fmpy hangs its types on it."""
+
+    argnames: Any
+    argtypes: Any
+    restype: Any
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __call__(self, *_: Any) -> Any:
+        raise MissingFunctionError(f"the library does not export {self._name}")
+
+
+class _Library:
+    """A loaded library whose missing functions are noted in `missing`."""
+
+    def __init__(self, dll: ctypes.CDLL) -> None:
+        self._dll = dll
+        self._handle = dll._handle
+        self.missing: list[str] = []
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return getattr(self._dll, name)
+        except AttributeError:
+            self.missing.append(name)
+            return _Missing(name)
+
+
+def _tolerant(face: type) -> Any:
+    def load_functions(self: Any) -> None:
+        self.dll = _Library(self.dll)
+        face._loadFunctions(self)  # type: ignore[attr-defined]
+
+    return type(face.__name__, (face,), {"_loadFunctions": load_functions})  # fmpy goes by the name of the class

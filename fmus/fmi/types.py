@@ -1,0 +1,67 @@
+"""Types of variables: which are numbers, how C holds them, by which functions they are read. Knows variables only."""
+
+from __future__ import annotations
+
+import ctypes
+from math import prod
+from typing import Any
+
+import numpy as np
+from fmpy.model_description import ModelVariable
+
+REAL_TYPE = {1: "Real", 2: "Real", 3: "Float64"}
+FLOATING_TYPES = frozenset({"Real", "Float64", "Float32"})
+
+NUMERIC_TYPES = frozenset(
+    {"Real", "Integer", "Boolean", "Enumeration", "Float64", "Float32"}
+    | {f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)}
+)
+"""Types whose values a table of numbers can hold. Integers beyond 2**53 are rounded in it; see `exact_ports`."""
+
+CTYPES: dict[str, tuple[Any, str, Any]] = {
+    "Real": (ctypes.c_double, "d", np.float64),
+    "Float64": (ctypes.c_double, "d", np.float64),
+    "Float32": (ctypes.c_float, "f", np.float32),
+    "Integer": (ctypes.c_int, "i", np.int32),
+    "Int8": (ctypes.c_int8, "b", np.int8),
+    "UInt8": (ctypes.c_uint8, "B", np.uint8),
+    "Int16": (ctypes.c_int16, "h", np.int16),
+    "UInt16": (ctypes.c_uint16, "H", np.uint16),
+    "Int32": (ctypes.c_int32, "i", np.int32),
+    "UInt32": (ctypes.c_uint32, "I", np.uint32),
+    "Int64": (ctypes.c_int64, "q", np.int64),
+    "UInt64": (ctypes.c_uint64, "Q", np.uint64),
+}
+"""FMI type -> C type, its letter in `struct`, and its dtype."""
+
+BOOLEANS: dict[int, tuple[Any, str, Any]] = {
+    1: (ctypes.c_char, "B", np.uint8),
+    2: (ctypes.c_int, "i", np.int32),
+    3: (ctypes.c_bool, "B", np.uint8),
+}
+"""The same for Boolean, by FMI version. Numbers, not truth values: a slave may say 2 for true."""
+
+
+def size(variable: ModelVariable) -> int:
+    """Number of values of a variable: 1, or the product of its dimensions."""
+    return prod(variable.shape) if variable.shape else 1
+
+
+def getter_type(kind: str, fmi_version: int) -> str:
+    """The type in the name of the functions that read and write a variable type.
+
+    Args:
+        fmi_version: 2 or 3.
+    """
+    if kind == "Enumeration":
+        return "Int64" if fmi_version == 3 else "Integer"
+    return kind
+
+
+def c_type(kind: str, fmi_version: int) -> tuple[Any, str, Any]:
+    """C type, letter in `struct` and dtype of a getter's numeric type.
+
+    Args:
+        fmi_version: 2 or 3.
+    """
+    return BOOLEANS[fmi_version] if kind == "Boolean" else CTYPES[kind]

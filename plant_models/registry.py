@@ -1,0 +1,197 @@
+"""Registries: the members of one kind by name, found without importing them and loaded when they are asked for.
+
+A member is a class that states its own name, ``name = "locomotive"``, in a file of one of the registry's rooms: a new
+file is a new member. Installed packages bring members by entry points, and a program adds its own by assignment.
+Standard library only.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, MutableMapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+T = TypeVar("T")
+
+NAMED_CLASS = re.compile(r'^(?:class (\w+)|    name(?:: [^=\n]+)? = "(\w+)")', re.MULTILINE)
+"""A class at the top of a file, and the name that it states."""
+
+
+class RegistryError(ValueError):
+    """A member cannot be had: two bear its name, or what an installed package announces cannot be used."""
+
+
+@dataclass(frozen=True)
+class Member:
+    """A member that has not been loaded.
+
+    Args:
+        name: in the registry. target: ``module:Class``. origin: who brings it, for people.
+        room: package of the file that holds it; empty for an installed package of others.
+    """
+
+    name: str
+    target: str
+    origin: str
+    room: str = ""
+
+
+class Registry(MutableMapping[str, T], Generic[T]):
+    """Members of one kind by name.
+
+    Iteration, ``in`` and `len` import nothing; a look-up imports the file of that member only.
+
+    Args:
+        kind: what a member is, for messages: ``plant``.
+        rooms: packages whose files hold the members.
+        group: of the entry points by which installed packages bring members.
+        base: ``module:Class`` that members are subclasses of.
+    """
+
+    def __init__(self, kind: str, rooms: Sequence[str], group: str, base: str) -> None:
+        self.kind, self.rooms, self.group, self.base = kind, tuple(rooms), group, base
+        self._own: dict[str, T] = {}
+        self._members: dict[str, list[Member]] | None = None
+
+    @property
+    def members(self) -> dict[str, list[Member]]:
+        """What ships and what installed packages bring, by name; more than one where a name is taken twice."""
+        if self._members is None:
+            self._members = {}
+            for member in (*self._shipped(), *self._announced()):
+                self._members.setdefault(member.name, []).append(member)
+        return self._members
+
+    def room(self, name: str) -> str:
+        """The package that a shipped member lives in; empty for one of an installed package or of this program.
+
+        Args:
+            name: of the member.
+        """
+        return "" if name in self._own or name not in self.members else self.members[name][0].room
+
+    def origin(self, name: str) -> str:
+        """Who brings a member, for people.
+
+        Args:
+            name: of the member.
+        """
+        if name in self._own or name not in self.members:
+            return "registered by this program"
+        return " and ".join(member.origin for member in self.members[name])
+
+    def __getitem__(self, name: str) -> T:
+        if name in self._own:
+            return self._own[name]
+        member, *others = self.members[name]
+        if others:
+            raise RegistryError(
+                f"the {self.kind} name {name!r} is taken twice, by {self.origin(name)}; uninstall one of them, or use "
+                "file.py:Class or package.module:Class in place of the name."
+            )
+        loaded: T = _load(member, self.kind, self.base)
+        return loaded
+
+    def __setitem__(self, name: str, member: T) -> None:
+        self._own[name] = member
+
+    def __delitem__(self, name: str) -> None:
+        del self._own[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._own or name in self.members
+
+    def __iter__(self) -> Iterator[str]:
+        yield from self.members
+        yield from (name for name in self._own if name not in self.members)
+
+    def __len__(self) -> int:
+        return len({*self.members, *self._own})
+
+    def _shipped(self) -> Iterator[Member]:
+        for room in self.rooms:
+            for path in files_of(room):
+                cls = ""
+                for found, name in NAMED_CLASS.findall(path.read_text(encoding="utf-8")):
+                    cls = found or cls
+                    if name and cls:
+                        target = f"{room}.{path.stem}:{cls}"
+                        yield Member(name, target, f"this package ({target})", room)
+
+    def _announced(self) -> Iterator[Member]:
+        for entry in entry_points(group=self.group):
+            yield Member(entry.name, entry.value, f"{_package(entry)} ({entry.value})")
+
+
+@cache
+def files_of(room: str) -> tuple[Path, ...]:
+    """The files of a package, without those of packages in it, in the order of their names.
+
+    Args:
+        room: name of the package.
+    """
+    spec = find_spec(room)
+    folders = (spec.submodule_search_locations if spec is not None else None) or ()
+    return tuple(path for folder in folders for path in sorted(Path(folder).glob("*.py")) if path.stem != "__init__")
+
+
+def lazy_names(room: str) -> Callable[[str], Any]:
+    """A ``__getattr__`` for a package whose names are those at the top of its files: a file is imported when one of its
+    names is asked for.
+
+    Args:
+        room: name of the package.
+    """
+
+    def get(name: str) -> Any:
+        files = files_of(room)
+        if not name.startswith("_") and name not in {path.stem for path in files}:  # that is a module, not in one
+            definition = re.compile(rf"^(?:(?:class |def ){name}\b|(?:\w+, )*{name}\b[^.\n(]*=)", re.MULTILINE)
+            for path in files:
+                if definition.search(path.read_text(encoding="utf-8")):
+                    return getattr(import_module(f"{room}.{path.stem}"), name)
+        raise AttributeError(f"module {room!r} has no attribute {name!r}")
+
+    return get
+
+
+def load(target: str) -> Any:
+    """What ``package.module:name`` stands for.
+
+    Args:
+        target: module and name.
+
+    Raises:
+        ImportError, AttributeError: there is no such module, or no such name in it.
+    """
+    module, _, name = target.partition(":")
+    found: Any = import_module(module)
+    for part in name.split("."):
+        found = getattr(found, part)
+    return found
+
+
+def _load(member: Member, kind: str, base: str) -> Any:
+    if member.room:
+        return load(member.target)
+    try:
+        found = load(member.target)
+    except Exception as error:  # whatever the code of others raises while it is imported
+        raise RegistryError(
+            f"the {kind} {member.name!r} of {member.origin} cannot be loaded: {type(error).__name__}: {error}"
+        ) from error
+    if not (isinstance(found, type) and issubclass(found, load(base))):
+        raise RegistryError(
+            f"the {kind} {member.name!r} of {member.origin} is no subclass of {base.replace(':', '.')}."
+        )
+    return found
+
+
+def _package(entry: EntryPoint) -> str:
+    return f"the package {entry.dist.name} {entry.dist.version}" if entry.dist is not None else "an installed package"
