@@ -60,7 +60,11 @@ class RunError(CosimError, RuntimeError):
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """A hint with the names nearest to a misspelt one, or all of them where none is near."""
+    """A hint with the names nearest to a misspelt one, or all of them where none is near.
+
+    Args:
+        name: as it was given. known: names that exist.
+    """
     names = list(known)
     close = get_close_matches(name, names, 3, 0.5)
     if close:

@@ -86,7 +86,7 @@ class VariableTable:
         outcomes: first of the counts of what became of events, see `OUTCOME_VARIABLES`; missing there too.
         derivatives: first of the derivatives of the continuous states.
         indicators: first of the event indicators: one for each state with dry friction, then one for each switching
-        function.
+            function.
         end: first value reference that is not used.
     """
 
@@ -154,7 +154,7 @@ def describe(
         model_name: name to show; None for the system's own.
         protocol: how it is told of triggered events; by default as is usual in the FMI version.
         model_exchange: whether it is a model exchange FMU as well; only a traceable system without communication events
-        can be.
+            can be.
 
     Raises:
         ValueError: the preset or the version of FMI is unknown, or the protocol is none of this version.

@@ -72,6 +72,9 @@ def plan_fmu(
 ) -> Plan:
     """Trace and describe a system.
 
+    Args:
+        fmi_version: 2 or 3.
+
     Raises:
         ValueError: the FMI version is not 2 or 3, the preset is unknown, a name is not legal, the protocol is none of
         this
@@ -161,6 +164,9 @@ class Draft:
     def compile(self, progress: Progress | None = None) -> dict[Platform, bytes]:
         """The libraries.
 
+        Args:
+            progress: called with what is being done.
+
         Raises:
             CompilationError: a compiler refused the sources.
         """
@@ -168,6 +174,9 @@ class Draft:
 
     def pack(self, libraries: dict[Platform, bytes], path: Path) -> Path:
         """Write the file.
+
+        Args:
+            path: of the FMU.
 
         Raises:
             OSError: it cannot be written.
@@ -186,6 +195,9 @@ class Draft:
 def write_fmu(plan: Plan, targets: Sequence[Target], path: Path, progress: Progress | None = None) -> Path:
     """Carry out a plan: generate, compile, pack.
 
+    Args:
+        targets: platforms, each with its compiler. path: of the FMU. progress: called with what is being done.
+
     Raises:
         TextRefusedError: a name or a description holds a character that XML forbids.
         CompilationError: a compiler refused the sources.
@@ -203,5 +215,9 @@ def runtime_sources() -> dict[str, bytes]:
 
 @cache
 def standard_headers(fmi_version: int) -> dict[str, bytes]:
-    """The headers of the FMI standard, by name, as fmpy carries them."""
+    """The headers of the FMI standard, by name, as fmpy carries them.
+
+    Args:
+        fmi_version: 2 or 3.
+    """
     return {path.name: path.read_bytes() for path in sorted(header_folder().glob(f"fmi{fmi_version}*.h"))}

@@ -22,7 +22,11 @@ def plain(text: str, keep: str = "\n\t") -> str:
 
 
 def one_line(text: str) -> str:
-    """The same in one line, spaces and ends of lines folded."""
+    """The same in one line, spaces and ends of lines folded.
+
+    Args:
+        text: of others.
+    """
     return plain(" ".join(text.split()), keep="")
 
 

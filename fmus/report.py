@@ -80,13 +80,21 @@ def describe_file(path: Path) -> list[str]:
 
 
 def platforms_of(path: Path) -> list[str]:
-    """Names of the folders of an FMU that hold libraries."""
+    """Names of the folders of an FMU that hold libraries.
+
+    Args:
+        path: of the FMU.
+    """
     with zipfile.ZipFile(path) as archive:
         return _platforms(archive)
 
 
 def problems_of(path: Path) -> list[str]:
-    """Damaged files, libraries in the wrong folder, and what fmpy's validation finds; empty for a valid FMU."""
+    """Damaged files, libraries in the wrong folder, and what fmpy's validation finds; empty for a valid FMU.
+
+    Args:
+        path: of the FMU.
+    """
     with zipfile.ZipFile(path) as archive:
         problems = [*_damage(archive), *_strays(archive)]
     return problems + list(validate_fmu(str(path)))

@@ -38,7 +38,7 @@ class Draft:
 
     Args:
         header: all but numbers. table: the CSV of the rows. events: the CSV of the telegrams; empty where there are
-        none.
+            none.
     """
 
     header: Header

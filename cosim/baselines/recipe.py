@@ -23,7 +23,7 @@ class Recipe:
     Args:
         kind: ``fmu`` alone, ``scenario``, or ``result``: something else, which cannot be run again from here.
         source: path of the FMU or of the scenario file (absolute here, relative in a file), or name of a shipped
-        scenario. start, stop, step: of an FMU alone [s]; None for its own default experiment.
+            scenario. start, stop, step: of an FMU alone [s]; None for its own default experiment.
         inputs: of an FMU alone: constants by name, or path of a table.
         parameters: start values by name, of an FMU alone.
         record: variables recorded besides the outputs, of an FMU alone.

@@ -25,7 +25,11 @@ EPILOG = "Exit codes: 0 equal within tolerance or done, 1 different, 2 error."
 
 
 def register(commands: Any) -> None:
-    """Add the command and its actions to the parser."""
+    """Add the command and its actions to the parser.
+
+    Args:
+        commands: subparsers of the program.
+    """
     description = "Keep a result as a baseline, and check later ones against it."
     parser = commands.add_parser(
         "baseline", help="make, check and update baselines", description=description, epilog=EPILOG

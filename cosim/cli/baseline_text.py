@@ -21,14 +21,22 @@ def print_json(data: Any) -> None:
 
 
 def tell_comparison(found: Regression, verbose: bool) -> None:
-    """Print a comparison."""
+    """Print a comparison.
+
+    Args:
+        found: what the check found. verbose: all signals, not only those that differ.
+    """
     from cosim.comparison.text import comparison_text  # noqa: PLC0415 - NumPy only for those who ran
 
     print(comparison_text(found, verbose=verbose))
 
 
 def tell_change(update: Update, path: Path, as_json: bool) -> None:
-    """Print what was written."""
+    """Print what was written.
+
+    Args:
+        update: what was changed. path: of the baseline. as_json: print JSON.
+    """
     from cosim.baselines.call import Call  # noqa: PLC0415 - NumPy only for those who ran
 
     worst = Call.worst(update.before) if update.before is not None else []

@@ -11,13 +11,17 @@ from typing import TYPE_CHECKING, Any
 from cosim.cli.scenarios import add_scenario, load_scenario, positive
 
 if TYPE_CHECKING:
-    from cosim.studies.observers import ObserverBenchmark
+    from cosim.observer_benchmark.observers import ObserverBenchmark
 
 DONE, NOT_AS_ASKED = 0, 1
 
 
 def register(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Args:
+        commands: subparsers of the program.
+    """
     description = (
         "Run the plant side of a scenario once, play it back to several observers, each alone, and compare errors, "
         "slip "
@@ -54,9 +58,13 @@ def register(commands: Any) -> None:
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Compare, print and write."""
+    """Compare, print and write.
+
+    Args:
+        options: of the command line.
+    """
+    from cosim.observer_benchmark.observers import benchmark_observers  # noqa: PLC0415
     from cosim.results.folder import check_writable  # noqa: PLC0415 - scipy is loaded only by those who run
-    from cosim.studies.observers import benchmark_observers  # noqa: PLC0415
 
     for folder in (options.out, options.record):
         if folder is not None:

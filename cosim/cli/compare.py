@@ -31,7 +31,11 @@ EPILOG = (
 
 
 def register(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Args:
+        commands: subparsers of the program.
+    """
     description = "Compare a result with a reference: signals in tolerance tubes, telegrams as events."
     parser = commands.add_parser(
         "compare", help="compare a result with a reference", description=description, epilog=EPILOG
@@ -60,7 +64,11 @@ def register(commands: Any) -> None:
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Compare, tell, and write what was asked for."""
+    """Compare, tell, and write what was asked for.
+
+    Args:
+        options: of the command line.
+    """
     asked = asked_tolerances(options)  # before anything is read: a mistake in them is told at once
     comparison = replace(_compare(options, asked), extra_fails=options.extra_fails)
     _tell(comparison, options)

@@ -10,7 +10,11 @@ DONE = 0
 
 
 def register(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Args:
+        commands: subparsers of the program.
+    """
     text = (
         "Write a result in another format: the ending of TARGET says which, one of .csv, .mat (MATLAB), .modelica.mat "
         "(Dymola, "
@@ -28,7 +32,11 @@ def register(commands: Any) -> None:
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Read, choose, write; say what was written and what the format does not keep."""
+    """Read, choose, write; say what was written and what the format does not keep.
+
+    Args:
+        options: of the command line.
+    """
     from cosim.errors import OutputError  # noqa: PLC0415 - NumPy is loaded only by those who convert
     from cosim.results.formats.catalogue import format_of  # noqa: PLC0415
     from cosim.results.load import load_result  # noqa: PLC0415

@@ -10,7 +10,11 @@ from cosim.cli.scenarios import add_scenario, load_scenario
 
 
 def register(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Args:
+        commands: subparsers of the program.
+    """
     parser = commands.add_parser(
         "export",
         help="write a scenario as SSP",
@@ -23,6 +27,10 @@ def register(commands: Any) -> None:
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Write the package."""
+    """Write the package.
+
+    Args:
+        options: of the command line.
+    """
     print(load_scenario(options).export_ssp(options.file, options.ssp_version))
     return 0

@@ -10,13 +10,17 @@ from pathlib import Path
 from typing import Any
 
 from cosim.components.loading import read_description, runs_here
-from cosim.ssp.names import is_package
+from cosim.scenario.package_names import is_package
 from fmus.fmi.capabilities import read_capabilities
 from fmus.text_table import text_table
 
 
 def register(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Args:
+        commands: subparsers of the program.
+    """
     parser = commands.add_parser(
         "info",
         help="describe an FMU or SSP file",
@@ -29,7 +33,11 @@ def register(commands: Any) -> None:
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Print the description."""
+    """Print the description.
+
+    Args:
+        options: of the command line.
+    """
     if is_package(options.file):
         return _execute_package(options)
     data = describe_file(options.file)
@@ -59,6 +67,9 @@ def _execute_package(options: argparse.Namespace) -> int:
 
 def describe_file(path: Path) -> dict[str, Any]:
     """The description of an FMU file as plain data.
+
+    Args:
+        path: of the file.
 
     Raises:
         FmuLoadError: the file is missing or not an FMU.

@@ -7,15 +7,20 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from cosim.scenario import Scenario, shipped_scenarios
-from cosim.ssp.names import is_package
+from cosim.scenario.includes import shipped_scenarios
+from cosim.scenario.package_names import is_package
+from cosim.simulation.scenario import Scenario
 from fmus.text_table import text_table
 
 KINDS = ("scenarios", "models", "observers", "all")
 
 
 def register(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Args:
+        commands: subparsers of the program.
+    """
     parser = commands.add_parser(
         "list", help="list what ships", description="Scenarios, plants and observers with their sources."
     )
@@ -25,7 +30,11 @@ def register(commands: Any) -> None:
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Print the lists."""
+    """Print the lists.
+
+    Args:
+        options: of the command line.
+    """
     if is_package(options.what):
         return _execute_package(options)
     data = {kind: entries for kind, entries in catalogue().items() if options.what in (kind, "all")}

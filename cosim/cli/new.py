@@ -9,7 +9,11 @@ from typing import Any
 
 
 def register(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Args:
+        commands: subparsers of the program.
+    """
     description = """Look into an FMU and write a commented scenario file: inputs and outputs, and guesses for position,
     speed, wheel speed and effort, to be confirmed by editing. Only the description is read; nothing of the FMU is
     executed."""
@@ -27,7 +31,11 @@ def register(commands: Any) -> None:
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Write the file and say what was guessed."""
+    """Write the file and say what was guessed.
+
+    Args:
+        options: of the command line.
+    """
     from cosim.starter.starter import write_starter  # noqa: PLC0415 - only for those who begin
 
     target = options.out if options.out is not None else Path(f"{options.fmu.stem}.toml")

@@ -21,7 +21,11 @@ DONE = 0
 
 
 def register(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Args:
+        commands: subparsers of the program.
+    """
     description = (
         "Make the report of a results folder again, or lay several results over each other on one page: the first is "
         "what the "
@@ -53,7 +57,11 @@ def register(commands: Any) -> None:
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Read, draw and write; nothing in the results is changed."""
+    """Read, draw and write; nothing in the results is changed.
+
+    Args:
+        options: of the command line.
+    """
     from cosim.evaluation.stored_spec import is_guessed, spec_of  # noqa: PLC0415 - NumPy is loaded only by those who ask
     from cosim.results.load import load_result  # noqa: PLC0415
 

@@ -20,7 +20,11 @@ DESCRIPTION = (
 
 
 def register(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Args:
+        commands: subparsers of the program.
+    """
     parser = commands.add_parser("rerun", help="run results again and compare", description=DESCRIPTION)
     parser.add_argument("directory", metavar="DIR", help="a results folder")
     parser.add_argument("--out", metavar="OTHER", help="folder for the new results (default: only the verdict is kept)")
@@ -38,7 +42,11 @@ def register(commands: Any) -> None:
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Run, compare, tell."""
+    """Run, compare, tell.
+
+    Args:
+        options: of the command line.
+    """
     from cosim.cli.run import ProgressBar  # noqa: PLC0415 - what runs is loaded only by those who run
     from cosim.provenance import rerun  # noqa: PLC0415
     from cosim.results.summary_file import jsonable  # noqa: PLC0415

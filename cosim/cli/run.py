@@ -15,7 +15,8 @@ from cosim.cli.scenarios import add_scenario, load_scenario, positive
 from cosim.errors import OutputError
 from cosim.process.last_call import LAST_CALL
 from cosim.results.unfinished import SPARE
-from cosim.scenario import Outcome, Scenario
+from cosim.scenario.outcome import Outcome
+from cosim.simulation.scenario import Scenario
 from fmus.plain import plain
 
 DONE, NOT_AS_ASKED, ERROR = 0, 1, 2
@@ -23,7 +24,11 @@ CALL_LOG = "calls.log"
 
 
 def register(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Args:
+        commands: subparsers of the program.
+    """
     description = "Run a scenario: shipped, from a TOML file, or from a system structure package (SSP)."
     epilog = (
         "Exit codes: 0 done, 1 an expectation of the scenario is not met (or --strict), 2 the run failed or could "
@@ -59,7 +64,11 @@ def register(commands: Any) -> None:
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Run and write; everything computed is written also when the run fails."""
+    """Run and write; everything computed is written also when the run fails.
+
+    Args:
+        options: of the command line.
+    """
     from cosim.results.folder import check_writable  # noqa: PLC0415 - scipy is loaded only by those who run
 
     scenario = load_scenario(options)

@@ -7,7 +7,7 @@ import tomllib
 from typing import Any
 
 from cosim.errors import ScenarioError
-from cosim.scenario import Scenario
+from cosim.simulation.scenario import Scenario
 
 DEFAULT = "freight_profile_d"
 OVERRIDES = "override component.parameter, master.KEY, balises.KEY, report.KEY or a top-level key; may be repeated"
@@ -29,6 +29,9 @@ def add_scenario(parser: argparse.ArgumentParser, default: str | None = DEFAULT)
 
 def load_scenario(options: argparse.Namespace) -> Scenario:
     """The scenario that the arguments name, with its overrides.
+
+    Args:
+        options: of the command line.
 
     Raises:
         ScenarioError: there is none, or an override is not ``NAME=VALUE``.
@@ -56,6 +59,9 @@ def parse_setting(text: str) -> tuple[str, Any]:
 
 def positive(text: str) -> int:
     """A whole number of at least 1, for an option of a command.
+
+    Args:
+        text: as it was typed.
 
     Raises:
         argparse.ArgumentTypeError: it is something else.

@@ -13,7 +13,11 @@ from cosim.cli.scenarios import add_scenario, load_scenario
 
 
 def register(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Args:
+        commands: subparsers of the program.
+    """
     parser = commands.add_parser(
         "show",
         help="show how components hang together",
@@ -26,7 +30,11 @@ def register(commands: Any) -> None:
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Print, and draw where asked."""
+    """Print, and draw where asked.
+
+    Args:
+        options: of the command line.
+    """
     structure = load_scenario(options).structure()
     if options.json:
         print(json.dumps(structure.to_dict(), indent=2))

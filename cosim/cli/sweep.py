@@ -21,7 +21,11 @@ a range, with --samples"""  # noqa: E501
 
 
 def register(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Args:
+        commands: subparsers of the program.
+    """
     description = "Run a scenario once for each combination of some values. A run that fails does not stop the others."
     epilog = (
         "Exit codes: 0 all runs done, 1 a run failed, 2 error or interrupted; runs that were done are in the folder."
@@ -46,7 +50,11 @@ def register(commands: Any) -> None:
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Run, write each run as soon as it is done, and print the table."""
+    """Run, write each run as soon as it is done, and print the table.
+
+    Args:
+        options: of the command line.
+    """
     from cosim.results.folder import check_writable  # noqa: PLC0415 - only for those who run
     from cosim.studies.sampling import Range  # noqa: PLC0415
 

@@ -45,6 +45,9 @@ def add_tolerances(group: Any) -> None:
 def asked_tolerances(options: argparse.Namespace) -> Asked:
     """What the command line asks for: keys of the default, tolerances by signal, patterns to ignore.
 
+    Args:
+        options: of the command line.
+
     Raises:
         ComparisonError: a tolerance that cannot be, or a file that cannot be read.
     """

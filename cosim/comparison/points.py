@@ -35,7 +35,7 @@ class Points:
 
     Args:
         time: [s]. error: signed difference of value beyond what the allowed time explains, result minus reference
-        [unit]. reference, result: values there; that of the finer curve is the nearest one its tube allows.
+            [unit]. reference, result: values there; that of the finer curve is the nearest one its tube allows.
         judged: where both curves have a number in the same piece.
         no_number: where one holds a number and the other does not, or they hold different kinds of none.
     """

@@ -59,7 +59,7 @@ def tolerance(given: Tolerance | Mapping[str, Any] | float, base: Tolerance) -> 
 
     Args:
         given: a tolerance, a mapping with some of its keys (the others as in `base`), or a number: the relative
-        tolerance.
+            tolerance.
         base: what is not given.
 
     Raises:

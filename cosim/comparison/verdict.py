@@ -87,7 +87,7 @@ class SignalComparison:
         name: of the signal. unit: SI unit of the reference. status: see `Status`.
         tolerance: in use. allowed: difference in value allowed [unit]. allowed_time: in time [s].
         max_error: largest difference in value beyond what the allowed time explains [unit]; NaN where nothing was
-        compared.
+            compared.
         max_error_at: when [s].
         max_shift: largest difference in time of a matched jump [s]; 0 without jumps.
         rms_error: time-weighted root mean square of the value error [unit].

@@ -53,7 +53,7 @@ class Telling:
     Args:
         receiver: see `can_be_told`. place: of its component in the plan. program: the plan in C. library: the stepper.
         answering: context in which slaves give answers and nothing calls the stepper. idle: whether it may be called
-        now.
+            now.
     """
 
     def __init__(

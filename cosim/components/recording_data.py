@@ -86,7 +86,7 @@ def make_recording(
     Args:
         result: what was recorded. source: where it comes from, for messages.
         component: whose columns are taken. None: those of `name` where it was recorded, else all under their full
-        names.
+            names.
         name: of the component that plays it back.
         interpolation: between the rows; what was recorded as discrete is always held.
         span: start and stop of the run [s], which the recording must cover; None where nobody steps it.

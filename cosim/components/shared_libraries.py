@@ -33,7 +33,7 @@ def refuse_foreign_libraries(library: Path, fmu: Path, name: str) -> None:
 
     Args:
         library: the FMU's own library, unpacked and not loaded yet. fmu: the file, name: of the component, for the
-        message.
+            message.
 
     Raises:
         FmuLoadError: another FMU has brought another library of the same name into this process.

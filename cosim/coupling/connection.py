@@ -37,9 +37,9 @@ class Connection:
 
     Args:
         source: (component, output). target: (component, input). factor, offset: unit conversion and linear
-        transformation.
+            transformation.
         table: (source, target) values of a discrete signal, where it is mapped; a value without an entry passes
-        unchanged.
+            unchanged.
         exact: whether the value travels as it is instead of as a double.
         source_array, target_array: the array that the source or target is an element of, or an empty name.
     """

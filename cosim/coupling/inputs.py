@@ -30,7 +30,7 @@ class Inputs:
         buffer: what `send` writes, shape (m,).
         send: writes `buffer` to the component.
         tables: for an input whose values are mapped, its place -> {source: target}; a value without an entry passes
-        unchanged.
+            unchanged.
         non_numeric: inputs that are no numbers, or integers beyond doubles, gathered and sent with the others; or None.
 
     `gather` takes what holds for a step: of held signals the value at its start. `gather_now` takes what the sources

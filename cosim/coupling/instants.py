@@ -31,7 +31,7 @@ def held_signals(
     Args:
         components: by name. connections: checked. order: of execution.
         iterated: names of the components of each loop that is iterated; within it all values are those of the end of
-        the step.
+            the step.
     """
     place = {name: i for i, name in enumerate(order)}
     loop_of = {name: i for i, loop in enumerate(iterated) for name in loop}

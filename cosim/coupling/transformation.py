@@ -16,7 +16,7 @@ class Transformation:
     Args:
         factor, offset: linear transformation, of the source in the unit of the target.
         convert_units: whether the source is converted to the unit of the target first; if not, its number is taken as
-        it is.
+            it is.
         table: (source, target) values of a discrete signal; a value without an entry passes unchanged.
     """
 

@@ -56,7 +56,7 @@ def accepted_stamps(events: Sequence[BaliseRecord], receiver: str | None = None)
     Args:
         events: the telegrams.
         receiver: count what this component used; None for any receiver. A telegram without outcomes counts unless
-        missed.
+            missed.
     """
     stamps = set()
     for event in events:

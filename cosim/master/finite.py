@@ -12,7 +12,7 @@ def make_finite_check(values: np.ndarray) -> Callable[[], bool]:
 
     Args:
         values: shape (n,); looked at anew in each call. The flags are compared as bytes, a quarter of what ``all``
-        costs.
+            costs.
     """
     flags, good, isfinite = bytearray(len(values)), b"\1" * len(values), np.isfinite
     finite = np.frombuffer(flags, dtype=bool)

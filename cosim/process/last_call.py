@@ -31,6 +31,9 @@ class LastCall:
     `call[0]` is the number of the call, `time[0]` the time of the communication point from which it is made [s].
     Whoever calls stores there; `numbers` says what. `watched` says that another process looks at it, `timed` that it
     also keeps the time.
+
+    Args:
+        memory: one page, shared between the processes.
     """
 
     def __init__(self, memory: mmap.mmap) -> None:
@@ -47,7 +50,11 @@ class LastCall:
         self._unknown = self._four("of which nothing is known")
 
     def attach(self, path: Path) -> None:
-        """Use the page that another process made with `make_page`; before anything is called."""
+        """Use the page that another process made with `make_page`; before anything is called.
+
+        Args:
+            path: of the page's file.
+        """
         with path.open("r+b") as file:
             self._use(mmap.mmap(file.fileno(), PAGE))
         self.watched = True
@@ -62,14 +69,22 @@ class LastCall:
     # -- who calls --------------------------------------------------------------------------------------------------
 
     def number(self, component: str, what: str) -> int:
-        """The number of a call, in words such as ``doStep``."""
+        """The number of a call, in words such as ``doStep``.
+
+        Args:
+            component: its name.
+        """
         key = component, what[:LONGEST]
         if key not in self._numbers:
             self._numbers[key] = self._add(*key) or self._unknown
         return self._numbers[key]
 
     def numbers(self, component: str) -> int:
-        """The number of the first of the calls `OFTEN`; `WRITE`, `READ`, `STEP` and `EVENT` are added to it."""
+        """The number of the first of the calls `OFTEN`; `WRITE`, `READ`, `STEP` and `EVENT` are added to it.
+
+        Args:
+            component: its name.
+        """
         key = component, OFTEN[0]
         if key not in self._numbers:
             self._numbers[key] = self._four(component) or self._unknown
@@ -80,6 +95,9 @@ class LastCall:
         """A call that is made now and then, at `time` [s]; within this context it is the present one.
 
         What stands behind ``=`` in `what` is left out: a value is not part of the call.
+
+        Args:
+            component: its name.
         """
         self.call[0], self.time[0] = self.number(component, what.partition(" = ")[0]), time
         try:
@@ -88,7 +106,11 @@ class LastCall:
             self.call[0] = 0
 
     def limit(self, seconds: float | None) -> None:
-        """A call may last so long [s]; None for any time."""
+        """A call may last so long [s]; None for any time.
+
+        Args:
+            seconds: longest time a call may take [s]; None for any.
+        """
         self._limit[0] = seconds or 0.0
 
     def _four(self, component: str) -> int:
@@ -153,7 +175,11 @@ class LastCall:
 
 
 def make_page(path: Path) -> LastCall:
-    """A page in a file, to look at what another process does that is started afresh and attaches it."""
+    """A page in a file, to look at what another process does that is started afresh and attaches it.
+
+    Args:
+        path: of the page's file.
+    """
     path.write_bytes(bytes(PAGE))
     with path.open("r+b") as file:
         return LastCall(mmap.mmap(file.fileno(), PAGE))

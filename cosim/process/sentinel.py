@@ -64,6 +64,9 @@ def _exit_called() -> None:
 def limited_calls(seconds: float | None) -> Iterator[None]:
     """Within this context a call may last so long [s]; None for any time. A process that does not return is ended with
     code 2.
+
+    Args:
+        seconds: longest time a call may take [s]; None for any.
     """
     LAST_CALL.limit(seconds)
     over = threading.Event()

@@ -15,12 +15,19 @@ CHUNK = 65536
 def same_result(first: Result, second: Result) -> bool:
     """Whether tables and telegrams agree in every bit; one NaN is as good as another, since text files keep no more of
     it.
+
+    Args:
+        first: one of them. second: the other.
     """
     return same_table(first.table, second.table) and same_events(first.events, second.events)
 
 
 def same_table(first: np.ndarray, second: np.ndarray) -> bool:
-    """Whether two tables have the same columns in the same order and the same bits in every row."""
+    """Whether two tables have the same columns in the same order and the same bits in every row.
+
+    Args:
+        first: one of them. second: the other.
+    """
     if first.dtype.names != second.dtype.names or first.shape != second.shape:
         return False
     names = first.dtype.names or ()
@@ -32,7 +39,11 @@ def same_table(first: np.ndarray, second: np.ndarray) -> bool:
 
 
 def same_events(first: Sequence[BaliseRecord], second: Sequence[BaliseRecord]) -> bool:
-    """Whether two lists of telegrams are the same."""
+    """Whether two lists of telegrams are the same.
+
+    Args:
+        first: one of them. second: the other.
+    """
     return len(first) == len(second) and all(
         list(map(_bits, astuple(a))) == list(map(_bits, astuple(b))) for a, b in zip(first, second, strict=True)
     )

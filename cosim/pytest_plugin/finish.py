@@ -30,7 +30,11 @@ WORDS = {
 
 
 def write_baselines(session: pytest.Session, exitstatus: int) -> None:
-    """Write staged baselines, in the controller only, if no test failed or it is forced."""
+    """Write staged baselines, in the controller only, if no test failed or it is forced.
+
+    Args:
+        session: of pytest. exitstatus: of the tests.
+    """
     config = session.config
     if hasattr(config, "workerinput") or options.mode(config) != "update":
         return
@@ -55,7 +59,11 @@ def write_baselines(session: pytest.Session, exitstatus: int) -> None:
 
 
 def report(terminal: pytest.TerminalReporter, config: pytest.Config) -> None:
-    """The section at the end; nothing where the fixture was not used."""
+    """The section at the end; nothing where the fixture was not used.
+
+    Args:
+        terminal: where the summary goes. config: of the session.
+    """
     records = Records.of(config).all()
     if not records:
         return

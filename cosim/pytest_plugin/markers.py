@@ -12,13 +12,21 @@ LINES = (
 
 
 def register(config: pytest.Config) -> None:
-    """Make the markers known, so that --strict-markers accepts them."""
+    """Make the markers known, so that --strict-markers accepts them.
+
+    Args:
+        config: of the session.
+    """
     for line in LINES:
         config.addinivalue_line("markers", line)
 
 
 def skip_slow(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Skip tests marked ``fmu_slow`` unless ``--fmu-slow`` is given."""
+    """Skip tests marked ``fmu_slow`` unless ``--fmu-slow`` is given.
+
+    Args:
+        config: of the session. items: collected tests.
+    """
     if config.getoption("--fmu-slow"):
         return
     for item in items:
@@ -27,7 +35,11 @@ def skip_slow(config: pytest.Config, items: list[pytest.Item]) -> None:
 
 
 def demand_vendor_files(item: pytest.Item) -> None:
-    """Skip a test marked ``fmu_vendor(path)`` where a file is absent, or fail it with ``--fmu-vendor=require``."""
+    """Skip a test marked ``fmu_vendor(path)`` where a file is absent, or fail it with ``--fmu-vendor=require``.
+
+    Args:
+        item: the test.
+    """
     for marker in item.iter_markers("fmu_vendor"):
         if not marker.args:
             pytest.fail("the marker fmu_vendor needs a path: @pytest.mark.fmu_vendor('vendor.fmu')", pytrace=False)

@@ -48,12 +48,20 @@ def add(parser: pytest.Parser) -> None:
 
 
 def mode(config: pytest.Config) -> Mode:
-    """What to do with baselines."""
+    """What to do with baselines.
+
+    Args:
+        config: of the session.
+    """
     return cast(Mode, config.getoption("--fmu-baseline"))
 
 
 def baseline_folder(config: pytest.Config, test_file: Path) -> Path:
-    """Where the baselines of a test file are."""
+    """Where the baselines of a test file are.
+
+    Args:
+        config: of the session. test_file: of the test.
+    """
     given = config.getoption("--fmu-baseline-dir") or config.getini("fmu_baseline_dir")
     if not given:
         return test_file.parent / "baselines" / test_file.stem
@@ -63,5 +71,9 @@ def baseline_folder(config: pytest.Config, test_file: Path) -> Path:
 
 
 def artifacts_folder(config: pytest.Config) -> Path:
-    """Where pictures and pages go."""
+    """Where pictures and pages go.
+
+    Args:
+        config: of the session.
+    """
     return config.rootpath / str(config.getoption("--fmu-artifacts") or config.getini("fmu_artifacts"))

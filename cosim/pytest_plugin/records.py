@@ -41,7 +41,7 @@ class Records:
 
     Args:
         shared: folder that the controller gave to this worker; None for a controller, which makes one when it is
-        needed.
+            needed.
     """
 
     KEY: pytest.StashKey[Records] = pytest.StashKey()
@@ -52,14 +52,22 @@ class Records:
 
     @classmethod
     def of(cls, config: Any) -> Records:
-        """The records of this process."""
+        """The records of this process.
+
+        Args:
+            config: of the session.
+        """
         if cls.KEY not in config.stash:
             config.stash[cls.KEY] = cls(getattr(config, "workerinput", {}).get(cls.INPUT))
         found: Records = config.stash[cls.KEY]
         return found
 
     def share_with(self, node: Any) -> None:
-        """Tell a worker where the folder is."""
+        """Tell a worker where the folder is.
+
+        Args:
+            node: a worker of pytest-xdist.
+        """
         node.workerinput[self.INPUT] = str(self.folder)
 
     @property

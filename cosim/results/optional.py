@@ -14,7 +14,7 @@ def optional_module(name: str, extra: str, purpose: str) -> Any:
 
     Args:
         name: of the module, e.g. ``pyarrow.parquet``. extra: of ours that brings it. purpose: what needs it, for the
-        message.
+            message.
 
     Raises:
         OutputError: it is not installed; the message says what to install.

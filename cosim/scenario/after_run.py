@@ -21,7 +21,7 @@ def warnings_after(
 
     Args:
         components: by name. telegrams: everything that was passed. changed_in_steps: what FMUs changed for the whole
-        program.
+            program.
     """
     yield from _trespasses(components, changed_in_steps)
     for name, component in components.items():

@@ -18,6 +18,9 @@ def parse_connections(items: Iterable[str | ConnectionTable], where: str) -> lis
     """Links (source, target) from lines such as ``driver.effort -> locomotive.effort, observer.effort``, with a
     transformation from tables.
 
+    Args:
+        items: as they stand in the scenario. where: name of the scenario, for messages.
+
     Raises:
         ScenarioError: a line has no arrow or an empty side.
     """

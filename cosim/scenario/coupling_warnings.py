@@ -69,7 +69,11 @@ def lines_note(lines: Mapping[str, str], inputs: str) -> str:
 def late_telegram_warnings(
     table: BalisesTable, components: Mapping[str, Component], receivers: Sequence[str]
 ) -> list[str]:
-    """A block replays what arrives late, and so does an FMU with the parameter `late_policy`; another one may not."""
+    """A block replays what arrives late, and so does an FMU with the parameter `late_policy`; another one may not.
+
+    Args:
+        table: of the scenario. components: by name. receivers: components that take telegrams.
+    """
     delay = table.latency + table.latency_jitter
     sealed = [n for n in receivers if components[n].kind == "FMU" and "late_policy" not in components[n].variables]
     if not sealed or delay <= 0.0:

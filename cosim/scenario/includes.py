@@ -15,9 +15,9 @@ from typing import Any
 from cosim.errors import ScenarioError, nearest
 from cosim.scenario.merging import Line, join, merge, removed_components
 from cosim.scenario.override import flat, override
+from cosim.scenario.package_names import is_package
 from cosim.scenario.paths import absolute, map_paths
 from cosim.scenario.toml_file import read_toml
-from cosim.ssp.names import is_package
 
 SHIPPED = files("cosim") / "scenarios"
 CONNECTIONS = "connections"
@@ -50,7 +50,7 @@ def attribute(message: str, where: str, places: Mapping[Key, str]) -> str:
 
     Args:
         message: lines such as ``my.toml: components.plant.fmu: ...``. where: the file that was loaded. places: see
-        `Tables`.
+            `Tables`.
     """
     head = f"{where}: "
     lines = [line.removeprefix(head) if line.startswith(head) else None for line in message.split("\n")]

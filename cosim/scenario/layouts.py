@@ -29,7 +29,7 @@ def make_layout(table: BalisesTable, start: float, stop: float, folder: Path, wh
 
     Args:
         table: its balise table. start, stop: of the run [s]. folder: start of relative paths. where: place for
-        messages.
+            messages.
 
     Raises:
         ScenarioError: with file and key.

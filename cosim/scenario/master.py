@@ -112,7 +112,11 @@ def stepping_groups(
 
 
 def idle_settings(table: MasterTable) -> list[str]:
-    """What the user set that has no effect beside the other settings, in words."""
+    """What the user set that has no effect beside the other settings, in words.
+
+    Args:
+        table: of the scenario.
+    """
     needs = {
         "threads": ("algorithm", "jacobi", table.algorithm == "jacobi" or table.threads == 1),
         "tolerance": ("control", "doubling", table.control == "doubling"),

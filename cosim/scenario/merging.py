@@ -20,7 +20,11 @@ Line = tuple[Any, str]
 
 
 def merge(earlier: dict[str, Any], later: Mapping[str, Any]) -> None:
-    """Merge tables into earlier ones, in place; connections are not looked at (see `join`)."""
+    """Merge tables into earlier ones, in place; connections are not looked at (see `join`).
+
+    Args:
+        later: what comes on top.
+    """
     _merge({k: v for k, v in later.items() if k != "connections"}, earlier, ())
 
 
@@ -65,7 +69,7 @@ def join(earlier: Sequence[Line], later: Sequence[Line], removed: Iterable[str])
 
     Args:
         earlier, later: connections as written, lines or tables. removed: components that are gone, with their
-        connections.
+            connections.
 
     Raises:
         ScenarioError: an input is to be left free that nothing is connected to.

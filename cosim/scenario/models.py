@@ -33,6 +33,9 @@ def shipped() -> Mapping[str, type[HybridSystem]]:
 def make_system(table: ComponentTable, where: str) -> HybridSystem | None:
     """The hybrid system of a component, or None for an FMU by path and for a recording.
 
+    Args:
+        table: of the scenario. where: name of the scenario, for messages.
+
     Raises:
         ScenarioError: unknown model, option or preset.
     """
@@ -65,7 +68,7 @@ def component_factories(
         tables: of the components. folder: paths are relative to it. where: place for messages.
         tell: told of FMUs that are built. span: start and stop of the run [s], which recordings must cover.
         tolerance: of the FMUs whose table says nothing else; see
-        `cosim.components.described.Described.choose_tolerance`.
+            `cosim.components.described.Described.choose_tolerance`.
 
     Raises:
         ScenarioError, FmuLoadError: a component cannot be made.
@@ -110,7 +113,11 @@ def open_recording(
 
 
 def left_out_note(name: str, recording: Recording) -> list[str]:
-    """Which columns of a recording are not there, if any."""
+    """Which columns of a recording are not there, if any.
+
+    Args:
+        name: of the component.
+    """
     columns = "; ".join(f"{column}: {why}" for column, why in recording.left_out.items())
     return [f"{name}: columns that cannot be played back are left out. {columns}."] if columns else []
 
@@ -132,6 +139,9 @@ def _lasting(table: ComponentTable, system: HybridSystem) -> HybridSystem:
 
 def protocol_parameters(table: ComponentTable, component: Component, where: str) -> dict[str, float | str]:
     """What the table says about late events, as parameters of an FMU; a block was made with them.
+
+    Args:
+        where: name of the scenario, for messages.
 
     Raises:
         ScenarioError: the component has no such parameter.

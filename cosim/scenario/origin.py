@@ -97,7 +97,11 @@ def foreign_files(table: ScenarioTable, folder: Path) -> list[ForeignFile]:
 
 
 def stamp(path: Path) -> Stamp:
-    """Size [bytes] and time of the last change [ns] of a file."""
+    """Size [bytes] and time of the last change [ns] of a file.
+
+    Args:
+        path: of the file.
+    """
     status = path.stat()
     return status.st_size, status.st_mtime_ns
 

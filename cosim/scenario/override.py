@@ -59,6 +59,9 @@ def _component_key(rest: str) -> tuple[str, ...]:
 def flat(tables: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
     """Names and values of nested tables: ``[overrides]`` takes ``"plant.mass" = 1.0`` and ``plant.mass = 1.0``
     alike.
+
+    Args:
+        before: keys that lead to it.
     """
     for name, value in tables.items():
         if isinstance(value, Mapping):

@@ -61,7 +61,11 @@ def inferred_roles(
 
 
 def with_roles(table: ScenarioTable, roles: Mapping[str, str]) -> ScenarioTable:
-    """The scenario whose report has these roles too."""
+    """The scenario whose report has these roles too.
+
+    Args:
+        table: of the scenario.
+    """
     return table.model_copy(update={"report": table.report.model_copy(update=dict(roles))}) if roles else table
 
 
@@ -95,6 +99,9 @@ def signals_to_record(table: ScenarioTable) -> dict[str, list[str]]:
 
 def check_roles(table: ScenarioTable, components: Mapping[str, Component], where: str) -> None:
     """Check the report table of a scenario against its components.
+
+    Args:
+        where: name of the scenario, for messages.
 
     Raises:
         ScenarioError: an observer that is no component, a signal of another dimension, a phase or zone without length.

@@ -87,7 +87,7 @@ def run_scenario(
         table: validated scenario. name: its name. folder: start of relative paths. where: place for messages.
         progress: called with the time reached and the end [s].
         warn: told of everything doubtful as soon as it is known, before the run where it can be; by default the log
-        ``cosim``.
+            ``cosim``.
         call_log: where calls are logged, where the scenario asks for that; by default `CALL_LOG` in the working folder.
         building: told of FMUs that are built before the run, as they are done; by default the log, as information.
         stream: the folder that rows are written to as they come; None to keep them in memory.

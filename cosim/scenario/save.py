@@ -57,7 +57,7 @@ def save_scenario(table: ScenarioTable, folder: Path, path: Path, unpacked: Path
     Args:
         table: the validated scenario. folder: start of its relative paths. path: of the file, ending in ``.toml``.
         unpacked: a folder that lasts no longer than this process; files in it are copied to ``NAME_files`` beside the
-        new file.
+            new file.
 
     Returns:
         The path.

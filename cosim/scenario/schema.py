@@ -73,6 +73,9 @@ MAX_STEPS = 1e12
 def step_count(start: float, stop: float, step: float) -> int:
     """Number of communication steps.
 
+    Args:
+        start: begin of the run [s]. stop: end of the run [s].
+
     Raises:
         ValueError: the step is not positive, the horizon is empty, or the step does not divide it.
     """

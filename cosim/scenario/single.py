@@ -31,6 +31,13 @@ def single_tables(
 ) -> tuple[dict[str, Any], list[str]]:
     """The tables of a scenario of one FMU, and what is doubtful about it; arguments as for `Scenario.fmu`.
 
+    Args:
+        path: of the file. name: of the component.
+        start: begin of the run [s]; None for that of the FMU's default experiment.
+        stop: end of the run [s]; None for that of the FMU's default experiment.
+        step: communication step [s]; None for the FMU's own. inputs: constants by name, or a table, or its path.
+        parameters: start values by name. record: signals to record; none for all.
+
     Raises:
         FmuLoadError: the FMU cannot be read.
         ScenarioError: no end is known, or an input does not exist.
@@ -62,6 +69,11 @@ def run_times(
 ) -> tuple[float, float, float]:
     """Start, stop and step [s]: as given, else of the FMU's default experiment; without its step, a thousandth of the
     run.
+
+    Args:
+        description: model description of the FMU.
+        start: begin of the run [s]; None for that of the FMU's default experiment.
+        where: name of the scenario, for messages.
 
     Raises:
         ScenarioError: there is no stop, or the step does not divide the run.

@@ -16,7 +16,11 @@ from fmus.fmi.types import NUMERIC_TYPES
 
 
 def given_values(table: ScenarioTable) -> dict[str, list[str]]:
-    """Names of the variables whose start values the scenario gives, by component."""
+    """Names of the variables whose start values the scenario gives, by component.
+
+    Args:
+        table: of the scenario.
+    """
     return {name: list(component.parameters) for name, component in table.components.items()}
 
 

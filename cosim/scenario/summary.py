@@ -18,7 +18,11 @@ MESSAGES_SHOWN = 20
 
 
 def first_summary(name: str, table: ScenarioTable, plan: Plan) -> dict[str, Any]:
-    """What is known before the first step; arguments as for `run_summary`."""
+    """What is known before the first step; arguments as for `run_summary`.
+
+    Args:
+        name: of the scenario. table: of the scenario. plan: prepared, components instantiated.
+    """
     return {
         "scenario": name,
         "title": table.title,
@@ -40,7 +44,7 @@ def run_summary(name: str, table: ScenarioTable, plan: Plan, master: Master, set
 
     Args:
         name: of the scenario. table: the scenario. plan, master: after the run. setup_seconds: wall time of the set-up
-        [s].
+            [s].
     """
     axis, timing = master.axis, master.timing
     reached = float(master.recorder.table()["time"][-1]) if master.recorder.count else axis.start

@@ -16,6 +16,9 @@ CONFLICT = re.compile(r"(<{7}|={7}|>{7})( |$)")
 def read_toml(path: Path) -> dict[str, Any]:
     """The content of a TOML file; the mark that some editors put before UTF-8 is passed over.
 
+    Args:
+        path: of the file.
+
     Raises:
         ValueError: it is not TOML; the message says what it is and what to do. OSError: it cannot be read.
     """

@@ -26,6 +26,9 @@ DIGEST = "fmu_sha256"
 def read_extras(node: Node) -> dict[str, Any]:
     """What our annotation on an element says; nothing where it has none.
 
+    Args:
+        node: element of the document.
+
     Raises:
         ScenarioError: the annotation is not what this package writes.
     """
@@ -43,7 +46,11 @@ def read_extras(node: Node) -> dict[str, Any]:
 
 
 def write_extras(extras: Mapping[str, Any]) -> Node:
-    """An ``ssd:Annotations`` element with our annotation."""
+    """An ``ssd:Annotations`` element with our annotation.
+
+    Args:
+        extras: what the standard has no place for.
+    """
     outer = etree.Element(f"{{{NAMESPACES['ssd']}}}Annotations")
     annotation = etree.SubElement(outer, f"{{{NAMESPACES['ssc']}}}Annotation", type=TYPE)
     holder = etree.SubElement(annotation, f"{{{NAMESPACE}}}extras", nsmap={None: NAMESPACE})
@@ -52,5 +59,9 @@ def write_extras(extras: Mapping[str, Any]) -> Node:
 
 
 def digest(path: Path) -> str:
-    """SHA-256 of a file."""
+    """SHA-256 of a file.
+
+    Args:
+        path: of the file.
+    """
     return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -42,7 +42,7 @@ class Type:
 
     Args:
         name: as written, for example ``Float64``. unit: of a real number, where one is given. enumeration: name of its
-        type.
+            type.
     """
 
     name: str
@@ -106,7 +106,11 @@ class UnitTable:
             self._compare(name, node)
 
     def named(self, node: Node) -> NamedUnit | None:
-        """The unit that the attribute ``unit`` of an element names; None where it names none."""
+        """The unit that the attribute ``unit`` of an element names; None where it names none.
+
+        Args:
+            node: element of the document.
+        """
         name = node.get("unit")
         if name is None or name in self._units:
             return None if name is None else NamedUnit(name, self._units[name])
@@ -154,6 +158,9 @@ def read_type(node: Node, units: UnitTable, prefix: str = "ssc") -> Type | None:
 
 def read_transformation(node: Node) -> Step | None:
     """The transformation of a connection or a mapping entry.
+
+    Args:
+        node: element of the document.
 
     Raises:
         ScenarioError: a mapping has two targets for one source.

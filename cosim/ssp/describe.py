@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from cosim.scenario.package_names import split_variant
 from cosim.ssp.lapses import Lapses
 from cosim.ssp.load import find_variant, load_structure
 from cosim.ssp.model import ComponentElement, DictionaryReference, Element, SystemElement
-from cosim.ssp.names import split_variant
 from cosim.ssp.package import Package, Unpacked
 from cosim.ssp.structure import read_structure
 
@@ -43,7 +43,11 @@ def describe_package(name: str) -> dict[str, Any]:
 
 
 def text_of_package(data: dict[str, Any]) -> str:
-    """The same for people."""
+    """The same for people.
+
+    Args:
+        data: plain data of `describe`.
+    """
     lines = [f"{data['name']}: {data['description']}".rstrip(": ")]
     lines += [f"SSP {data['SSP version']}, variants: {', '.join(data['variants'])}"]
     times = {key: "not given" if data[key] is None else f"{data[key]:g} s" for key in ("start", "stop", "step")}

@@ -80,6 +80,9 @@ def parse(text: bytes, file: str, kind: str, undeclared: Callable[[str, str], No
 def validated(root: Node, file: str, kind: str) -> Node:
     """An element that is to be the root of a part of SSP, also where it stands inline in another file.
 
+    Args:
+        kind: of the document.
+
     Raises:
         ScenarioError: it is another element, of an unknown version, or not as the schema wants it; with the line.
     """
@@ -108,7 +111,11 @@ def namespace_of(prefix: str) -> str:
 
 
 def find(node: Node, path: str) -> Node:
-    """The first descendant at a path such as ``ssd:Elements/ssd:Component``, or None."""
+    """The first descendant at a path such as ``ssd:Elements/ssd:Component``, or None.
+
+    Args:
+        node: element of the document.
+    """
     return node.find(path, NAMESPACES)
 
 
@@ -118,17 +125,28 @@ def find_all(node: Node | None, path: str) -> list[Node]:
 
 
 def short(tag: str) -> str:
-    """The name of an element without its namespace."""
+    """The name of an element without its namespace.
+
+    Args:
+        tag: name with its namespace.
+    """
     return tag.rpartition("}")[2]
 
 
 def place(node: Node) -> str:
-    """Where an element stands: file and line."""
+    """Where an element stands: file and line.
+
+    Args:
+        node: element of the document.
+    """
     return f"{node.base}, line {node.sourceline}"
 
 
 def fail(node: Node, message: str) -> NoReturn:
     """Refuse what stands at an element.
+
+    Args:
+        node: element of the document. message: what is wrong.
 
     Raises:
         ScenarioError: always.
@@ -137,7 +155,11 @@ def fail(node: Node, message: str) -> NoReturn:
 
 
 def flag(node: Node, name: str) -> bool:
-    """An attribute of type xs:boolean, false where it is missing."""
+    """An attribute of type xs:boolean, false where it is missing.
+
+    Args:
+        node: element of the document. name: of the attribute.
+    """
     return node.get(name, "false").strip() in ("true", "1")
 
 

@@ -46,7 +46,7 @@ class Part:
 
     Args:
         table: of the scenario. fmu: its FMU. member: name of that in the package. interface: what it says of its
-        variables.
+            variables.
     """
 
     table: ComponentTable

@@ -34,6 +34,9 @@ class Interface:
     def variable(self, name: str, node: Node) -> ModelVariable:
         """The variable of this name, or of the array it is an element of.
 
+        Args:
+            node: element of the document.
+
         Raises:
             ScenarioError: there is none; the nearest names are suggested.
         """

@@ -38,7 +38,11 @@ class Lapses:
         self.tell(node, text)
 
     def tell(self, node: Node | str, text: str) -> None:
-        """Something doubtful that is no fault by the standard."""
+        """Something doubtful that is no fault by the standard.
+
+        Args:
+            node: element of the document. text: what was read, and how.
+        """
         self._places.setdefault(text, []).append(node if isinstance(node, str) else place(node))
 
     def lines(self) -> list[str]:

@@ -10,12 +10,12 @@ from typing import Any
 
 from cosim.errors import ScenarioError, nearest
 from cosim.scenario.models import LATE_PARAMETERS
+from cosim.scenario.package_names import split_variant
 from cosim.ssp.annotation import DIGEST, digest
 from cosim.ssp.bindings import start_values
 from cosim.ssp.document import fail
 from cosim.ssp.lapses import Lapses
 from cosim.ssp.model import ComponentElement, Structure
-from cosim.ssp.names import split_variant
 from cosim.ssp.nets import Chain, Nets, Path, flat_names
 from cosim.ssp.package import DEFAULT_VARIANT, Package, Unpacked
 from cosim.ssp.pipe import Pipe, by_items, numeric, simplest
@@ -62,6 +62,9 @@ def load_package(name: str, strict: bool = False) -> Loaded:
 def list_variants(name: str) -> dict[str, str]:
     """The structures in an SSP: their names as ``#NAME`` takes them, the default one first, and the titles within them.
 
+    Args:
+        name: of the member.
+
     Raises:
         CosimError: one of them cannot be read.
     """
@@ -72,6 +75,9 @@ def list_variants(name: str) -> dict[str, str]:
 
 def find_variant(package: Package, variant: str) -> str:
     """The member that a variant's name means: its file name, with its ending or without, or the name written within it.
+
+    Args:
+        package: the open package.
 
     Raises:
         ScenarioError: there is none.
@@ -90,6 +96,9 @@ def find_variant(package: Package, variant: str) -> str:
 
 def load_structure(structure: Structure, package: Package) -> Loaded:
     """The scenario of one system structure.
+
+    Args:
+        package: the open package.
 
     Raises:
         CosimError: something in it cannot be carried out.

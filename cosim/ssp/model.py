@@ -88,7 +88,7 @@ class Binding:
 
     Args:
         parameters: names with the prefix of the binding. mapping: entries, or None where all apply under their own
-        names.
+            names.
     """
 
     parameters: tuple[Parameter, ...]

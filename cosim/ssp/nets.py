@@ -142,14 +142,22 @@ class Nets:
         return self.elements[point.path].connectors[point.name]
 
     def kind(self, point: Point) -> str:
-        """Kind of a connector; what an FMU's unspecified connector is, its variable says."""
+        """Kind of a connector; what an FMU's unspecified connector is, its variable says.
+
+        Args:
+            point: end of a connection.
+        """
         kind = self.connector(point).kind
         if kind == "unspecified" and point.path in self.interfaces:
             return str(self.interfaces[point.path].variables[point.name].causality)
         return kind
 
     def unit(self, point: Point) -> NamedUnit | None:
-        """Unit of a connector, its own or that of the FMU's variable."""
+        """Unit of a connector, its own or that of the FMU's variable.
+
+        Args:
+            point: end of a connection.
+        """
         own = self.connector(point).type
         if own is not None and own.unit is not None:
             return own.unit
@@ -267,6 +275,9 @@ def _walk(element: Element, path: Path) -> Iterator[tuple[Path, Element]]:
 def flat_names(paths: Iterable[Path]) -> dict[Path, str]:
     """A legal, unique component name for each path: its parts joined by ``__``, other characters than letters, digits
     and ``_`` replaced.
+
+    Args:
+        paths: of components.
     """
     names: dict[Path, str] = {}
     for path in paths:

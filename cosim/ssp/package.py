@@ -85,6 +85,9 @@ class Package:
     def read(self, name: str) -> bytes:
         """The content of a member that is XML.
 
+        Args:
+            name: of the element.
+
         Raises:
             ScenarioError: it is too large or damaged.
         """
@@ -97,6 +100,9 @@ class Package:
 
     def file(self, name: str) -> Path:
         """A member as a file, unpacked once.
+
+        Args:
+            name: of the element.
 
         Raises:
             ScenarioError: it is damaged.

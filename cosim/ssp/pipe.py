@@ -62,13 +62,20 @@ class Pipe:
         return pipe
 
     def number(self, value: float, node: Node) -> float:
-        """What becomes of a number; a whole number stays one where nothing is done to it."""
+        """What becomes of a number; a whole number stays one where nothing is done to it.
+
+        Args:
+            value: number before the transformation. node: element of the document.
+        """
         if self.maps:
             return numeric(self.maps, node).get(float(value), value)
         return value if self.is_identity else self.factor * value + self.offset
 
     def item(self, name: str, node: Node) -> str:
         """What becomes of the name of an item.
+
+        Args:
+            node: element of the document.
 
         Raises:
             ScenarioError: there is a transformation for numbers in the pipe.
@@ -107,6 +114,9 @@ class Pipe:
 def numeric(maps: tuple[ValueMap, ...], node: Node) -> dict[float, float]:
     """Tables of booleans or integers in a row as one table; a value without an entry passes unchanged.
 
+    Args:
+        node: element of the document.
+
     Raises:
         ScenarioError: one of them is not numeric, or maps one value twice.
     """
@@ -125,6 +135,7 @@ def by_items(
 
     Args:
         source, target: items of the two enumerations.
+        maps: value maps of both ends. node: element of the document.
 
     Raises:
         ScenarioError: an entry leads to an item that the target does not have.

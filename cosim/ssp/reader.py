@@ -79,7 +79,11 @@ def _track(table: BalisesTable, places: list[float]) -> tuple[dict[str, Any], di
 
 
 def is_told_by_counts(interface: Interface) -> bool:
-    """Whether an FMU takes balises as a count, an instant and a position."""
+    """Whether an FMU takes balises as a count, an instant and a position.
+
+    Args:
+        interface: of a component's FMU.
+    """
     inputs = {v.name: FAMILIES[str(v.type)] for v in interface.variables.values() if v.causality == "input"}
     fields = [f"{BALISE_EVENT}_{field}" for field in TOLD]
     return all(field in inputs for field in fields) and inputs[fields[0]] == INTEGER

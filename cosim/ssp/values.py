@@ -33,6 +33,9 @@ def read_parameter_set(root: Node, prefix: str, lapses: Lapses) -> tuple[Paramet
 def read_mapping(root: Node) -> tuple[Entry, ...]:
     """The entries of a valid ParameterMapping.
 
+    Args:
+        root: element of the document.
+
     Raises:
         ScenarioError: two entries have one target.
     """

@@ -31,11 +31,19 @@ class Definitions:
         return _register(self.units, unit.name, unit.unit)
 
     def enumeration(self, name: str, items: Mapping[str, int]) -> str:
-        """The name of an enumeration in this file."""
+        """The name of an enumeration in this file.
+
+        Args:
+            items: numbers by name.
+        """
         return _register(self.enumerations, name, dict(items))
 
     def write(self, root: Node, prefix: str) -> None:
-        """Append the definitions to a root element, in the order of the schema."""
+        """Append the definitions to a root element, in the order of the schema.
+
+        Args:
+            prefix: of the namespace.
+        """
         if self.enumerations:
             holder = child(root, prefix, "Enumerations")
             for name, items in self.enumerations.items():
@@ -53,18 +61,32 @@ class Definitions:
 
 
 def root_of(kind: str, tag: str, version: str, **attributes: str) -> Node:
-    """A root element, for example ``root_of("ssv", "ParameterSet", "2.0", name="plant")``."""
+    """A root element, for example ``root_of("ssv", "ParameterSet", "2.0", name="plant")``.
+
+    Args:
+        kind: of the document. tag: name of the element with its namespace.
+        version: of the standard, ``1.0`` or ``2.0``. attributes: by name.
+    """
     used = {prefix: NAMESPACES[prefix] for prefix in ("ssc", kind)}
     return etree.Element(f"{{{NAMESPACES[kind]}}}{tag}", nsmap=used, version=version, **attributes)
 
 
 def child(parent: Node, prefix: str, tag: str, **attributes: str) -> Node:
-    """A new last child."""
+    """A new last child.
+
+    Args:
+        parent: element that gets the child. prefix: of the namespace.
+        tag: name of the element with its namespace. attributes: by name.
+    """
     return etree.SubElement(parent, f"{{{NAMESPACES[prefix]}}}{tag}", attributes)
 
 
 def text_of(root: Node) -> bytes:
-    """The file."""
+    """The file.
+
+    Args:
+        root: element of the document.
+    """
     etree.indent(root, space="  ")
     return etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)  # type: ignore[no-any-return]
 
@@ -104,7 +126,8 @@ def add_parameter(parent: Node, name: str, kind: str, values: Sequence[Any], sha
 
     Args:
         parent: ``Parameters`` element. kind: type in the words of SSP. values: in row-major order. shape: empty for a
-        scalar.
+            scalar.
+        name: of the element.
     """
     node = child(parent, "ssv", "Parameter", name=name)
     texts = [_text(value, FAMILIES[kind]) for value in values]

@@ -43,7 +43,7 @@ class Signal:
 
     Args:
         name: its name. unit: name of its unit, or None. meaning: of the unit; None without one, or where nobody
-        understands it.
+            understands it.
         description: one line. start: its start value as a number, or None. type: of FMI.
     """
 

@@ -31,8 +31,7 @@ class Look:
     Args:
         path: of the file. component: to be asked for variables and units; it cannot be stepped.
         inputs, outputs, parameters, hidden: numeric scalars, and the elements of short arrays; hidden ones are local
-        variables,
-            which may be read like outputs.
+            variables, which may be read like outputs.
         unread: inputs and outputs that no connection of numbers can reach (texts, clocks, long arrays), a line each.
         runs_here: whether it has a library for this platform.
     """

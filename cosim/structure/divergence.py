@@ -66,7 +66,7 @@ def explained_failure(error: Exception, plan: Plan, table: Any) -> str:
 
     Args:
         error: that ended the run. plan: that was run. table: rows by ``component.signal``, in the components' own
-        units.
+            units.
     """
     found = first_departure(plan, table) if isinstance(error, RunError) else None
     if found is None:

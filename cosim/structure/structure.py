@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from cosim.structure.text import structure_text
+
 Signal = tuple[str, str]
 """(component, variable)"""
 
@@ -46,9 +48,10 @@ class Part:
     Args:
         name: in the scenario. kind: ``FMU`` or ``block``. fmi_version: as the description says. model: its model name.
         source: file or origin. inputs, outputs: without the triggers and payloads of events. events: triggered ones it
-        declares.
+            declares.
         abilities: capabilities that matter to a master, in words. group: index of its group in `Structure.groups`.
         rate: every how many communication steps it runs, or how many times in one, in words; empty for once a step.
+        chain: how it moves over a step, in words: the stages, outermost first, then what is done within them.
     """
 
     name: str
@@ -62,6 +65,7 @@ class Part:
     abilities: tuple[str, ...]
     group: int
     rate: str = ""
+    chain: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -101,7 +105,7 @@ class Balises:
         plant: the watched component. position, speed: its outputs, empty where telegrams are recorded.
         receivers: components that are told.
         method: as asked for; ``auto`` is decided by a probe of the plant when the run is set up. timing: ``exact`` or
-        ``stale``.
+            ``stale``.
         odometer: output whose reading the telegrams carry, or None.
     """
 
@@ -163,8 +167,6 @@ class Structure:
         Args:
             width: columns at which long lists are broken; None for no limit.
         """
-        from cosim.structure.text import structure_text  # noqa: PLC0415 - it needs this class
-
         return structure_text(self, width)
 
     def draw(self, path: str | Path) -> Path:

@@ -7,11 +7,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cosim.errors import CosimError, ScenarioError
 from cosim.scenario.outcome import INTERRUPTED, Outcome
-from cosim.scenario.scenario import Scenario
 from cosim.scenario.starts import start_values
 from cosim.scenario.structure import describe_component
 from cosim.studies.measures import Measure, error_measures, own_measures
@@ -19,6 +18,9 @@ from cosim.studies.sampling import Mode, Range, Variation, variations
 from cosim.studies.sweep_files import run_folder, write_index, write_run
 from cosim.studies.sweep_result import SweepResult, SweepRun
 from cosim.studies.workers import Died, Raised, attempt, in_processes
+
+if TYPE_CHECKING:
+    from cosim.simulation.scenario import Scenario
 
 Progress = Callable[[int, int], None]
 
@@ -89,14 +91,13 @@ class Sweep:
 
         Args:
             workers: processes at a time; 1 runs in this process. A script that uses more needs
-            ``if __name__ == "__main__":``.
+                ``if __name__ == "__main__":``.
             progress: called with the number done and the number in all.
             measure: own numbers to take of each outcome, ``{"name": function}``; called in this process.
             units: of these numbers, by name, for pictures.
             keep: keep the outcomes in memory; without them only measures are left, and what is in `directory`.
             directory: where each run is written as soon as it is done, ``run_000``, ``run_001``, ..., with an index at
-            the end,
-                also where the sweep is interrupted.
+                the end, also where the sweep is interrupted.
 
         Returns:
             The runs in order of the variations, with settings, measures, outcome or failure.

@@ -85,7 +85,7 @@ class FMIInterface:
             the parameter of that name.
         replay_horizon: how far back ``replay`` can go [s]; the start value of the parameter of that name.
         announcement: how events are announced, ``clocks`` (FMI 3 only) or ``counts``; None for what is usual in the
-        version.
+            version.
 
     Raises:
         ValueError: the preset, the policy or the announcement is unknown, or the horizon is not a time.

@@ -61,7 +61,7 @@ class SwitchingError:
 
         Args:
             P: positive definite, shape (n, n). longest: longest gap [s]. gaps: rising, from 0 to `longest` [s], shape
-            (count,).
+                (count,).
 
         Returns:
             Shape (count,); at a gap of zero the limit.

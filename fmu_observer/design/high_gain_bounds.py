@@ -39,7 +39,7 @@ def high_gain_bounds(
     Args:
         A: block shift matrix, shape (n, n). K: shape (n, q). C: shape (q, n).
         theta: gain in use [1/s]. lipschitz: constant L of the nonlinear remainder [1/s]. mu: any positive number; it
-        cancels.
+            cancels.
 
     Returns:
         The bounds; where ``A - K C`` is not Hurwitz no theta is large enough (inf) and no gap short enough (0).

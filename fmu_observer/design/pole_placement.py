@@ -24,8 +24,8 @@ def observer_gain(
 
     Args:
         A: shape (n, n). C: shape (q, n), (A, C) observable. poles: n of them [1/s], real or in conjugate pairs; with
-        several
-            measurements none repeated more often than C has rank. For a discrete A the same, within the unit circle.
+            several measurements none repeated more often than C has rank. For a discrete A the same, within the unit
+            circle.
         states: their names, for the message. name: what asks, for the message.
 
     Returns:

@@ -29,7 +29,7 @@ def steady_filter(A: np.ndarray, C: np.ndarray, QN: np.ndarray, RN: np.ndarray) 
 
     Args:
         A: shape (n, n). C: shape (q, n). QN: process covariance of one period, shape (n, n). RN: measurement
-        covariance, shape (q, q).
+            covariance, shape (q, q).
 
     Returns:
         The steady state; None when there is no stabilising solution (a mode on or outside the unit circle that C does

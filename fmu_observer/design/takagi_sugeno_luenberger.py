@@ -88,7 +88,7 @@ def designed_gains(model: TakagiSugenoModel, decay: float = 1.0) -> np.ndarray:
 
     Args:
         model: N vertices; all its measurements count as continuous. decay: rate at which the error shall decay at least
-        [1/s].
+            [1/s].
 
     Returns:
         Gains of shape (N, n, q) in SI units, their inequality recomputed.

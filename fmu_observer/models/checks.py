@@ -69,7 +69,7 @@ def checked_matrix(where: str, name: str, value: object, shape: tuple[int, ...],
 
     Args:
         where: for the message. name: of the matrix. value: what was given. shape: what is expected. reason: why that
-        shape.
+            shape.
 
     Raises:
         ValueError: it holds something else than finite numbers, or has another shape.

@@ -28,9 +28,10 @@ class ObserverModel:
 
     Args:
         name: identifier. description: one line. source: where the equations come from.
-        states: scalar `state` signals named by the quantity (``angle``); their starts are the observer's starts.
-        inputs: scalar `input_signal`s, the known inputs u.
-        measurements: scalar `input_signal`s named by the quantity; measured continuously an observer calls them
+        states: scalar signals by `state` named by the quantity (``angle``); their starts are the observer's starts.
+        inputs: scalar signals by `input_signal`, the known inputs u.
+        measurements: scalar signals by `input_signal` named by the quantity; measured continuously an observer calls
+        them
             ``measured_angle``, at an event ``<event>_angle``.
         A: shape (n, n). B: shape (n, m). C: shape (q, n).
         phi: nonlinear remainder, plain NumPy that can be traced; None for a linear model.

@@ -72,10 +72,11 @@ class TakagiSugenoModel:
 
     Args:
         name: identifier. description: one line. source: where the equations come from.
-        states: scalar `state` signals named by the quantity; their starts are the observer's starts.
-        inputs: scalar `input_signal`s, the known inputs u.
-        sampled: scalar `input_signal`s y1 that arrive at `event`; an observer calls them ``<event>_<name>``.
-        continuous: scalar `input_signal`s y2 that are there always; an observer calls them ``measured_<name>``.
+        states: scalar signals by `state` named by the quantity; their starts are the observer's starts.
+        inputs: scalar signals by `input_signal`, the known inputs u.
+        sampled: scalar signals by `input_signal` y1 that arrive at `event`; an observer calls them ``<event>_<name>``.
+        continuous: scalar signals by `input_signal` y2 that are there always; an observer calls them
+        ``measured_<name>``.
         premises: p of them. A: shape (2**p, n, n). B: shape (2**p, n, m).
         C_sampled: C1, shape (q1, n). C_continuous: C2, shape (q2, n).
         D: how the noise v enters y2, shape (q2, nv); None for the identity.
@@ -205,7 +206,7 @@ class TakagiSugenoModel:
 
         Args:
             x: estimate, shape (n,). sampled: y1 of shape (q1,), or None to keep what the estimate says. continuous: y2,
-            likewise.
+                likewise.
 
         Returns:
             ``x + C^+ (y - C x)``, shape (n,); where rows of C pick states, these are replaced.

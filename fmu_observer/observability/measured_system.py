@@ -20,7 +20,7 @@ class MeasuredSystem:
         C_sampled: what is measured at the instants of a pattern, shape (q2, n), or None.
         states: names of the states; ``x1`` ... ``xn`` where none are given.
         scales: a typical size of each state, so that states of different units can be compared, shape (n,); 1 where not
-        given.
+            given.
         name: for messages.
 
     Raises:

@@ -35,7 +35,7 @@ def measured_plant(
     Args:
         system: a traceable hybrid system, a plant or an observer; events do not enter.
         x0, u0: states and inputs of the point. continuous, sampled: names of outputs measured at all times, or at
-        instants. preset, parameters, memory: of the system. scales: typical sizes of states by name. t: time [s].
+            instants. preset, parameters, memory: of the system. scales: typical sizes of states by name. t: time [s].
 
     Raises:
         ValueError: a name is unknown, nothing is measured, or nothing in the system is continuous.
@@ -67,7 +67,7 @@ def measured_model(
     Args:
         model: the model. sampled: names of the measurements taken at instants, the others last; None for all of them.
         x0: states of the point, by default the model's starts. u0: inputs, likewise. scales: typical sizes of states by
-        name.
+            name.
 
     Raises:
         ValueError: a name is unknown, or a number of values is wrong.

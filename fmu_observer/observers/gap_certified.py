@@ -34,8 +34,7 @@ class GapCertified(HybridSystem):
         Args:
             max_gap: longest expected time between two samples [s].
             parameters: values by name that replace those of the preset, scalars or whole vectors (``theta``,
-            ``high_gain[1]``,
-                ``high_gain``).
+                ``high_gain[1]``, ``high_gain``).
             preset: preset to start from; by default the observer's own default.
 
         Returns:

@@ -86,7 +86,7 @@ class Told(NamedTuple):
     Args:
         position: told [m]. accuracy: of the place of the balise, either way [m]. estimate: believed position [m].
         bound: of the estimate's own error, where the observer has one [m]. odometer: reading [m/s]; None where there is
-        none.
+            none.
         t: stamp [s].
     """
 

@@ -21,7 +21,7 @@ def parameter_values(
 
     Args:
         system: whose parameters. overrides: values by name, scalars or whole vectors (``theta``, ``gain[1]``,
-        ``gain``).
+            ``gain``).
         preset: preset to start from; None for the system's default.
         purpose: for the message, as in "unknown parameter x to certify".
 

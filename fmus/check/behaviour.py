@@ -115,7 +115,11 @@ def go_elsewhere(bench: Bench, distance: float = 1.0) -> None:
 
 
 def again(bench: Bench, saved_at: float, path: Sequence[float]) -> list[np.ndarray]:
-    """Steps from a restored state of time `saved_at` [s] under the inputs of before."""
+    """Steps from a restored state of time `saved_at` [s] under the inputs of before.
+
+    Args:
+        path: of the FMU.
+    """
     bench.now = saved_at
     bench.set_inputs(bench.amplitude)
     return bench.steps(path)

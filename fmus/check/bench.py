@@ -201,6 +201,9 @@ def end_of_experiment(description: ModelDescription, start_time: float) -> float
 
     Some FMUs divide the time up to the announced end into steps of their own: a far end is a coarse step, or a run
     without end.
+
+    Args:
+        description: model description of the FMU. start_time: [s].
     """
     experiment = description.defaultExperiment
     stop = _number(experiment.stopTime if experiment else None, start_time)

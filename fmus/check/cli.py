@@ -19,7 +19,11 @@ TRUTH = {"true": 1.0, "false": 0.0}
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand to what `argparse.ArgumentParser.add_subparsers` returned."""
+    """Add the subcommand to what `argparse.ArgumentParser.add_subparsers` returned.
+
+    Args:
+        commands: subparsers of the program.
+    """
     parser: argparse.ArgumentParser = commands.add_parser(
         "check", help="how far an FMU can be trusted: validity and behaviour"
     )

@@ -50,7 +50,7 @@ class _Child:
 
     Args:
         findings: what it told. current: the check it was in when it ended, empty where it did all. end: how it ended,
-        in words.
+            in words.
         crashed: whether it ended by itself or had to be stopped for what it took; not where it was silent.
         left: processes that it left running.
     """

@@ -43,7 +43,11 @@ class FmuModel(FmuInstance):
         self.guarded("enterContinuousTimeMode", self.slave.enterContinuousTimeMode)
 
     def set_time(self, t: float) -> None:
-        """The independent variable [s]."""
+        """The independent variable [s].
+
+        Args:
+            t: time at which it happened [s].
+        """
         self.guarded("setTime", lambda: self.slave.setTime(t))
 
     def states(self) -> np.ndarray:

@@ -36,7 +36,7 @@ class ProbeReport:
         spread: by output, in its own unit: how far results lay apart that differ by the solver's steps alone, after
             restoring and between a step and its parts. Empty where that was not measured.
         drift: by output, in its own unit for each second: how fast it leaves what a finer tolerance gives. Empty
-        likewise.
+            likewise.
     """
 
     component: str

@@ -44,7 +44,7 @@ class Restoring:
     Args:
         restores: ``exact`` bit for bit; ``within_tolerance`` of the solver; ``no``.
         mismatch: largest difference of an output after restoring, relative to its size, or its movement where that is
-        more.
+            more.
         apart: largest difference of each output in its own unit, shape (q,).
         problem: what differed, in words; empty where nothing did.
     """

@@ -147,7 +147,11 @@ def check_count(archive: Archive) -> int:
 
 
 def default_step(description: ModelDescription) -> float:
-    """The communication step to check with [s]."""
+    """The communication step to check with [s].
+
+    Args:
+        description: model description of the FMU.
+    """
     experiment = description.defaultExperiment
     if experiment is None:
         return DEFAULT_STEP

@@ -60,7 +60,11 @@ class FmuSlave(FmuInstance):
         ]
 
     def enter_initialization(self, start_time: float, stop_time: float) -> None:
-        """Begin initialisation; times in [s]."""
+        """Begin initialisation; times in [s].
+
+        Args:
+            start_time: [s]. stop_time: [s], without effect.
+        """
         self._next_event = math.inf
         self._enter_initialization(start_time, stop_time)
 

@@ -53,10 +53,18 @@ class Steppable(Protocol):
         """Back to the state after `instantiate`."""
 
     def set_start(self, name: str, value: float) -> None:
-        """Set a variable before initialisation."""
+        """Set a variable before initialisation.
+
+        Args:
+            name: of the class.
+        """
 
     def enter_initialization(self, start_time: float, stop_time: float) -> None:
-        """Begin initialisation; times in [s]."""
+        """Begin initialisation; times in [s].
+
+        Args:
+            start_time: [s]. stop_time: [s], without effect.
+        """
 
     def exit_initialization(self) -> None:
         """End initialisation, discrete states settled."""
@@ -86,4 +94,8 @@ class Steppable(Protocol):
         """Free the instance and its library; never raises."""
 
     def failure(self, reason: str, t: float | None = None) -> Exception:
-        """An error of this component, one of `FAILURES`."""
+        """An error of this component, one of `FAILURES`.
+
+        Args:
+            t: time at which it happened [s].
+        """

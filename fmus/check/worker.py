@@ -85,7 +85,11 @@ def findings(
 
 
 def unrun(name: str, basis: str) -> Finding:
-    """The finding of a check that could not run because another one failed."""
+    """The finding of a check that could not run because another one failed.
+
+    Args:
+        name: of the class.
+    """
     return Finding(name, Verdict.SKIPPED, f"not run, because '{basis}' failed")
 
 

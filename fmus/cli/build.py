@@ -35,7 +35,11 @@ class Job:
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand to what `argparse.ArgumentParser.add_subparsers` returned."""
+    """Add the subcommand to what `argparse.ArgumentParser.add_subparsers` returned.
+
+    Args:
+        commands: subparsers of the program.
+    """
     parser: argparse.ArgumentParser = commands.add_parser(
         "build",
         help="export models as native FMUs",
@@ -83,6 +87,9 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Build what was asked for; the paths go to standard output, everything else to standard error.
+
+    Args:
+        options: of the command line.
 
     Raises:
         ValueError, LookupError, OSError, RuntimeError, TypeError: a mistake of the user, or a build that failed.
@@ -204,7 +211,11 @@ def _option(text: str, known: dict[str, Sequence[Any]]) -> tuple[str, Any]:
 
 
 def legal(choices: Sequence[Any] | None) -> str:
-    """The legal values of an option in words; empty where any is legal."""
+    """The legal values of an option in words; empty where any is legal.
+
+    Args:
+        choices: allowed values; None where anything is.
+    """
     if not choices:
         return ""
     if isinstance(choices, range):

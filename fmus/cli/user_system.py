@@ -26,6 +26,9 @@ def load_class(name: str) -> type[HybridSystem]:
     """The class that ``path/to/file.py:ClassName`` names; ``:ClassName`` may be left out where the file has only one
     system.
 
+    Args:
+        name: of the class.
+
     Raises:
         UserSystemError: there is no such file or class, the file fails, or the class is no hybrid system.
     """

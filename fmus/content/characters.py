@@ -37,6 +37,9 @@ def number_text(value: float) -> str:
 
     A quotient such as ``1 / (1 / 3.6)`` is one rounding away from the number that is meant; so is what is written here
     at most.
+
+    Args:
+        value: a finite number.
     """
     neat = float(f"{value:.{DIGITS}g}")
     return repr(neat if abs(neat - value) <= math.ulp(value) else float(value))

@@ -18,7 +18,11 @@ LATE = {
 
 
 def event_section(system: HybridSystem, description: ModelDescription) -> str:
-    """Triggered events with their protocol, periodic events with their period; empty where there are none."""
+    """Triggered events with their protocol, periodic events with their period; empty where there are none.
+
+    Args:
+        system: the system in the FMU. description: model description of the FMU.
+    """
     by_name = {v.name: v for v in description.modelVariables}
     parts = [_triggered(event, by_name) for event in system.triggered_events]
     if parts:

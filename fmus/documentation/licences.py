@@ -16,7 +16,11 @@ def is_ours(system: HybridSystem) -> bool:
 
 
 def licence_files(system: HybridSystem) -> dict[str, str]:
-    """Texts under ``documentation/``, by name; ``licenses/license.txt`` is the entry that FMI names."""
+    """Texts under ``documentation/``, by name; ``licenses/license.txt`` is the entry that FMI names.
+
+    Args:
+        system: the system in the FMU.
+    """
     texts = {f"licenses/{name}": text for name, text in licence_texts().items()}
     return {"licenses/license.txt": _entry(system), **texts}
 
@@ -29,7 +33,11 @@ def licence_texts() -> dict[str, str]:
 
 
 def model_terms(system: HybridSystem) -> str:
-    """One sentence about the terms of the model itself."""
+    """One sentence about the terms of the model itself.
+
+    Args:
+        system: the system in the FMU.
+    """
     if is_ours(system):
         return f"The model {system.name} is part of fmu-observer: BSD-3-Clause, see fmu-observer.txt."
     return f"The model {system.name} is not part of fmu-observer: its terms are its author's to state."

@@ -21,7 +21,11 @@ def rebuild_commands(identifier: str) -> dict[str, str]:
 
 
 def rebuild_text(description: ModelDescription) -> str:
-    """The text of ``documentation/staticLinking.txt``."""
+    """The text of ``documentation/staticLinking.txt``.
+
+    Args:
+        description: model description of the FMU.
+    """
     interface = description.coSimulation or description.modelExchange
     name, version = interface.modelIdentifier, str(description.fmiVersion)[0]
     shared = "\n".join(f"    {system}:\n        {command}" for system, command in rebuild_commands(name).items())

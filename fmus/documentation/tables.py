@@ -31,7 +31,11 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def variable_table(description: ModelDescription, causality: str) -> str:
-    """The variables of one causality; empty where there are none."""
+    """The variables of one causality; empty where there are none.
+
+    Args:
+        description: model description of the FMU.
+    """
     chosen = [v for v in description.modelVariables if v.causality == causality]
     if not chosen:
         return ""
@@ -68,7 +72,11 @@ def _range(variable: ModelVariable) -> str:
 
 
 def preset_table(system: HybridSystem, chosen: str | None) -> str:
-    """Values of all presets, and those of this FMU marked; empty for a system without presets."""
+    """Values of all presets, and those of this FMU marked; empty for a system without presets.
+
+    Args:
+        chosen: preset that the FMU has as its start values.
+    """
     if not system.presets:
         return ""
     values = {name: system.preset_values(name) for name in system.presets}

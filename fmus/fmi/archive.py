@@ -125,6 +125,9 @@ def open_archive(path: Path, max_bytes: int = MAX_UNPACKED_BYTES, versions: Sequ
 def demand_harmless(path: Path, entries: list[zipfile.ZipInfo], max_bytes: int = MAX_UNPACKED_BYTES) -> None:
     """Refuse an archive that would unpack to too much, or to places outside of its own folder; by its entries alone.
 
+    Args:
+        path: of the FMU.
+
     Raises:
         NotAnFmuError: it is refused.
     """

@@ -15,7 +15,11 @@ LIBRARY_SUFFIXES = (".so", ".dll", ".dylib")
 
 
 def platform_folder(description: ModelDescription) -> str:
-    """Name of this platform's folder in ``binaries/``."""
+    """Name of this platform's folder in ``binaries/``.
+
+    Args:
+        description: model description of the FMU.
+    """
     return str(fmpy.platform_tuple if str(description.fmiVersion).startswith("3") else fmpy.platform)
 
 

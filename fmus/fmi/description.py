@@ -43,6 +43,9 @@ FLAGS_OF_FMI_1 = (
 def read_description(source: Path) -> ModelDescription:
     """The model description of an FMU file or of the folder it was unpacked into; not validated.
 
+    Args:
+        source: the user's file.
+
     Raises:
         Exception: whatever a broken file makes the parsers throw.
     """
@@ -68,6 +71,9 @@ def read_description(source: Path) -> ModelDescription:
 def why_unreadable(source: Path, error: Exception) -> str:
     """Why a model description could not be read: what the schema of the standard says first, else what the parser
     threw.
+
+    Args:
+        source: the user's file.
     """
     try:
         read_model_description(str(source), validate=True)
@@ -90,7 +96,11 @@ def _complete_clock(clock: ModelVariable, entry: ElementTree.Element) -> None:
 
 
 def declared_tolerance(description: ModelDescription) -> float | None:
-    """Relative tolerance of the default experiment; None where none is declared, or no positive number."""
+    """Relative tolerance of the default experiment; None where none is declared, or no positive number.
+
+    Args:
+        description: model description of the FMU.
+    """
     experiment = description.defaultExperiment
     try:
         tolerance = math.nan if experiment is None or experiment.tolerance is None else float(experiment.tolerance)
@@ -102,6 +112,9 @@ def declared_tolerance(description: ModelDescription) -> float | None:
 def negated_aliases(source: Path) -> frozenset[str]:
     """Names of the variables of an FMI 1.0 FMU whose slave holds the value with the other sign; fmpy does not read
     it.
+
+    Args:
+        source: the user's file.
     """
     root = ElementTree.fromstring(_text(source))
     entries = root.iterfind("ModelVariables/ScalarVariable")

@@ -23,7 +23,11 @@ ENCODING = ("utf-8", "surrogateescape")
 
 
 def make_exact_reader(slave: Any, fmi_version: int, variable: ModelVariable) -> Callable[[], Values]:
-    """A call that returns the values of a variable, one for a scalar."""
+    """A call that returns the values of a variable, one for a scalar.
+
+    Args:
+        fmi_version: 2 or 3.
+    """
     kind, total = getter_type(variable.type, fmi_version), size(variable)
     if not is_native(slave):
         return _list_reader(slave, kind, variable, total)
@@ -38,6 +42,9 @@ def make_exact_writer(slave: Any, fmi_version: int, variable: ModelVariable) -> 
     """A call that writes the values of a variable, one for a scalar.
 
     The call raises ValueError, OverflowError, TypeError or struct.error for a value that the type cannot hold.
+
+    Args:
+        fmi_version: 2 or 3.
     """
     kind, total = getter_type(variable.type, fmi_version), size(variable)
     if not is_native(slave):

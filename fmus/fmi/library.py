@@ -43,7 +43,11 @@ def functions_of(version: int, interface: str) -> list[str]:
 
 
 def functions_of_capabilities(description: ModelDescription, interface: str) -> Iterator[tuple[str, str]]:
-    """Pairs of a declared capability and a C function that it needs, names in lower case."""
+    """Pairs of a declared capability and a C function that it needs, names in lower case.
+
+    Args:
+        description: model description of the FMU.
+    """
     declared = getattr(description, interface)
     for capability, functions in CAPABILITY_FUNCTIONS.items():
         if getattr(declared, capability, False):

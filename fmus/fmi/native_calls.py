@@ -25,7 +25,7 @@ def prepared_call(slave: Any, name: str, *arguments: Any) -> Callable[[], None]:
         slave: fmpy's slave, instantiated.
         name: the function in fmpy's words, e.g. ``fmi2GetReal``.
         arguments: as for fmpy's method of this name. What is to change between calls is a ctypes object and changes its
-        value.
+            value.
 
     Returns:
         The call; it raises `FMICallException` where the status is worse than a warning.

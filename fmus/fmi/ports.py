@@ -29,14 +29,22 @@ def is_native(slave: Any) -> bool:
 def make_reader(
     slave: Any, fmi_version: int, variables: Sequence[ModelVariable], values: np.ndarray
 ) -> Callable[[], None]:
-    """A call that reads `variables` into `values`, shape (number of values of all,)."""
+    """A call that reads `variables` into `values`, shape (number of values of all,).
+
+    Args:
+        fmi_version: 2 or 3.
+    """
     return _make_port(slave, fmi_version, variables, values, "Get")
 
 
 def make_writer(
     slave: Any, fmi_version: int, variables: Sequence[ModelVariable], buffer: np.ndarray
 ) -> Callable[[], None]:
-    """A call that writes `variables` from `buffer`, shape (number of values of all,)."""
+    """A call that writes `variables` from `buffer`, shape (number of values of all,).
+
+    Args:
+        fmi_version: 2 or 3.
+    """
     return _make_port(slave, fmi_version, variables, buffer, "Set")
 
 

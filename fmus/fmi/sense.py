@@ -22,6 +22,9 @@ def tell_apart(description: ModelDescription) -> None:
 
     Public FMUs have such pairs. Inputs, outputs and parameters are left as they are: they are set and connected by
     name, so that two of one name are refused.
+
+    Args:
+        description: model description of the FMU.
     """
     named: dict[str, list[ModelVariable]] = {}
     for variable in description.modelVariables:
@@ -34,7 +37,11 @@ def tell_apart(description: ModelDescription) -> None:
 
 
 def doubled_names(description: ModelDescription) -> str | None:
-    """Which internal variables had to be told apart, as a sentence, or None."""
+    """Which internal variables had to be told apart, as a sentence, or None.
+
+    Args:
+        description: model description of the FMU.
+    """
     shared = [v.name for v in description.modelVariables if SHARED in v.name]
     if not shared:
         return None
@@ -44,7 +51,11 @@ def doubled_names(description: ModelDescription) -> str | None:
 
 
 def nonsense(description: ModelDescription) -> str | None:
-    """The first thing that nobody could act on without guessing, as a sentence; None where all is well."""
+    """The first thing that nobody could act on without guessing, as a sentence; None where all is well.
+
+    Args:
+        description: model description of the FMU.
+    """
     return next(_faults(description), None)
 
 

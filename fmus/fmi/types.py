@@ -48,12 +48,20 @@ def size(variable: ModelVariable) -> int:
 
 
 def getter_type(kind: str, fmi_version: int) -> str:
-    """The type in the name of the functions that read and write a variable type."""
+    """The type in the name of the functions that read and write a variable type.
+
+    Args:
+        fmi_version: 2 or 3.
+    """
     if kind == "Enumeration":
         return "Int64" if fmi_version == 3 else "Integer"
     return kind
 
 
 def c_type(kind: str, fmi_version: int) -> tuple[Any, str, Any]:
-    """C type, letter in `struct` and dtype of a getter's numeric type."""
+    """C type, letter in `struct` and dtype of a getter's numeric type.
+
+    Args:
+        fmi_version: 2 or 3.
+    """
     return BOOLEANS[fmi_version] if kind == "Boolean" else CTYPES[kind]

@@ -63,7 +63,11 @@ class Host:
         self.folder = Path(module.__file__ or resources).parent
 
     def describe_failure(self, function: str, error: BaseException, t: float | None) -> str:
-        """One line: the call, the time, the error, and the function and line of the model where it came from."""
+        """One line: the call, the time, the error, and the function and line of the model where it came from.
+
+        Args:
+            t: time at which it happened [s].
+        """
         text = str(error)
         if not isinstance(error, FMICallException):  # a block's own refusal names call and time already
             at = "" if t is None else f" at t = {t!r} s"
@@ -89,6 +93,9 @@ def package_version() -> str:
 
 def check_package(built_with: str) -> None:
     """Refuse an older `fmu-observer` than the FMU was built with.
+
+    Args:
+        built_with: version of this package that built the FMU.
 
     Raises:
         HostError: it is older.
@@ -134,6 +141,9 @@ def make_hosted_block(recipe: Mapping[str, Any], resources: Path, instance_name:
 
 def load_factory(recipe: Mapping[str, Any], resources: Path) -> Any:
     """The class or function of a recipe.
+
+    Args:
+        resources: folder of the FMU's resources.
 
     Raises:
         HostError: the module has no such name, or imports something that is not there.

@@ -12,7 +12,11 @@ OURS = ("fmu-observer.txt", "fmi-headers.txt")
 
 
 def hosted_licences(source: Source) -> dict[str, str]:
-    """Texts under ``documentation/licenses/``, by name; ``license.txt`` is the entry, as in a native FMU."""
+    """Texts under ``documentation/licenses/``, by name; ``license.txt`` is the entry, as in a native FMU.
+
+    Args:
+        source: the user's file.
+    """
     texts = {name: licence_texts()[name] for name in OURS}
     return {"license.txt": _entry(source), **texts, "pythonfmu.txt": _pythonfmu()}
 

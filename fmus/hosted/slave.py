@@ -65,7 +65,11 @@ class Hosted(Fmi2Slave):
     def setup_experiment(
         self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
     ) -> None:
-        """fmi2SetupExperiment."""
+        """fmi2SetupExperiment.
+
+        Args:
+            start_time: [s]. stop_time: [s], without effect. tolerance: without effect.
+        """
         self._hand_on("setupExperiment", None, tolerance, start_time, stop_time)
 
     def enter_initialization_mode(self) -> None:
@@ -81,45 +85,81 @@ class Hosted(Fmi2Slave):
         self._hand_on("terminate")
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """fmi2DoStep; False is fmi2Discard."""
+        """fmi2DoStep; False is fmi2Discard.
+
+        Args:
+            current_time: start of the step [s]. step_size: its length [s].
+        """
         done = self._guard("fmi2DoStep", lambda: self.host.block.doStep(current_time, step_size), current_time)
         return bool(done != DISCARD)
 
     # -- values -----------------------------------------------------------------------------------------------------
 
     def get_real(self, vrs: list[int]) -> list[float]:
-        """fmi2GetReal."""
+        """fmi2GetReal.
+
+        Args:
+            vrs: value references.
+        """
         return list(map(float, self._hand_on("getReal", [nan] * len(vrs), vrs)))
 
     def get_integer(self, vrs: list[int]) -> list[int]:
-        """fmi2GetInteger; without value references it only reports what else went wrong."""
+        """fmi2GetInteger; without value references it only reports what else went wrong.
+
+        Args:
+            vrs: value references.
+        """
         problem = self.problems.pop(threading.get_ident(), None)
         if problem is not None:
             self._report(problem)
         return list(map(int, self._hand_on("getInteger", [0] * len(vrs), vrs))) if vrs else []
 
     def get_boolean(self, vrs: list[int]) -> list[bool]:
-        """fmi2GetBoolean."""
+        """fmi2GetBoolean.
+
+        Args:
+            vrs: value references.
+        """
         return list(map(bool, self._hand_on("getBoolean", [False] * len(vrs), vrs)))
 
     def get_string(self, vrs: list[int]) -> list[str]:
-        """fmi2GetString."""
+        """fmi2GetString.
+
+        Args:
+            vrs: value references.
+        """
         return [_text(value) for value in self._hand_on("getString", [""] * len(vrs), vrs)]
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
-        """fmi2SetReal."""
+        """fmi2SetReal.
+
+        Args:
+            vrs: value references. values: one for each reference.
+        """
         self._hand_on("setReal", None, vrs, values)
 
     def set_integer(self, vrs: list[int], values: list[int]) -> None:
-        """fmi2SetInteger."""
+        """fmi2SetInteger.
+
+        Args:
+            vrs: value references. values: one for each reference.
+        """
         self._hand_on("setInteger", None, vrs, values)
 
     def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
-        """fmi2SetBoolean."""
+        """fmi2SetBoolean.
+
+        Args:
+            vrs: value references. values: one for each reference.
+        """
         self._hand_on("setBoolean", None, vrs, values)
 
     def set_string(self, vrs: list[int], values: list[str]) -> None:
-        """fmi2SetString."""
+        """fmi2SetString.
+
+        Args:
+            vrs: value references. values: one for each reference.
+        """
         self._hand_on("setString", None, vrs, values)
 
     # -- state: all of it, not the registered variables that pythonfmu would save --------------------------------------
@@ -180,7 +220,11 @@ def _text(value: Any) -> str:
 
 
 def describe_failure(host: Any, function: str, error: BaseException, t: float | None) -> str:
-    """What to log: the call, the error and, where it came from the model's own files, function, line and time."""
+    """What to log: the call, the error and, where it came from the model's own files, function, line and time.
+
+    Args:
+        host: the Python host of the instance. t: time at which it happened [s].
+    """
     if host is None:
         return f"{function}: {error}" if isinstance(error, Missing) else f"{function}: {type(error).__name__}: {error}"
     text: str = host.describe_failure(function, error, t)

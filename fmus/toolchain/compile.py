@@ -145,7 +145,11 @@ def header_folder() -> Path:
 
 
 def library_name(identifier: str) -> str:
-    """File name of the shared library of a model on this platform."""
+    """File name of the shared library of a model on this platform.
+
+    Args:
+        identifier: modelIdentifier of the FMU.
+    """
     return identifier + host_platform().extension
 
 

@@ -23,7 +23,7 @@ class TriggeredEvent:
 
     Args:
         name: identifier; in FMI 3 the name of a triggered input clock, in FMI 2 the stem of ``<name>_count`` and
-        ``<name>_time``.
+            ``<name>_time``.
         payload: discrete inputs that arrive with the event; each name starts with ``<name>_``. Only the jump at this
             event may read them: before it they are not known. What is needed later belongs into memory.
         description: one line for the user.

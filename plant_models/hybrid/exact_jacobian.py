@@ -23,7 +23,7 @@ def exact_jacobian(
 
     Args:
         function: plain NumPy without branching on values; x of shape (states,), u of shape (inputs,), returns shape
-        (rows,).
+            (rows,).
         states: number of states. inputs: number of inputs.
 
     Returns:

@@ -63,7 +63,7 @@ def step(
 
     Args:
         t: time at the start [s]. h: step [s]. x: state, shape (n,). u: inputs held over the step, shape (m,). p: shape
-        (k,).
+            (k,).
         jacobian: exact derivatives of `effective_flow`, needed by ``rosenbrock``; see `tracing`.
 
     Returns:
@@ -146,7 +146,7 @@ def rosenbrock_step(
     Args:
         derivative, jacobian: of the flow with dry friction resolved. t: time at the start [s]. h: step [s].
         x: continuous states, shape (nc,). at_rest: 1 for states at rest under dry friction, else 0, shape (nc,); None
-        without.
+            without.
         stiff: 1 for states treated implicitly, else 0, shape (nc,); None for all.
     """
     implicit = 1.0 if stiff is None else stiff

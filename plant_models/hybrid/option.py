@@ -10,7 +10,7 @@ def require_whole(where: str, low: int = 1, high: int | None = None, **options: 
 
     Args:
         where: what asks, for the message. low, high: bounds, both legal; None for no upper one. options: values by
-        name.
+            name.
 
     Raises:
         ValueError: one is not; the message says which, and what is expected.

@@ -64,8 +64,7 @@ class HybridSystem:
     9. Where only some states are stiff, `stiff` names all of these and `rosenbrock` treats them alone implicitly. The
        step keeps its order; with all states that carry a conserved sum among them, momentum say, it stays conserved.
     10. Time does not run with parameters that break one of the `requirements`: bounds to be kept (`within_bounds`), or
-       what
-        several must fulfil together. They are checked before time runs, so they are about fixed parameters.
+        what several must fulfil together. They are checked before time runs, so they are about fixed parameters.
     11. A system that cannot be traced says ``traceable = False`` and may then use any Python.
     """
 

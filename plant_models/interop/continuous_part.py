@@ -25,7 +25,7 @@ class ContinuousPart:
 
     Args:
         system: the hybrid system. preset: its preset; None for the default one. parameters: values that replace the
-        preset's.
+            preset's.
         memory: values at which discrete states are held; by default their starts.
 
     Raises:

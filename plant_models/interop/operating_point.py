@@ -54,7 +54,7 @@ def operating_point(
 
     Args:
         system: a traceable hybrid system. x0, u0: first guess of states and inputs, and the values of what is not
-        sought.
+            sought.
         hold: states that keep their value of `x0`. drift: states that may change with time. find: inputs that are
             sought; the others keep their value of `u0`. outputs: wanted values.
         preset, parameters, memory: see `to_nonlinear_io`. t: time [s].

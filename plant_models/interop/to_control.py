@@ -28,7 +28,7 @@ def to_nonlinear_io(
 
     Args:
         system: the hybrid system. preset: its preset; None for the default one. parameters: values that replace the
-        preset's.
+            preset's.
         memory: values at which discrete states are held; by default their starts.
 
     Returns:
@@ -71,7 +71,7 @@ def to_state_space(
 
     Args:
         system: a traceable hybrid system. x0: continuous states. u0: inputs. preset, parameters, memory: see
-        `to_nonlinear_io`.
+            `to_nonlinear_io`.
         t: time of the linearisation [s].
 
     Returns:

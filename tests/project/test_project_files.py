@@ -13,7 +13,7 @@ from pages import PACKAGES, ROOT
 
 TEXT = {".py", ".md", ".toml", ".c", ".h", ".csv", ".json", ".txt", ""}
 PLACES = (*PACKAGES, "tests", "docs", ".ci")
-SKIPPED = {"__pycache__", "_build", "venv", "venv-newest"}
+SKIPPED = {"__pycache__", "_build", "api", "venv", "venv-newest"}
 MACHINE_PATH = re.compile(
     r"(?<![\w.)}\]*~$/])/(?:home|Users|root|work|tmp|opt|mnt|media|srv|usr/local)/\w|\b[A-Z]:\\\w"
 )

@@ -47,7 +47,7 @@ def embed_baseline(baseline: Baseline, fmu: str | Path, target: str | Path, name
 
     Args:
         baseline: of this FMU alone. fmu: the FMU; all its files are kept as they are, but for the manifest of the
-        standard.
+            standard.
         target: path of the copy; may be the FMU itself. name: of the reference; None for that of the baseline.
 
     Returns:

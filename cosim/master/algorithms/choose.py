@@ -46,7 +46,7 @@ def choose_algorithm(wanted: Wanted, groups: Sequence[Group], components: Mappin
 
     Args:
         wanted: ``auto`` iterates algebraic loops and steps everything else by Gauss-Seidel; ``iterate`` iterates all
-        loops.
+            loops.
         groups: from `execution_groups`. components: by name.
 
     Raises:

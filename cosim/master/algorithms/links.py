@@ -17,7 +17,7 @@ class Link:
 
     Args:
         text: ``a.y -> b.u``. column: of the source within the values. source, target: places of the components in the
-        plan.
+            plan.
         place: of the input among the connected inputs of its component.
         held: whether the value is that of the start of a step.
     """

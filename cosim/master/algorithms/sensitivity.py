@@ -45,7 +45,7 @@ class Sensitivity:
 
     Args:
         plan: the plan. members: places of the loop's components. links: of the plan. interface: columns fed back, shape
-        (n,).
+            (n,).
 
     `usable` says whether every component through which something passes at once declares directional derivatives.
     """

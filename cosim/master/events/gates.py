@@ -24,7 +24,7 @@ class Gate:
     Args:
         component: with Event Mode. inputs: its connected inputs; `gather` stays as it is.
         events_pass: discrete inputs are sent in Event Mode; otherwise in Step Mode like the others, and clocked ones
-        never.
+            never.
     """
 
     def __init__(self, component: Component, inputs: Inputs, *, events_pass: bool = True) -> None:

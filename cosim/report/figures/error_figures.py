@@ -56,7 +56,7 @@ class ErrorCurve:
 
     Args:
         time: [s], shape (rows,). error: shape (rows,). settled: rows after the start-up, which set the scale, shape
-        (rows,).
+            (rows,).
         line: colour, dashes, width. text: for the legend.
     """
 

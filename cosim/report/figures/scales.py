@@ -21,7 +21,7 @@ class ErrorScale:
     Args:
         limit: the largest error on the axis.
         floor: the smallest one on a logarithmic axis of absolute errors, or None for a linear axis from -limit to
-        limit.
+            limit.
     """
 
     limit: float

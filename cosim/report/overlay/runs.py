@@ -32,7 +32,7 @@ def make_runs(results: Sequence[Result], specs: Sequence[ReportSpec], labels: Se
 
     Args:
         results: the runs, the first one is what the others are compared with. specs: roles of each. labels: text for
-        each.
+            each.
 
     Raises:
         ComparisonError: other numbers of results, roles and labels; a label twice; a run without rows; too many runs.

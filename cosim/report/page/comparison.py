@@ -157,7 +157,9 @@ def comparison_page(comparison: Comparison, pictures: Mapping[str, bytes]) -> st
         comparison=comparison,
         facts=_facts(comparison),
         verdict=verdict_text(comparison),
-        worst=_cut([f"{s.name}: {_in_words(s)}" for s in comparison.failed], FINDINGS_SHOWN, "... and {} more, listed below"),
+        worst=_cut(
+            [f"{s.name}: {_in_words(s)}" for s in comparison.failed], FINDINGS_SHOWN, "... and {} more, listed below"
+        ),
         found={s.name: _cut([_text(s, f) for f in s.findings] or [_in_words(s)]) for s in comparison.failed},
         pictures=pictures,
         not_drawn=sum(s.curves is not None for s in comparison.failed) - len(pictures),

@@ -11,7 +11,7 @@ import numpy as np
 
 from cosim.drawing.style import png
 from cosim.errors import OutputError
-from cosim.evaluation.numbers import DASH, number
+from cosim.evaluation.numbers import DASH, cell, number
 from cosim.report.figures.error_figures import speed_error_figure
 from cosim.report.figures.observers_figure import observers_picture
 from cosim.report.page.files import write_file
@@ -23,7 +23,7 @@ from cosim.results.result import Result
 from cosim.results.summary_file import jsonable
 
 if TYPE_CHECKING:
-    from cosim.studies.observers import ObserverBenchmark
+    from cosim.observer_benchmark.observers import ObserverBenchmark
 
 PAGE, PICTURE, DATA = "observers.html", "observers.png", "observers.json"
 DPI = 120
@@ -82,8 +82,6 @@ def benchmark_page(benchmark: ObserverBenchmark, picture: bytes) -> str:
 
 
 def _overview(benchmark: ObserverBenchmark) -> Table:
-    from cosim.studies.observer_table import cell  # noqa: PLC0415 - the study imports what reports share
-
     rows = benchmark.rows()
     headings = list(rows[0]) if rows else []
     return simple_table(headings, [[cell(value) for value in row.values()] for row in rows], range(1, len(headings)))

@@ -45,9 +45,9 @@ def candidates(problem: Theorem7Problem, performance: bool, gains: Gains | None 
 
     Args:
         problem: the question. performance: minimise gamma squared; without it maximise the margin of the decay at
-        trace(P) = n.
+            trace(P) = n.
         gains: K_i1 of shape (N, n, q1) and K_i2 of shape (N, n, q2) in scaled coordinates to keep; None to seek them
-        too.
+            too.
 
     Yields:
         What the solver returned, where it is usable.

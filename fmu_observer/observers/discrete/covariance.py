@@ -29,7 +29,7 @@ def corrected(x: Array, P: Array, innovation: Array, C: np.ndarray, RN: Array) -
 
     Args:
         x: prediction, shape (n,). P: its covariance, shape (n, n). innovation: ``y - C x``, shape (q,). C: shape (q,
-        n).
+            n).
         RN: covariance of the measurements, shape (q, q).
 
     Returns:

@@ -107,7 +107,7 @@ def hybrid_gains(K: np.ndarray, theta: float, share: float) -> tuple[np.ndarray,
 
     Args:
         K: shape (n, q), blocks of q rows, the first one invertible. theta: [1/s]. share: of the correction given at
-        once, 0 to 1.
+            once, 0 to 1.
 
     Returns:
         ``theta inv(Delta) K`` of shape (n, q), ``-theta K_1`` of shape (q, q), ``share inv(Delta) K inv(K_1)`` of shape

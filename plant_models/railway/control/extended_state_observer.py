@@ -17,7 +17,7 @@ def observer_derivative(
 
     Args:
         measured: speed y [m/s]. speed: its estimate z1 [m/s]. disturbance: estimate z2 of all other accelerations
-        [m/s2].
+            [m/s2].
         applied_acceleration: applied effort over mass, b0 F [m/s2]. bandwidth: wo [rad/s].
 
     Returns:

@@ -62,7 +62,7 @@ class HermiteCubic(NamedTuple):
 
         Args:
             target: position [m], reached between the ends of the bracket. direction: 1 where it is reached upwards, -1
-            downwards. low, high: the bracket.
+                downwards. low, high: the bracket.
         """
         distance = target - self.p0
         s = 0.5 * (low + high)

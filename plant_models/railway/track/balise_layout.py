@@ -95,7 +95,7 @@ class Positions:
         size: number of entries.
         positions: start values [m], no more than `size`.
         told_apart: number of crossings in a stretch up to which entries at one place are recognised; beyond it each one
-        counts.
+            counts.
 
     Raises:
         ValueError: there are too many positions, one is not finite, or they do not increase.

@@ -45,7 +45,7 @@ def filling(cylinder: Array, pipe: Array, p: Any) -> Array:
 
     Args:
         cylinder: pressure in the cylinder [Pa]. pipe: pressure in the pipe at the vehicle [Pa]. p: with
-        `BRAKE_PARAMETERS`.
+            `BRAKE_PARAMETERS`.
 
     Source: limits Bouchama 2024, section 4.1; the time constants are ours: 95 % after 4 s, empty but for 0.4 bar after
     17 s, inside the 3-5 s and 15-20 s that the passenger setting of the UIC brake allows.

@@ -81,6 +81,9 @@ class Manifest:
 def read_manifest(directory: str | Path) -> Manifest:
     """What a results folder says of how it was made.
 
+    Args:
+        directory: results folder.
+
     Raises:
         ProvenanceError: it is no results folder, says nothing, or something unreadable.
     """
@@ -128,6 +131,9 @@ def _why(error: Exception) -> str:
 
 def sha256(path: Path) -> str:
     """SHA-256 of a file, in hexadecimal; read once as long as it does not change.
+
+    Args:
+        path: of the file.
 
     Raises:
         OSError: it cannot be read.

@@ -12,20 +12,22 @@ from typing import TYPE_CHECKING, Any, Self
 
 from cosim.errors import CosimError, ScenarioError
 from cosim.scenario.includes import Key, attribute, find_file, read_tables, shipped_scenarios
+from cosim.scenario.manifest import read_manifest
 from cosim.scenario.origin import Origin
 from cosim.scenario.outcome import Outcome
 from cosim.scenario.override import override
+from cosim.scenario.package_names import is_package, stem
 from cosim.scenario.paths import COMPONENT_PATHS, absolute
 from cosim.scenario.run import run_scenario
 from cosim.scenario.save import plain, save_scenario, scenario_text
 from cosim.scenario.schema import ScenarioTable, parse_scenario
+from cosim.scenario.single import single_tables
 from cosim.scenario.streaming import finish_stream, streaming_to
-from cosim.ssp.names import is_package, stem
 from cosim.structure.structure import Structure
+from cosim.studies.sweep import Sweep, make_sweep
 
 if TYPE_CHECKING:
     from cosim.studies.sampling import Mode, Range
-    from cosim.studies.sweep import Sweep
 
 LOG = logging.getLogger("cosim")
 
@@ -77,8 +79,6 @@ class Scenario:
             return cls._from_package(str(name_or_path), strict)
         stored = None
         if Path(name_or_path).is_dir() and str(name_or_path) not in shipped_scenarios():
-            from cosim.provenance.manifest import read_manifest  # noqa: PLC0415 - only for those who load results
-
             stored = read_manifest(name_or_path)
         path = find_file(name_or_path) if stored is None else stored.scenario
         tables = read_tables(path)
@@ -126,8 +126,6 @@ class Scenario:
             FmuLoadError: the FMU cannot be read.
             ScenarioError: no end is known, or an input does not exist; the nearest are suggested.
         """
-        from cosim.scenario.single import single_tables  # noqa: PLC0415 - only for those who want it
-
         tables, doubts = single_tables(Path(path), name, start, stop, step, inputs, parameters or {}, record)
         scenario = cls(where=Path(path).name, **tables)
         scenario._doubts = doubts
@@ -138,8 +136,7 @@ class Scenario:
 
         Args:
             folder: where the file will stand: paths in the text are relative to it. Where not given they stay as they
-            are,
-                relative to the folder of this scenario.
+                are, relative to the folder of this scenario.
 
         Raises:
             ScenarioError: something in the scenario cannot be; every fault is named.
@@ -185,14 +182,22 @@ class Scenario:
         return self._name or stem(self.where)
 
     def add(self, name: str, **table: Any) -> Self:
-        """Add a component; keys as in a file: `fmu`, `model` or `observer`, `parameters`, `preset`, `options`, ..."""
+        """Add a component; keys as in a file: `fmu`, `model` or `observer`, `parameters`, `preset`, `options`, ...
+
+        Args:
+            table: of the scenario.
+        """
         if name in self._data["components"]:
             raise ScenarioError(f"{self.where}: there is a component {name!r} already.")
         self._data["components"][name] = plain(table)
         return self
 
     def connect(self, *lines: str) -> Self:
-        """Add connections: ``"source.signal -> target.signal, target.signal"``."""
+        """Add connections: ``"source.signal -> target.signal, target.signal"``.
+
+        Args:
+            lines: such as ``"train.speed -> observer.odometer"``.
+        """
         self._data["connections"] = [*self._data["connections"], *lines]
         return self
 
@@ -217,7 +222,7 @@ class Scenario:
         Args:
             check: what is checked: ``speed_error``, ``signal``, ``on``, ``telegrams``, ...
             table: its keys as in a file; ``start`` and ``end`` may stand for ``from``, which Python keeps for itself,
-            and ``to``.
+                and ``to``.
         """
         self._data["expect"] = [*self._data.get("expect", []), {"check": check, **table}]
         return self
@@ -278,7 +283,7 @@ class Scenario:
 
         Args:
             values: names as for `set`, each with the values it takes; or a list of variations, each a mapping of names
-            to values.
+                to values.
             mode: ``grid``: every combination, the last name changes quickest; ``zip``: first with first, second with
                 second; ``latin`` (Latin hypercube) and ``random``: `count` points of `cosim.studies.sampling.uniform`
                 ranges and lists.
@@ -288,8 +293,6 @@ class Scenario:
             ScenarioError: a name or a value cannot be; nothing has been run then.
             CosimError: a component that is varied cannot be described.
         """
-        from cosim.studies.sweep import make_sweep  # noqa: PLC0415 - only for those who vary
-
         return make_sweep(self, values, mode, count, seed)
 
     def run(
@@ -319,7 +322,7 @@ class Scenario:
             finished: called with the outcome before the components are closed, which is what is returned as well: what
                 it writes is not lost where an FMU crashes while it is freed.
             spare: a folder to which rows are written as for `stream`, only in case the process dies: whoever gives it
-            removes it.
+                removes it.
 
         Returns:
             The outcome: result, report roles, warnings; also for a run that failed on the way (see `Outcome.failure`).

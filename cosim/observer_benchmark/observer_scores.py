@@ -48,7 +48,7 @@ class CertifiedGap:
     Args:
         limit: gaps that vary are certified up to here [s]; None where that is not known.
         expected: longest gap to expect before the run [s], None where it cannot be known. seen: longest that occurred
-        [s].
+            [s].
     """
 
     limit: float | None
