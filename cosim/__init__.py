@@ -14,12 +14,14 @@ if TYPE_CHECKING:
     from cosim.comparison.tolerance import Tolerance, Tolerances
     from cosim.comparison.verdict import Comparison
     from cosim.errors import CosimError, UnmetError
+    from cosim.observer_benchmark.observers import benchmark_observers
     from cosim.provenance import rerun
     from cosim.results.load import load_result
     from cosim.results.result import Result
     from cosim.results.save import save_result
-    from cosim.scenario import Outcome, Scenario, shipped_scenarios
-    from cosim.studies.observers import benchmark_observers
+    from cosim.scenario.includes import shipped_scenarios
+    from cosim.scenario.outcome import Outcome
+    from cosim.simulation.scenario import Scenario
     from cosim.studies.sampling import log_uniform, uniform, whole
     from cosim.studies.sweep import Sweep
     from cosim.studies.sweep_result import SweepResult
@@ -49,21 +51,21 @@ __all__ = [
 _HOMES = {
     "Comparison": "cosim.comparison.verdict",
     "CosimError": "cosim.errors",
-    "Outcome": "cosim.scenario",
+    "Outcome": "cosim.scenario.outcome",
     "Result": "cosim.results.result",
-    "Scenario": "cosim.scenario",
+    "Scenario": "cosim.simulation.scenario",
     "Sweep": "cosim.studies.sweep",
     "SweepResult": "cosim.studies.sweep_result",
     "Tolerance": "cosim.comparison.tolerance",
     "Tolerances": "cosim.comparison.tolerance",
     "UnmetError": "cosim.errors",
-    "benchmark_observers": "cosim.studies.observers",
+    "benchmark_observers": "cosim.observer_benchmark.observers",
     "compare": "cosim.comparison.compare",
     "load_result": "cosim.results.load",
     "log_uniform": "cosim.studies.sampling",
     "rerun": "cosim.provenance",
     "save_result": "cosim.results.save",
-    "shipped_scenarios": "cosim.scenario",
+    "shipped_scenarios": "cosim.scenario.includes",
     "uniform": "cosim.studies.sampling",
     "whole": "cosim.studies.sampling",
 }

@@ -10,15 +10,19 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from fmus.batch.error import BatchError
+    from fmus.batch.members import Batch
     from fmus.build import build_fmu
     from fmus.cache import cached_fmu
     from fmus.content.generate import GenerationError
-    from fmus.folders import cache_folder
     from fmus.recipes import RECIPES, UnknownRecipeError, recipe
     from fmus.toolchain.compile import CompilationError, CompilerMissing
+    from plant_models.disk_cache.folder import cache_folder
 
 __all__ = [
     "RECIPES",
+    "Batch",
+    "BatchError",
     "CompilationError",
     "CompilerMissing",
     "GenerationError",
@@ -31,12 +35,14 @@ __all__ = [
 
 _HOMES = {
     "RECIPES": "fmus.recipes",
+    "Batch": "fmus.batch.members",
+    "BatchError": "fmus.batch.error",
     "CompilationError": "fmus.toolchain.compile",
     "CompilerMissing": "fmus.toolchain.compile",
     "GenerationError": "fmus.content.generate",
     "UnknownRecipeError": "fmus.recipes",
     "build_fmu": "fmus.build",
-    "cache_folder": "fmus.folders",
+    "cache_folder": "plant_models.disk_cache.folder",
     "cached_fmu": "fmus.cache",
     "recipe": "fmus.recipes",
 }

@@ -12,7 +12,8 @@ from cosim.baselines.baseline import Baseline
 from cosim.baselines.recipe import Recipe
 from cosim.errors import BaselineError, ScenarioError
 from cosim.results.result import Result
-from cosim.scenario import Outcome, Scenario
+from cosim.scenario.outcome import Outcome
+from cosim.simulation.scenario import Scenario
 
 Progress = Callable[[float, float], None]
 

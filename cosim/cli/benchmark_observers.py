@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from cosim.cli.scenarios import add_scenario, load_scenario, positive
 
 if TYPE_CHECKING:
-    from cosim.studies.observers import ObserverBenchmark
+    from cosim.observer_benchmark.observers import ObserverBenchmark
 
 DONE, NOT_AS_ASKED = 0, 1
 
@@ -63,8 +63,8 @@ def execute(options: argparse.Namespace) -> int:
     Args:
         options: of the command line.
     """
+    from cosim.observer_benchmark.observers import benchmark_observers  # noqa: PLC0415
     from cosim.results.folder import check_writable  # noqa: PLC0415 - scipy is loaded only by those who run
-    from cosim.studies.observers import benchmark_observers  # noqa: PLC0415
 
     for folder in (options.out, options.record):
         if folder is not None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.components.loading import read_description, runs_here
-from cosim.ssp.names import is_package
+from cosim.scenario.package_names import is_package
 from fmus.fmi.capabilities import read_capabilities
 from fmus.text_table import text_table
 

@@ -7,8 +7,9 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from cosim.scenario import Scenario, shipped_scenarios
-from cosim.ssp.names import is_package
+from cosim.scenario.includes import shipped_scenarios
+from cosim.scenario.package_names import is_package
+from cosim.simulation.scenario import Scenario
 from fmus.text_table import text_table
 
 KINDS = ("scenarios", "models", "observers", "all")

@@ -15,7 +15,8 @@ from cosim.cli.scenarios import add_scenario, load_scenario, positive
 from cosim.errors import OutputError
 from cosim.process.last_call import LAST_CALL
 from cosim.results.unfinished import SPARE
-from cosim.scenario import Outcome, Scenario
+from cosim.scenario.outcome import Outcome
+from cosim.simulation.scenario import Scenario
 from fmus.plain import plain
 
 DONE, NOT_AS_ASKED, ERROR = 0, 1, 2

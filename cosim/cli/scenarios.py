@@ -7,7 +7,7 @@ import tomllib
 from typing import Any
 
 from cosim.errors import ScenarioError
-from cosim.scenario import Scenario
+from cosim.simulation.scenario import Scenario
 
 DEFAULT = "freight_profile_d"
 OVERRIDES = "override component.parameter, master.KEY, balises.KEY, report.KEY or a top-level key; may be repeated"

@@ -5,14 +5,13 @@ folder only.
 from __future__ import annotations
 
 import ctypes
-import hashlib
-import tempfile
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
-from fmus.folders import cache_folder
-from fmus.toolchain.compile import Compiler, compile_library, find_compiler, library_name
+from fmus.toolchain.cached_library import cached_library
+from fmus.toolchain.compile import Compiler, find_compiler
+from plant_models.disk_cache.folder import cache_folder
 
 SOURCES = ("stepper.c", "balises.c", "notifying.c", "slave.c", "stepper.h")  # the first one includes the others
 
@@ -25,40 +24,13 @@ def load_stepper() -> ctypes.CDLL:
         CompilationError: the compiler refused the sources.
         OSError: the cache folder cannot be written, or the library not be loaded.
     """
-    return _loaded(cached_library(find_compiler(), cache_folder()))
+    return _loaded(stepper_library(find_compiler(), cache_folder()))
 
 
-def cached_library(compiler: Compiler, folder: Path) -> Path:
-    """Path of the library in a cache folder; built there where it is missing, in one move, so that nothing is to be
-    locked.
-    """
+def stepper_library(compiler: Compiler, folder: Path) -> Path:
+    """Path of the library in a cache folder, built there where it is missing."""
     sources = {name: (files("cosim.compiled") / name).read_bytes() for name in SOURCES}
-    digest = hashlib.sha256(b"\0".join([compiler.identity().encode(), *sources.values()])).hexdigest()[:32]
-    target = folder / f"stepper-{digest}" / library_name("stepper")
-    check = target.with_suffix(".sha256")
-    if not _is_whole(target, check):
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix="build-", dir=target.parent) as scratch:
-            for name, text in sources.items():
-                (Path(scratch) / name).write_bytes(text)
-            library = compile_library(compiler, Path(scratch), ["stepper.c"], target.name)
-            written = Path(scratch) / check.name
-            written.write_text(_sha256(library))
-            library.replace(target)
-            written.replace(check)
-    return target
-
-
-def _is_whole(library: Path, check: Path) -> bool:
-    """Whether a library is the one that was built: to load a part of one can end the process."""
-    try:
-        return check.read_text() == _sha256(library)
-    except (OSError, ValueError):
-        return False
-
-
-def _sha256(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    return cached_library("stepper", sources, SOURCES[0], compiler, folder)
 
 
 @cache

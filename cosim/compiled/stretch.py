@@ -22,7 +22,7 @@ from cosim.compiled.notifying import Telling, can_be_told
 from cosim.compiled.program import NotCompilable, Program, Stop
 from cosim.compiled.recorded_returns import Answer, answered
 from cosim.components.component import Component
-from cosim.coupling.chain import Mover, Position, Stage
+from cosim.coupling.chain import COMPILED_STAGE_TEXT, Mover, Position, Stage
 from cosim.coupling.plan import Plan
 from cosim.coupling.planned import PlannedComponent
 from cosim.master.axis import TimeAxis
@@ -49,8 +49,6 @@ WITHIN = frozenset({Stop.REFUSED, Stop.WRITE, Stop.STEP, Stop.READ, Stop.CROSSED
 
 STEPPED = frozenset({Stop.STEP, Stop.READ, Stop.CROSSED})
 """That one has been called to do the step."""
-
-COMPILED_STAGE = "one call into the compiled stepper"
 
 
 class CompiledStepper:
@@ -199,7 +197,7 @@ class CompiledStepper:
             return lambda t, until: move(slowly, t, until, reads)
 
         step.add_stage(
-            Stage(Position.COMPILED, COMPILED_STAGE, drive=partial(quickly, True), advance=partial(quickly, False))
+            Stage(Position.COMPILED, COMPILED_STAGE_TEXT, drive=partial(quickly, True), advance=partial(quickly, False))
         )
 
     def _watch_balises(self) -> Crossings | None:

@@ -40,6 +40,9 @@ class Position(IntEnum):
     """One call into the compiled stepper does what is inside, where nothing extraordinary is due."""
 
 
+COMPILED_STAGE_TEXT = "compiled stepper"
+
+
 def unchanged(inner: Any) -> Any:
     """What a stage does around a call that it leaves alone: nothing."""
     return inner
@@ -72,15 +75,14 @@ def around(way: Callable[[Mover, float, float], None]) -> Callable[[Mover], Move
     return lambda inner: partial(way, inner)
 
 
-def plain_way(interpolator: str | None, substeps: int, *, inputs: bool, gated: bool) -> tuple[str, ...]:
+def plain_way(interpolator: str | None, substeps: int, *, inputs: bool, gated: bool) -> str:
     """The inner end of every chain in words, in the order in which things are done.
 
     Args:
         interpolator: name of the input interpolator; None where inputs are held over a step.
         substeps: steps that the component takes for one of the master's.
-        inputs: whether any input is connected. gated: whether discrete inputs wait for Event Mode.
+        inputs: whether any input is connected. gated: whether discrete inputs are sent in Event Mode only.
     """
-    how = "held" if interpolator is None else f"interpolated ({interpolator})"
-    gate = ", discrete ones in Event Mode only" if gated else ""
-    sent = (f"send inputs, {how}{gate}",) if inputs else ()
-    return (*sent, "advance" if substeps == 1 else f"advance in {substeps} substeps", "read outputs")
+    how = "held" if interpolator is None else f"interpolated: {interpolator}"
+    sent = [f"send inputs ({how}{', discrete ones at events' if gated else ''})"] if inputs else []
+    return ", ".join([*sent, "advance" if substeps == 1 else f"advance in {substeps} substeps", "read outputs"])

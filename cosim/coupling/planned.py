@@ -95,11 +95,10 @@ class PlannedComponent:
 
     def chain(self) -> tuple[str, ...]:
         """How it moves, in words: the stages, outermost first, then the plain way."""
-        interpolator = None if self.interpolator is None else self.interpolator.name
-        inputs, gated = len(self.inputs) > 0 or self.inputs.non_numeric is not None, self.inputs.gated
-        return *(stage.text for stage in self.stages), *plain_way(
-            interpolator, self.substeps, inputs=inputs, gated=gated
-        )
+        name = None if self.interpolator is None else self.interpolator.name
+        inputs = len(self.inputs) > 0 or self.inputs.non_numeric is not None
+        plain = plain_way(name, self.substeps, inputs=inputs, gated=self.inputs.gated)
+        return *(stage.text for stage in self.stages), plain
 
     def send(self, t: float, until: float) -> None:
         """Send the prepared inputs for a step from `t` to `until` [s]."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 DASH = "–"
 
@@ -37,3 +38,10 @@ def _finite(value: float, digits: int) -> str:
 def error_number(value: float | None, digits: int = 3) -> str:
     """A size of an error: as `number`, but an infinite one reads ``diverged``."""
     return "diverged" if value is not None and math.isinf(value) else number(value, digits)
+
+
+def cell(value: Any) -> str:
+    """A cell of a table as text."""
+    if isinstance(value, str | int):
+        return str(value)
+    return DASH if value is None else error_number(value)

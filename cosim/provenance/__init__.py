@@ -1,6 +1,5 @@
-"""Provenance: results folders that say how they were made, and runs made again from them."""
+"""Provenance: runs made again from what their results folders say of how they were made."""
 
-from cosim.provenance.manifest import Manifest, read_manifest
 from cosim.provenance.rerun import Rerun, rerun
 
-__all__ = ["Manifest", "Rerun", "read_manifest", "rerun"]
+__all__ = ["Rerun", "rerun"]

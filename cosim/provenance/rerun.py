@@ -12,15 +12,19 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from cosim.comparison.compare import compare
 from cosim.comparison.verdict import Comparison
 from cosim.errors import OutputError, ProvenanceError
-from cosim.provenance.manifest import Manifest, read_manifest
 from cosim.provenance.same import same_result
+from cosim.results.load import load_result
+from cosim.results.unfinished import DID_NOT_END
+from cosim.scenario.manifest import Manifest, read_manifest
+from cosim.scenario.outcome import Outcome
+from cosim.simulation.scenario import Scenario
 
 if TYPE_CHECKING:
     from cosim.comparison.compare import Given
     from cosim.results.result import Result
-    from cosim.scenario import Outcome, Scenario
 
 LOG = logging.getLogger("cosim")
 Verdict = Literal["bit-identical", "within tolerance", "differs"]
@@ -112,9 +116,6 @@ def rerun(
         ProvenanceError: the folder does not say how it was made, a file was edited, or one that was not kept is gone.
         CosimError: the scenario cannot be set up any more.
     """
-    from cosim.comparison.compare import compare  # noqa: PLC0415 - loaded when there is something to compare
-    from cosim.results.load import load_result  # noqa: PLC0415
-
     manifest = read_manifest(directory)
     _check_out(manifest, out)
     edited = manifest.edited()
@@ -145,8 +146,6 @@ def stored_scenario(manifest: Manifest) -> Scenario:
     Args:
         manifest: of the results.
     """
-    from cosim.scenario import Scenario  # noqa: PLC0415 - a scenario loads results folders, and these make scenarios
-
     scenario = Scenario.load(manifest.directory)
     if scenario.table().master.log_calls:
         scenario.master(log_calls=False)
@@ -171,8 +170,6 @@ def _check_out(manifest: Manifest, out: str | Path | None) -> None:
 
 def _as_far_as(stored: Result, result: Result) -> Result:
     """The new result; cut where the stored run was taken along by its program and the new one went on."""
-    from cosim.results.unfinished import DID_NOT_END  # noqa: PLC0415
-
     if stored.failure is None or not stored.failure.startswith(DID_NOT_END) or not len(stored.table):
         return result
     end = float(stored.time[-1])

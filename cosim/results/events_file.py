@@ -9,7 +9,10 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
-from cosim.results.result import BaliseRecord
+from cosim.results.data import BaliseRecord
+
+EVENTS_SUFFIX = ".events.csv"
+"""Ending of the file of telegrams beside a table without room for them."""
 
 COLUMNS = tuple(f.name for f in fields(BaliseRecord))
 NUMBERS = frozenset(f.name for f in fields(BaliseRecord) if f.type == "float")

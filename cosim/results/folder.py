@@ -16,10 +16,10 @@ import numpy as np
 
 from cosim.diagnostics.messages import read_messages, write_messages
 from cosim.errors import OutputError
+from cosim.results.data import ResultData, SignalInfo
 from cosim.results.events_file import read_events, write_events
 from cosim.results.formats.catalogue import FASTEST_FIRST, FORMATS, check_formats
 from cosim.results.optional import is_installed
-from cosim.results.result import Result, SignalInfo
 from cosim.results.summary_file import read_summary, write_summary
 from cosim.results.unfinished import read_unfinished
 
@@ -63,7 +63,7 @@ def _reason(error: OSError) -> str:
     return f"{error.strerror or error}" + (f" ({error.filename})" if error.filename else "")
 
 
-def _write_all(result: Result, folder: Path, formats: Sequence[str]) -> list[str]:
+def _write_all(result: ResultData, folder: Path, formats: Sequence[str]) -> list[str]:
     for name in formats:
         FORMATS[name].write(folder / TABLES[name], result)
     write_events(folder / EVENTS, result.events)
@@ -73,7 +73,9 @@ def _write_all(result: Result, folder: Path, formats: Sequence[str]) -> list[str
     return [*(TABLES[name] for name in TABLES if name in formats), EVENTS, MESSAGES, SUMMARY]
 
 
-def write_results(result: Result, directory: str | Path, formats: Sequence[str] = ("csv", "mat")) -> dict[str, Path]:
+def write_results(
+    result: ResultData, directory: str | Path, formats: Sequence[str] = ("csv", "mat")
+) -> dict[str, Path]:
     """Write a result to a folder, replacing what an earlier run left there.
 
     Args:
@@ -116,7 +118,7 @@ def _table(folder: Path, name: str | None) -> np.ndarray:
     return chosen.read(folder / TABLES[chosen.name]).table
 
 
-def _read(folder: Path, table_name: str | None = None) -> tuple[Result, Mapping[str, Any]]:
+def _read(folder: Path, table_name: str | None = None) -> tuple[ResultData, Mapping[str, Any]]:
     content = read_summary(folder / SUMMARY)
     if content.get("layout") != LAYOUT:
         raise ValueError(f"{SUMMARY} has layout {content.get('layout')!r}, this version reads layout {LAYOUT}.")
@@ -125,10 +127,10 @@ def _read(folder: Path, table_name: str | None = None) -> tuple[Result, Mapping[
         return read_unfinished(folder / TABLES["npy"], folder / EVENTS, folder / MESSAGES, content), content
     table = _table(folder, table_name)
     messages = read_messages(folder / MESSAGES) if (folder / MESSAGES).exists() else []  # older results have none
-    return Result(table, signals, read_events(folder / EVENTS), messages=messages), content
+    return ResultData(table, signals, read_events(folder / EVENTS), messages=messages), content
 
 
-def read_results(directory: str | Path, table: str | None = None) -> Result:
+def read_results(directory: str | Path, table: str | None = None) -> ResultData:
     """Read the result that `write_results` left in a folder.
 
     Args:

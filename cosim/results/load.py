@@ -7,12 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from cosim.errors import OutputError, nearest
-from cosim.results.events_file import read_events
+from cosim.results.data import ResultData
+from cosim.results.events_file import EVENTS_SUFFIX, read_events
 from cosim.results.folder import SUMMARY, TABLES, read_results
 from cosim.results.formats.columns import check_time
 from cosim.results.result import Result
-
-EVENTS_SUFFIX = ".events.csv"
 
 
 def load_result(path: str | Path) -> Result:
@@ -34,16 +33,16 @@ def load_result(path: str | Path) -> Result:
     """
     source = Path(path)
     if source.is_dir():
-        return _folder(source)
+        return Result.of(_folder(source))
     if not source.exists():
         raise OutputError(f"There is no {source}; {_neighbours(source)}")
     folder = source.parent
     if source.name in TABLES.values() and (folder / SUMMARY).is_file():
-        return read_results(folder, table=source.name)
+        return Result.of(read_results(folder, table=source.name))
     try:
         result = _reader(source)(source)
         check_time(str(source), result.table["time"])
-        return _with_events(result, source)
+        return Result.of(_with_events(result, source))
     except OutputError:
         raise
     except OSError as error:
@@ -55,7 +54,7 @@ def load_result(path: str | Path) -> Result:
         ) from error
 
 
-def _folder(folder: Path) -> Result:
+def _folder(folder: Path) -> ResultData:
     if (folder / SUMMARY).is_file():
         return read_results(folder)
     tables = [name for name in TABLES.values() if (folder / name).is_file()]
@@ -80,7 +79,7 @@ def _neighbours(path: Path) -> str:
     return nearest(path.name, sorted(p.name for p in path.parent.iterdir() if not p.name.startswith(".")))
 
 
-def _reader(path: Path) -> Callable[[Path], Result]:
+def _reader(path: Path) -> Callable[[Path], ResultData]:
     """Who reads a file, by its first bytes."""
     with path.open("rb") as file:
         start = file.read(16)
@@ -103,7 +102,7 @@ def _reader(path: Path) -> Callable[[Path], Result]:
     return read
 
 
-def _with_events(result: Result, source: Path) -> Result:
+def _with_events(result: ResultData, source: Path) -> ResultData:
     """The telegrams of a file without room for them, from the one beside it."""
     recorded = bool(result.summary.get("events_recorded"))
     beside = source.with_name(source.with_suffix("").name + EVENTS_SUFFIX)

@@ -1,133 +1,59 @@
-"""The result of a run: one table, one list of events, one summary. Imports NumPy only."""
+"""The result of a run, with what can be made of it: data frames, data sets, files."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Self
 
-import numpy as np
+from cosim.results.data import BaliseRecord, ResultData, SignalInfo
+from cosim.results.save import save_result
+from cosim.results.to_frames import events_to_pandas, to_pandas, to_xarray
 
-from cosim.diagnostics.messages import Message
-
-
-@dataclass(frozen=True, slots=True)
-class SignalInfo:
-    """What a column of the table is.
-
-    Args:
-        name: ``component.signal``.
-        unit: SI unit, ``1`` for a pure number.
-        display_unit: unit to show to people, or None for `unit`.
-        variability: ``continuous`` or ``discrete`` (held between its changes).
-        description: one line.
-    """
-
-    name: str
-    unit: str = "1"
-    display_unit: str | None = None
-    variability: Literal["continuous", "discrete"] = "continuous"
-    description: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class BaliseRecord:
-    """One balise telegram of a run.
-
-    Args:
-        stamp: when the train passed the balise [s].
-        delivered_at: when the receivers were told [s]; NaN for a missed one.
-        identity: name of the balise.
-        position: position told [m].
-        true_position: position of the plant at the stamp [m].
-        location_accuracy: Q_LOCACC told [m].
-        odometer_reading: odometer output at the crossing [m/s], NaN without an odometer.
-        kind: ``true``, ``missed`` (read by nobody) or ``false`` (told, but no balise is there).
-        method: localisation method that gave the stamp.
-        time_bound: bound or estimate of the stamp's error [s], NaN where it is not known.
-        outcomes: what became of it at each receiver: ``accepted``, ``replayed``, ``late``, ``rejected``, ``told``
-            (it does not say), or ``undelivered`` (still on its way when the run ended).
-    """
-
-    stamp: float
-    delivered_at: float
-    identity: str
-    position: float
-    true_position: float
-    location_accuracy: float = 0.0
-    odometer_reading: float = float("nan")
-    kind: Literal["true", "missed", "false"] = "true"
-    method: str = ""
-    time_bound: float = 0.0
-    outcomes: Mapping[str, str] = field(default_factory=dict)
+__all__ = ["BaliseRecord", "Result", "SignalInfo"]
 
 
 @dataclass(frozen=True)
-class Result:
-    """Everything a run leaves behind.
+class Result(ResultData):
+    """Everything a run leaves behind; see `cosim.results.data.ResultData`."""
 
-    Args:
-        table: structured array, first field ``time`` [s], then one float64 field ``component.signal`` for each recorded
-            signal. A row labelled t holds the values at t; an event gives two rows with the same time, before and
-            after.
-        signals: what each column is, in column order, without ``time``.
-        events: the balise telegrams in order of delivery.
-        summary: versions, parameters, certificates, methods, wall times, warnings; JSON-able.
-        failure: why the run ended early, or None.
-        messages: what the components logged, in order of time.
-    """
+    @classmethod
+    def of(cls, data: ResultData) -> Self:
+        """The result of data that were read.
 
-    table: np.ndarray
-    signals: Sequence[SignalInfo]
-    events: Sequence[BaliseRecord] = ()
-    summary: Mapping[str, Any] = field(default_factory=dict)
-    failure: str | None = None
-    messages: Sequence[Message] = ()
-
-    @property
-    def time(self) -> np.ndarray:
-        """Time of the rows [s], shape (rows,)."""
-        return np.asarray(self.table["time"])
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        """Values of one signal in its SI unit, shape (rows,).
-
-        Raises:
-            KeyError: the signal was not recorded; the message lists the nearest names.
+        Args:
+            data: as the readers of files return it.
         """
-        names = self.table.dtype.names or ()
-        if name not in names:
-            from difflib import get_close_matches  # noqa: PLC0415 - only on the way to an error
-
-            near = ", ".join(get_close_matches(name, names, 3)) or ", ".join(names)
-            raise KeyError(f"signal {name!r} was not recorded; nearest: {near}")
-        return np.asarray(self.table[name])
-
-    def info(self, name: str) -> SignalInfo:
-        """What a column is."""
-        return next(s for s in self.signals if s.name == name)
+        return cls(**{field.name: getattr(data, field.name) for field in fields(ResultData)})
 
     def to_pandas(self, signals: Iterable[str] | None = None) -> Any:
-        """A `pandas.DataFrame`; see `cosim.results.frames.to_pandas`."""
-        from cosim.results.frames import to_pandas  # noqa: PLC0415 - pandas is for those who want it
+        """A `pandas.DataFrame`; see `cosim.results.to_frames.to_pandas`.
 
+        Args:
+            signals: names of those wanted; all by default.
+        """
         return to_pandas(self, signals)
 
     def events_to_pandas(self) -> Any:
-        """The telegrams as a `pandas.DataFrame`; see `cosim.results.frames.events_to_pandas`."""
-        from cosim.results.frames import events_to_pandas  # noqa: PLC0415
-
+        """The telegrams as a `pandas.DataFrame`; see `cosim.results.to_frames.events_to_pandas`."""
         return events_to_pandas(self)
 
     def to_xarray(self, signals: Iterable[str] | None = None) -> Any:
-        """An `xarray.Dataset`; see `cosim.results.frames.to_xarray`."""
-        from cosim.results.frames import to_xarray  # noqa: PLC0415
+        """An `xarray.Dataset`; see `cosim.results.to_frames.to_xarray`.
 
+        Args:
+            signals: names of those wanted; all by default.
+        """
         return to_xarray(self, signals)
 
     def save(self, path: str | Path) -> list[Path]:
-        """Write one file in the format that the ending of its name means; see `cosim.results.save.save_result`."""
-        from cosim.results.save import save_result  # noqa: PLC0415
+        """Write one file in the format that the ending of its name means; see `cosim.results.save.save_result`.
 
+        Args:
+            path: the file.
+
+        Returns:
+            The files written.
+        """
         return save_result(self, path)

@@ -20,10 +20,10 @@ import numpy as np
 from cosim.diagnostics.messages import MessageLog, in_order, write_messages
 from cosim.errors import OutputError
 from cosim.results.block_file import BLOCK_FILE, BlockFile
+from cosim.results.data import BaliseRecord, SignalInfo
 from cosim.results.events_file import record_row, write_events
 from cosim.results.folder import EVENTS, LAYOUT, MESSAGES, SUMMARY, TABLES, check_writable
 from cosim.results.formats.growing_npy import growing_header
-from cosim.results.result import BaliseRecord, SignalInfo
 from cosim.results.row_file import RowFile
 from cosim.results.si import UnitOf, convert, described, foreign_units
 from cosim.results.summary_file import write_summary

@@ -10,9 +10,9 @@ import numpy as np
 
 from cosim.diagnostics.messages import read_messages
 from cosim.results.block_file import BLOCK_FILE, read_block
+from cosim.results.data import BaliseRecord, ResultData, SignalInfo
 from cosim.results.events_file import read_events
 from cosim.results.formats.growing_npy import read_grown
-from cosim.results.result import BaliseRecord, Result, SignalInfo
 
 SPARE = ".unfinished"
 """The folder, within that of the results, to which a run is streamed in case its process dies."""
@@ -25,7 +25,7 @@ EXPLAINED = (
 )
 
 
-def read_unfinished(table: Path, events: Path, messages: Path, content: dict[str, Any]) -> Result:
+def read_unfinished(table: Path, events: Path, messages: Path, content: dict[str, Any]) -> ResultData:
     """Everything that was whole when the program died.
 
     Args:
@@ -42,7 +42,7 @@ def read_unfinished(table: Path, events: Path, messages: Path, content: dict[str
     )
     signals = [SignalInfo(**signal) for signal in content["signals"]]
     logged = read_messages(messages) if messages.exists() else []
-    return Result(rows, signals, _whole_lines(events), messages=logged)
+    return ResultData(rows, signals, _whole_lines(events), messages=logged)
 
 
 def _all_rows(table: Path) -> np.ndarray:

@@ -15,9 +15,9 @@ from typing import Any
 from cosim.errors import ScenarioError, nearest
 from cosim.scenario.merging import Line, join, merge, removed_components
 from cosim.scenario.override import flat, override
+from cosim.scenario.package_names import is_package
 from cosim.scenario.paths import absolute, map_paths
 from cosim.scenario.toml_file import read_toml
-from cosim.ssp.names import is_package
 
 SHIPPED = files("cosim") / "scenarios"
 CONNECTIONS = "connections"

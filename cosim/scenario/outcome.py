@@ -11,7 +11,9 @@ import numpy as np
 from cosim.errors import UnmetError
 from cosim.evaluation.spec import ReportSpec
 from cosim.expectations.judged import Judged, judged_text
+from cosim.results.folder import write_results
 from cosim.results.result import Result
+from cosim.scenario.made_from import renewed
 
 if TYPE_CHECKING:
     from cosim.scenario.origin import Origin
@@ -100,9 +102,7 @@ class Outcome:
         Raises:
             OutputError: the folder cannot be written.
         """
-        from cosim.provenance.write import renewed  # noqa: PLC0415 - only for those who write
         from cosim.report.page.report import write_report  # noqa: PLC0415 - matplotlib is loaded only for a report
-        from cosim.results.folder import write_results  # noqa: PLC0415 - and scipy only for MAT files
 
         with renewed(directory, self.origin, files_up_to) as seal:
             paths = dict(write_results(self.result, directory, self.tables))

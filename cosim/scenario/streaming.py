@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cosim.errors import OutputError
+from cosim.results.folder import check_writable
+from cosim.scenario.made_from import renewed
 
 if TYPE_CHECKING:
     from cosim.scenario.origin import Origin
@@ -26,8 +28,6 @@ def streaming_to(directory: str | Path, origin: Origin) -> Streaming:
     Raises:
         OutputError: the folder cannot be written.
     """
-    from cosim.provenance.write import renewed  # noqa: PLC0415 - only for those who stream
-    from cosim.results.folder import check_writable  # noqa: PLC0415 - it loads the formats of results
 
     def begun() -> None:
         with renewed(directory, origin) as seal:

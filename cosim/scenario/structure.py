@@ -20,6 +20,7 @@ from cosim.scenario.balise_service import find_receivers, watched_plant
 from cosim.scenario.connections import parse_connections
 from cosim.scenario.master import stepping_groups
 from cosim.scenario.models import make_system, open_recording
+from cosim.scenario.movement import movement_chains
 from cosim.scenario.schema import ScenarioTable
 from cosim.scenario.starts import given_values
 from cosim.scenario.tables import ComponentTable
@@ -57,13 +58,14 @@ def _structure(table: ScenarioTable, name: str, folder: Path, where: str) -> Str
     loops = [loop for group in groups for loop in group.algebraic]
     number = group_index(group.names for group in groups)
     rates = {n: rate_text(t.every, t.substeps) for n, t in table.components.items()}
+    chains = movement_chains(table, {n: components[n] for n in order}, connections, clocks, choice, balises)
     return Structure(
         name=name,
         title=table.title,
         start=table.start,
         stop=table.stop,
         step=table.step,
-        parts=tuple(make_part(components[n], connections, number[n], rates[n], clocks) for n in order),
+        parts=tuple(make_part(components[n], connections, number[n], rates[n], clocks, chains[n]) for n in order),
         links=make_links(components, connections, choice, order, loops),
         clocks=tuple(Link(c.source, c.target) for c in clocks),
         groups=tuple(group.names for group in groups),

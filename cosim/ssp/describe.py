@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from cosim.scenario.package_names import split_variant
 from cosim.ssp.lapses import Lapses
 from cosim.ssp.load import find_variant, load_structure
 from cosim.ssp.model import ComponentElement, DictionaryReference, Element, SystemElement
-from cosim.ssp.names import split_variant
 from cosim.ssp.package import Package, Unpacked
 from cosim.ssp.structure import read_structure
 

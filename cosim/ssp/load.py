@@ -10,12 +10,12 @@ from typing import Any
 
 from cosim.errors import ScenarioError, nearest
 from cosim.scenario.models import LATE_PARAMETERS
+from cosim.scenario.package_names import split_variant
 from cosim.ssp.annotation import DIGEST, digest
 from cosim.ssp.bindings import start_values
 from cosim.ssp.document import fail
 from cosim.ssp.lapses import Lapses
 from cosim.ssp.model import ComponentElement, Structure
-from cosim.ssp.names import split_variant
 from cosim.ssp.nets import Chain, Nets, Path, flat_names
 from cosim.ssp.package import DEFAULT_VARIANT, Package, Unpacked
 from cosim.ssp.pipe import Pipe, by_items, numeric, simplest

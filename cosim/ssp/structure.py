@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from cosim.errors import nearest
+from cosim.scenario.package_names import split_variant
 from cosim.ssp.annotation import read_extras
 from cosim.ssp.common import UnitTable, read_transformation, read_type
 from cosim.ssp.document import Node, fail, find, find_all, flag, parse, short, validated
@@ -21,7 +22,6 @@ from cosim.ssp.model import (
     SystemElement,
     Wire,
 )
-from cosim.ssp.names import split_variant
 from cosim.ssp.package import DEFAULT_VARIANT, Package
 from cosim.ssp.steps import read_step
 from cosim.ssp.values import read_mapping, read_parameter_set

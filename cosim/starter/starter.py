@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cosim.errors import CosimError, OutputError, ScenarioError, nearest
 from cosim.scenario.paths import relative
-from cosim.scenario.scenario import Scenario
+from cosim.simulation.scenario import Scenario
 from cosim.starter.alone import alone
 from cosim.starter.look import Look, look_into
 from cosim.starter.observer import observer_beside

@@ -65,13 +65,14 @@ def make_part(
     group: int,
     rate: str = "",
     clocks: Iterable[ClockConnection] = (),
+    chain: Sequence[str] = (),
 ) -> Part:
     """A component as data.
 
     Args:
         component: what is described. connections: of all components. group: number of its group. rate: of its steps, in
             words.
-        clocks: connections between clocks.
+        clocks: connections between clocks. chain: how it moves over a step, in words.
     """
     description = component.description
     taken = {n for c in connections if c.target[0] == component.name for n in (c.target[1], c.target_variable[1])}
@@ -96,6 +97,7 @@ def make_part(
         abilities(component),
         group,
         rate,
+        tuple(chain),
     )
 
 

@@ -11,10 +11,12 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from cosim.structure.shapes import Box, Edge, Frame, Layout, Size, Wire
-from cosim.structure.structure import Structure
+
+if TYPE_CHECKING:
+    from cosim.structure.structure import Structure
 
 BOX_GAP, BAND_GAP, PASS = 0.28, 0.34, 0.16  # between boxes and bands; height left free for a wire that passes
 # of group frames, and the room of a wire that runs back

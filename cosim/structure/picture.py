@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -23,7 +24,9 @@ from cosim.drawing.style import RC, new_figure, styled
 from cosim.errors import OutputError
 from cosim.structure.layout import EVENT_PORT, lay_out
 from cosim.structure.shapes import FOOT, PAD, Box, Edge, Frame, Layout, Size, Wire
-from cosim.structure.structure import Link, Part, Structure
+
+if TYPE_CHECKING:
+    from cosim.structure.structure import Link, Part, Structure
 
 COLOURS = {"fresh": "#33475B", "held": "#D55E00", "iterated": "#7A4FA3", "loop": "#B00020", "event": "#009E73"}
 MEANINGS = {

@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from cosim.structure.text import structure_text
+
 Signal = tuple[str, str]
 """(component, variable)"""
 
@@ -49,6 +51,7 @@ class Part:
             declares.
         abilities: capabilities that matter to a master, in words. group: index of its group in `Structure.groups`.
         rate: every how many communication steps it runs, or how many times in one, in words; empty for once a step.
+        chain: how it moves over a step, in words: the stages, outermost first, then what is done within them.
     """
 
     name: str
@@ -62,6 +65,7 @@ class Part:
     abilities: tuple[str, ...]
     group: int
     rate: str = ""
+    chain: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -163,8 +167,6 @@ class Structure:
         Args:
             width: columns at which long lists are broken; None for no limit.
         """
-        from cosim.structure.text import structure_text  # noqa: PLC0415 - it needs this class
-
         return structure_text(self, width)
 
     def draw(self, path: str | Path) -> Path:

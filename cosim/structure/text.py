@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from textwrap import TextWrapper
+from typing import TYPE_CHECKING
 
-from cosim.structure.structure import Link, Part, Port, Structure
 from fmus.text_table import text_table
+
+if TYPE_CHECKING:
+    from cosim.structure.structure import Link, Part, Port, Structure
 
 DASH = "-"
 
@@ -24,6 +27,7 @@ def structure_text(structure: Structure, width: int | None = None) -> str:
         _section("Connections", _connections(structure)),
         _section("Groups", _groups(structure)),
         _section("Algebraic loops", _loops(structure)),
+        _section("Movement over a step, outermost stage first", _chains(structure)),
         _section("Balises", _balises(structure)),
         _section(
             "Algorithm", [f"{structure.algorithm}: {structure.reason}" if structure.reason else structure.algorithm]
@@ -158,6 +162,11 @@ def _groups(structure: Structure) -> list[str]:
 
 def _loops(structure: Structure) -> list[str]:
     return [" -> ".join(".".join(node) for node in loop) for loop in structure.loops] or ["none"]
+
+
+def _chains(structure: Structure) -> list[str]:
+    rows = [[part.name, " > ".join(part.chain)] for part in structure.parts if part.chain]
+    return text_table(rows, (0, 1)) if rows else []
 
 
 def _balises(structure: Structure) -> list[str]:

@@ -1,1 +1,1 @@
-"""Studies: one scenario run several times with something varied; several observers on one recorded run."""
+"""Studies: one scenario run several times with something varied."""

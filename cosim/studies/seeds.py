@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from math import isnan
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cosim.errors import RunError
 from cosim.evaluation.metrics import phase_metrics
 from cosim.evaluation.spec import ReportSpec
-from cosim.scenario import Scenario
 from fmus.text_table import text_table
+
+if TYPE_CHECKING:
+    from cosim.simulation.scenario import Scenario
 
 QUARTILES = (25.0, 50.0, 75.0)
 

@@ -7,11 +7,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cosim.errors import CosimError, ScenarioError
 from cosim.scenario.outcome import INTERRUPTED, Outcome
-from cosim.scenario.scenario import Scenario
 from cosim.scenario.starts import start_values
 from cosim.scenario.structure import describe_component
 from cosim.studies.measures import Measure, error_measures, own_measures
@@ -19,6 +18,9 @@ from cosim.studies.sampling import Mode, Range, Variation, variations
 from cosim.studies.sweep_files import run_folder, write_index, write_run
 from cosim.studies.sweep_result import SweepResult, SweepRun
 from cosim.studies.workers import Died, Raised, attempt, in_processes
+
+if TYPE_CHECKING:
+    from cosim.simulation.scenario import Scenario
 
 Progress = Callable[[int, int], None]
 

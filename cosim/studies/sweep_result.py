@@ -14,7 +14,6 @@ from cosim.evaluation.numbers import number as number_text
 from cosim.results.load import load_result
 from cosim.results.result import Result
 from cosim.scenario.outcome import Outcome
-from cosim.scenario.scenario import Scenario
 from cosim.studies.measures import measure_unit, setting_text, with_unit
 from fmus.text_table import text_table
 
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from cosim.comparison.verdict import Comparison
+    from cosim.simulation.scenario import Scenario
 
 
 @dataclass(frozen=True)

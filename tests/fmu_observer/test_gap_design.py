@@ -16,15 +16,15 @@ from scipy.linalg import expm
 from fmu_observer import OBSERVERS
 from fmu_observer.certificates import SampledError
 from fmu_observer.design.certified_gains import rounded_down
-from fmu_observer.design.gap_aware import (
+from fmu_observer.design.noise_amplification import noise_amplification
+from fmu_observer.observers.train import DifferentiatorCdo, MultirateCdo, TrainObserver
+from fmu_observer.tuning.gap_aware import (
     GainDesign,
     balise_gaps,
     design_adaptive,
     design_high_gain,
     design_takagi_sugeno,
 )
-from fmu_observer.design.noise_amplification import noise_amplification
-from fmu_observer.observers.train import DifferentiatorCdo, MultirateCdo, TrainObserver
 
 TRACK = (100.0, (5.0, 14.0))
 DESIGNS: dict[str, Callable[[], GainDesign]] = {

@@ -17,7 +17,6 @@ from fmu_observer.design.theorem7 import (
     InfeasibleDesign,
     Theorem7Design,
     design_theorem7,
-    design_train_gains,
     largest_eta,
     largest_gap,
     search_eta,
@@ -31,6 +30,7 @@ from fmu_observer.observers.sampled.takagi_sugeno_gains import (
     TRAIN_PUBLISHED,
 )
 from fmu_observer.observers.train import TakagiSugenoCdo
+from fmu_observer.tuning.theorem7_train import design_train_gains
 
 READING = 0.005  # relative: the independent measurement gives three digits
 TRAIN, FIRST, SECOND = "takagi_sugeno_train", "triangularisable_example", "non_triangularisable_example"

@@ -54,7 +54,7 @@ class SlowRate:
 
 def rate_stage_text(every: int) -> str:
     """The stage of a component that is stepped every n-th communication step, in words."""
-    return f"one step for {every} communication steps"
+    return f"1 step for {every} communication steps"
 
 
 def set_rates(

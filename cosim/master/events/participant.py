@@ -29,7 +29,7 @@ class Participant:
     def __init__(self, planned: PlannedComponent, *, gives: bool) -> None:
         assert isinstance(planned.component, FMI3Component)
         self.planned, self.component = planned, planned.component
-        self.interrupts = gives and self.component.capabilities.mightReturnEarlyFromDoStep
+        self.interrupts = interrupts(self.component, gives=gives)
         self.gate = Gate(self.component, planned.inputs)
         self.wires: dict[int, list[Wire]] = {}
         self.in_event_mode = self.needs_update = False
@@ -143,3 +143,12 @@ class Participant:
                 self._reported.add(clock)
                 for participant, target in self.wires[clock]:
                     participant.trigger(target)
+
+
+def interrupts(component: FMI3Component, *, gives: bool) -> bool:
+    """Whether the others are taken back to an event at which a component returns early.
+
+    Args:
+        component: it takes part in events. gives: whether another one takes something from it.
+    """
+    return gives and bool(component.capabilities.mightReturnEarlyFromDoStep)

@@ -66,4 +66,4 @@ class Stride:
 
 def event_stage_text(*, whole: bool) -> str:
     """The stage in words; `whole`: the component takes whole communication steps only."""
-    return "wait for the end of steps divided at events" if whole else "wait where it has gone past an event"
+    return "event stop (whole steps only)" if whole else "event stop"

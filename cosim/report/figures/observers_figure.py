@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from cosim.drawing.style import axes_or_new, new_figure, observer_line, styled
 
 if TYPE_CHECKING:
-    from cosim.studies.observer_scores import ObserverScore
+    from cosim.observer_benchmark.observer_scores import ObserverScore
 
 MARKERS = "osD^vP*Xph"
 """A shape for each observer beside its colour."""

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 from cosim.errors import OutputError
 from cosim.evaluation.event_counts import outcome_columns
-from cosim.evaluation.numbers import DASH, number
+from cosim.evaluation.numbers import DASH, cell, number
 from cosim.report.error_table import html_table
 from cosim.report.figures.error_figures import speed_error_figure
 from cosim.report.figures.observers_figure import observers_picture
@@ -25,7 +25,7 @@ from cosim.results.result import Result
 from cosim.results.summary_file import jsonable
 
 if TYPE_CHECKING:
-    from cosim.studies.observers import ObserverBenchmark
+    from cosim.observer_benchmark.observers import ObserverBenchmark
 
 PAGE, PICTURE, DATA = "observers.html", "observers.png", "observers.json"
 DPI = 120
@@ -98,8 +98,6 @@ def _statement(benchmark: ObserverBenchmark) -> str:
 
 
 def _overview(benchmark: ObserverBenchmark) -> str:
-    from cosim.studies.observer_table import cell  # noqa: PLC0415 - the study imports what reports share
-
     rows = benchmark.rows()
     if not rows:
         return ""

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from cosim.results.data import BaliseRecord, ResultData, SignalInfo
 from cosim.results.events_file import NUMBERS, record_from_row, record_row
-from cosim.results.result import BaliseRecord, Result, SignalInfo
 from cosim.results.summary_file import jsonable, restored
 from cosim.results.table_layout import column_names
 
@@ -18,7 +18,7 @@ BLOCK = 1 << 25  # bytes of a table that are turned over at a time: it may be la
 _FROM_JSON = {None: math.nan, "inf": math.inf, "-inf": -math.inf}
 
 
-def signals_of(result: Result) -> list[SignalInfo]:
+def signals_of(result: ResultData) -> list[SignalInfo]:
     """What each column but ``time`` is, in the order of the table.
 
     Raises:
@@ -35,13 +35,13 @@ def blocks(table: np.ndarray, size: int = BLOCK) -> Iterator[tuple[int, np.ndarr
         yield start, np.asarray(table[start : start + rows])
 
 
-def about_text(result: Result) -> str:
+def about_text(result: ResultData) -> str:
     """Telegrams, summary and failure as JSON."""
     content = {"events": [record_row(e) for e in result.events], "summary": result.summary, "failure": result.failure}
     return json.dumps(jsonable(content), ensure_ascii=False, allow_nan=False)
 
 
-def with_about(table: np.ndarray, signals: list[SignalInfo], text: str) -> Result:
+def with_about(table: np.ndarray, signals: list[SignalInfo], text: str) -> ResultData:
     """The result of a table and what `about_text` told; NaN in the summary has become None.
 
     Raises:
@@ -50,7 +50,7 @@ def with_about(table: np.ndarray, signals: list[SignalInfo], text: str) -> Resul
     content = json.loads(text)
     events = [_record(row) for row in content["events"]]
     summary = {"events_recorded": True, **restored(content["summary"])}
-    return Result(table, signals, events, summary, content["failure"])
+    return ResultData(table, signals, events, summary, content["failure"])
 
 
 def _record(row: Mapping[str, Any]) -> BaliseRecord:

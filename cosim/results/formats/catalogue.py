@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from cosim.errors import OutputError, nearest
+from cosim.results.data import ResultData, SignalInfo
 from cosim.results.formats.csv_file import read_csv, write_csv
 from cosim.results.formats.npy_file import read_npy, write_npy
 from cosim.results.optional import is_installed
-from cosim.results.result import Result, SignalInfo
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +30,8 @@ class Format:
 
     name: str
     endings: tuple[str, ...]
-    write: Callable[[Path, Result], None]
-    read: Callable[[Path], Result]
+    write: Callable[[Path, ResultData], None]
+    read: Callable[[Path], ResultData]
     keeps: bool = True
     package: str | None = None
     extra: str | None = None
@@ -46,10 +46,10 @@ def _later(module: str, function: str) -> Callable[..., Any]:
     return call
 
 
-def _bare(read: Callable[[Path], Any]) -> Callable[[Path], Result]:
-    def result(path: Path) -> Result:
+def _bare(read: Callable[[Path], Any]) -> Callable[[Path], ResultData]:
+    def result(path: Path) -> ResultData:
         table = read(path)
-        return Result(table, [SignalInfo(name) for name in table.dtype.names[1:]])
+        return ResultData(table, [SignalInfo(name) for name in table.dtype.names[1:]])
 
     return result
 

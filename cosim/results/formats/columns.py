@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from cosim.errors import OutputError
-from cosim.results.result import Result, SignalInfo
+from cosim.results.data import ResultData, SignalInfo
 from cosim.results.si import in_si
 from cosim.results.table_layout import table_dtype
 from plant_models.hybrid.units import UnitError, conversion, parse_unit
@@ -24,7 +24,7 @@ def result_of_columns(
     columns: Sequence[np.ndarray],
     units: Mapping[str, str | None],
     described: Callable[[str], SignalInfo] = SignalInfo,
-) -> Result:
+) -> ResultData:
     """A result of columns as a file names them.
 
     Args:
@@ -48,7 +48,7 @@ def result_of_columns(
     check_time(source, table["time"])
     signals = [_signal(described(name), units.get(name)) for name in order[1:]]
     table, signals = in_si(table, signals, lambda name: parse_unit(units.get(name) or "1"))
-    return Result(table, signals)
+    return ResultData(table, signals)
 
 
 def check_time(source: str, time: np.ndarray) -> None:

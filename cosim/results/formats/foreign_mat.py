@@ -14,17 +14,17 @@ import numpy as np
 from scipy.io import loadmat
 
 from cosim.errors import OutputError
+from cosim.results.data import ResultData, SignalInfo
 from cosim.results.formats.about import with_about
 from cosim.results.formats.columns import result_of_columns
 from cosim.results.formats.mat_file import read_mat
 from cosim.results.formats.modelica_file import ABOUT, LARGEST, split_description
-from cosim.results.result import Result, SignalInfo
 from cosim.results.table_layout import table_dtype
 
 TEXTS = 3  # in ``dataInfo``: a text over time, in the matrix ``stringData``
 
 
-def read_foreign_mat(path: Path) -> Result:
+def read_foreign_mat(path: Path) -> ResultData:
     """Read a MAT file of version 4 to 7: ours, a Modelica trajectory (``binTrans`` or ``binNormal``), or vectors with
     ``time``.
 
@@ -48,7 +48,7 @@ def read_foreign_mat(path: Path) -> Result:
     return _vectors(str(path), content)
 
 
-def read_modelica(path: str | Path) -> Result:
+def read_modelica(path: str | Path) -> ResultData:
     """Read a Modelica trajectory; see `read_foreign_mat`."""
     return read_foreign_mat(Path(path))
 
@@ -73,7 +73,7 @@ class _Trajectory:
     about: str | None
 
 
-def _trajectory(source: str, content: Mapping[str, Any]) -> Result:
+def _trajectory(source: str, content: Mapping[str, Any]) -> ResultData:
     """The result of a trajectory, of whatever version and order."""
     kind = [text.strip() for text in _texts(content["Aclass"], transposed=False)]
     transposed = kind[3:4] != ["binNormal"]
@@ -109,7 +109,7 @@ def _matrices(source: str, content: Mapping[str, Any], transposed: bool) -> _Tra
     return _Trajectory(signals, info[:, :2].astype(int), start, data, about)
 
 
-def _foreign(source: str, trajectory: _Trajectory) -> Result:
+def _foreign(source: str, trajectory: _Trajectory) -> ResultData:
     """Variables over time become columns, aliases with their sign; what is constant goes to ``summary["parameters"]``.
 
     Texts over time, which OpenModelica knows since 2026, are left out.
@@ -128,7 +128,7 @@ def _foreign(source: str, trajectory: _Trajectory) -> Result:
     return replace(result, summary={"parameters": {name: float(value) for name, value in parameters.items()}})
 
 
-def _ours(trajectory: _Trajectory, about: str) -> Result:
+def _ours(trajectory: _Trajectory, about: str) -> ResultData:
     """A trajectory that `write_modelica` wrote: nothing is converted, nothing is left out."""
     more = json.loads(about)
     signals = [SignalInfo(**signal) for signal in more["signals"]]
@@ -160,7 +160,7 @@ def _decoded(text: str) -> str:
 # --- vectors ----------------------------------------------------------------------------------------------------------
 
 
-def _vectors(source: str, content: Mapping[str, Any]) -> Result:
+def _vectors(source: str, content: Mapping[str, Any]) -> ResultData:
     """All vectors as long as ``time``: a workspace, as from Simulink's *To Workspace* blocks saved as arrays."""
     arrays = {n: v for n, v in content.items() if isinstance(v, np.ndarray) and v.dtype.kind in "biuf" and v.ndim == 2}
     vectors = {n: v.ravel() for n, v in arrays.items() if 1 in v.shape}

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from cosim.errors import OutputError
+from cosim.results.data import ResultData, SignalInfo
 from cosim.results.formats.columns import result_of_columns
 from cosim.results.formats.npy_file import HEADER
-from cosim.results.result import Result, SignalInfo
 
 
-def read_foreign_npy(path: Path) -> Result:
+def read_foreign_npy(path: Path) -> ResultData:
     """Read a structured array with a field ``time``; one of ours stays in the file, whose pages are read when looked
     at.
 
@@ -27,7 +27,7 @@ def read_foreign_npy(path: Path) -> Result:
         raise OutputError(f"{path}: expected a structured array of shape (rows,) with a field 'time', got {found}.")
     kinds: list[np.dtype[Any]] = [table.dtype[name] for name in names]
     if names[0] == "time" and all(kind == np.float64 for kind in kinds):
-        return Result(table, [SignalInfo(name) for name in names[1:]])
+        return ResultData(table, [SignalInfo(name) for name in names[1:]])
     fields: list[str] = []
     columns: list[np.ndarray] = []
     for field, kind in zip(names, kinds, strict=True):

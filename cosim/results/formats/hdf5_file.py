@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 
 from cosim.errors import OutputError
+from cosim.results.data import BaliseRecord, ResultData, SignalInfo
 from cosim.results.events_file import COLUMNS, NUMBERS, record_from_row, record_row
 from cosim.results.formats.about import BLOCK, blocks, signals_of
 from cosim.results.formats.columns import result_of_columns
 from cosim.results.formats.guarded_file import GuardedFile
 from cosim.results.optional import optional_module
-from cosim.results.result import BaliseRecord, Result, SignalInfo
 from cosim.results.summary_file import jsonable, restored
 from cosim.results.table_layout import table_dtype
 
@@ -36,7 +36,7 @@ def _h5py() -> Any:
     return optional_module("h5py", "hdf5", "HDF5 files")
 
 
-def write_hdf5(path: str | Path, result: Result) -> None:
+def write_hdf5(path: str | Path, result: ResultData) -> None:
     """Write a result; a table larger than the memory is written block by block.
 
     Args:
@@ -109,7 +109,7 @@ def _write_events(group: Any, events: Sequence[BaliseRecord]) -> None:
         )
 
 
-def read_hdf5(path: str | Path) -> Result:
+def read_hdf5(path: str | Path) -> ResultData:
     """Read a file of `write_hdf5`, bit by bit, or of another tool: vectors of numbers, one of them ``time``; groups
     become names.
 
@@ -127,7 +127,7 @@ def read_hdf5(path: str | Path) -> Result:
         raise
 
 
-def _ours(file: Any) -> Result:
+def _ours(file: Any) -> ResultData:
     found = [dataset for name, dataset in file.items() if name not in (TIME, EVENTS)]
     datasets = sorted(found, key=lambda dataset: int(dataset.attrs["column"]))
     signals = [_signal(dataset) for dataset in datasets]
@@ -137,7 +137,7 @@ def _ours(file: Any) -> Result:
     columns = {n: file[EVENTS][n][:].tolist() if n in NUMBERS else file[EVENTS][n].asstr()[:].tolist() for n in COLUMNS}
     events = [record_from_row(dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)]
     summary = {"events_recorded": True, **restored(json.loads(file.attrs["summary"]))}
-    return Result(table, signals, events, summary, _text(file.attrs.get("failure")))
+    return ResultData(table, signals, events, summary, _text(file.attrs.get("failure")))
 
 
 def _signal(dataset: Any) -> SignalInfo:
@@ -158,7 +158,7 @@ def _text(value: Any) -> str | None:
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else None if value is None else str(value)
 
 
-def _foreign(source: str, file: Any) -> Result:
+def _foreign(source: str, file: Any) -> ResultData:
     """Vectors as long as that of time, wherever they are; text and matrices are left out."""
     vectors: dict[str, Any] = {}
 

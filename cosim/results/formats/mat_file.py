@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from scipy.io import loadmat, savemat
 
+from cosim.results.data import BaliseRecord, ResultData, SignalInfo
 from cosim.results.events_file import COLUMNS, NUMBERS, record_from_row, record_row
 from cosim.results.formats.matlab_names import matlab_names
-from cosim.results.result import BaliseRecord, Result, SignalInfo
 from cosim.results.table_layout import column_names, table_dtype
 
 RESERVED = ("time", "units", "signals", "events")
@@ -50,7 +50,7 @@ def _events_struct(events: Sequence[BaliseRecord]) -> dict[str, np.ndarray]:
     }
 
 
-def write_mat(path: str | Path, result: Result) -> None:
+def write_mat(path: str | Path, result: ResultData) -> None:
     """Write the table, the units and the events of a result as a MATLAB 5 file.
 
     Args:
@@ -88,7 +88,7 @@ def _read_events(struct: Mapping[str, Any]) -> list[BaliseRecord]:
     return [record_from_row(dict(zip(columns, values, strict=True))) for values in zip(*columns.values(), strict=True)]
 
 
-def read_mat(path: str | Path) -> Result:
+def read_mat(path: str | Path) -> ResultData:
     """Read a file written by `write_mat`.
 
     Args:
@@ -113,4 +113,4 @@ def read_mat(path: str | Path) -> Result:
     table = np.empty(np.size(columns[0]), table_dtype(names))
     for name, column in zip(names, columns, strict=True):
         table[name] = np.ravel(column)
-    return Result(table, signals, events)
+    return ResultData(table, signals, events)

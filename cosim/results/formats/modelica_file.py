@@ -19,8 +19,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from cosim.results.data import ResultData, SignalInfo
 from cosim.results.formats.about import about_text, blocks, signals_of
-from cosim.results.result import Result, SignalInfo
 from cosim.results.table_layout import column_names
 
 ACLASS = [text.ljust(11) for text in ("Atrajectory", "1.1", "", "binTrans")]  # OpenModelica wants it so to the byte
@@ -29,7 +29,7 @@ TEXT, INTEGERS, DOUBLES = 51, 20, 0  # types of a matrix: little-endian; letters
 LARGEST = 2**31 - 1
 
 
-def write_modelica(path: str | Path, result: Result) -> None:
+def write_modelica(path: str | Path, result: ResultData) -> None:
     """Write a result; a table larger than the memory is written block by block.
 
     Args:

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from cosim.errors import OutputError
+from cosim.results.data import ResultData, SignalInfo
 from cosim.results.formats.about import about_text, blocks, signals_of, with_about
 from cosim.results.formats.columns import result_of_columns
 from cosim.results.optional import optional_module
-from cosim.results.result import Result, SignalInfo
 from cosim.results.table_layout import table_dtype
 
 ABOUT = b"fmu-observer"
@@ -29,7 +29,7 @@ def _modules() -> tuple[Any, Any]:
     return arrow, parquet
 
 
-def write_parquet(path: str | Path, result: Result) -> None:
+def write_parquet(path: str | Path, result: ResultData) -> None:
     """Write a result; a table larger than the memory is written block by block.
 
     Args:
@@ -62,7 +62,7 @@ def _metadata(signal: SignalInfo) -> dict[str, str]:
     return known | ({} if signal.display_unit is None else {"display_unit": signal.display_unit})
 
 
-def read_parquet(path: str | Path) -> Result:
+def read_parquet(path: str | Path) -> ResultData:
     """Read a file of `write_parquet`, bit by bit, or of another tool: columns of numbers, one of them ``time``.
 
     Raises:
@@ -79,7 +79,7 @@ def read_parquet(path: str | Path) -> Result:
             raise ValueError(f"{path} is not a Parquet file that can be read: {error}") from error
 
 
-def _ours(file: Any, about: str) -> Result:
+def _ours(file: Any, about: str) -> ResultData:
     schema = file.schema_arrow
     table = np.empty(file.metadata.num_rows, table_dtype(schema.names))
     start = 0
@@ -96,7 +96,7 @@ def _signal(field: Any) -> SignalInfo:
     return SignalInfo(field.name, known.get("unit") or known.get("units") or "1", **kept)
 
 
-def _foreign(source: str, table: Any) -> Result:
+def _foreign(source: str, table: Any) -> ResultData:
     described = {field.name: _signal(field) for field in table.schema}
     columns = [_column(source, name, table.column(place)) for place, name in enumerate(table.column_names)]
     attributes = json.loads((table.schema.metadata or {}).get(b"PANDAS_ATTRS", b"{}"))

@@ -8,13 +8,11 @@ from fmu_observer.design.theorem7.design import (
     largest_gap,
     search_eta,
 )
-from fmu_observer.design.theorem7.train import design_train_gains
 
 __all__ = [
     "InfeasibleDesign",
     "Theorem7Design",
     "design_theorem7",
-    "design_train_gains",
     "largest_eta",
     "largest_gap",
     "search_eta",

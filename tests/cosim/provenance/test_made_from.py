@@ -19,11 +19,11 @@ from small_scenarios import small
 
 from cosim import Scenario
 from cosim.errors import OutputError, ProvenanceError
-from cosim.provenance import read_manifest
-from cosim.provenance.write import renewed
 from cosim.results.folder import read_results
-from cosim.scenario import Outcome
+from cosim.scenario.made_from import renewed
+from cosim.scenario.manifest import read_manifest
 from cosim.scenario.origin import Origin
+from cosim.scenario.outcome import Outcome
 from cosim.scenario.schema import parse_scenario
 
 

@@ -19,11 +19,11 @@ from cosim.errors import RunError, ScenarioError
 from cosim.evaluation.metrics import phase_metrics
 from cosim.evaluation.spec import ReportSpec
 from cosim.master.master import Master
+from cosim.observer_benchmark.observer_scores import CertifiedGap, error_at_balises, false_alarms, longest_gap
+from cosim.observer_benchmark.observers import ObserverBenchmark, benchmark_observers
+from cosim.observer_benchmark.playback import find_sides, known_facts
 from cosim.results.load import load_result
 from cosim.results.result import BaliseRecord, Result, SignalInfo
-from cosim.studies.observer_scores import CertifiedGap, error_at_balises, false_alarms, longest_gap
-from cosim.studies.observers import ObserverBenchmark, benchmark_observers
-from cosim.studies.playback import find_sides, known_facts
 
 
 def quietly(scenario: Scenario) -> Any:
@@ -156,7 +156,7 @@ def test_a_certificate_is_held_against_both_gaps() -> None:
 
 
 def test_by_default_all_take_part_that_fit_and_the_others_are_named() -> None:
-    from cosim.studies.observers import find_candidates
+    from cosim.observer_benchmark.observers import find_candidates
 
     scenario = two()
     found, notes = find_candidates(scenario, find_sides(scenario), None)

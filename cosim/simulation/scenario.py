@@ -12,20 +12,22 @@ from typing import TYPE_CHECKING, Any, Self
 
 from cosim.errors import CosimError, ScenarioError
 from cosim.scenario.includes import Key, attribute, find_file, read_tables, shipped_scenarios
+from cosim.scenario.manifest import read_manifest
 from cosim.scenario.origin import Origin
 from cosim.scenario.outcome import Outcome
 from cosim.scenario.override import override
+from cosim.scenario.package_names import is_package, stem
 from cosim.scenario.paths import COMPONENT_PATHS, absolute
 from cosim.scenario.run import run_scenario
 from cosim.scenario.save import plain, save_scenario, scenario_text
 from cosim.scenario.schema import ScenarioTable, parse_scenario
+from cosim.scenario.single import single_tables
 from cosim.scenario.streaming import finish_stream, streaming_to
-from cosim.ssp.names import is_package, stem
 from cosim.structure.structure import Structure
+from cosim.studies.sweep import Sweep, make_sweep
 
 if TYPE_CHECKING:
     from cosim.studies.sampling import Mode, Range
-    from cosim.studies.sweep import Sweep
 
 LOG = logging.getLogger("cosim")
 
@@ -77,8 +79,6 @@ class Scenario:
             return cls._from_package(str(name_or_path), strict)
         stored = None
         if Path(name_or_path).is_dir() and str(name_or_path) not in shipped_scenarios():
-            from cosim.provenance.manifest import read_manifest  # noqa: PLC0415 - only for those who load results
-
             stored = read_manifest(name_or_path)
         path = find_file(name_or_path) if stored is None else stored.scenario
         tables = read_tables(path)
@@ -126,8 +126,6 @@ class Scenario:
             FmuLoadError: the FMU cannot be read.
             ScenarioError: no end is known, or an input does not exist; the nearest are suggested.
         """
-        from cosim.scenario.single import single_tables  # noqa: PLC0415 - only for those who want it
-
         tables, doubts = single_tables(Path(path), name, start, stop, step, inputs, parameters or {}, record)
         scenario = cls(where=Path(path).name, **tables)
         scenario._doubts = doubts
@@ -295,8 +293,6 @@ class Scenario:
             ScenarioError: a name or a value cannot be; nothing has been run then.
             CosimError: a component that is varied cannot be described.
         """
-        from cosim.studies.sweep import make_sweep  # noqa: PLC0415 - only for those who vary
-
         return make_sweep(self, values, mode, count, seed)
 
     def run(

@@ -16,11 +16,13 @@ from typing import Any
 import tomli_w
 
 from cosim.errors import OutputError
-from cosim.provenance.manifest import FILES, FORMAT, MADE_FROM, MANIFEST, SCENARIO, sha256
+from cosim.results.folder import check_writable
 from cosim.results.summary_file import jsonable
+from cosim.scenario.manifest import FILES, FORMAT, MADE_FROM, MANIFEST, SCENARIO, sha256
 from cosim.scenario.origin import ForeignFile, Origin, stamp
 from cosim.scenario.paths import map_paths
 from cosim.scenario.save import plain
+from cosim.scenario.summary import versions
 
 FILES_UP_TO = 50e6
 """Files of others up to this size are copied into the results [bytes]."""
@@ -47,8 +49,6 @@ def renewed(directory: str | Path, origin: Origin | None, files_up_to: float = F
     Raises:
         OutputError: the folder cannot be written.
     """
-    from cosim.results.folder import check_writable  # noqa: PLC0415 - it loads the formats of results
-
     folder = check_writable(directory)
     place = folder / MADE_FROM
     if place.exists() and not (place / MANIFEST).is_file():
@@ -137,8 +137,6 @@ def _keep_part(path: Path, copy: str, origin: Origin, new: Path, files_up_to: fl
 
 def _seal(manifest: dict[str, Any], new: Path, paths: Mapping[str, Path], summary: Mapping[str, Any]) -> None:
     """Add what is known of the results and write the manifest."""
-    from cosim.scenario.summary import versions  # noqa: PLC0415 - pulls in the master
-
     results = {p.name: {"sha256": sha256(p), "size": p.stat().st_size} for k, p in paths.items() if k not in UNHASHED}
     components = [
         {k: c.get(k) for k in ("name", "kind", "model", "fmi_version", "guid")} for c in summary.get("components", ())

@@ -9,25 +9,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import fmu_observer
 from cosim.balises.recorded import read_layout
 from cosim.coupling.connection import Link
 from cosim.errors import CosimError, RunError, ScenarioError, nearest
+from cosim.evaluation.numbers import cell
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.error_table import error_text
-from cosim.results.folder import write_results
-from cosim.results.load import load_result
-from cosim.results.result import Result
-from cosim.scenario import Outcome, Scenario
-from cosim.scenario.balise_service import BALISE_EVENT
-from cosim.scenario.certificates import check_certificates, expected_gap
-from cosim.scenario.layouts import make_layout
-from cosim.scenario.models import make_system
-from cosim.scenario.outcome import INTERRUPTED
-from cosim.scenario.schema import step_count
-from cosim.scenario.tables import ComponentTable
-from cosim.studies.observer_scores import CertifiedGap, ObserverScore, divergence, longest_gap, measured
-from cosim.studies.observer_table import aligned, cell, main_row
-from cosim.studies.playback import (
+from cosim.observer_benchmark.observer_scores import CertifiedGap, ObserverScore, divergence, longest_gap, measured
+from cosim.observer_benchmark.observer_table import aligned, main_row
+from cosim.observer_benchmark.playback import (
     FACTS,
     Sides,
     find_sides,
@@ -36,6 +26,18 @@ from cosim.studies.playback import (
     recording_scenario,
     train_observers,
 )
+from cosim.report.error_table import error_text
+from cosim.results.folder import write_results
+from cosim.results.load import load_result
+from cosim.results.result import Result
+from cosim.scenario.balise_service import BALISE_EVENT
+from cosim.scenario.certificates import check_certificates, expected_gap
+from cosim.scenario.layouts import make_layout
+from cosim.scenario.models import make_system
+from cosim.scenario.outcome import INTERRUPTED, Outcome
+from cosim.scenario.schema import step_count
+from cosim.scenario.tables import ComponentTable
+from cosim.simulation.scenario import Scenario
 
 Progress = Callable[[str, int, int], None]
 MICROSECONDS = 1e6
@@ -253,8 +255,6 @@ def find_candidates(scenario: Scenario, sides: Sides, names: Sequence[str] | Non
 
 
 def _named(scenario: Scenario, sides: Sides, name: str) -> Candidate:
-    import fmu_observer  # noqa: PLC0415 - the registry, beside its only use here
-
     if name in sides.observers:
         return _own(sides, name)
     if name not in fmu_observer.OBSERVERS:

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cosim.evaluation.metrics import PhaseMetrics
-from cosim.evaluation.numbers import DASH, error_number, number
-from cosim.studies.observer_scores import CertifiedGap, ObserverScore
+from cosim.evaluation.numbers import number
+from cosim.observer_benchmark.observer_scores import CertifiedGap, ObserverScore
 from fmus.text_table import text_table
 
 
@@ -41,13 +41,6 @@ def certified(certificate: CertifiedGap | None) -> str | None:
         return None
     words = {True: "yes", False: "NO", None: "?"}
     return f"{words[certificate.holds_expected]}/{words[certificate.holds_seen]}"
-
-
-def cell(value: Any) -> str:
-    """A cell of a table as text."""
-    if isinstance(value, str | int):
-        return str(value)
-    return DASH if value is None else error_number(value)
 
 
 def aligned(rows: Sequence[Mapping[str, str]]) -> str:

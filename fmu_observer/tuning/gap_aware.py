@@ -18,6 +18,9 @@ import numpy as np
 from fmu_observer.certificates import Certificate, SampledError
 from fmu_observer.design.certified_gains import RATIOS, SHARES, Gains, balise_family, certified_gains, rounded_down
 from fmu_observer.design.noise_amplification import NoiseAmplification, noise_amplification
+from fmu_observer.observers.train.adaptive_gain_cdo import AdaptiveGainCdo
+from fmu_observer.observers.train.differentiator_cdo import DifferentiatorCdo
+from fmu_observer.observers.train.takagi_sugeno_cdo import TakagiSugenoCdo
 
 if TYPE_CHECKING:
     from fmu_observer.observers.train.high_gain_observer import HighGainTrainObserver
@@ -124,8 +127,6 @@ def design_high_gain(
     Raises:
         ValueError: bad input (see `balise_gaps`), or nothing could be certified.
     """
-    from fmu_observer.observers.train.differentiator_cdo import DifferentiatorCdo  # noqa: PLC0415 - observers use designs
-
     chosen = DifferentiatorCdo() if observer is None else observer
     gaps = balise_gaps(spacing, speeds)
     parameters = _searched(chosen, lambda theta: {chosen.theta_name: theta}, _with_margin(gaps, margin))
@@ -151,8 +152,6 @@ def design_takagi_sugeno(
     Raises:
         ValueError: bad input (see `balise_gaps`), an unknown `trust`, or nothing could be certified.
     """
-    from fmu_observer.observers.train.takagi_sugeno_cdo import TakagiSugenoCdo  # noqa: PLC0415 - observers use designs
-
     gaps, observer = balise_gaps(spacing, speeds), TakagiSugenoCdo()
     if trust not in ("balises", "odometer"):
         raise ValueError(f"Takagi-Sugeno design: unknown trust {trust!r}; use 'balises' or 'odometer'.")
@@ -188,8 +187,6 @@ def design_adaptive(
     Raises:
         ValueError: bad input (see `balise_gaps`), or no rule could be certified; the constant theta that can is named.
     """
-    from fmu_observer.observers.train.adaptive_gain_cdo import AdaptiveGainCdo  # noqa: PLC0415 - observers use designs
-
     gaps, observer = balise_gaps(spacing, speeds), AdaptiveGainCdo()
     longest, middle = _with_margin(gaps, margin), 0.5 * (gaps.nearest + gaps.farthest)
     journey = {

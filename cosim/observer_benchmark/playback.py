@@ -15,7 +15,6 @@ from typing import Any
 import fmu_observer
 from cosim.coupling.connection import Link
 from cosim.errors import ScenarioError
-from cosim.scenario import Scenario
 from cosim.scenario.balise_service import BALISE_EVENT
 from cosim.scenario.connections import parse_connections
 from cosim.scenario.models import make_system
@@ -23,6 +22,7 @@ from cosim.scenario.roles import ROLES, roles_of_balises
 from cosim.scenario.schema import ScenarioTable
 from cosim.scenario.structure import describe_component
 from cosim.scenario.tables import ComponentTable
+from cosim.simulation.scenario import Scenario
 from fmu_observer.observers.train.train_observer import TrainObserver
 
 ESTIMATES = ("position", "speed")

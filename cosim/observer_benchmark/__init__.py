@@ -1,0 +1,1 @@
+"""Several observers beside one recorded run of the plant, compared."""

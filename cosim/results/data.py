@@ -1,0 +1,107 @@
+"""The data of a result: one table, one list of events, one summary. Imports NumPy only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from typing import Any, Literal
+
+import numpy as np
+
+from cosim.diagnostics.messages import Message
+
+
+@dataclass(frozen=True, slots=True)
+class SignalInfo:
+    """What a column of the table is.
+
+    Args:
+        name: ``component.signal``.
+        unit: SI unit, ``1`` for a pure number.
+        display_unit: unit to show to people, or None for `unit`.
+        variability: ``continuous`` or ``discrete`` (held between its changes).
+        description: one line.
+    """
+
+    name: str
+    unit: str = "1"
+    display_unit: str | None = None
+    variability: Literal["continuous", "discrete"] = "continuous"
+    description: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class BaliseRecord:
+    """One balise telegram of a run.
+
+    Args:
+        stamp: when the train passed the balise [s].
+        delivered_at: when the receivers were told [s]; NaN for a missed one.
+        identity: name of the balise.
+        position: position told [m].
+        true_position: position of the plant at the stamp [m].
+        location_accuracy: Q_LOCACC told [m].
+        odometer_reading: odometer output at the crossing [m/s], NaN without an odometer.
+        kind: ``true``, ``missed`` (read by nobody) or ``false`` (told, but no balise is there).
+        method: localisation method that gave the stamp.
+        time_bound: bound or estimate of the stamp's error [s], NaN where it is not known.
+        outcomes: what became of it at each receiver: ``accepted``, ``replayed``, ``late``, ``rejected``, ``told``
+            (it does not say), or ``undelivered`` (still on its way when the run ended).
+    """
+
+    stamp: float
+    delivered_at: float
+    identity: str
+    position: float
+    true_position: float
+    location_accuracy: float = 0.0
+    odometer_reading: float = float("nan")
+    kind: Literal["true", "missed", "false"] = "true"
+    method: str = ""
+    time_bound: float = 0.0
+    outcomes: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class ResultData:
+    """Everything a run leaves behind, as the readers of files return it.
+
+    Args:
+        table: structured array, first field ``time`` [s], then one float64 field ``component.signal`` for each recorded
+            signal. A row labelled t holds the values at t; an event gives two rows with the same time, before and
+            after.
+        signals: what each column is, in column order, without ``time``.
+        events: the balise telegrams in order of delivery.
+        summary: versions, parameters, certificates, methods, wall times, warnings; JSON-able.
+        failure: why the run ended early, or None.
+        messages: what the components logged, in order of time.
+    """
+
+    table: np.ndarray
+    signals: Sequence[SignalInfo]
+    events: Sequence[BaliseRecord] = ()
+    summary: Mapping[str, Any] = field(default_factory=dict)
+    failure: str | None = None
+    messages: Sequence[Message] = ()
+
+    @property
+    def time(self) -> np.ndarray:
+        """Time of the rows [s], shape (rows,)."""
+        return np.asarray(self.table["time"])
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Values of one signal in its SI unit, shape (rows,).
+
+        Raises:
+            KeyError: the signal was not recorded; the message lists the nearest names.
+        """
+        names = self.table.dtype.names or ()
+        if name not in names:
+            near = ", ".join(get_close_matches(name, names, 3)) or ", ".join(names)
+            raise KeyError(f"signal {name!r} was not recorded; nearest: {near}")
+        return np.asarray(self.table[name])
+
+    def info(self, name: str) -> SignalInfo:
+        """What a column is."""
+        return next(s for s in self.signals if s.name == name)

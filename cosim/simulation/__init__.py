@@ -1,0 +1,1 @@
+"""The class `Scenario`: built by a script or from a file, run, varied, saved and exported."""

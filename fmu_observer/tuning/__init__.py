@@ -1,0 +1,1 @@
+"""Tuning: gains of whole observers for a track and its gaps, believed by the observers' own certificates."""
