@@ -207,12 +207,12 @@ def _tell(outcome: Outcome, study: Any, paths: dict[str, Path], options: argpars
         data = dict(summary) | {"failure": outcome.failure, "files": {k: str(p) for k, p in paths.items()}}
         print(json.dumps(jsonable(data), indent=2))
         return
-    from cosim.report.cost import cost_text  # noqa: PLC0415 - only here
+    from cosim.evaluation.cost import cost_text  # noqa: PLC0415 - only here
 
     print(_headline(summary))
     if outcome.result.table.size:
+        from cosim.evaluation.error_table import error_text  # noqa: PLC0415
         from cosim.evaluation.metrics import phase_metrics  # noqa: PLC0415 - only here
-        from cosim.report.error_table import error_text  # noqa: PLC0415
 
         metrics = phase_metrics(outcome.result, outcome.spec)
         if metrics:
