@@ -13,9 +13,9 @@ from typing import Any, Literal
 import numpy as np
 
 from cosim.balises.telegram import payload
-from cosim.components.described import EventPort
 from cosim.coupling.planned import PlannedComponent
 from cosim.results.result import BaliseRecord
+from fmus.fmi.described import EventPort
 from fmus.fmi.standard import TIME_TOLERANCE
 
 Timing = Literal["exact", "stale"]

@@ -13,10 +13,10 @@ from typing import Any
 
 from cosim.cli.scenarios import add_scenario, load_scenario, positive, simulated_time_bar
 from cosim.errors import OutputError
+from cosim.evaluation.cost import cost_text
+from cosim.evaluation.error_table import error_text
 from cosim.evaluation.metrics import phase_metrics
 from cosim.process.last_call import LAST_CALL
-from cosim.report.cost import cost_text
-from cosim.report.error_table import error_text
 from cosim.results.folder import check_writable
 from cosim.results.summary_file import jsonable
 from cosim.results.unfinished import SPARE

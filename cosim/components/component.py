@@ -7,40 +7,33 @@ sealed library or a block makes no difference here. The dialects are in `fmi1`, 
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from time import perf_counter
 from typing import Any
 
 import numpy as np
-from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription
 
 from cosim.components.derivatives import directional_derivative, make_derivative_writer
-from cosim.components.described import Described, EventPort
+from cosim.components.described import Described
 from cosim.components.start_values import StartValue, refusal, typed_value, typed_values
 from cosim.components.surroundings import Surroundings
 from cosim.diagnostics.call_statistics import CallStatistics, count_methods, new_call_statistics
 from cosim.diagnostics.log_choice import LogSwitch, log_switch, switch_log
 from cosim.diagnostics.messages import LogChoice, MessageLog
-from cosim.diagnostics.native_log import forget
 from cosim.errors import CouplingError, RunError
 from cosim.process.last_call import LAST_CALL, READ, STEP, WRITE
 from fmu_observer.event_protocol import OUTCOME_VARIABLES
 from fmus.fmi.capabilities import tool_warning
-from fmus.fmi.exact_ports import Values
-from fmus.fmi.standard import FATAL, NEVER
-from fmus.fmi.values import element_reader, element_writer, exact_reader, exact_writer, write_start
+from fmus.fmi.instance import shown
+from fmus.fmi.slave import Slave
+from fmus.fmi.values import element_reader, write_start
 
 NOT_PREPARED: Callable[[], None] | None = None
-Step = Callable[[float, float], Any]
-Refused = Callable[[FMICallException, float, float], None]
 WITHOUT_STATES = "without it: algorithm gauss-seidel or jacobi, control fixed, no balise method rollback"
-NAMES_SHOWN = 6
 
 
-class Component(Described):
+class Component(Described, Slave):
     """One stepped thing, from instantiation to the end.
 
     The life: `configure`, `instantiate`, `set_start`, `enter_initialization`, readers and writers in turn,
@@ -62,6 +55,8 @@ class Component(Described):
         release_files: called once at the end, e.g. to remove an unpacked archive.
     """
 
+    without_states = f" (which its description promises; {WITHOUT_STATES})"
+
     def __init__(
         self,
         name: str,
@@ -72,16 +67,10 @@ class Component(Described):
         kind: str = "FMU",
         release_files: Callable[[], None] | None = None,
     ) -> None:
-        super().__init__(name, description, source, kind)
-        self.slave = slave
-        self.negated: frozenset[str] = frozenset()  # variables whose slave holds the value with the other sign (FMI 1)
+        self.source, self.kind = source, kind
+        super().__init__(name, slave, description)
         self.starts: dict[str, StartValue] = {}
-        self.seconds, self.calls = 0.0, 0
-        self.time = math.nan
-        self.terminated = False
-        self.next_event = NEVER
         self._release_files = release_files
-        self._alive = self._running = False
         self.messages = MessageLog(name)
         # that others take at the start of a step, as where they were recorded
         self.held_outputs: frozenset[str] = frozenset()
@@ -90,20 +79,11 @@ class Component(Described):
         self.log: LogSwitch | None = None
         self.call_statistics = new_call_statistics()
         self.trespasses: dict[str, str] = {}
-        self._last, self._numbers = LAST_CALL, LAST_CALL.numbers(name)
+        self._numbers = LAST_CALL.numbers(name)
+        self._call_note, self._step_number = LAST_CALL, self._numbers + STEP
         self._outcomes, self._read_outcomes = np.zeros(len(OUTCOME_VARIABLES)), NOT_PREPARED
 
     # -- how it stands ----------------------------------------------------------------------------------------------
-
-    @property
-    def running(self) -> bool:
-        """Whether initialisation is over and the end has not come."""
-        return self._running
-
-    @property
-    def usable(self) -> bool:
-        """Whether the slave may still be called: instantiated, and no fatal error so far."""
-        return self._alive
 
     @property
     def seconds_in_all(self) -> float:
@@ -127,21 +107,14 @@ class Component(Described):
             RunError: the slave refuses; where it needs another program, the message says so.
         """
         try:
-            self._guard("instantiate", self._instantiate)
+            super().instantiate()
         except RunError as error:
             warning = tool_warning(self.name, self.description)
             if warning is None:
                 raise
             raise RunError(f"{error} Perhaps because: {warning}", self.name, error.time) from error
-        self._alive, self._read_outcomes = True, NOT_PREPARED
+        self._read_outcomes = NOT_PREPARED
         self._switch_log()
-
-    def reset(self) -> None:
-        """Back to the state after `instantiate`."""
-        self._guard("reset", self.slave.reset)
-        self._forget()
-        self.time, self.terminated, self.next_event = math.nan, False, NEVER
-        self._running = False
 
     def set_start(self, name: str, value: StartValue) -> None:
         """Set a parameter, a start state or an unconnected input before initialisation.
@@ -161,39 +134,15 @@ class Component(Described):
             values = typed_values(variable, value) if element is None else [typed_value(variable, value)]
         except ValueError as error:
             raise CouplingError(refusal(f"{self.name}.{name} cannot be set", error)) from error
-        self._guard(f"setting {name} = {value!r}", lambda: write_start(self, variable, element, values))
+        self.guard(f"setting {name} = {value!r}", lambda: write_start(self, variable, element, values))
         self.starts[name] = value
 
-    @abstractmethod
-    def enter_initialization(self, start_time: float, stop_time: float) -> None:
-        """Begin initialisation; times in [s]."""
+    def reader(self, names: Sequence[str], values: np.ndarray) -> Callable[[], None]:  # noqa: D102 - see Instance
+        return self._counted("get", READ, f"reading {shown(names)}", self._unguarded_reader(names, values))
 
-    @abstractmethod
-    def exit_initialization(self) -> None:
-        """End initialisation, discrete states settled."""
-
-    def reader(self, names: Sequence[str], values: np.ndarray) -> Callable[[], None]:
-        """A call that reads scalars and elements into `values`, shape (len(names),), a contiguous view of the caller's
-        array.
-        """
-        return self._counted("get", READ, f"reading {_shown(names)}", self._unguarded_reader(names, values))
-
-    def writer(self, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
-        """A call that writes scalars and elements, and the array of shape (len(names),) it writes from."""
+    def writer(self, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:  # noqa: D102 - see Instance
         write, buffer = self._unguarded_writer(names)
-        return self._counted("set", WRITE, f"writing {_shown(names)}", write), buffer
-
-    def exact_reader(self, name: str) -> Callable[[], Values]:
-        """A call that returns the values of a whole variable as they are: texts, bytes, integers of any size; row by
-        row.
-        """
-        read = exact_reader(self, self.variables[name])
-        return lambda: self._guard(f"reading {name}", read)
-
-    def exact_writer(self, name: str) -> Callable[[Sequence[Any]], None]:
-        """A call that writes the values of a whole variable as they are."""
-        write = exact_writer(self, self.variables[name])
-        return lambda values: self._guard(f"writing {name}", lambda: write(values))
+        return self._counted("set", WRITE, f"writing {shown(names)}", write), buffer
 
     def make_derivative_writer(self, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
         """A call that tells the first derivatives of inputs (FMI 1 and 2), and the array of shape (len(names),) it
@@ -205,8 +154,8 @@ class Component(Described):
             CouplingError: the slave does not take derivatives (canInterpolateInputs), or a name is no continuous real
             input.
         """
-        tell, buffer = make_derivative_writer(self, names)
-        return self._guarded(f"derivatives of {_shown(names)}", tell), buffer
+        write, buffer = make_derivative_writer(self, names)
+        return self.guarded(f"derivatives of {shown(names)}", write), buffer
 
     def directional_derivative(
         self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
@@ -224,72 +173,15 @@ class Component(Described):
             RunError: the call failed.
         """
         call = directional_derivative(self, unknowns, knowns, seed)
-        found: np.ndarray = self._guard("getDirectionalDerivative", call)
+        found: np.ndarray = self.guard("getDirectionalDerivative", call)
         return found
-
-    @abstractmethod
-    def advance(self, t: float, until: float) -> None:
-        """Step from `t` to `until` [s], own time events on the way included.
-
-        Raises:
-            RunError: the component failed or did not get there.
-        """
-
-    @abstractmethod
-    def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:
-        """A triggered event is delivered at `t` [s]; it happened at `stamp` [s].
-
-        Args:
-            event: one of `events`.
-            t: current time of the component [s].
-            stamp: when the event happened [s]: at or before `t`, or within the coming step where the component takes
-                stamps.
-            payload: fields by name; fields the component does not declare are dropped.
-
-        Where `event_needs_step` says so, only the last event told before a step happens, and it happens in that step.
-        """
-
-    @abstractmethod
-    def save(self) -> Any:
-        """The state, to be restored any number of times and released once."""
-
-    @abstractmethod
-    def restore(self, state: Any) -> None:
-        """Return to a saved state."""
-
-    @abstractmethod
-    def release(self, state: Any) -> None:
-        """Free a saved state."""
-
-    def terminate(self) -> None:
-        """End the run; errors of a dying component are of no interest."""
-        if self._alive and self._running:
-            self._running = False
-            self._quietly("terminate", self.slave.terminate)
 
     def free(self) -> None:
         """Free the instance, its library and its files."""
-        if self._alive:
-            self._alive = False
-            self._quietly("freeInstance", self.slave.freeInstance)
-        elif self._release_files is not None and math.isnan(self.time):
-            self._quietly("unloading", self._free_library)  # loaded, never instantiated: freeInstance did not do it
+        super().free()
         if self._release_files is not None:
             self._release_files()
             self._release_files = None
-        forget(self)
-
-    def pending(self, t: float) -> RunError:
-        """The error of a slave that returned from doStep at `t` [s] before it was done."""
-        asynchronous = (
-            "as canRunAsynchronuously allows" if self.capabilities.canRunAsynchronuously else "against its description"
-        )
-        return self.failure(
-            f"doStep returned before it was done (status pending), {asynchronous}; slaves that compute asynchronously "
-            f"are not "
-            "stepped here. Export the FMU without asynchronous computation.",
-            t,
-        )
 
     def outcomes(self) -> Mapping[str, int] | None:
         """Counts of what became of the events told, where the slave keeps them: blocks, and FMUs with
@@ -305,7 +197,7 @@ class Component(Described):
             return None
         if self._alive and self._read_outcomes is None:
             read = element_reader(self, counted, self._outcomes[: len(counted)])
-            self._read_outcomes = self._guarded("counts of events", read)
+            self._read_outcomes = self.guarded("counts of events", read)
         if self._alive and self._read_outcomes is not None:
             with suppress(RunError):
                 self._read_outcomes()
@@ -318,6 +210,7 @@ class Component(Described):
             CouplingError: a category that the slave does not declare.
         """
         self.log = log_switch(self.name, self.description, choice)
+        self.logging = self.log is not None and self.log.on
         self.messages.silent = choice == "none"
 
     def note(self, message: str | bytes | None, status: int | str = 0, category: str | bytes | None = None) -> None:
@@ -334,103 +227,37 @@ class Component(Described):
 
     # -- internals --------------------------------------------------------------------------------------------------
 
-    @abstractmethod
-    def _instantiate(self) -> None: ...
-
     def __init_subclass__(cls, **named: Any) -> None:
         super().__init_subclass__(**named)
         count_methods(cls)
-
-    @property
-    def _logging_on(self) -> bool:
-        return self.log is not None and self.log.on
 
     def _switch_log(self) -> None:
         refused = None if self.log is None else switch_log(self.slave, self.fmi_version, self.log)
         if refused is not None:
             self.note(refused, "warning")
 
-    def _forget(self) -> None:
-        """Drop what the dialect remembers of a run; by default there is nothing."""
-        return
-
-    def _free_library(self) -> None:
-        self.slave.freeLibrary()
-
-    def _step_whole(self, do_step: Step, refused: Refused, t: float, until: float) -> None:
-        """One timed doStep of a slave that gets to `until` [s] or refuses (FMI 1, 2)."""
-        last = self._last
-        last.call[0], last.time[0] = self._numbers + STEP, t
-        begin = perf_counter()
-        try:
-            do_step(t, until - t)
-            self.time = until
-        except FMICallException as error:
-            refused(error, t, until)
-        except Exception as error:
-            raise self._explained("doStep", error, t) from error
-        finally:
-            self.seconds += perf_counter() - begin
-            self.calls += 1
-
-    def _unguarded_reader(self, names: Sequence[str], values: np.ndarray) -> Callable[[], None]:
-        return element_reader(self, names, values)
-
-    def _unguarded_writer(self, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
-        return element_writer(self, names)
-
     def _counted(self, kind: str, number: int, what: str, call: Callable[[], None]) -> Callable[[], None]:
-        """`_guarded`, counted, and noted as the last call: the one of this number among those that are made often."""
+        """`guarded`, counted, and noted as the last call: the one of this number among those that are made often."""
         statistics: CallStatistics = self.call_statistics[kind]
         return statistics.counting(
-            call, lambda error: self._explained(what, error), self._last.call, self._numbers + number
+            call, lambda error: self.explained(what, error), LAST_CALL.call, self._numbers + number
         )
 
-    def _guarded(self, what: str, call: Callable[[], None]) -> Callable[[], None]:
-        def guarded() -> None:
-            try:
-                call()
-            except Exception as error:
-                raise self._explained(what, error) from error
-
-        return guarded
-
-    def _guard(self, what: str, call: Callable[[], Any]) -> Any:
-        """Run a call of the slave; turn whatever it throws into a RunError with component and time."""
+    def guard(self, what: str, call: Callable[[], Any]) -> Any:  # noqa: D102 - see Instance
         before = None if self._running else Surroundings()  # in a run its steps are looked at
         try:
-            with self._last.making(self.name, what, self.time):
+            with LAST_CALL.making(self.name, what, self.time):
                 return call()
         except Exception as error:
-            raise self._explained(what, error) from error
+            raise self.explained(what, error) from error
         finally:
             for changed in () if before is None else before.put_back():
                 self.trespasses[changed] = what
 
     def _quietly(self, what: str, call: Callable[[], Any]) -> None:
         """A component that fails while it is put away changes nothing any more."""
-        with suppress(Exception), self._last.making(self.name, what, self.time):
+        with suppress(Exception), LAST_CALL.making(self.name, what, self.time):
             call()
 
-    def _saved_state(self, name: str, get: Callable[[], Any]) -> Any:
-        """A state from the slave; a null pointer is none, and to restore it would end the process."""
-        try:
-            state = get()
-            if getattr(state, "value", state) is None:
-                raise RuntimeError("the slave gave no state")
-        except Exception as error:
-            raise self._explained(f"{name} (which its description promises; {WITHOUT_STATES})", error) from error
-        return state
-
-    def _explained(self, what: str, error: Exception, t: float | None = None) -> RunError:
-        if isinstance(error, FMICallException) and getattr(error, "status", None) == FATAL:
-            self._alive = self._running = False  # after a fatal error no function of the slave may be called
-        return (
-            error if isinstance(error, RunError) else self.failure(f"{what} failed: {error or type(error).__name__}", t)
-        )
-
-
-def _shown(names: Sequence[str]) -> str:
-    return ", ".join(names[:NAMES_SHOWN]) + (
-        f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
-    )
+    def explained(self, what: str, error: Exception, t: float | None = None) -> Exception:  # noqa: D102 - see Instance
+        return error if isinstance(error, RunError) else super().explained(what, error, t)

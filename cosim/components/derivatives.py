@@ -1,16 +1,18 @@
-"""Derivatives that slaves take and give: of inputs in time (FMI 1, 2), and directional derivatives (FMI 2, 3)."""
+"""Which derivatives a component takes and gives, told in words where it does not; the calls are in
+`fmus.fmi.derivatives`.
+"""
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cosim.errors import CouplingError
+from fmus.fmi.derivatives import directional_derivative as derivative_call
+from fmus.fmi.derivatives import input_derivative_writer
 from fmus.fmi.elements import Layout, described, layout
-from fmus.fmi.ports import is_native
 from fmus.fmi.types import FLOATING_TYPES
 from fmus.fmi.values import signs
 
@@ -19,10 +21,11 @@ if TYPE_CHECKING:
 
 
 def make_derivative_writer(component: Component, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
-    """A call of setRealInputDerivatives of first order, and the array of shape (len(names),) it tells from.
+    """A call of setRealInputDerivatives of first order, and the array of shape (len(names),) it writes from.
 
     Args:
-        component: an instantiated slave of FMI 1 or 2. names: of real inputs.
+        component: an instantiated slave of FMI 1 or 2.
+        names: of real inputs.
 
     Raises:
         CouplingError: the slave does not take derivatives, or a name is no real input.
@@ -41,53 +44,34 @@ def make_derivative_writer(component: Component, names: Sequence[str]) -> tuple[
     references, buffer = [v.valueReference for v in variables], np.zeros(len(names))
     turn = signs(component, names)
     held = buffer if turn is None else np.zeros(len(names))
-    make = _native_teller if is_native(component.slave) else _teller
-    tell = make(component, references, held)
+    write = input_derivative_writer(component.slave, component.fmi_version, references, held)
     if turn is None:
-        return tell, buffer
+        return write, buffer
 
-    def turn_and_tell() -> None:
+    def turn_and_write() -> None:
         turn(buffer, held)
-        tell()
+        write()
 
-    return turn_and_tell, buffer
-
-
-def _native_teller(component: Component, references: Sequence[int], values: np.ndarray) -> Callable[[], None]:
-    count = len(references)
-    call = getattr(component.slave, f"fmi{component.fmi_version}SetRealInputDerivatives")
-    pointer = values.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
-    orders = (ctypes.c_int * count)(*[1] * count)
-    arguments = (component.slave.component, (ctypes.c_uint32 * count)(*references), count, orders, pointer)
-
-    def tell() -> None:
-        call(*arguments)
-
-    return tell
-
-
-def _teller(component: Component, references: Sequence[int], values: np.ndarray) -> Callable[[], None]:
-    call, orders = component.slave.setRealInputDerivatives, [1] * len(references)
-    return lambda: call(list(references), orders, values.tolist())
+    return turn_and_write, buffer
 
 
 def directional_derivative(
     component: Component, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
 ) -> Callable[[], np.ndarray]:
-    """A call of getDirectionalDerivative; arguments as for `Component.directional_derivative`.
+    """A call of getDirectionalDerivative.
+
+    Args:
+        component: an instantiated slave.
+        unknowns: outputs and the like.
+        knowns: inputs and the like.
+        seed: the direction, shape (len(knowns),).
 
     Raises:
         CouplingError: the slave does not declare it, or a variable is not real.
     """
     if component.fmi_version == 1 or not component.capabilities.providesDirectionalDerivatives:
         raise CouplingError(f"{component.name} gives no directional derivatives: it does not declare them.")
-    targets, sources = _real(component, unknowns), _real(component, knowns)
-    direction = np.zeros(sources.total)
-    direction[sources.positions] = seed
-    references = [[v.valueReference for v in spread.variables] for spread in (targets, sources)]
-    more = {"nSensitivity": targets.total} if any(v.shape for v in targets.variables) else {}
-    call = component.slave.getDirectionalDerivative
-    return lambda: np.array(call(*references, direction.tolist(), **more))[targets.positions]
+    return derivative_call(component.slave, _real(component, unknowns), _real(component, knowns), seed)
 
 
 def _real(component: Component, names: Sequence[str]) -> Layout:

@@ -8,6 +8,7 @@ from typing import Any
 from cosim.components.component import Component
 from cosim.diagnostics.call_log import CallLog
 from cosim.diagnostics.call_text import Names, describe_native, describe_prepared, describe_python
+from fmus.fmi.types import REAL_TYPE
 
 
 def log_calls(component: Component, log: CallLog) -> None:
@@ -67,7 +68,7 @@ class LoggedSlave:
         return call
 
     def _prepared(self, verb: str, prepare: Callable[..., Callable[[], None]]) -> Callable[..., Callable[[], None]]:
-        component, kind = self._component, self._component.real_type
+        component, kind = self._component, REAL_TYPE[self._component.fmi_version]
 
         def prepared(references: Sequence[int], values: Any) -> Callable[[], None]:
             inner = prepare(references, values)

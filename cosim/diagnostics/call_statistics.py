@@ -105,14 +105,19 @@ def counted(method: Callable[..., Any], kind: str) -> Callable[..., Any]:
             statistics.depth = 0
             statistics.add(perf_counter() - begin)
 
+    call.counted_as = kind  # type: ignore[attr-defined]
     return call
 
 
 def count_methods(cls: type) -> None:
-    """Let the methods that a class of components defines count themselves."""
+    """Let the methods of a class of components count themselves, inherited ones too.
+
+    Args:
+        cls: the class.
+    """
     for name, kind in OF_METHOD.items():
-        method = cls.__dict__.get(name)
-        if callable(method) and not getattr(method, "__isabstractmethod__", False):
+        method = getattr(cls, name, None)
+        if callable(method) and not hasattr(method, "counted_as") and not hasattr(method, "__isabstractmethod__"):
             setattr(cls, name, counted(method, kind))
 
 

@@ -72,7 +72,7 @@ def _seen(
     if not hasattr(shipped().get(component.observer or ""), "premise_range"):
         return None
     system: Any = make_system(component, name)
-    values = system.unpack_parameters(parameter_values(system, given_parameters(component), component.preset))
+    values = system.unpack_parameters(parameter_values(system, given_parameters(component, system), component.preset))
     signal, low, high = system.premise_range(values)
     column = _column(table, name, signal, connections)
     if column is None or len(column) < 2:

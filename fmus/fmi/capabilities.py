@@ -9,6 +9,8 @@ from typing import Any
 
 from fmpy.model_description import ModelDescription
 
+from fmus.fmi.standard import CO_SIMULATION
+
 HELD_AS = {
     "canGetAndSetFMUState": "canGetAndSetFMUstate",
     "canSerializeFMUState": "canSerializeFMUstate",
@@ -71,13 +73,19 @@ class Capabilities:
         return {f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name) != f.default}
 
 
-def read_capabilities(description: ModelDescription) -> Capabilities:
-    """The capabilities a model description declares for co-simulation; defaults where it has no co-simulation."""
-    interface = description.coSimulation
-    if interface is None:
+def read_capabilities(description: ModelDescription, interface: str = CO_SIMULATION) -> Capabilities:
+    """The capabilities a model description declares for an interface type; defaults where it has none of it.
+
+    Args:
+        description: as read from the FMU.
+        interface: ``coSimulation`` or ``modelExchange``.
+    """
+    element = getattr(description, interface)
+    if element is None:
         return Capabilities()
-    names = [field.name for field in fields(Capabilities)]
-    found: dict[str, Any] = {name: getattr(interface, HELD_AS.get(name, name)) for name in names}
+    found: dict[str, Any] = {
+        f.name: getattr(element, HELD_AS.get(f.name, f.name), f.default) for f in fields(Capabilities)
+    }
     step = found["fixedInternalStepSize"]
     found["fixedInternalStepSize"] = None if step is None else float(step)  # fmpy leaves it a text
     return Capabilities(**found)

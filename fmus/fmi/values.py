@@ -1,4 +1,4 @@
-"""Values by name: reading and writing scalars and elements of a component's variables, whole arrays and signs included.
+"""Values by name: reading and writing scalars and elements of an instance's variables, whole arrays and signs included.
 
 FMI reads and writes whole variables. Where only some elements of an array are asked for, the others are read and left
 alone; where the slave holds a variable with the other sign (a negated alias of FMI 1.0), the sign is turned on the way.
@@ -17,16 +17,16 @@ from fmus.fmi.exact_ports import Values, make_exact_reader, make_exact_writer
 from fmus.fmi.ports import make_reader, make_writer
 
 if TYPE_CHECKING:
-    from cosim.components.component import Component
+    from fmus.fmi.instance import Instance
 
 Turn = Callable[[np.ndarray, np.ndarray], None]
 
 
-def element_reader(component: Component, names: Sequence[str], values: np.ndarray) -> Callable[[], None]:
+def element_reader(instance: Instance, names: Sequence[str], values: np.ndarray) -> Callable[[], None]:
     """A call that reads scalars and elements into `values`, shape (len(names),)."""
-    spread, turn = layout([component.variables.element(n) for n in names]), signs(component, names)
+    spread, turn = layout([instance.variables.element(n) for n in names]), signs(instance, names)
     whole = values if spread.is_whole else np.zeros(spread.total)
-    read = make_reader(component.slave, component.fmi_version, spread.variables, whole)
+    read = make_reader(instance.slave, instance.fmi_version, spread.variables, whole)
     if whole is values and turn is None:
         return read
 
@@ -40,10 +40,10 @@ def element_reader(component: Component, names: Sequence[str], values: np.ndarra
     return read_and_pick
 
 
-def element_writer(component: Component, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
+def element_writer(instance: Instance, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
     """A call that writes scalars and elements, and the array of shape (len(names),) it writes from."""
-    spread, turn = layout([component.variables.element(n) for n in names]), signs(component, names)
-    slave, version, buffer = component.slave, component.fmi_version, np.zeros(len(names))
+    spread, turn = layout([instance.variables.element(n) for n in names]), signs(instance, names)
+    slave, version, buffer = instance.slave, instance.fmi_version, np.zeros(len(names))
     if spread.is_whole and turn is None:
         return make_writer(slave, version, spread.variables, buffer), buffer
     whole, signed = np.zeros(spread.total), np.zeros(len(names))
@@ -61,44 +61,47 @@ def element_writer(component: Component, names: Sequence[str]) -> tuple[Callable
     return place_and_write, buffer
 
 
-def exact_reader(component: Component, variable: ModelVariable) -> Callable[[], Values]:
+def exact_reader(instance: Instance, variable: ModelVariable) -> Callable[[], Values]:
     """A call that returns the values of a whole variable as they are."""
-    read = make_exact_reader(component.slave, component.fmi_version, variable)
-    if variable.name not in component.negated:
+    read = make_exact_reader(instance.slave, instance.fmi_version, variable)
+    if variable.name not in instance.negated:
         return read
     return lambda: tuple(negative(variable, value) for value in read())
 
 
-def exact_writer(component: Component, variable: ModelVariable) -> Callable[[Sequence[Any]], None]:
+def exact_writer(instance: Instance, variable: ModelVariable) -> Callable[[Sequence[Any]], None]:
     """A call that writes the values of a whole variable as they are."""
-    write = make_exact_writer(component.slave, component.fmi_version, variable)
-    if variable.name not in component.negated:
+    write = make_exact_writer(instance.slave, instance.fmi_version, variable)
+    if variable.name not in instance.negated:
         return write
     return lambda values: write([negative(variable, value) for value in values])
 
 
-def write_start(component: Component, variable: ModelVariable, element: Element | None, values: list[Any]) -> None:
+def write_start(instance: Instance, variable: ModelVariable, element: Element | None, values: list[Any]) -> None:
     """Write a whole variable, or one element of it, once.
 
     Args:
-        values: one for each reference.
+        instance: whose variable it is.
+        variable: what is written.
+        element: the element; None for the whole variable.
+        values: of the variable or the element.
     """
     if element is not None and element.index is not None:
-        everything = list(exact_reader(component, variable)())
+        everything = list(exact_reader(instance, variable)())
         everything[element.index] = values[0]
         values = everything
-    exact_writer(component, variable)(values)
+    exact_writer(instance, variable)(values)
 
 
-def signs(component: Component, names: Sequence[str]) -> Turn | None:
+def signs(instance: Instance, names: Sequence[str]) -> Turn | None:
     """What turns values as the slave holds them into those of the variables and back, or None where nothing is negated.
 
     The call takes source and target, both of shape (len(names),), which may be the same array.
     """
-    if not any(name in component.negated for name in names):
+    if not any(name in instance.negated for name in names):
         return None
-    held_negative = np.array([name in component.negated for name in names])
-    truths = np.array([component.variables[name].type == "Boolean" for name in names])
+    held_negative = np.array([name in instance.negated for name in names])
+    truths = np.array([instance.variables[name].type == "Boolean" for name in names])
     factor, offset = np.where(held_negative, -1.0, 1.0), np.where(held_negative & truths, 1.0, 0.0)
 
     def turn(source: np.ndarray, target: np.ndarray) -> None:

@@ -15,12 +15,12 @@ from test_fmus.events import awkward_fmu
 from test_fmus.typed import typed_fmu
 
 from cosim.components.component import Component
-from cosim.components.described import EventPort
 from cosim.components.fmi1 import FMI1Component
 from cosim.components.loading import describe_fmu, load_fmu
 from cosim.coupling.connection import connect
 from cosim.coupling.graph import check_algebraic_loops
 from cosim.errors import CouplingError, RunError
+from fmus.fmi.described import EventPort
 
 LAG: dict[str, Any] = {"A": [[-1.0]], "B": [[1.0]], "C": [[1.0]], "D": [[0.5]]}
 

@@ -16,10 +16,10 @@ from test_fmus.events import awkward_fmu, chatter
 from cosim import Scenario
 from cosim.components.loading import load_fmu
 from cosim.diagnostics.messages import OMITTED, Message, MessageLog, in_order, read_messages, write_messages
-from cosim.diagnostics.native_log import _listeners
 from cosim.errors import CouplingError, ScenarioError
 from cosim.report.page.report import report_page
 from cosim.results.folder import read_results
+from fmus.fmi.native_log import _listeners
 
 STEP = 0.05
 

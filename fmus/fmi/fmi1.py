@@ -1,0 +1,162 @@
+"""FMI 1.0: co-simulation slaves; no Initialization Mode, no saved states, aliases with the other sign.
+
+Inputs and start values are set before fmiInitializeSlave, and nothing can be read before it: until then the outputs are
+their declared start values, which is what the other components see while inputs and outputs are exchanged at the start
+time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from fmpy.fmi1 import FMICallException, fmi1LastSuccessfulTime
+from fmpy.model_description import ModelDescription, ModelVariable
+
+from fmus.fmi.described import EventPort
+from fmus.fmi.exact_ports import Values
+from fmus.fmi.native_log import fmi1_callbacks
+from fmus.fmi.ports import is_native
+from fmus.fmi.prepared_step import make_step
+from fmus.fmi.slave import Slave, answer
+from fmus.fmi.values import negative
+
+TRUE = b"\x01"
+NOTHING = {"String": "", "Boolean": False}
+"""What a variable without a declared start value is taken for; else 0."""
+
+
+class FMI1Slave(Slave):
+    """A co-simulation slave of FMI 1.0. Arguments as for `Slave`."""
+
+    fmi_version = 1
+    event_needs_step = True
+
+    def __init__(self, name: str, slave: Any, description: ModelDescription) -> None:
+        super().__init__(name, slave, description)
+        self._stop_time, self._initialized = 0.0, False
+        self._held: dict[tuple[str, int], Any] = {}
+
+    @property
+    def can_save(self) -> bool:
+        """Never: FMI 1.0 has no saved states."""
+        return False
+
+    def _instantiate(self) -> None:
+        if is_native(self.slave):
+            self.slave.instantiate(functions=fmi1_callbacks(self), loggingOn=self.logging)
+            if not self.slave.component:
+                raise RuntimeError("fmiInstantiateSlave returned no instance")
+        else:
+            self.slave.instantiate()
+        self._do_step = make_step(self.slave, "fmi1DoStep", TRUE)  # each is new, none is repeated
+        self._forget()
+
+    def _forget(self) -> None:
+        self._initialized = False
+        self._held = {}
+        for name, variable in self.variables.items():
+            if variable.start is not None:
+                self._hold(name, self._declared_start(variable))
+
+    def _find_events(self) -> dict[str, EventPort]:
+        return {}
+
+    def enter_initialization(self, start_time: float, stop_time: float) -> None:
+        """Only note the times: the slave is initialised when all start values and inputs are known.
+
+        Args:
+            start_time: [s].
+            stop_time: [s].
+        """
+        self.time, self._stop_time = start_time, stop_time
+
+    def exit_initialization(self) -> None:
+        """Initialise the slave with the inputs and start values set so far."""
+        call, start, stop = self.slave.initialize, self.time, self._stop_time
+        self.guard("fmiInitializeSlave", lambda: call(tStart=start, stopTime=stop))
+        self._initialized = self._running = True
+
+    def advance(self, t: float, until: float) -> None:  # noqa: D102 - see Slave
+        self._step_whole(self._do_step, self._after_refusal, t, until)
+
+    def _after_refusal(self, error: FMICallException, t: float, until: float) -> None:
+        self._raise_unless_discarded(error, t)
+        raise self._not_done(t, until, answer(self.slave.getRealStatus, fmi1LastSuccessfulTime)) from error
+
+    def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Slave
+        raise self.failure(f"an FMI 1.0 slave takes no events (got '{event.name}')", t)
+
+    def save(self) -> Any:  # noqa: D102 - see Instance
+        raise self.failure("an FMI 1.0 slave cannot save its state")
+
+    def restore(self, state: Any) -> None:  # noqa: D102 - see Instance
+        raise self.failure("an FMI 1.0 slave cannot restore a state")
+
+    def release(self, state: Any) -> None:
+        """Nothing to free.
+
+        Args:
+            state: none.
+        """
+
+    # -- what is known before the slave is initialised -----------------------------------------------------------------
+
+    def _hold(self, name: str, value: Any) -> None:
+        """Remember a value as the slave has it: aliases share it."""
+        variable = self.variables[name]
+        held = negative(variable, value) if name in self.negated else value
+        self._held[variable.type, variable.valueReference] = held
+
+    def _known(self, name: str) -> Any:
+        variable = self.variables[name]
+        value = self._held.get((variable.type, variable.valueReference), NOTHING.get(variable.type, 0))
+        return negative(variable, value) if name in self.negated else value
+
+    def _declared_start(self, variable: ModelVariable) -> Any:
+        text = str(variable.start)
+        if variable.type == "String":
+            return text
+        if variable.type == "Boolean":
+            return text.strip() in {"true", "1"}
+        try:
+            return float(text) if variable.type == "Real" else int(text)
+        except ValueError as error:
+            given = f"{self.name}.{variable.name} declares the start value {text!r}"
+            raise ValueError(f"{given}, which is no {variable.type}.") from error
+
+    def exact_reader(self, name: str) -> Callable[[], Values]:  # noqa: D102 - see Instance
+        read = super().exact_reader(name)
+        return lambda: read() if self._initialized else (self._known(name),)
+
+    def exact_writer(self, name: str) -> Callable[[Sequence[Any]], None]:  # noqa: D102 - see Instance
+        write = super().exact_writer(name)
+
+        def write_and_hold(values: Sequence[Any]) -> None:
+            write(values)
+            self._hold(name, values[0])
+
+        return write_and_hold
+
+    def _unguarded_reader(self, names: Sequence[str], values: np.ndarray) -> Callable[[], None]:
+        read = super()._unguarded_reader(names, values)
+
+        def read_or_show() -> None:
+            if self._initialized:
+                read()
+            else:
+                values[:] = [self._known(name) for name in names]
+
+        return read_or_show
+
+    def _unguarded_writer(self, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
+        write, buffer = super()._unguarded_writer(names)
+
+        def write_and_hold() -> None:
+            write()
+            if not self._initialized:
+                for name, value in zip(names, buffer.tolist(), strict=True):
+                    self._hold(name, value)
+
+        return write_and_hold, buffer

@@ -1,0 +1,108 @@
+"""FMI 2.0: instances and slaves; events by count, stamp and payload before a step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import fmi2LastSuccessfulTime, fmi2Terminated
+
+from fmus.fmi.described import EventPort
+from fmus.fmi.instance import Instance
+from fmus.fmi.native_log import fmi2_callbacks
+from fmus.fmi.ports import is_native
+from fmus.fmi.prepared_step import make_step
+from fmus.fmi.slave import Slave, answer
+from fmus.fmi.standard import TIME_TOLERANCE
+
+
+class FMI2Instance(Instance):
+    """An instance of FMI 2.0, for either interface type. Arguments as for `Instance`."""
+
+    fmi_version = 2
+    event_needs_step = True
+    _state_calls = ("getFMUstate", "setFMUstate", "freeFMUstate")
+
+    def _instantiate(self) -> None:
+        log = {"loggingOn": self.logging} if is_native(self.slave) else {}
+        self.slave.instantiate(callbacks=fmi2_callbacks(self), **log)
+
+    def _find_events(self) -> dict[str, EventPort]:
+        inputs = {v.name: v for v in self.description.modelVariables if v.causality == "input"}
+        references = {name: v.valueReference for name, v in inputs.items()}
+        events = {}
+        for name, variable in inputs.items():
+            stem = name.removesuffix("_count")
+            if stem != name and variable.type == "Integer" and f"{stem}_time" in inputs:
+                events[stem] = EventPort(
+                    stem, variable.valueReference, references[f"{stem}_time"], self._payload_of(stem, references)
+                )
+        return events
+
+    def begin_initialization(self, start_time: float, stop_time: float) -> None:
+        """Set up the experiment and enter Initialization Mode.
+
+        Args:
+            start_time: [s].
+            stop_time: announced to the FMU [s].
+        """
+        slave = self.slave
+        tolerance, words = self.tolerance_argument()
+        self.guard(
+            f"setupExperiment{words}",
+            lambda: slave.setupExperiment(startTime=start_time, stopTime=stop_time, **tolerance),
+        )
+        self.guard("enterInitializationMode", slave.enterInitializationMode)
+
+
+class FMI2Slave(FMI2Instance, Slave):
+    """A co-simulation slave of FMI 2.0. Arguments as for `Slave`."""
+
+    def _instantiate(self) -> None:
+        super()._instantiate()
+        # its state may be set back: nothing of the past may be forgotten
+        self._do_step = make_step(self.slave, "fmi2DoStep", False)
+        self._forget()
+
+    def _forget(self) -> None:
+        self._counts = dict.fromkeys(self.events, 0)
+
+    def enter_initialization(self, start_time: float, stop_time: float) -> None:  # noqa: D102 - see Slave
+        self.time = start_time
+        self.begin_initialization(start_time, stop_time)
+
+    def exit_initialization(self) -> None:  # noqa: D102 - see Slave
+        self.guard("exitInitializationMode", self.slave.exitInitializationMode)
+        self._running = True
+
+    def advance(self, t: float, until: float) -> None:  # noqa: D102 - see Slave
+        self._step_whole(self._do_step, self._after_refusal, t, until)
+
+    def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Slave
+        self._counts[event.name] += 1
+        fields, count = event.fields(stamp, payload), self._counts[event.name]
+        self.guard(f"payload of event '{event.name}'", lambda: self.slave.setReal(list(fields), list(fields.values())))
+        self.guard(f"count of event '{event.name}'", lambda: self.slave.setInteger([event.trigger], [count]))
+
+    def _remember(self) -> tuple[Any, ...]:
+        return dict(self._counts), self.time, self.terminated
+
+    def _recall(self, remembered: tuple[Any, ...]) -> None:
+        counts, self.time, self.terminated = remembered
+        self._counts = dict(counts)
+
+    def _after_refusal(self, error: FMICallException, t: float, until: float) -> None:
+        """A discarded step is the end: the slave has terminated, or it cannot do this step and its state is lost."""
+        self._raise_unless_discarded(error, t)
+        reached = answer(self.slave.getRealStatus, fmi2LastSuccessfulTime)
+        if not answer(self.slave.getBooleanStatus, fmi2Terminated):  # one that cannot say why has not terminated
+            raise self._not_done(t, until, reached) from error
+        self.time = t if reached is None else min(max(float(reached), t), until)
+        if self.time <= t + TIME_TOLERANCE and self._says_why():
+            raise self.explained("doStep", error, t) from error  # it did nothing
+        self.terminated = True
+
+    def _says_why(self) -> bool:
+        """Whether what the slave logged last tells why it did nothing."""
+        return False

@@ -1,0 +1,287 @@
+"""FMI 3.0: instances and slaves; clocks, event mode, early return, time events."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Callable, Mapping, Sequence
+from time import perf_counter
+from typing import Any
+
+from fmpy.model_description import ModelDescription, ModelVariable
+
+from fmus.fmi.clocks import ClockSchedule
+from fmus.fmi.described import EventPort
+from fmus.fmi.instance import Instance
+from fmus.fmi.intermediate import IntermediateUpdate
+from fmus.fmi.interruption import EventMet
+from fmus.fmi.native_calls import prepared_call
+from fmus.fmi.ports import is_native
+from fmus.fmi.quick_calls import quicken
+from fmus.fmi.slave import Slave
+from fmus.fmi.standard import DISCARD, MAX_EVENT_ITERATIONS, MAX_RETURNS_PER_STEP, NEVER, TIME_TOLERANCE
+
+
+class FMI3Instance(Instance):
+    """An instance of FMI 3.0, for either interface type. Arguments as for `Instance`."""
+
+    fmi_version = 3
+    event_needs_step = False
+    _state_calls = ("getFMUState", "setFMUState", "freeFMUState")
+
+    def _instantiate(self) -> None:
+        log = {"loggingOn": self.logging} if is_native(self.slave) else {}
+        self.slave.instantiate(
+            logMessage=lambda _environment, status, category, message: self.note(message, status, category),
+            **log,
+            **self._step_arguments(),
+        )
+
+    def _step_arguments(self) -> dict[str, Any]:
+        """Further arguments of instantiate."""
+        return {}
+
+    def _find_events(self) -> dict[str, EventPort]:
+        variables = self.description.modelVariables
+        events = {}
+        for clock in variables:
+            if clock.type == "Clock" and clock.causality == "input" and clock.intervalVariability == "triggered":
+                clocked = {v.name: v.valueReference for v in variables if _is_clocked_by(v, clock)}
+                stamp = clocked.get(f"{clock.name}_time")
+                events[clock.name] = EventPort(
+                    clock.name, clock.valueReference, stamp, self._payload_of(clock.name, clocked)
+                )
+        return events
+
+    def begin_initialization(self, start_time: float, stop_time: float) -> None:
+        """Enter Initialization Mode.
+
+        Args:
+            start_time: [s].
+            stop_time: announced to the FMU [s].
+        """
+        call = self.slave.enterInitializationMode
+        tolerance, words = self.tolerance_argument()
+        self.guard(
+            f"enterInitializationMode{words}", lambda: call(startTime=start_time, stopTime=stop_time, **tolerance)
+        )
+
+
+class FMI3Slave(FMI3Instance, Slave):
+    """A co-simulation slave of FMI 3.0. Arguments as for `Slave`.
+
+    It handles its events itself, unless somebody coordinates it: then it stops at an event (`EventMet`), says so
+    (`event_pending`), and is taken through Event Mode from outside. `next_event` is when something known in advance is
+    due, `clocks` are its time-based input clocks.
+    """
+
+    def __init__(self, name: str, slave: Any, description: ModelDescription) -> None:
+        super().__init__(name, slave, description)
+        self._intermediate = IntermediateUpdate()
+        clocks = description.modelVariables if self.has_event_mode else []
+        self.clocks = ClockSchedule(lambda: self.slave, clocks, self.failure)
+        self.coordinated = self.event_pending = False
+        self.interrupts_from = -math.inf  # [s]; early returns before it are handled here even when coordinated
+
+    def _instantiate(self) -> None:
+        super()._instantiate()
+        native = is_native(self.slave)
+        self._do_step = _native_step(self.slave) if native else self.slave.doStep
+        if native:
+            quicken(self.slave)
+
+    def enter_initialization(self, start_time: float, stop_time: float) -> None:  # noqa: D102 - see Slave
+        self.time = start_time
+        self.begin_initialization(start_time, stop_time)
+
+    def exit_initialization(self) -> None:  # noqa: D102 - see Slave
+        if self.clocks:
+            self.guard("intervals of clocks", lambda: self.clocks.begin(self.time))
+        self.guard("exitInitializationMode", self.slave.exitInitializationMode)
+        self._running = True
+        if self.has_event_mode:
+            self._settle()
+
+    def step(self, t: float, until: float) -> tuple[float, bool]:
+        """One doStep from `t` towards `until` [s]; returns the time reached and whether event handling is needed.
+
+        Raises:
+            RunError: doStep failed, or says that it reached a time outside the step.
+        """
+        note = self._call_note
+        note.call[0], note.time[0] = self._step_number, t
+        begin = perf_counter()
+        try:
+            event, terminate, early, reached = self._do_step(t, until - t)
+            if self._intermediate.requested:
+                self._intermediate.check()
+        except self.mistakes:
+            raise
+        except Exception as error:
+            raise self._step_failed(error, t, until) from error
+        finally:
+            self.seconds += perf_counter() - begin
+            self.calls += 1
+        if terminate:
+            self.terminated = True
+            # a slave that stops on the way says where
+            early = early or t + TIME_TOLERANCE < reached < until - TIME_TOLERANCE
+        # lastSuccessfulTime may then be that of an internal step: the slave stands where it was asked to go
+        if not early:
+            self.time = until
+            return until, event
+        if not t - TIME_TOLERANCE <= reached <= until + TIME_TOLERANCE:
+            raise self.failure(f"doStep to {until:g} s says that it reached {reached!r} s", t)
+        self.time = min(max(float(reached), t), until)
+        return self.time, event
+
+    def _step_failed(self, error: Exception, t: float, until: float) -> Exception:
+        if getattr(error, "status", None) != DISCARD:
+            return self.explained("doStep", error, t)
+        return self.failure(f"doStep was discarded: asked for {until:g} s; try a smaller communication step", t)
+
+    def advance(self, t: float, until: float) -> None:  # noqa: D102 - see Component
+        if self.next_event == NEVER:  # the ordinary step: nothing is due, and mostly nothing happens
+            reached, event = self.step(t, until)
+            if event and self.has_event_mode and not self.terminated:
+                self._meet_event(reached, until)
+            if self.terminated or until - reached <= TIME_TOLERANCE:
+                return
+            t = reached
+        for _ in range(MAX_RETURNS_PER_STEP):
+            if self.has_event_mode and not self.coordinated and self.next_event <= t + TIME_TOLERANCE:
+                self.handle_event()
+            t = self.step_towards(t, until)
+            if self.terminated or until - t <= TIME_TOLERANCE:
+                return
+        raise self.failure(f"returned early {MAX_RETURNS_PER_STEP} times without reaching {until:g} s", t)
+
+    def step_towards(self, t: float, until: float) -> float:
+        """One doStep to `until` or to the next time event before it, with the event handled; returns the time reached
+        [s].
+        """
+        reached, event = self.step(t, self.next_stop(t, until))
+        if self.has_event_mode and not self.terminated and self.is_event(reached, event):
+            self._meet_event(reached, until)
+        return reached
+
+    def next_stop(self, t: float, until: float) -> float:
+        """Where the next doStep from `t` must end: `until`, or the time event before it where the step may vary [s]."""
+        ahead = t + TIME_TOLERANCE < self.next_event < until - TIME_TOLERANCE
+        return self.next_event if ahead and self.can_vary_step else until
+
+    def is_event(self, reached: float, event: bool) -> bool:
+        """Whether events must be handled at the time reached [s]: the slave says so, or its time event is due."""
+        return event or reached >= self.next_event - TIME_TOLERANCE
+
+    def handle_event(self) -> None:
+        """Enter event mode, let due clocks tick, settle, and return to step mode."""
+        self.enter_event_mode()
+        self.tick_due_clocks()
+        self._settle()
+
+    def enter_event_mode(self) -> None:
+        """From Step Mode to Event Mode."""
+        self.guard("enterEventMode", self.slave.enterEventMode)
+
+    def tick_due_clocks(self) -> list[int]:
+        """In Event Mode: set the time-based clocks active that are due here; returns their value references."""
+        due = self.clocks.due(self.time) if self.clocks else []
+        if due:
+            self.set_clocks([clock.variable.valueReference for clock in due])
+            self.clocks.tick(due)
+        return [clock.variable.valueReference for clock in due]
+
+    def set_clocks(self, references: Sequence[int]) -> None:
+        """In Event Mode: set input clocks active."""
+        self.guard("setClock", lambda: self.slave.setClock(list(references), [True] * len(references)))
+
+    def ticking(self, references: Sequence[int]) -> list[bool]:
+        """In Event Mode: which of these output clocks are active."""
+        return [bool(x) for x in self.guard("getClock", lambda: self.slave.getClock(list(references)))]
+
+    def update_discrete_states(self) -> bool:
+        """In Event Mode: end a super-dense instant; True where the slave needs another one."""
+        again, terminate, _, _, defined, next_time = self.guard("updateDiscreteStates", self.slave.updateDiscreteStates)
+        self.terminated |= bool(terminate)
+        if defined and math.isnan(next_time):
+            raise self.failure("updateDiscreteStates says that the next event is at t = nan")
+        if self.clocks:
+            self.guard("intervals of clocks", lambda: self.clocks.ask(self.time))
+        self.next_event = min(float(next_time) if defined else NEVER, self.clocks.next)
+        self.event_pending = False
+        return bool(again)
+
+    def enter_step_mode(self) -> None:
+        """From Event Mode to Step Mode."""
+        self.guard("enterStepMode", self.slave.enterStepMode)
+
+    def _meet_event(self, reached: float, until: float) -> None:
+        """An event at the time reached [s] of a step to `until` [s]: handle it, or leave it to who coordinates."""
+        early = until - reached > TIME_TOLERANCE
+        if not self.coordinated or (early and reached < self.interrupts_from - TIME_TOLERANCE):
+            self.handle_event()
+            return
+        self.event_pending = True
+        if early:
+            raise EventMet(self, reached)
+
+    def report_clock(self, clock: int) -> bool:
+        """Handle an event; True where the triggered output clock ticked."""
+        self.enter_event_mode()
+        self.tick_due_clocks()
+        ticked = self.ticking([clock])[0]
+        self._settle()
+        return ticked
+
+    def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Slave
+        self.guard(f"event '{event.name}'", lambda: self._deliver(event, stamp, payload))
+
+    def _deliver(self, event: EventPort, stamp: float, payload: Mapping[str, float]) -> None:
+        slave, fields = self.slave, event.fields(stamp, payload)
+        slave.enterEventMode()
+        slave.setClock([event.trigger], [True])
+        if fields:
+            slave.setFloat64(list(fields), list(fields.values()))
+        self._settle()
+
+    def _settle(self) -> None:
+        for _ in range(MAX_EVENT_ITERATIONS):
+            if not self.update_discrete_states():
+                break
+        else:
+            raise self.failure(f"discrete states do not settle in {MAX_EVENT_ITERATIONS} updates")
+        self.enter_step_mode()
+
+    def _remember(self) -> tuple[Any, ...]:
+        return self.next_event, self.time, self.terminated, self.event_pending, self.clocks.save()
+
+    def _recall(self, remembered: tuple[Any, ...]) -> None:
+        self.next_event, self.time, self.terminated, self.event_pending, clocks = remembered
+        self.clocks.restore(clocks)
+
+    def _step_arguments(self) -> dict[str, Any]:
+        early = self.capabilities.mightReturnEarlyFromDoStep
+        return {"eventModeUsed": self.has_event_mode, "earlyReturnAllowed": early} | self._intermediate.arguments
+
+
+def _is_clocked_by(variable: ModelVariable, clock: ModelVariable) -> bool:
+    """fmpy puts the clocks themselves where it read a file, and value references where a description was made in
+    Python.
+    """
+    return any(entry is clock or entry == clock.valueReference for entry in variable.clocks or ())
+
+
+def _native_step(slave: Any) -> Callable[[float, float], tuple[bool, bool, bool, float]]:
+    """fmpy's doStep of a native slave with its four results allocated once instead of at every call."""
+    event, terminate, early, reached = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool(), ctypes.c_double()
+    results = (ctypes.byref(event), ctypes.byref(terminate), ctypes.byref(early), ctypes.byref(reached))
+    start, length = ctypes.c_double(), ctypes.c_double()
+    call = prepared_call(slave, "fmi3DoStep", slave.component, start, length, ctypes.c_bool(False), *results)
+
+    def do_step(t: float, h: float) -> tuple[bool, bool, bool, float]:
+        start.value, length.value, reached.value = t, h, t + h  # the last for slaves that do not fill it in
+        call()
+        return event.value, terminate.value, early.value, reached.value
+
+    return do_step

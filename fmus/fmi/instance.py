@@ -1,0 +1,323 @@
+"""Instances: what co-simulation and model exchange have in common, for every FMI version, native or a Python block.
+
+An instance wraps an object with the call surface of fmpy's classes. Every call is guarded: whatever the FMU or fmpy
+throws comes out as one kind of error, which the subclass makes in `failure`.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+from fmpy.fmi1 import FMICallException
+from fmpy.model_description import ModelDescription
+
+from fmus.fmi.derivatives import directional_derivative
+from fmus.fmi.described import Described
+from fmus.fmi.elements import layout
+from fmus.fmi.exact_ports import Values
+from fmus.fmi.native_log import forget
+from fmus.fmi.ports import is_native
+from fmus.fmi.standard import FATAL
+from fmus.fmi.values import element_reader, element_writer, exact_reader, exact_writer
+
+INSTANTIATING = "instantiate"
+NAMES_SHOWN = 6
+
+
+class Instance(Described):
+    """One instance, from `instantiate` to `free`.
+
+    Args:
+        name: of the instance.
+        slave: object with fmpy's call surface, not yet instantiated.
+        description: its model description.
+    """
+
+    mistakes: tuple[type[Exception], ...] = ()
+    """What is passed on as it is: it says nothing of the FMU."""
+
+    logging = False
+    """Whether the FMU is asked to log."""
+
+    without_states = ""
+    """What to say of a state that cannot be had."""
+
+    def __init__(self, name: str, slave: Any, description: ModelDescription) -> None:
+        super().__init__(name, description)
+        self.slave = slave
+        self.negated: frozenset[str] = frozenset()  # variables whose slave holds the value with the other sign (FMI 1)
+        self.terminated = False
+        self._alive = self._running = False
+        self._loaded = is_native(slave)
+
+    # -- how it stands ----------------------------------------------------------------------------------------------
+
+    @property
+    def running(self) -> bool:
+        """Whether initialisation is over and the end has not come."""
+        return self._running
+
+    @property
+    def usable(self) -> bool:
+        """Whether the slave may still be called: instantiated, and no fatal error so far."""
+        return self._alive
+
+    # -- life -------------------------------------------------------------------------------------------------------
+
+    def instantiate(self) -> None:
+        """Create the instance. Raises what `failure` makes where the slave refuses."""
+        self.guard(INSTANTIATING, self._instantiate)
+        self._alive = True
+
+    def reset(self) -> None:
+        """Back to the state after `instantiate`."""
+        self.guard("reset", self.slave.reset)
+        self._forget()
+        self.terminated = self._running = False
+
+    def terminate(self) -> None:
+        """End the run; errors of a dying instance are of no interest."""
+        if self._alive and self._running:
+            self._running = False
+            self._quietly("terminate", self.slave.terminate)
+
+    def free(self) -> None:
+        """Free the instance and its library."""
+        if self._alive:
+            self._alive = False
+            self._quietly("freeInstance", self.slave.freeInstance)
+        elif self._loaded and self.slave.component is None:
+            self._quietly("unloading", self.slave.freeLibrary)  # never instantiated: freeInstance did not do it
+        self._loaded = False
+        forget(self)
+
+    # -- values -----------------------------------------------------------------------------------------------------
+
+    def reader(self, names: Sequence[str], values: np.ndarray) -> Callable[[], None]:
+        """A call that reads scalars and elements.
+
+        Args:
+            names: what is read.
+            values: where to, shape (len(names),), a contiguous view of the caller's array.
+
+        Returns:
+            The call, prepared once; it takes no arguments.
+        """
+        return self.guarded(f"reading {shown(names)}", self._unguarded_reader(names, values))
+
+    def writer(self, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
+        """A call that writes scalars and elements.
+
+        Args:
+            names: what is written.
+
+        Returns:
+            The call, prepared once, and the array of shape (len(names),) it writes from.
+        """
+        write, buffer = self._unguarded_writer(names)
+        return self.guarded(f"writing {shown(names)}", write), buffer
+
+    def exact_reader(self, name: str) -> Callable[[], Values]:
+        """A call that returns the values of a whole variable as they are: texts, bytes, integers of any size.
+
+        Args:
+            name: of the variable. The values of an array come row by row.
+        """
+        read = exact_reader(self, self.variables[name])
+        return lambda: self.guard(f"reading {name}", read)
+
+    def exact_writer(self, name: str) -> Callable[[Sequence[Any]], None]:
+        """A call that writes the values of a whole variable as they are.
+
+        Args:
+            name: of the variable.
+        """
+        write = exact_writer(self, self.variables[name])
+        return lambda values: self.guard(f"writing {name}", lambda: write(values))
+
+    def directional_derivative(
+        self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
+    ) -> np.ndarray:
+        """Derivatives of scalars and elements along a direction.
+
+        Args:
+            unknowns: outputs and the like. An array stands for all its elements.
+            knowns: inputs and the like.
+            seed: the direction, shape (len(knowns),).
+
+        Returns:
+            The derivatives, shape (len(unknowns),).
+        """
+        spreads = [layout([e for name in names for e in self.variables.expanded(name)]) for names in (unknowns, knowns)]
+        found: np.ndarray = self.guard(
+            "getDirectionalDerivative", directional_derivative(self.slave, spreads[0], spreads[1], seed)
+        )
+        return found
+
+    # -- state ------------------------------------------------------------------------------------------------------
+
+    def save(self) -> Any:
+        """The state, to be restored any number of times and released once."""
+        return self._slave_state(), self._remember()
+
+    def restore(self, state: Any) -> None:
+        """Return to a saved state.
+
+        Args:
+            state: of this instance, from `save` or `deserialize`.
+        """
+        self.guard(self._state_calls[1], lambda: getattr(self.slave, self._state_calls[1])(state[0]))
+        self._recall(state[1])
+
+    def release(self, state: Any) -> None:
+        """Free a saved state.
+
+        Args:
+            state: of this instance.
+        """
+        if self._alive:
+            self.guard(self._state_calls[2], lambda: getattr(self.slave, self._state_calls[2])(state[0]))
+
+    def serialize(self, state: Any) -> bytes:
+        """A saved state as bytes.
+
+        Args:
+            state: of this instance.
+        """
+        return bytes(self.guard("serializeFMUState", lambda: self.slave.serializeFMUState(state[0])))
+
+    def deserialize(self, content: bytes) -> Any:
+        """A saved state from bytes; what the slave's own state does not hold is as it is here and now.
+
+        Args:
+            content: from `serialize`, of this or another instance of the FMU.
+        """
+        return self.guard("deserializeFMUState", lambda: self.slave.deserializeFMUState(content)), self._remember()
+
+    # -- errors -----------------------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def failure(self, reason: str, t: float | None = None) -> Exception:
+        """An error of this instance, with what it logged last.
+
+        Args:
+            reason: what happened.
+            t: when [s]; by default where it stands.
+        """
+
+    @abstractmethod
+    def note(self, message: str | bytes | None, status: int | str = 0, category: str | bytes | None = None) -> None:
+        """Take a message of the slave's own log.
+
+        Args:
+            message: the text.
+            status: of FMI, by number or name.
+            category: as the slave names it.
+        """
+
+    def guard(self, what: str, call: Callable[[], Any]) -> Any:
+        """Run a call of the slave; whatever it throws becomes an error of this instance.
+
+        Args:
+            what: the call, for the error.
+            call: takes no arguments.
+
+        Returns:
+            What the call returned.
+        """
+        try:
+            return call()
+        except self.mistakes:
+            raise
+        except Exception as error:
+            raise self.explained(what, error) from error
+
+    def guarded(self, what: str, call: Callable[[], None]) -> Callable[[], None]:
+        """The same for a call that is made often.
+
+        Args:
+            what: the call, for the error.
+            call: takes no arguments.
+        """
+        mistakes = self.mistakes
+
+        def guarded() -> None:
+            try:
+                call()
+            except mistakes:
+                raise
+            except Exception as error:
+                raise self.explained(what, error) from error
+
+        return guarded
+
+    def explained(self, what: str, error: Exception, t: float | None = None) -> Exception:
+        """The error of this instance for what a call threw. After a fatal one the slave is not called again.
+
+        Args:
+            what: the call.
+            error: what it threw.
+            t: when [s]; by default where it stands.
+        """
+        if isinstance(error, FMICallException) and getattr(error, "status", None) == FATAL:
+            self._alive = self._running = False
+        return self.failure(f"{what} failed: {error or type(error).__name__}", t)
+
+    # -- what versions and interface types add ----------------------------------------------------------------------
+
+    _state_calls: tuple[str, str, str]
+    """The slave's functions that save, restore and free a state."""
+
+    @abstractmethod
+    def _instantiate(self) -> None: ...
+
+    def _forget(self) -> None:
+        """Drop what is remembered of a run; by default there is nothing."""
+        return
+
+    def _remember(self) -> tuple[Any, ...]:
+        """What belongs to a state beside the slave's own."""
+        return ()
+
+    def _recall(self, remembered: tuple[Any, ...]) -> None:
+        """Return to what `_remember` gave."""
+
+    # -- internals --------------------------------------------------------------------------------------------------
+
+    def _slave_state(self) -> Any:
+        """A state from the slave; a null pointer is none, and to restore it would end the process."""
+        name = self._state_calls[0]
+        try:
+            state = getattr(self.slave, name)()
+            if getattr(state, "value", state) is None:
+                raise RuntimeError("the slave gave no state")
+        except self.mistakes:
+            raise
+        except Exception as error:
+            raise self.explained(f"{name}{self.without_states}", error) from error
+        return state
+
+    def _unguarded_reader(self, names: Sequence[str], values: np.ndarray) -> Callable[[], None]:
+        return element_reader(self, names, values)
+
+    def _unguarded_writer(self, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
+        return element_writer(self, names)
+
+    def _quietly(self, what: str, call: Callable[[], Any]) -> None:
+        """Run a call that changes nothing any more where it fails."""
+        with suppress(Exception):
+            self.guard(what, call)
+
+
+def shown(names: Sequence[str]) -> str:
+    """The first names, and how many more there are.
+
+    Args:
+        names: of variables.
+    """
+    more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
+    return ", ".join(names[:NAMES_SHOWN]) + more

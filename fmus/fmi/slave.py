@@ -1,0 +1,159 @@
+"""Slaves: instances for co-simulation of any FMI version, with what their steps have in common."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from time import perf_counter
+from typing import Any, Protocol
+
+from fmpy.fmi1 import FMICallException
+from fmpy.model_description import ModelDescription
+
+from fmus.fmi.described import EventPort
+from fmus.fmi.instance import Instance
+from fmus.fmi.standard import DISCARD, NEVER, PENDING
+
+Refused = Callable[[FMICallException, float, float], None]
+
+
+class CallNote(Protocol):
+    """Where the step under way is noted: its number in `call[0]`, its time [s] in `time[0]`."""
+
+    call: Any
+    time: Any
+
+
+class Unnoted:
+    """A note that nobody reads."""
+
+    def __init__(self) -> None:
+        self.call, self.time = [0], [math.nan]
+
+
+class Slave(Instance):
+    """A co-simulation instance. Its life: `instantiate`, `enter_initialization`, readers and writers in turn,
+    `exit_initialization`, then `advance` and `notify` in turn, `terminate`, `free`.
+
+    `time` is where it stands [s], `next_event` when something known in advance is due [s]; `seconds` were spent in
+    `calls` calls of doStep; `terminated` says that the slave asked for the end of the run.
+
+    Args:
+        name: of the instance.
+        slave: object with fmpy's slave call surface, not yet instantiated.
+        description: its model description.
+    """
+
+    def __init__(self, name: str, slave: Any, description: ModelDescription) -> None:
+        super().__init__(name, slave, description)
+        self.seconds, self.calls = 0.0, 0
+        self.time, self.next_event = math.nan, NEVER
+        self._call_note: CallNote = Unnoted()
+        self._step_number = 0
+
+    def reset(self) -> None:
+        """Back to the state after `instantiate`."""
+        super().reset()
+        self.time, self.next_event = math.nan, NEVER
+
+    @abstractmethod
+    def enter_initialization(self, start_time: float, stop_time: float) -> None:
+        """Begin initialisation.
+
+        Args:
+            start_time: [s].
+            stop_time: announced to the slave [s].
+        """
+
+    @abstractmethod
+    def exit_initialization(self) -> None:
+        """End initialisation, discrete states settled."""
+
+    @abstractmethod
+    def advance(self, t: float, until: float) -> None:
+        """Step to a time, own time events on the way included. Raises what `failure` makes where it does not get there.
+
+        Args:
+            t: where it stands [s].
+            until: where to [s].
+        """
+
+    @abstractmethod
+    def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:
+        """Deliver a triggered event.
+
+        Args:
+            event: one of `events`.
+            t: current time of the slave [s].
+            stamp: when the event happened [s]: at or before `t`, or within the coming step where the slave takes
+                stamps.
+            payload: fields by name; fields that the slave does not declare are dropped.
+
+        Where `event_needs_step` says so, only the last event before a step happens, and it happens in that step.
+        """
+
+    def pending(self, t: float) -> Exception:
+        """The error of a slave that returned from doStep before it was done.
+
+        Args:
+            t: when [s].
+        """
+        asynchronous = (
+            "as canRunAsynchronuously allows" if self.capabilities.canRunAsynchronuously else "against its description"
+        )
+        return self.failure(
+            f"doStep returned before it was done (status pending), {asynchronous}; slaves that compute asynchronously "
+            "are not stepped here. Export the FMU without asynchronous computation.",
+            t,
+        )
+
+    # -- internals --------------------------------------------------------------------------------------------------
+
+    def _step_whole(self, do_step: Callable[[float, float], Any], refused: Refused, t: float, until: float) -> None:
+        """One timed doStep of a slave that gets to `until` [s] or refuses (FMI 1, 2)."""
+        note = self._call_note
+        note.call[0], note.time[0] = self._step_number, t
+        begin = perf_counter()
+        try:
+            do_step(t, until - t)
+            self.time = until
+        except FMICallException as error:
+            refused(error, t, until)
+        except self.mistakes:
+            raise
+        except Exception as error:
+            raise self.explained("doStep", error, t) from error
+        finally:
+            self.seconds += perf_counter() - begin
+            self.calls += 1
+
+    def _raise_unless_discarded(self, error: FMICallException, t: float) -> None:
+        """Of a discarded step the slave can be asked why (FMI 1, 2); everything else is an error."""
+        if error.status == PENDING:
+            raise self.pending(t) from error
+        if error.status != DISCARD:
+            raise self.explained("doStep", error, t) from error
+
+    def _not_done(self, t: float, until: float, reached: float | None) -> Exception:
+        """The error of a discarded step from `t` to `until`, of which it did the part to `reached` [s]."""
+        known = "it does not say how far it came" if reached is None else f"it came to {reached:g} s"
+        return self.failure(
+            f"doStep was discarded: asked for {until:g} s, {known}; try a smaller communication step", t
+        )
+
+
+def answer(ask: Callable[[int], Any], kind: int) -> Any:
+    """What a slave says of its last step.
+
+    Args:
+        ask: one of its status functions.
+        kind: of status, in the numbers of FMI.
+
+    Returns:
+        The value; None where it cannot say.
+    """
+    try:
+        return ask(kind)
+    except Exception:
+        return None
