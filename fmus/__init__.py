@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from fmus.build import build_fmu
     from fmus.cache import cached_fmu
     from fmus.content.generate import GenerationError
-    from fmus.folders import cache_folder
     from fmus.recipes import RECIPES, UnknownRecipeError, recipe
     from fmus.toolchain.compile import CompilationError, CompilerMissing
+    from plant_models.disk_cache.folder import cache_folder
 
 __all__ = [
     "RECIPES",
@@ -42,7 +42,7 @@ _HOMES = {
     "GenerationError": "fmus.content.generate",
     "UnknownRecipeError": "fmus.recipes",
     "build_fmu": "fmus.build",
-    "cache_folder": "fmus.folders",
+    "cache_folder": "plant_models.disk_cache.folder",
     "cached_fmu": "fmus.cache",
     "recipe": "fmus.recipes",
 }

@@ -2,23 +2,20 @@
 
 An FMU is kept under a digest of all that decides its bytes: the equations, the model description, the runtime, the
 generator and the compiler. There is nothing to invalidate and nothing to lock: two processes that build the same FMU at
-the same time write the same bytes, each in one move.
+the same time write the same bytes, each in one move. Which digest a request leads to is kept as well, so that a system
+need not be traced to find its FMU; code that changed without changing the equations finds the same FMU again.
 """
 
 from __future__ import annotations
 
 import hashlib
 import inspect
-import os
 import sys
-import zipfile
-import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 from weakref import WeakKeyDictionary
 
 import casadi as ca
@@ -26,11 +23,15 @@ import casadi as ca
 from fmu_observer.description import FmiVersion
 from fmu_observer.event_protocol import EventProtocol
 from fmus.build import Draft, Plan, plan_fmu, runtime_sources, standard_headers
-from fmus.folders import cache_folder
+from fmus.toolchain.platforms import Platform
 from fmus.toolchain.targets import Target, choose_targets
+from plant_models.disk_cache.entries import keep, recall
+from plant_models.disk_cache.files import is_sealed, seal
+from plant_models.disk_cache.folder import cache_folder
+from plant_models.disk_cache.identity import identity
 from plant_models.hybrid import HybridSystem
 
-_known: WeakKeyDictionary[HybridSystem, dict[Any, Path]] = WeakKeyDictionary()
+_known: WeakKeyDictionary[HybridSystem, dict[str, str]] = WeakKeyDictionary()
 
 
 def cached_fmu(
@@ -54,7 +55,7 @@ def cached_fmu(
     """
     entry = cache_entry(system, fmi_version, preset, protocol)
     if entry.draft is not None:
-        entry.draft.pack(entry.draft.compile(), entry.path)
+        entry.pack(entry.draft.compile())
     return entry.path
 
 
@@ -69,48 +70,68 @@ class CacheEntry:
     path: Path
     draft: Draft | None = None
 
+    def pack(self, libraries: dict[Platform, bytes]) -> None:
+        """Write the file, and the seal by which it is known to be whole.
+
+        Args:
+            libraries: what `Draft.compile` returned.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        assert self.draft is not None
+        seal(self.draft.pack(libraries, self.path))
+
 
 def cache_entry(
     system: HybridSystem, fmi_version: FmiVersion = 3, preset: str | None = None, protocol: EventProtocol | None = None
 ) -> CacheEntry:
     """`cached_fmu` up to the compiler, for those who build several FMUs at a time.
 
+    A system with an identity is traced only where its FMU was never asked for with this code and compiler.
+
     Args:
-        system: the system to be built. fmi_version: 2 or 3. preset: its preset; None for the defaults.
-        protocol: how events are announced.
+        system: the hybrid system. fmi_version: 2 or 3. preset: its preset; None for the default.
+        protocol: how it is told of triggered events; None for the default.
+
+    Returns:
+        The place of the FMU, with a draft where it is not there, or not whole.
 
     Raises:
         ValueError, CompilerMissing: as `cached_fmu`.
     """
-    folder = cache_folder()
-    by_request = _known.setdefault(system, {})
-    request = (fmi_version, preset, protocol, folder, os.environ.get("CC"))
-    known = by_request.get(request)  # a system does not change once it is built, so within one process this is enough
-    if known is not None and _is_whole(known):
-        return CacheEntry(known)
-    plan, targets = plan_fmu(system, fmi_version, preset, protocol), choose_targets()
-    path = by_request[request] = folder / content_key(plan, targets) / f"{system.name}.fmu"
-    return CacheEntry(path, None if _is_whole(path) else Draft.of(plan, targets))
+    targets = choose_targets()
+    request = fmi_version, preset, protocol, [f"{t.platform.name} {t.compiler.identity()}" for t in targets]
+    key = identity(system, request, code=("fmus",))
+    known = _known_content(system, key, repr(request))
+    if known is not None:
+        path = _place(system, known)
+        if is_sealed(path):
+            return CacheEntry(path)
+    plan = plan_fmu(system, fmi_version, preset, protocol)
+    content = content_key(plan, targets)
+    _keep_content(system, key, repr(request), content)
+    path = _place(system, content)
+    return CacheEntry(path, None if is_sealed(path) else Draft.of(plan, targets))
 
 
-def _is_whole(path: Path) -> bool:
-    """Whether an FMU is there and all of it can be read: a full disk, or a machine that stopped, may have left a
-    part.
-    """
-    try:
-        stamp = path.stat()
-        return _can_be_read(path, stamp.st_size, stamp.st_mtime_ns)
-    except OSError:
-        return False
+def _place(system: HybridSystem, content: str) -> Path:
+    return cache_folder() / content / f"{system.name}.fmu"
 
 
-@cache
-def _can_be_read(path: Path, _size: int, _modified: int) -> bool:
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return archive.testzip() is None
-    except (OSError, ValueError, EOFError, NotImplementedError, zipfile.BadZipFile, zlib.error):
-        return False
+def _known_content(system: HybridSystem, key: str | None, request: str) -> str | None:
+    """The content key of a request that was met before: ever, or for a system without identity in this process."""
+    if key is None:
+        return _known.get(system, {}).get(request)
+    found = recall("fmu", key)
+    return found if isinstance(found, str) else None
+
+
+def _keep_content(system: HybridSystem, key: str | None, request: str, content: str) -> None:
+    if key is None:  # a system does not change once it is built, so within one process this is enough
+        _known.setdefault(system, {})[request] = content
+    else:
+        keep("fmu", key, content)
 
 
 def content_key(plan: Plan, targets: Sequence[Target]) -> str:

@@ -60,7 +60,7 @@ def _identity(entry: Mapping[str, Any]) -> Identity:
 
 def _vendor_file(entry: Mapping[str, Any]) -> Path | None:
     """The FMU that a user brought; None for blocks and for shipped models, which are built anew on every machine."""
-    from fmus.folders import cache_folder  # noqa: PLC0415 - only where a result is at hand
+    from plant_models.disk_cache.folder import cache_folder  # noqa: PLC0415 - only where a result is at hand
 
     path = Path(str(entry.get("source") or ""))
     if entry.get("kind") != "FMU" or not path.is_file() or cache_folder() in path.parents:

@@ -9,9 +9,9 @@ from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
-from fmus.folders import cache_folder
 from fmus.toolchain.cached_library import cached_library
 from fmus.toolchain.compile import Compiler, find_compiler
+from plant_models.disk_cache.folder import cache_folder
 
 SOURCES = ("stepper.c", "balises.c", "notifying.c", "slave.c", "stepper.h")  # the first one includes the others
 

@@ -15,7 +15,10 @@ from typing import Any
 
 from cosim.errors import FmuLoadError
 from cosim.scenario.tables import Backend, ComponentTable
+from fmus.build import Draft
+from fmus.cache import CacheEntry, cache_entry
 from fmus.toolchain.compile import CompilerMissing, find_compiler
+from fmus.toolchain.platforms import Platform
 from plant_models.hybrid import HybridSystem
 
 NATIVE: Backend = "fmu3"
@@ -132,47 +135,61 @@ def _note(requests: Mapping[str, Request], made: Realised, faults: Mapping[str, 
 def _build(
     requests: Mapping[str, Request], kinds: Mapping[str, Backend], tell: Tell
 ) -> tuple[dict[str, Path], dict[str, Exception]]:
-    """The FMUs by component, and what went wrong with the others. Only the compilers run beside each other."""
-    from fmus.cache import CacheEntry, cache_entry  # noqa: PLC0415 - only for those who run
-
+    """The FMUs by component, and what went wrong with the others. Systems are traced here, one after the other, while
+    compilers work on those that were traced before.
+    """
     entries: dict[str, CacheEntry] = {}
     faults: dict[str, Exception] = {}
-    for name, request in requests.items():
-        version: Any = int(kinds[name][-1])
+    with ThreadPoolExecutor(AT_A_TIME) as pool:
+        building = _Building(pool, tell)
         try:
-            entries[name] = cache_entry(request.system, version, request.table.preset)
-        except FAULTS as error:
-            faults[name] = error
-    missing = {entry.path: entry.draft for entry in entries.values() if entry.draft is not None}
-    wrong = _compile(missing, tell) if missing else {}
+            for name, request in requests.items():
+                version: Any = int(kinds[name][-1])
+                try:
+                    entries[name] = cache_entry(request.system, version, request.table.preset)
+                except FAULTS as error:
+                    faults[name] = error
+                else:
+                    building.begin(entries[name])
+            wrong = building.finish()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)  # interrupted: what waits is not begun
+            raise
     faults |= {name: wrong[entry.path] for name, entry in entries.items() if entry.path in wrong}
     return {name: entry.path for name, entry in entries.items() if name not in faults}, faults
 
 
-def _compile(drafts: Mapping[Path, Any], tell: Tell) -> dict[Path, Exception]:
-    """Compile and pack; what went wrong, by path."""
-    faults: dict[Path, Exception] = {}
-    tell(f"building {'an FMU' if len(drafts) == 1 else f'{len(drafts)} FMUs'}, kept for later runs")
-    with ThreadPoolExecutor(AT_A_TIME) as pool:
-        working: dict[Future[tuple[Any, float]], Path] = {
-            pool.submit(_timed, draft): path for path, draft in drafts.items()
-        }
-        try:
-            for done in as_completed(working):
-                path = working[done]
-                try:
-                    libraries, seconds = done.result()
-                    drafts[path].pack(libraries, path)
-                except FAULTS as error:
-                    faults[path] = error
-                else:
-                    tell(f"building {path.stem} ... {seconds:.1f} s")
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)  # interrupted: what waits is not begun
-            raise
-    return faults
+class _Building:
+    """FMUs that are being compiled, each once."""
+
+    def __init__(self, pool: ThreadPoolExecutor, tell: Tell) -> None:
+        self._pool, self._tell = pool, tell
+        self._working: dict[Path, tuple[CacheEntry, Future[tuple[dict[Platform, bytes], float]]]] = {}
+
+    def begin(self, entry: CacheEntry) -> None:
+        """Let a compiler work on an FMU that is not there."""
+        if entry.draft is None or entry.path in self._working:
+            return
+        if not self._working:
+            self._tell("building FMUs of shipped models, kept for later runs")
+        self._working[entry.path] = entry, self._pool.submit(_timed, entry.draft)
+
+    def finish(self) -> dict[Path, Exception]:
+        """Pack each as soon as it is compiled; what went wrong, by path."""
+        faults: dict[Path, Exception] = {}
+        entries = {working: entry for entry, working in self._working.values()}
+        for done in as_completed(entries):
+            entry = entries[done]
+            try:
+                libraries, seconds = done.result()
+                entry.pack(libraries)
+            except FAULTS as error:
+                faults[entry.path] = error
+            else:
+                self._tell(f"building {entry.path.stem} ... {seconds:.1f} s")
+        return faults
 
 
-def _timed(draft: Any) -> tuple[Any, float]:
+def _timed(draft: Draft) -> tuple[dict[Platform, bytes], float]:
     begin = perf_counter()
     return draft.compile(), perf_counter() - begin

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from cosim.balises.delivery import Receiver
@@ -21,11 +21,15 @@ from cosim.errors import CouplingError, ScenarioError
 from cosim.scenario.layouts import Layout
 from cosim.scenario.tables import BalisesTable
 from fmus.check.probe import ProbeReport, probe
+from plant_models.disk_cache.entries import keep, recall
+from plant_models.disk_cache.identity import identity
 from plant_models.hybrid.units import UnitError, conversion, parse_unit
 
 BALISE_EVENT = "balise"
 ASKED_FOR = "asked for in the scenario"
 AS_RECORDED = "they are told as they were in an earlier run"
+PROBING = ("fmus", "cosim/components")
+"""The code by which plants are probed."""
 NO_ERROR = PlantError()
 UNTOUCHED = ("early-return", "interpolate")
 """Methods that neither cut nor redo the steps of the plant."""
@@ -133,7 +137,7 @@ def choose_method(
         return Choice(asked, ASKED_FOR, error=plant_error(table, asked, component, start))
     if component.kind == RECORDING:
         return Choice("rollback", PLAYED_BACK) if asked is None else Choice(asked, ASKED_FOR)
-    report = probe(make, starts, start, step)
+    report = known_probe(make, starts, start, step)
     chosen, reason = choose(report.honest_step, report.restores, table.clock)
     method, why = (chosen, reason) if asked is None else (asked, ASKED_FOR)
     choice = Choice(method, why, report, error=plant_error(table, method, component, start, report))
@@ -144,6 +148,22 @@ def choose_method(
             f"instants are off is unknown (time_bound = nan): {choice.error.unknown}."
         )
     return choice
+
+
+def known_probe(make: Callable[[], Component], starts: Mapping[str, Any], start: float, step: float) -> ProbeReport:
+    """The report of a probe, from the cache where the same plant was probed in the same way before.
+
+    Args:
+        make, starts, start, step: as for `choose_method`.
+    """
+    key = identity(make, starts, start, step, code=PROBING)
+    known = None if key is None else recall("probe", key)
+    if known is not None:
+        return ProbeReport(**known | {"remarks": tuple(known["remarks"])})
+    report = probe(make, starts, start, step)
+    if key is not None and report.excited:  # else the FMU may lack something today, a licence say
+        keep("probe", key, asdict(report))
+    return report
 
 
 def plant_error(

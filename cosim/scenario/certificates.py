@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, dataclass
 from math import inf
 from typing import Any
 
@@ -16,6 +16,9 @@ from cosim.scenario.layouts import Layout
 from cosim.scenario.models import make_system
 from cosim.scenario.tables import BalisesTable, ComponentTable
 from fmu_observer.observers.parameter_values import parameter_values
+from plant_models.disk_cache.entries import remembered
+from plant_models.disk_cache.identity import identity
+from plant_models.hybrid import HybridSystem
 
 
 @dataclass(frozen=True)
@@ -98,17 +101,24 @@ def check_certificates(
                 f"limit."
             )
             continue
-        certificates[name], doubt = _judge(name, table, system, gap)
+        certificates[name], doubt = _known_judgement(name, table, system, gap)
         warnings += [*doubt, *_other_spacing(name, table, system, gap)]
     if mode == "require" and warnings:
         raise CertificateError(f"{where}: certificates = 'require' and not all hold.\n" + "\n".join(warnings))
     return certificates, warnings
 
 
+def _known_judgement(name: str, table: ComponentTable, system: Any, gap: ExpectedGap) -> Sequence[Any]:
+    """What `_judge` says, from the cache where it was asked before."""
+    asked = name, system, table.preset, given_parameters(table, system), astuple(gap)
+    key = identity(asked, code=("fmu_observer", "cosim/scenario/certificates.py"))
+    return remembered("certificate", key, lambda: _judge(name, table, system, gap))  # type: ignore[no-any-return]
+
+
 def _judge(name: str, table: ComponentTable, system: Any, gap: ExpectedGap) -> tuple[dict[str, Any], list[str]]:
     """Certificate of one observer as plain data, and what speaks against it, with what would be certified instead."""
     asked = ASKED_FOR_LIMITS_ONLY if gap.seconds is None else gap.seconds
-    in_use = {"parameters": given_parameters(table), "preset": table.preset}
+    in_use = {"parameters": given_parameters(table, system), "preset": table.preset}
     certificate = system.certify(asked, **in_use)
     if gap.seconds is None and gap.distance is not None and certificate.aperiodic_limit == inf:
         # no limit so far: ask for gaps like these
@@ -134,7 +144,7 @@ def _other_spacing(name: str, table: ComponentTable, system: Any, gap: ExpectedG
     """A doubt where an observer expects balises at another spacing than the layout's, and does not learn it."""
     if gap.spacings is None or "expected_spacing" not in {s.name for s in system.parameter_signals}:
         return []
-    values = system.unpack_parameters(parameter_values(system, given_parameters(table), table.preset))
+    values = system.unpack_parameters(parameter_values(system, given_parameters(table, system), table.preset))
     expected, error = float(values.expected_spacing), float(values.assumed_spacing_error)
     shortest, longest = gap.spacings
     within = expected * (1.0 - error) <= shortest * (1.0 + ROUNDING) and longest <= expected * (1.0 + error) * (
@@ -149,10 +159,11 @@ def _other_spacing(name: str, table: ComponentTable, system: Any, gap: ExpectedG
     ]
 
 
-def given_parameters(table: ComponentTable) -> dict[str, Any]:
-    """What the table of a component says of the parameters of its system, by name."""
-    system = make_system(table, "")
-    if system is None:
-        return {}
+def given_parameters(table: ComponentTable, system: HybridSystem) -> dict[str, Any]:
+    """What the table of a component says of the parameters of its system, by name.
+
+    Args:
+        table: of the component. system: the hybrid system that it names.
+    """
     known = {n for s in system.parameter_signals for n in (s.name, *s.scalar_names)}
     return {name: value for name, value in table.parameters.items() if name in known}

@@ -72,7 +72,7 @@ def _seen(
     system: Any = make_system(component, name) if component.observer is not None else None
     if not hasattr(system, "premise_range"):
         return None
-    values = system.unpack_parameters(parameter_values(system, given_parameters(component), component.preset))
+    values = system.unpack_parameters(parameter_values(system, given_parameters(component, system), component.preset))
     signal, low, high = system.premise_range(values)
     column = _column(table, name, signal, connections)
     if column is None or len(column) < 2:

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from fmus.build import Plan
-from fmus.folders import cache_folder
 from fmus.toolchain.cached_library import cached_library
 from fmus.toolchain.compile import find_compiler
+from plant_models.disk_cache.folder import cache_folder
 
 MAIN = "batch.c"
 

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from fmus.toolchain.compile import Compiler, compile_library, library_name
+from plant_models.disk_cache.files import is_sealed, seal
 
 
 def cached_library(name: str, sources: Mapping[str, bytes], main: str, compiler: Compiler, folder: Path) -> Path:
@@ -31,27 +32,11 @@ def cached_library(name: str, sources: Mapping[str, bytes], main: str, compiler:
     parts = [compiler.identity().encode(), *(text for _, text in sorted(sources.items()))]
     digest = hashlib.sha256(b"\0".join(parts)).hexdigest()[:32]
     target = folder / f"{name}-{digest}" / library_name(name)
-    check = target.with_suffix(".sha256")
-    if not _is_whole(target, check):
+    if not is_sealed(target):  # to load a part of a library can end the process
         target.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix="build-", dir=target.parent) as scratch:
             for file, text in sources.items():
                 (Path(scratch) / file).write_bytes(text)
-            library = compile_library(compiler, Path(scratch), [main], target.name)
-            written = Path(scratch) / check.name
-            written.write_text(_sha256(library))
-            library.replace(target)
-            written.replace(check)
+            compile_library(compiler, Path(scratch), [main], target.name).replace(target)
+        seal(target)
     return target
-
-
-def _is_whole(library: Path, check: Path) -> bool:
-    """Whether a library is the one that was built: to load a part of one can end the process."""
-    try:
-        return check.read_text() == _sha256(library)
-    except (OSError, ValueError):
-        return False
-
-
-def _sha256(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -12,7 +12,7 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
-from fmus.folders import cache_folder
+from plant_models.disk_cache.folder import cache_folder
 
 EXTRA = "pip install 'fmu-observer[cross]'"
 

@@ -9,10 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any, Protocol
+from weakref import WeakKeyDictionary
 
 import casadi as ca
 import numpy as np
 
+from plant_models.disk_cache.entries import remembered
+from plant_models.disk_cache.identity import identity
 from plant_models.hybrid import integration
 from plant_models.hybrid.signal import scalar_names
 from plant_models.hybrid.switching import divided_step
@@ -20,6 +23,8 @@ from plant_models.hybrid.system import HybridSystem
 from plant_models.hybrid.tracing import TracedSystem
 
 BATCH_OF_STEPS = 10
+
+_traced: WeakKeyDictionary[HybridSystem, dict[str, ca.Function]] = WeakKeyDictionary()
 
 
 class Kernel(Protocol):
@@ -184,15 +189,20 @@ def _buffered(function: ca.Function, arguments: list[np.ndarray], *results: np.n
 
 
 def _traced_functions(system: HybridSystem) -> dict[str, ca.Function]:
-    cached: dict[str, ca.Function] | None = system.__dict__.get("_traced_functions")
-    if cached is None:
-        traced = TracedSystem(system)
-        cached = {"step": traced.step, "steps": traced.steps(BATCH_OF_STEPS), "output": traced.output}
-        cached |= {f"jump_{event.name}": traced.jump(event.name) for event in system.events}
-        check_payloads(system, cached)
-        cached = {name: _dense(function) for name, function in cached.items()}
-        system.__dict__["_traced_functions"] = cached
-    return cached
+    """The functions of a kernel by name, traced once in a process, and once ever where the system has an identity."""
+    known = _traced.get(system)
+    if known is None:
+        texts = remembered("kernel", identity(system), lambda: _trace(system))
+        known = _traced[system] = {name: ca.Function.deserialize(text) for name, text in texts.items()}
+    return known
+
+
+def _trace(system: HybridSystem) -> dict[str, str]:
+    traced = TracedSystem(system)
+    functions = {"step": traced.step, "steps": traced.steps(BATCH_OF_STEPS), "output": traced.output}
+    functions |= {f"jump_{event.name}": traced.jump(event.name) for event in system.events}
+    check_payloads(system, functions)
+    return {name: _dense(function).serialize() for name, function in functions.items()}
 
 
 def check_payloads(system: HybridSystem, functions: dict[str, ca.Function]) -> None:

@@ -29,6 +29,7 @@ from cosim.studies.workers import Died, in_processes
 from fmus import cache
 from fmus.toolchain.compile import find_compiler
 from plant_models import PLANTS
+from plant_models.disk_cache.files import seal
 
 pytestmark = [pytest.mark.compiler, pytest.mark.skipif(not hasattr(os, "fork"), reason="watching needs fork")]
 
@@ -327,13 +328,15 @@ def test_a_damaged_fmu_in_the_cache_is_built_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damage: bytes | None
 ) -> None:
     monkeypatch.setattr(cache, "Draft", FakeDraft)
-    monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path)
+    monkeypatch.setenv("FMU_OBSERVER_CACHE", str(tmp_path))
     system, first_byte = PLANTS["odometer"](), 30 + len("modelDescription.xml")  # that of the compressed content
     entry = cache.cache_entry(system, 2)
     assert entry.draft is not None
     entry.path.parent.mkdir(parents=True)
     with zipfile.ZipFile(entry.path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("modelDescription.xml", "words " * 100)
+    assert cache.cache_entry(system, 2).draft is not None  # an FMU that nobody here has put there
+    seal(entry.path)
     assert cache.cache_entry(system, 2).draft is None
     whole = entry.path.read_bytes()
     entry.path.write_bytes(whole[:first_byte] + b"\xff" + whole[first_byte + 1 :] if damage is None else damage)

@@ -13,11 +13,12 @@ from typing import Any
 import fmpy
 import pytest
 
-import fmus.folders
+import fmus
 from fmus import CompilationError, CompilerMissing, GenerationError, build_fmu, cache_folder, cached_fmu
 from fmus.build import MAIN_SOURCE
 from fmus.pack import pack_fmu
 from fmus.toolchain.compile import compile_library, find_compiler, header_folder
+from plant_models.disk_cache import folder
 from plant_models.hybrid import HybridSystem, TracingError, vector
 
 
@@ -111,17 +112,17 @@ def test_cache_serves_many_at_once(
     with ThreadPoolExecutor(4) as pool:
         paths = list(pool.map(lambda _: cached_fmu(reference("gain").system), range(4)))
     assert len(set(paths)) == 1
-    assert [p.name for p in paths[0].parent.iterdir()] == ["gain.fmu"]
+    assert sorted(p.name for p in paths[0].parent.iterdir()) == ["gain.fmu", "gain.sha256"]
 
 
 def test_cache_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(fmus.folders.sys, "platform", "linux")
+    monkeypatch.setattr(folder.sys, "platform", "linux")
     monkeypatch.delenv("FMU_OBSERVER_CACHE")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert cache_folder() == tmp_path / "fmu-observer"
     monkeypatch.delenv("XDG_CACHE_HOME")
     assert cache_folder() == Path.home() / ".cache" / "fmu-observer"
-    monkeypatch.setattr(fmus.folders.sys, "platform", "win32")
+    monkeypatch.setattr(folder.sys, "platform", "win32")
     monkeypatch.setenv("LOCALAPPDATA", str(tmp_path))
     assert cache_folder() == tmp_path / "fmu-observer" / "Cache"
 

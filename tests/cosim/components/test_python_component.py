@@ -140,10 +140,10 @@ class Broken(DeadReckoning):
         (lambda good: good | {"position": float("nan")}, "output 'position' is nan after step, expected finite"),
         (lambda good: good | {"position": np.zeros(3)}, r"output 'position' has shape \(3,\) after step, expected one"),
         (lambda good: good | {"position": "far"}, "output 'position' is no number after step: 'far'"),
-        (lambda good: {"count": 1.0}, "no output 'position': return it from step in a dict, or keep it as self.posi"),
+        (lambda _: {"count": 1.0}, "no output 'position': return it from step in a dict, or keep it as self.posi"),
         (lambda good: good | {"postion": 1.0}, "step returned 'postion', which is no output; did you mean 'position'"),
-        (lambda good: [1.0, 2.0], "step returned a list, expected a dict of outputs"),
-        (lambda good: 1 / 0, r"step raised ZeroDivisionError: division by zero \(.*test_python_component.py:\d+\)"),
+        (lambda _: [1.0, 2.0], "step returned a list, expected a dict of outputs"),
+        (lambda _: 1 / 0, r"step raised ZeroDivisionError: division by zero \(.*test_python_component.py:\d+\)"),
     ],
 )
 def test_what_a_step_gives_is_checked(gives: Any, words: str) -> None:
@@ -194,7 +194,7 @@ def declared(**attributes: Any) -> type:
         (declared(outputs={"position": 3}), r"outputs = \{'position': 3\} cannot be"),
         (declared(outputs=["odometer"]), "the name 'odometer' is taken twice"),
         (declared(direct={"position": "odometer"}), "write direct = "),
-        (declared(balise=lambda self, place: None), "balise takes 'place'; of a telegram is known: stamp, position"),
+        (declared(balise=lambda _, place: place), "balise takes 'place'; of a telegram is known: stamp, position"),
         (declared(outputs=["no name"]), "'no name' is not a legal identifier"),
     ],
 )

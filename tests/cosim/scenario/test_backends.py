@@ -120,7 +120,7 @@ def test_native_where_not_said_otherwise_built_once_and_told(tmp_path: Path) -> 
     assert not (tmp_path / "cache").exists()
     outcome, said = run(made)
     assert kinds(outcome) == shown == {"plant": "FMU", "reckoning": "FMU", "reckoning2": "FMU", "opaque": "block"}
-    assert said[0] == "building 2 FMUs, kept for later runs"
+    assert said[0] == "building FMUs of shipped models, kept for later runs"
     assert sorted(line.split(" ... ")[0] for line in said[1:]) == ["building reckoning", "building rolling"]
     assert all(line.endswith(" s") for line in said[1:])
     assert notes(outcome) == "Cannot be traced, so they run as Python blocks: opaque."
@@ -178,7 +178,7 @@ def test_the_command_says_what_it_builds(tmp_path: Path, capsys: pytest.CaptureF
     command = ["run", str(file), "--no-report", "--out", str(tmp_path / "out")]
     assert main(command) == 0
     lines = capsys.readouterr().err.splitlines()
-    assert lines[0] == "building an FMU, kept for later runs"
+    assert lines[0] == "building FMUs of shipped models, kept for later runs"
     assert lines[1].startswith("building rolling ... ")
     assert len(lines) == 2
     assert main(command) == 0

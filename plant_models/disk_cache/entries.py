@@ -1,0 +1,128 @@
+"""Entries: values as JSON under a digest of what they follow from, checked when they are read."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import os
+import tempfile
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from plant_models.disk_cache.folder import cache_folder
+
+LOG = logging.getLogger("plant_models")
+FORMAT = "fmu-observer cache 1"
+
+
+class DamagedEntryError(ValueError):
+    """A file in the cache is not the entry that was looked for; the message says why."""
+
+
+def remembered(kind: str, key: str | None, compute: Callable[[], Any]) -> Any:
+    """A value from the cache, computed and kept where it is not there.
+
+    A value that is kept goes through JSON at once, so it equals the one that a later call reads.
+
+    Args:
+        kind: what the value is, in one word; a folder of the cache.
+        key: digest of all that the value follows from, see `plant_models.disk_cache.identity`; None where that is not
+            known: then the value is computed, and nothing is read or kept.
+        compute: computes the value: None, numbers, strings, and lists and dictionaries with names of these.
+
+    Returns:
+        The value; as `json.loads` gives it where there is a key.
+
+    Raises:
+        Exception: whatever `compute` raises; nothing is kept then.
+    """
+    if key is None:
+        return compute()
+    value = recall(kind, key)
+    return keep(kind, key, compute()) if value is None else value
+
+
+def recall(kind: str, key: str) -> Any:
+    """The value of an entry, or None where there is none; a damaged or foreign entry is told in the log.
+
+    Args:
+        kind: as for `remembered`. key: digest of what the value follows from.
+    """
+    path = entry_path(kind, key)
+    try:
+        return _checked(path.read_bytes(), kind, key)
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:
+        LOG.warning("The cache entry %s is not used and made again: %s", path, error)
+        return None
+
+
+def keep(kind: str, key: str, value: Any) -> Any:
+    """Write an entry in one move; a folder that cannot be written keeps nothing, which the log tells as information.
+
+    Args:
+        kind: as for `remembered`. key: digest of what the value follows from. value: as for `remembered`.
+
+    Returns:
+        The value as `recall` will give it.
+    """
+    text = json.dumps(value)
+    head = {"format": FORMAT, "kind": kind, "key": key, "sha256": _digest(text.encode())}
+    try:
+        write_whole(entry_path(kind, key), f"{json.dumps(head)}\n{text}\n".encode())
+    except OSError as error:
+        LOG.info("Nothing is kept in the cache: %s", error)
+    return json.loads(text)
+
+
+def entry_path(kind: str, key: str) -> Path:
+    """Where an entry lies.
+
+    Args:
+        kind: as for `remembered`. key: digest of what the value follows from.
+    """
+    return cache_folder() / kind / f"{key}.json"
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file all or not at all, beside others that write the same one.
+
+    Args:
+        path: of the file; its folder is made where it is missing. content: of the file.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=f".{path.stem[:16]}-", suffix=".part", dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(content)
+        Path(name).replace(path)
+    finally:
+        with suppress(FileNotFoundError):
+            Path(name).unlink()
+
+
+def _checked(content: bytes, kind: str, key: str) -> Any:
+    first, _, rest = content.partition(b"\n")
+    try:
+        head = json.loads(first)
+        found = {name: head[name] for name in ("format", "kind", "key", "sha256")}
+    except (ValueError, KeyError, TypeError) as error:
+        raise DamagedEntryError("it has no head, so it is damaged or of another program.") from error
+    text = rest.removesuffix(b"\n")
+    expected = {"format": FORMAT, "kind": kind, "key": key, "sha256": _digest(text)}
+    wrong = [name for name in expected if found[name] != expected[name]]
+    if wrong:
+        what = "its content is damaged" if wrong == ["sha256"] else "it is the entry of something else"
+        raise DamagedEntryError(f"{what} ({', '.join(wrong)} differ).")
+    return json.loads(text)
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()

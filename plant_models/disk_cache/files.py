@@ -1,0 +1,70 @@
+"""Files by their content: digests, and seals by which a file in the cache is known to be the one that was put there."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from pathlib import Path
+
+from plant_models.disk_cache.entries import write_whole
+
+SETTLED = 2.0
+"""A file changed less than this ago [s] may change again without a trace in its time stamps."""
+
+Stamp = tuple[int, ...]
+_known: dict[Path, tuple[Stamp, str]] = {}
+
+
+def file_digest(path: Path) -> str:
+    """SHA-256 of the content of a file; read again only where the file system says that it changed.
+
+    Args:
+        path: of the file.
+
+    Returns:
+        64 hexadecimal digits.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    status = path.stat()
+    stamp = (status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
+    known = _known.get(path)
+    if known is not None and known[0] == stamp:
+        return known[1]
+    with path.open("rb") as stream:
+        digest = hashlib.file_digest(stream, "sha256").hexdigest()
+    _known.pop(path, None)
+    if abs(time.time() - max(status.st_mtime, status.st_ctime)) > SETTLED:
+        _known[path] = stamp, digest
+    return digest
+
+
+def seal(path: Path) -> None:
+    """Note the digest of a file beside it.
+
+    Args:
+        path: of the file.
+
+    Raises:
+        OSError: the note cannot be written.
+    """
+    write_whole(seal_of(path), file_digest(path).encode())
+
+
+def is_sealed(path: Path) -> bool:
+    """Whether a file is the one that `seal` saw: a full disk, a machine that stopped or another program may have left
+    something else.
+
+    Args:
+        path: of the file.
+    """
+    try:
+        return seal_of(path).read_text() == file_digest(path)
+    except (OSError, ValueError):
+        return False
+
+
+def seal_of(path: Path) -> Path:
+    """Where the digest of a file is noted."""
+    return path.with_suffix(".sha256")
