@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from hashlib import sha256
-from inspect import Parameter, Signature, getsourcefile, signature
+from inspect import Parameter, Signature, getattr_static, getsourcefile, signature
 from pathlib import Path
 from typing import Any
 
@@ -136,7 +136,8 @@ class PythonModel:
         call = getattr(self.given, "balise", None)
         if not callable(call):
             return None
-        named = [a for a in self._arguments(call, "balise") if a.name != "self"]
+        bound = self.given is not self.cls or isinstance(getattr_static(self.cls, "balise"), staticmethod)
+        named = self._arguments(call, "balise")[0 if bound else 1 :]
         unknown = [a.name for a in named if a.name not in TELEGRAM and a.default is Parameter.empty]
         if unknown:
             raise self._refused(f"balise takes {unknown[0]!r}; of a telegram is known: {', '.join(TELEGRAM)}")
