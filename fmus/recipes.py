@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from importlib import import_module
 from inspect import Parameter, signature
@@ -69,6 +69,19 @@ def recipe_options(name: str) -> dict[str, Any]:
         if p.kind in {Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY}
     }
     return dict.fromkeys(cls.option_choices) | named
+
+
+def legal_values(choices: Sequence[Any] | None) -> str:
+    """The legal values of an option in words; empty where any is legal.
+
+    Args:
+        choices: allowed values; None where anything is.
+    """
+    if not choices:
+        return ""
+    if isinstance(choices, range):
+        return f", {choices[0]} to {choices[-1]}"
+    return f", one of {', '.join(map(str, choices))}"
 
 
 def by_room(names: Iterable[str]) -> dict[str, list[str]]:

@@ -13,6 +13,7 @@ import fmu_observer
 from cosim.balises.recorded import read_layout
 from cosim.coupling.connection import Link
 from cosim.errors import CosimError, RunError, ScenarioError, nearest
+from cosim.evaluation.error_table import error_text
 from cosim.evaluation.numbers import cell
 from cosim.evaluation.spec import ReportSpec
 from cosim.observer_benchmark.observer_scores import CertifiedGap, ObserverScore, divergence, longest_gap, measured
@@ -26,7 +27,6 @@ from cosim.observer_benchmark.playback import (
     recording_scenario,
     train_observers,
 )
-from cosim.report.error_table import error_text
 from cosim.results.folder import write_results
 from cosim.results.load import load_result
 from cosim.results.result import Result
