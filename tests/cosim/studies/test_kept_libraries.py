@@ -18,7 +18,7 @@ SHIPPED = [name for name in shipped_scenarios() if name != "own_fmu"]
 
 
 @pytest.fixture(autouse=True)
-def none_kept(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def none_kept() -> Iterator[None]:
     """Every test begins without kept libraries."""
     kept_libraries._let_all_go()
     yield

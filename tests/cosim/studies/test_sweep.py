@@ -230,7 +230,7 @@ def test_one_failed_seed_is_named_and_the_rest_kept(tmp_path: Path, monkeypatch:
     assert lines[0] == "seed,observer,phase,speed_error_max,failure"
     assert lines[2] == "5,,,,the train is lost"
     assert [line.split(",")[0] for line in lines[1:]] == ["3", "5", "7"]
-    with pytest.raises(RunError, match="No seed could be run to its end. Seed 5: the train is lost"):
+    with pytest.raises(RunError, match=r"No seed could be run to its end\. Seed 5: the train is lost"):
         seed_study(scenario, [5])
 
 
