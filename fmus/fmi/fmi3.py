@@ -27,7 +27,7 @@ class FMI3Instance(Instance):
 
     fmi_version = 3
     event_needs_step = False
-    _state_calls = ("getFMUState", "setFMUState", "freeFMUState")
+    _get_state, _set_state, _free_state = "getFMUState", "setFMUState", "freeFMUState"
 
     def _instantiate(self) -> None:
         log = {"loggingOn": self.logging} if is_native(self.slave) else {}
