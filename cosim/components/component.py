@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from fmpy.model_description import ModelDescription
 
-from cosim.components.derivatives import directional_derivative, make_derivative_writer
+from cosim.components.derivatives import demand_derivatives, make_derivative_writer
 from cosim.components.described import Described
 from cosim.components.start_values import StartValue, refusal, typed_value, typed_values
 from cosim.components.surroundings import Surroundings
@@ -157,24 +157,16 @@ class Component(Described, Slave):
         write, buffer = make_derivative_writer(self, names)
         return self.guarded(f"derivatives of {shown(names)}", write), buffer
 
-    def directional_derivative(
+    def derivative_call(
         self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
-    ) -> np.ndarray:
-        """Derivatives of scalars and elements `unknowns` along a direction in `knowns`, where declared.
-
-        Args:
-            unknowns: outputs and the like. knowns: inputs and the like. seed: the direction, shape (len(knowns),).
-
-        Returns:
-            The derivatives, shape (len(unknowns),).
+    ) -> Callable[[], np.ndarray]:
+        """As for `Instance`.
 
         Raises:
             CouplingError: the slave does not declare providesDirectionalDerivatives, or a variable is not real.
-            RunError: the call failed.
         """
-        call = directional_derivative(self, unknowns, knowns, seed)
-        found: np.ndarray = self.guard("getDirectionalDerivative", call)
-        return found
+        demand_derivatives(self, *unknowns, *knowns)
+        return super().derivative_call(unknowns, knowns, seed)
 
     def free(self) -> None:
         """Free the instance, its library and its files."""

@@ -185,11 +185,27 @@ class Instance(Described):
         Returns:
             The derivatives, shape (len(unknowns),).
         """
-        spreads = [layout([e for name in names for e in self.variables.expanded(name)]) for names in (unknowns, knowns)]
-        found: np.ndarray = self.guard(
-            "getDirectionalDerivative", directional_derivative(self.slave, spreads[0], spreads[1], seed)
-        )
+        found: np.ndarray = self.guard("getDirectionalDerivative", self.derivative_call(unknowns, knowns, seed))
         return found
+
+    def derivative_call(
+        self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
+    ) -> Callable[[], np.ndarray]:
+        """The unguarded call of `directional_derivative`.
+
+        Args:
+            unknowns: outputs and the like. An array stands for all its elements.
+            knowns: inputs and the like.
+            seed: the direction, shape (len(knowns),).
+
+        Returns:
+            The call; it gives the derivatives, shape (len(unknowns),).
+        """
+        targets, sources = (
+            layout([element for name in names for element in self.variables.expanded(name)])
+            for names in (unknowns, knowns)
+        )
+        return directional_derivative(self.slave, targets, sources, seed)
 
     # -- state ------------------------------------------------------------------------------------------------------
 
