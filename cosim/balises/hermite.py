@@ -75,7 +75,18 @@ class HermiteStep:
     def crossing(self, target: float, stretch: Stretch | None = None) -> float:
         """Time after the start of the step at which the position is `target` [s]; `target` lies within the stretch."""
         part = self.stretches()[0] if stretch is None else stretch
-        return first_time(lambda s: (self.position(s) >= target) == part.rising, part.start, part.end)
+        (cubic, square), rising = self._coefficients(), part.rising
+        p0, linear, h, low, high = self.p0, self.h * self.v0, self.h, part.start, part.end
+        for _ in range(MAX_HALVINGS):  # as `first_time`, of `position`: some sixty halvings, without a call in each
+            middle = 0.5 * (low + high)
+            if middle in (low, high):
+                break
+            x = middle / h
+            if (p0 + x * (linear + x * (square + x * cubic)) >= target) == rising:
+                high = middle
+            else:
+                low = middle
+        return high
 
     def time_bound(self, acceleration_spread: float) -> float:
         """Bound of the crossing time's error [s] where the true acceleration differs from the cubic's by no more than a
