@@ -8,6 +8,7 @@ import os
 from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
+from zlib import crc32
 
 import pytest
 from hypothesis import settings
@@ -21,6 +22,8 @@ settings.load_profile("ci" if os.environ.get("CI") else "here")
 QUICK = "-O0"
 SECOND_TIER = Path(__file__).with_name("second_tier.txt")
 KEPT = "! "
+SAMPLE = 16
+"""One test in so many is in the sample, by a digest of its name."""
 
 
 def second_tier() -> dict[str, bool]:
@@ -40,20 +43,23 @@ def quick_builds(request: pytest.FixtureRequest) -> Iterator[None]:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark the second tier as slow, and what opens a browser. In whole files a line that fits none of the tests is an
-    error.
+    """Mark the second tier as slow, and what opens a browser; mark a sample, the first of each file among it. In whole
+    files a line that fits none of the tests is an error.
     """
     lines, by_file = second_tier(), defaultdict(list)
     for line in lines:
         by_file[line.partition("::")[0]].append(line)
-    used = set()
+    used, sampled = set(), set()
     for item in items:
         name = item.nodeid
-        fitting = [beginning for beginning in by_file[name.partition("::")[0]] if name.startswith(beginning)]
+        file = name.partition("::")[0]
+        if file not in sampled or crc32(name.encode()) % SAMPLE == 0:
+            sampled.add(file)
+            item.add_marker(pytest.mark.sample)
+        fitting = [beginning for beginning in by_file[file] if name.startswith(beginning)]
         used |= set(fitting)
         if (fitting and lines[max(fitting, key=len)]) or item.get_closest_marker("browser"):
             item.add_marker(pytest.mark.slow)
-    files = {item.nodeid.partition("::")[0] for item in items}
-    idle = [line for line in lines if line not in used and line.partition("::")[0] in files]
+    idle = [line for line in lines if line not in used and line.partition("::")[0] in sampled]
     if idle and not any("::" in argument for argument in config.args):
         raise pytest.UsageError(f"{SECOND_TIER.name}: no test begins with: {'; '.join(idle)}")
