@@ -109,7 +109,7 @@ def test_the_same_calls_in_the_same_order(spied: Callable[[Wrap], None], latency
     def note(call: Call) -> None:
         calls.append((call.component, call.function, *(call.arguments[1:3] if call.function == "fmi3DoStep" else ())))
 
-    scenario(latency).run(warn=lambda _: None)  # from here on the probe of the plant is remembered
+    scenario(latency).run(warn=lambda _: None)  # where FMUs are built their functions are called as well
     spied(note)
     runs = []
     for stepper in ("python", "compiled"):
