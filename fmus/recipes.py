@@ -5,12 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from importlib import import_module
-from inspect import Parameter, signature
+from inspect import Parameter, isabstract, signature
 from typing import Any
 
 from fmu_observer import OBSERVERS
 from plant_models import PLANTS
 from plant_models.hybrid import HybridSystem
+from plant_models.user_file import Expected
+
+SYSTEM = Expected(
+    "subclass of HybridSystem",
+    lambda found: isinstance(found, type) and issubclass(found, HybridSystem) and not isabstract(found),
+)
+"""What the name of a user's own model must stand for."""
 
 
 class UnknownRecipeError(LookupError):

@@ -14,12 +14,12 @@ from typing import Any, Literal
 from fmu_observer.event_protocol import LATE_POLICIES, EventProtocol
 from fmus.build import build_fmu, fmu_path
 from fmus.cli.progress import ProgressBar
-from fmus.cli.user_system import load_class, make_system, names_a_file
 from fmus.hosted import build_hosted_fmu
 from fmus.pack import check_target
-from fmus.recipes import RECIPES, legal_values, recipe
+from fmus.recipes import RECIPES, SYSTEM, legal_values, recipe
 from fmus.report import platforms_of
 from fmus.toolchain.targets import choose_targets
+from plant_models.user_file import load_class, make, names_a_file, names_code
 
 Version = Literal[2, 3]
 VERSIONS: dict[str, tuple[Version, ...]] = {"2": (2,), "3": (3,), "both": (2, 3)}
@@ -183,9 +183,9 @@ def _names(options: argparse.Namespace) -> list[str]:
 
 
 def _system(name: str, words: Sequence[str]) -> Any:
-    if names_a_file(name):
-        cls = load_class(name)
-        return make_system(cls, dict(_option(text, cls.option_choices) for text in words))
+    if name not in RECIPES and names_code(name):
+        cls = load_class(name, SYSTEM)
+        return make(cls, dict(_option(text, cls.option_choices) for text in words))
     choices = RECIPES[name].option_choices if name in RECIPES else {}
     return recipe(name, **dict(_option(text, choices) for text in words))
 
