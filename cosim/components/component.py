@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from fmpy.model_description import ModelDescription
 
-from cosim.components.derivatives import directional_derivative, make_derivative_writer
+from cosim.components.derivatives import demand_derivatives, make_derivative_writer
 from cosim.components.described import Described
 from cosim.components.start_values import StartValue, refusal, typed_value, typed_values
 from cosim.components.surroundings import Surroundings
@@ -156,24 +156,16 @@ class Component(Described, Slave):
         write, buffer = make_derivative_writer(self, names)
         return self.guarded(f"derivatives of {shown(names)}", write), buffer
 
-    def directional_derivative(
+    def derivative_call(
         self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
-    ) -> np.ndarray:
-        """Derivatives of scalars and elements `unknowns` along a direction in `knowns`, where declared.
-
-        Args:
-            unknowns: outputs and the like. knowns: inputs and the like. seed: the direction, shape (len(knowns),).
-
-        Returns:
-            The derivatives, shape (len(unknowns),).
+    ) -> Callable[[], np.ndarray]:
+        """As for `Instance`.
 
         Raises:
             CouplingError: the slave does not declare providesDirectionalDerivatives, or a variable is not real.
-            RunError: the call failed.
         """
-        call = directional_derivative(self, unknowns, knowns, seed)
-        found: np.ndarray = self.guard("getDirectionalDerivative", call)
-        return found
+        demand_derivatives(self, *unknowns, *knowns)
+        return super().derivative_call(unknowns, knowns, seed)
 
     def free(self) -> None:
         """Free the instance, its library and its files."""
@@ -181,6 +173,11 @@ class Component(Described, Slave):
         if self._release_files is not None:
             self._release_files()
             self._release_files = None
+
+    def take_files(self) -> Callable[[], None] | None:
+        """What releases its files, which from now on is up to the caller; None where it has none."""
+        release, self._release_files = self._release_files, None
+        return release
 
     def outcomes(self) -> Mapping[str, int] | None:
         """Counts of what became of the events told, where the slave keeps them: blocks, and FMUs with

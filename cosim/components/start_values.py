@@ -12,7 +12,7 @@ from fmpy.model_description import ModelVariable
 
 from cosim.errors import nearest
 from fmus.fmi.elements import described
-from fmus.fmi.types import CTYPES, FLOATING_TYPES, size
+from fmus.fmi.types import CTYPES, FLOATING_TYPES, enumeration_items, size
 
 StartValue = float | int | bool | str | bytes | Sequence[Any]
 
@@ -120,7 +120,7 @@ def _bytes(kind: str, value: Any) -> bytes:
 
 
 def _item(variable: ModelVariable, value: Any) -> int:
-    items = {item.name: int(item.value) for item in getattr(variable.declaredType, "items", None) or []}
+    items = enumeration_items(variable)
     if not isinstance(value, str):
         return _whole("Enumeration", value)
     if value not in items:

@@ -228,6 +228,16 @@ def is_time_based(variable: ModelVariable) -> bool:
     )
 
 
+def clock_references(variable: ModelVariable) -> frozenset[int]:
+    """Value references of the clocks of a variable; fmpy holds the clocks themselves, descriptions made in Python
+    references.
+
+    Args:
+        variable: in the model description.
+    """
+    return frozenset(int(getattr(entry, "valueReference", entry)) for entry in variable.clocks or ())
+
+
 def _may_change(clock: TimeClock) -> bool:
     """Whether the slave must be asked after an update of its discrete states."""
     if clock.kind == "changing":

@@ -65,3 +65,12 @@ def c_type(kind: str, fmi_version: int) -> tuple[Any, str, Any]:
         fmi_version: 2 or 3.
     """
     return BOOLEANS[fmi_version] if kind == "Boolean" else CTYPES[kind]
+
+
+def enumeration_items(variable: ModelVariable) -> dict[str, int]:
+    """Items of an enumeration by name; empty for a variable of another type.
+
+    Args:
+        variable: in the model description.
+    """
+    return {item.name: int(item.value) for item in getattr(variable.declaredType, "items", None) or ()}
