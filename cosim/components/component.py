@@ -174,6 +174,11 @@ class Component(Described, Slave):
             self._release_files()
             self._release_files = None
 
+    def take_files(self) -> Callable[[], None] | None:
+        """What releases its files, which from now on is up to the caller; None where it has none."""
+        release, self._release_files = self._release_files, None
+        return release
+
     def outcomes(self) -> Mapping[str, int] | None:
         """Counts of what became of the events told, where the slave keeps them: blocks, and FMUs with
         `OUTCOME_VARIABLES`.
