@@ -9,7 +9,7 @@ from pydantic import Discriminator, Field, PlainValidator, Tag, model_validator
 
 from cosim.scenario.model_name import Model
 from cosim.table import Name, Table
-from fmu_observer.block import LatePolicy
+from fmu_observer.event_protocol import LatePolicy
 
 
 def _start(value: Any) -> Any:
