@@ -104,5 +104,10 @@ PANELS: tuple[Panel, ...] = (
 
 
 def draw_all(result: Result, spec: ReportSpec) -> dict[Panel, bytes]:
-    """All figures that a run has, as PNG, in the order of the report."""
+    """All figures that a run has, as PNG, in the order of the report.
+
+    Args:
+        result: the run.
+        spec: roles of the signals, labels, phases and zones.
+    """
     return {panel: png(panel.draw(result, spec, None).figure) for panel in PANELS if panel.available(result, spec)}

@@ -88,6 +88,9 @@ FORMATS = {name: _BY_NAME[name] for name in ("csv", "mat", "npy", "parquet", "hd
 def check_formats(names: Iterable[str]) -> None:
     """Make sure, before a run, that these formats exist and that what they need is installed.
 
+    Args:
+        names: of the formats.
+
     Raises:
         OutputError: one does not, or lacks a package; the message says what to do.
     """
@@ -104,6 +107,9 @@ def check_formats(names: Iterable[str]) -> None:
 
 def format_of(path: Path) -> Format:
     """The format that the ending of a file name means.
+
+    Args:
+        path: the file.
 
     Raises:
         OutputError: none; the message lists the endings.
