@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.results.result import Result
+from plant_models.disk_cache.folder import cache_folder
 
 
 @dataclass(frozen=True)
@@ -60,8 +61,6 @@ def _identity(entry: Mapping[str, Any]) -> Identity:
 
 def _vendor_file(entry: Mapping[str, Any]) -> Path | None:
     """The FMU that a user brought; None for blocks and for shipped models, which are built anew on every machine."""
-    from plant_models.disk_cache.folder import cache_folder  # noqa: PLC0415 - only where a result is at hand
-
     path = Path(str(entry.get("source") or ""))
     if entry.get("kind") != "FMU" or not path.is_file() or cache_folder() in path.parents:
         return None

@@ -95,6 +95,9 @@ class Component(Described, Slave):
         """Take the structural parameters among start values: the shapes of arrays follow from them. Before
         `instantiate`.
 
+        Args:
+            starts: start values by name; other variables than structural parameters are left out.
+
         Raises:
             CouplingError: a value is no dimension.
         """
@@ -161,6 +164,11 @@ class Component(Described, Slave):
     ) -> Callable[[], np.ndarray]:
         """As for `Instance`.
 
+        Args:
+            unknowns: outputs and the like.
+            knowns: inputs and the like.
+            seed: the direction, shape (len(knowns),).
+
         Raises:
             CouplingError: the slave does not declare providesDirectionalDerivatives, or a variable is not real.
         """
@@ -213,6 +221,9 @@ class Component(Described, Slave):
     def choose_log(self, choice: LogChoice | None) -> None:
         """What the slave shall log; before `instantiate`. None leaves that to the slave.
 
+        Args:
+            choice: ``none``, ``errors``, ``all`` or categories.
+
         Raises:
             CouplingError: a category that the slave does not declare.
         """
@@ -221,11 +232,20 @@ class Component(Described, Slave):
         self.messages.silent = choice == "none"
 
     def note(self, message: str | bytes | None, status: int | str = 0, category: str | bytes | None = None) -> None:
-        """Keep a message of the slave's own log; what it said of something wrong is part of a failure."""
+        """Keep a message of the slave's own log; what it said of something wrong is part of a failure.
+
+        Args:
+            status: of FMI, by number or name.
+            category: as the slave names it.
+        """
         self.messages.add(self.time if self.clock is None else self.clock(), message, status, category)
 
     def failure(self, reason: str, t: float | None = None) -> RunError:
-        """A RunError of this component at `t` [s], by default where it stands, with what the slave logged last."""
+        """A RunError of this component at `t` [s], by default where it stands, with what the slave logged last.
+
+        Args:
+            reason: what happened.
+        """
         if self.messages:
             reason = f"{reason.rstrip('.')}. The FMU says: {self.messages.reason}"
         when = self.time if t is None else t

@@ -18,7 +18,11 @@ StartValue = float | int | bool | str | bytes | Sequence[Any]
 
 
 def refusal(what: str, error: ValueError) -> str:
-    """The sentence that a value does not fit, from what was to be set and why not."""
+    """The sentence that a value does not fit, from what was to be set and why not.
+
+    Args:
+        error: why not.
+    """
     return f"{what}: {error}" + ("" if str(error).endswith("?") else ".")
 
 

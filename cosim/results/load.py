@@ -11,6 +11,9 @@ from cosim.results.data import ResultData
 from cosim.results.events_file import EVENTS_SUFFIX, read_events
 from cosim.results.folder import SUMMARY, TABLES, read_results
 from cosim.results.formats.columns import check_time
+from cosim.results.formats.foreign_csv import read_foreign_csv
+from cosim.results.formats.foreign_mat import read_foreign_mat
+from cosim.results.formats.foreign_npy import read_foreign_npy
 from cosim.results.result import Result
 
 
@@ -86,20 +89,22 @@ def _reader(path: Path) -> Callable[[Path], ResultData]:
     if not start:
         raise OutputError(f"{path} is empty: expected a table with a column 'time'.")
     if start.startswith(b"\x93NUMPY"):
-        from cosim.results.formats.foreign_npy import read_foreign_npy as read  # noqa: PLC0415 - only what is needed
-    elif start.startswith(b"PAR1"):
-        from cosim.results.formats.parquet_file import read_parquet as read  # noqa: PLC0415
-    elif start.startswith((b"\x89HDF", b"MATLAB 7.3")):
-        from cosim.results.formats.hdf5_file import read_hdf5 as read  # noqa: PLC0415
-    elif start.startswith(b"MATLAB") or path.suffix.lower() == ".mat":
-        from cosim.results.formats.foreign_mat import read_foreign_mat as read  # noqa: PLC0415
-    elif start.startswith((b"PK\x03\x04", b"\x1f\x8b")):
+        return read_foreign_npy
+    if start.startswith(b"PAR1"):
+        from cosim.results.formats.parquet_file import read_parquet  # noqa: PLC0415 - an optional package
+
+        return read_parquet
+    if start.startswith((b"\x89HDF", b"MATLAB 7.3")):
+        from cosim.results.formats.hdf5_file import read_hdf5  # noqa: PLC0415 - an optional package
+
+        return read_hdf5
+    if start.startswith(b"MATLAB") or path.suffix.lower() == ".mat":
+        return read_foreign_mat
+    if start.startswith((b"PK\x03\x04", b"\x1f\x8b")):
         raise OutputError(
             f"{path} is an archive (FMU, spreadsheet, zip or gzip), not a table. Unpack it, or export it as CSV."
         )
-    else:
-        from cosim.results.formats.foreign_csv import read_foreign_csv as read  # noqa: PLC0415
-    return read
+    return read_foreign_csv
 
 
 def _with_events(result: ResultData, source: Path) -> ResultData:

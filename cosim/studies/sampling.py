@@ -9,6 +9,7 @@ from math import exp, floor, isfinite, log, prod
 from typing import Any, Literal
 
 import numpy as np
+import scipy
 
 from cosim.errors import ScenarioError
 from cosim.scenario.save import plain
@@ -128,13 +129,11 @@ def _choices(name: str, given: Any, ranges: bool) -> Any:
 
 def _sampled(choices: Mapping[str, Any], mode: Mode, count: int | None, seed: int) -> list[Variation]:
     """Points of a Latin hypercube, or independent ones; a list takes the place of a range by its entries."""
-    from scipy.stats import qmc  # noqa: PLC0415 - only for those who sample
-
     if count is None or count < 1:
         raise ScenarioError(f"vary: mode {mode!r} needs count=..., the number of points, at least 1 (got {count!r}).")
     _check_count(count)
     if mode == "latin":
-        points = qmc.LatinHypercube(d=len(choices), seed=seed).random(count)
+        points = scipy.stats.qmc.LatinHypercube(d=len(choices), seed=seed).random(count)
     else:
         points = np.random.default_rng(seed).random((count, len(choices)))
     return [

@@ -9,12 +9,14 @@ from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cosim.comparison.compare import compare
 from cosim.errors import ComparisonError, OutputError
 from cosim.evaluation.numbers import number as number_text
 from cosim.results.load import load_result
 from cosim.results.result import Result
 from cosim.scenario.outcome import Outcome
 from cosim.studies.measures import measure_unit, setting_text, with_unit
+from cosim.studies.sweep_files import write_sweep
 from fmus.text_table import text_table
 
 if TYPE_CHECKING:
@@ -133,8 +135,6 @@ class SweepResult:
         Raises:
             ComparisonError: the reference has no results.
         """
-        from cosim.comparison.compare import compare  # noqa: PLC0415 - only for those who compare
-
         results = {run.number: result for run in self.runs if (result := run.result) is not None}
         if reference not in results:
             known = ", ".join(map(str, results)) or "none"
@@ -169,6 +169,4 @@ class SweepResult:
         Raises:
             OutputError: the folder cannot be written.
         """
-        from cosim.studies.sweep_files import write_sweep  # noqa: PLC0415 - which knows this class
-
         return write_sweep(self, Path(directory))

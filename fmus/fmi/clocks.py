@@ -170,7 +170,11 @@ class ClockSchedule:
         return [(clock.rhythm, clock.number, clock.ticked) for clock in self.clocks]
 
     def restore(self, state: list[tuple[Rhythm | None, int, bool]]) -> None:
-        """Return to what was saved."""
+        """Return to what was saved.
+
+        Args:
+            state: from `save`.
+        """
         for clock, (rhythm, number, ticked) in zip(self.clocks, state, strict=True):
             clock.rhythm, clock.number, clock.ticked = rhythm, number, ticked
 

@@ -26,6 +26,7 @@ def make_exact_reader(slave: Any, fmi_version: int, variable: ModelVariable) -> 
     """A call that returns the values of a variable, one for a scalar.
 
     Args:
+        slave: instantiated, with fmpy's call surface.
         fmi_version: 2 or 3.
     """
     kind, total = getter_type(variable.type, fmi_version), size(variable)
@@ -44,6 +45,7 @@ def make_exact_writer(slave: Any, fmi_version: int, variable: ModelVariable) -> 
     The call raises ValueError, OverflowError, TypeError or struct.error for a value that the type cannot hold.
 
     Args:
+        slave: instantiated, with fmpy's call surface.
         fmi_version: 2 or 3.
     """
     kind, total = getter_type(variable.type, fmi_version), size(variable)

@@ -149,6 +149,9 @@ class FMI3Slave(FMI3Instance, Slave):
     def step_towards(self, t: float, until: float) -> float:
         """One doStep to `until` or to the next time event before it, with the event handled; returns the time reached
         [s].
+
+        Args:
+            t: where it stands [s].
         """
         reached, event = self.step(t, self.next_stop(t, until))
         if self.has_event_mode and not self.terminated and self.is_event(reached, event):
@@ -183,11 +186,19 @@ class FMI3Slave(FMI3Instance, Slave):
         return [clock.variable.valueReference for clock in due]
 
     def set_clocks(self, references: Sequence[int]) -> None:
-        """In Event Mode: set input clocks active."""
+        """In Event Mode: set input clocks active.
+
+        Args:
+            references: value references of the clocks.
+        """
         self.guard("setClock", lambda: self.slave.setClock(list(references), [True] * len(references)))
 
     def ticking(self, references: Sequence[int]) -> list[bool]:
-        """In Event Mode: which of these output clocks are active."""
+        """In Event Mode: which of these output clocks are active.
+
+        Args:
+            references: value references of the clocks.
+        """
         return [bool(x) for x in self.guard("getClock", lambda: self.slave.getClock(list(references)))]
 
     def update_discrete_states(self) -> bool:  # noqa: D102 - see Instance
@@ -223,6 +234,16 @@ class FMI3Slave(FMI3Instance, Slave):
         ticked = self.ticking([clock])[0]
         self.settle()
         return ticked
+
+    def activate(self, clock: str) -> None:
+        """Let a triggered input clock tick, with the values its clocked inputs have.
+
+        Args:
+            clock: its name.
+        """
+        self.enter_event_mode()
+        self.set_clocks([self.events[clock].trigger])
+        self.settle()
 
     def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Slave
         self.guard(f"event '{event.name}'", lambda: self._deliver(event, stamp, payload))

@@ -32,6 +32,7 @@ def make_reader(
     """A call that reads `variables` into `values`, shape (number of values of all,).
 
     Args:
+        slave: instantiated, with fmpy's call surface.
         fmi_version: 2 or 3.
     """
     return _make_port(slave, fmi_version, variables, values, "Get")
@@ -43,6 +44,7 @@ def make_writer(
     """A call that writes `variables` from `buffer`, shape (number of values of all,).
 
     Args:
+        slave: instantiated, with fmpy's call surface.
         fmi_version: 2 or 3.
     """
     return _make_port(slave, fmi_version, variables, buffer, "Set")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from hashlib import sha256
 from typing import Any
 
 from cosim.evaluation.event_counts import count_events
@@ -110,8 +111,6 @@ def _phases(run: Run) -> str:
 
 
 def _digest(lines: Sequence[Any]) -> str:
-    from hashlib import sha256  # noqa: PLC0415 - only here
-
     return sha256("\n".join(sorted(map(str, lines))).encode()).hexdigest()[:8]
 
 
