@@ -75,6 +75,10 @@ class Stream:
     def open(self, dtype: np.dtype[np.void], rows: int) -> RowFile:
         """The file of the table, with space for so many rows.
 
+        Args:
+            dtype: type of a row: its columns.
+            rows: number of rows.
+
         Raises:
             OutputError: there is no space.
         """
@@ -83,6 +87,9 @@ class Stream:
 
     def block(self, rows: int) -> BlockFile:
         """The block of rows that are not in the table yet.
+
+        Args:
+            rows: number of rows.
 
         Raises:
             OutputError: there is no space.

@@ -37,6 +37,10 @@ def sampling_gaps(result: Result) -> tuple[np.ndarray, np.ndarray]:
 def certified_gaps(result: Result, spec: ReportSpec) -> dict[str, float]:
     """Largest gap each observer is certified for when the gaps vary [s]; observers without a finite limit are left
     out.
+
+    Args:
+        result: with the certificates in its summary.
+        spec: roles of the signals, labels, phases and zones.
     """
     certificates = mapping_entry(result, "certificates")
     limits = {}

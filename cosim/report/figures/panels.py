@@ -25,5 +25,10 @@ def panels() -> list[type[Panel]]:
 
 
 def draw_all(result: Result, spec: ReportSpec) -> dict[type[Panel], bytes]:
-    """All figures that a run has, as PNG, in the order of the report."""
+    """All figures that a run has, as PNG, in the order of the report.
+
+    Args:
+        result: the run.
+        spec: roles of the signals, labels, phases and zones.
+    """
     return {panel: png(panel.draw(result, spec, None).figure) for panel in panels() if panel.available(result, spec)}

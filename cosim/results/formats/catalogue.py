@@ -42,6 +42,9 @@ def table_files() -> dict[str, str]:
 def check_formats(names: Iterable[str]) -> None:
     """Make sure, before a run, that these formats exist and that what they need is installed.
 
+    Args:
+        names: of the formats.
+
     Raises:
         OutputError: one does not, or lacks a package; the message says what to do.
     """
@@ -61,6 +64,9 @@ def check_formats(names: Iterable[str]) -> None:
 
 def format_of(path: Path) -> type[Format]:
     """The format that the ending of a file name means.
+
+    Args:
+        path: the file.
 
     Raises:
         OutputError: none; the message lists the endings.

@@ -29,6 +29,9 @@ def read_foreign_mat(path: Path) -> ResultData:
     """Read a MAT file of version 4 to 7: ours, a Modelica trajectory (``binTrans`` or ``binNormal``), or vectors with
     ``time``.
 
+    Args:
+        path: the file.
+
     Raises:
         OutputError: it is none of these; the message says what it holds.
         ValueError: the file is broken. OSError: it cannot be read.
@@ -50,7 +53,11 @@ def read_foreign_mat(path: Path) -> ResultData:
 
 
 def read_modelica(path: str | Path) -> ResultData:
-    """Read a Modelica trajectory; see `read_foreign_mat`."""
+    """Read a Modelica trajectory; see `read_foreign_mat`.
+
+    Args:
+        path: the file.
+    """
     return read_foreign_mat(Path(path))
 
 

@@ -114,6 +114,9 @@ def read_hdf5(path: str | Path) -> ResultData:
     """Read a file of `write_hdf5`, bit by bit, or of another tool: vectors of numbers, one of them ``time``; groups
     become names.
 
+    Args:
+        path: the file.
+
     Raises:
         OutputError: there is nothing of that kind in it, or h5py is not installed.
         ValueError: the file is broken. OSError: it cannot be read.

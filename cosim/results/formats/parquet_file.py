@@ -66,6 +66,9 @@ def _metadata(signal: SignalInfo) -> dict[str, str]:
 def read_parquet(path: str | Path) -> ResultData:
     """Read a file of `write_parquet`, bit by bit, or of another tool: columns of numbers, one of them ``time``.
 
+    Args:
+        path: the file.
+
     Raises:
         OutputError: a column holds no numbers, or pyarrow is not installed; the message names the column.
         ValueError: the file is broken. OSError: it cannot be read.
