@@ -85,7 +85,7 @@ class Change:
 
 
 def choose(root: Path, count: int, seed: int) -> list[Change]:
-    """So many changes over all rooms, at random."""
+    """So many changes over all rooms, at random and in random order: what is done of them is a sample too."""
     by_room: dict[str, list[Change]] = {}
     for change in all_changes(root):
         by_room.setdefault(change.room, []).append(change)
@@ -93,7 +93,8 @@ def choose(root: Path, count: int, seed: int) -> list[Change]:
     random = Random(seed)
     spare = count - EACH * len(by_room)
     wanted = {room: EACH + round(spare * len(places) / total) for room, places in sorted(by_room.items())}
-    return [one for room, n in wanted.items() for one in random.sample(by_room[room], min(n, len(by_room[room])))]
+    chosen = [one for room, n in wanted.items() for one in random.sample(by_room[room], min(n, len(by_room[room])))]
+    return random.sample(chosen, len(chosen))
 
 
 def all_changes(root: Path) -> Iterator[Change]:
