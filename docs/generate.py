@@ -20,8 +20,8 @@ from pydantic.fields import FieldInfo
 
 import fmu_observer
 from cosim import Outcome, Scenario
+from cosim.evaluation.error_table import error_text
 from cosim.evaluation.metrics import phase_metrics
-from cosim.report.error_table import error_text
 from cosim.report.figures.main_picture import main_picture
 from cosim.scenario import expectation_tables as expectations
 from cosim.scenario import schema, tables

@@ -169,9 +169,8 @@ def _tool_digest() -> str:
 
 def _own_files() -> dict[str, bytes]:
     """What writes the FMU, and what checks the gains that its documentation tells of."""
-    rooms = ("content", "toolchain", "documentation", "licenses")
+    rooms = ("content", "toolchain", "documentation", "documentation/templates", "licenses")
+    kinds = (".py", ".txt", ".j2", ".css")
     folders = (files("fmus"), *(files("fmus") / room for room in rooms), files("fmu_observer") / "certificates")
-    entries = [
-        (folder, entry) for folder in folders for entry in folder.iterdir() if entry.name.endswith((".py", ".txt"))
-    ]
+    entries = [(folder, entry) for folder in folders for entry in folder.iterdir() if entry.name.endswith(kinds)]
     return {f"{folder.name}/{entry.name}": entry.read_bytes() for folder, entry in entries}

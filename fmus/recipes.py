@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from importlib import import_module
-from inspect import Parameter, signature
+from inspect import Parameter, isabstract, signature
 from typing import Any
 
 from fmu_observer import OBSERVERS
 from plant_models import PLANTS
 from plant_models.hybrid import HybridSystem
+from plant_models.user_file import Expected
+
+SYSTEM = Expected(
+    "subclass of HybridSystem",
+    lambda found: isinstance(found, type) and issubclass(found, HybridSystem) and not isabstract(found),
+)
+"""What the name of a user's own model must stand for."""
 
 
 class UnknownRecipeError(LookupError):
@@ -69,6 +76,19 @@ def recipe_options(name: str) -> dict[str, Any]:
         if p.kind in {Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY}
     }
     return dict.fromkeys(cls.option_choices) | named
+
+
+def legal_values(choices: Sequence[Any] | None) -> str:
+    """The legal values of an option in words; empty where any is legal.
+
+    Args:
+        choices: allowed values; None where anything is.
+    """
+    if not choices:
+        return ""
+    if isinstance(choices, range):
+        return f", {choices[0]} to {choices[-1]}"
+    return f", one of {', '.join(map(str, choices))}"
 
 
 def by_room(names: Iterable[str]) -> dict[str, list[str]]:

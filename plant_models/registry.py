@@ -177,6 +177,16 @@ def load(target: str) -> Any:
     return found
 
 
+def descends_from(found: Any, base: str) -> bool:
+    """Whether a class, or an object's class, has a base of this name; that module is not imported for it.
+
+    Args:
+        found: a class or an object. base: ``module:Class``.
+    """
+    cls = found if isinstance(found, type) else type(found)
+    return any(f"{parent.__module__}:{parent.__qualname__}" == base for parent in cls.__mro__)
+
+
 def _load(member: Member, kind: str, base: str) -> Any:
     if member.room:
         return load(member.target)
@@ -186,7 +196,7 @@ def _load(member: Member, kind: str, base: str) -> Any:
         raise RegistryError(
             f"the {kind} {member.name!r} of {member.origin} cannot be loaded: {type(error).__name__}: {error}"
         ) from error
-    if not (isinstance(found, type) and issubclass(found, load(base))):
+    if not (isinstance(found, type) and descends_from(found, base)):
         raise RegistryError(
             f"the {kind} {member.name!r} of {member.origin} is no subclass of {base.replace(':', '.')}."
         )

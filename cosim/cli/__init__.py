@@ -6,35 +6,34 @@ A command runs in a process of its own, so that an FMU that crashes, exits or ha
 
 from __future__ import annotations
 
-import argparse
 import os
 import shlex
 import sys
 from collections.abc import Sequence
-from importlib import import_module
 
 from cosim.errors import CosimError
 from cosim.process.interruption import ends_like_ctrl_c
 from cosim.process.watch import can_watch, watched
+from fmus.cli.commands import Command, make_parser
 from fmus.plain import plain
 
 __all__ = ["main"]
 
 ERROR = 2
 COMMANDS = (
-    "run",
-    "rerun",
-    "sweep",
-    "compare",
-    "baseline",
-    "benchmark_observers",
-    "report",
-    "convert",
-    "new",
-    "show",
-    "listing",
-    "info",
-    "export",
+    Command("run", "cosim.cli.run", "run a scenario"),
+    Command("rerun", "cosim.cli.rerun", "run results again and compare"),
+    Command("sweep", "cosim.cli.sweep", "run a scenario with varied values"),
+    Command("compare", "cosim.cli.compare", "compare a result with a reference"),
+    Command("baseline", "cosim.cli.baseline", "make, check and update baselines"),
+    Command("benchmark-observers", "cosim.cli.benchmark_observers", "compare observers on one recorded run"),
+    Command("report", "cosim.cli.report", "report of results, or of several laid over each other"),
+    Command("convert", "cosim.cli.convert", "write a result in another format"),
+    Command("new", "cosim.cli.new", "write a starter scenario for an FMU"),
+    Command("show", "cosim.cli.show", "show how components hang together"),
+    Command("list", "cosim.cli.listing", "list what ships"),
+    Command("info", "cosim.cli.info", "describe an FMU or SSP file"),
+    Command("export", "cosim.cli.export", "write a scenario as SSP"),
 )
 
 
@@ -51,12 +50,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _main(arguments: Sequence[str]) -> int:
-    parser = argparse.ArgumentParser(
-        prog="cosim", description="Co-simulate train observers with train plant FMUs, balise events exact."
-    )
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for command in COMMANDS:  # imported here and not above: whoever watches needs none of it
-        import_module(f"cosim.cli.{command}").register(commands)
+    description = "Co-simulate train observers with train plant FMUs, balise events exact."
+    parser = make_parser("cosim", description, COMMANDS, arguments)
     options = parser.parse_args(arguments)
     options.command_line = shlex.join(["cosim", *arguments])
     try:

@@ -4,16 +4,25 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cosim.baselines import check, read_baseline
+from cosim.baselines.data import header_data
+from cosim.baselines.files import baseline_path, write_texts
+from cosim.baselines.recipe import Recipe
+from cosim.baselines.references import embed_baseline, find_references, read_reference
+from cosim.baselines.references.extract import extract_reference
+from cosim.baselines.subject import Subject, make_subject, run_again
+from cosim.baselines.update import plan_update
 from cosim.cli.baseline_text import print_json, tell_change, tell_comparison, tell_header
-from cosim.cli.run import ProgressBar
-from cosim.cli.scenarios import OVERRIDES, parse_setting
+from cosim.cli.scenarios import OVERRIDES, parse_setting, simulated_time_bar
 from cosim.cli.tolerances import Asked, add_tolerances, asked_tolerances, chosen_tolerances
+from cosim.comparison.tolerance import Tolerances
+from cosim.components.loading import read_description
 from cosim.errors import BaselineError
+from cosim.results.load import load_result
+from fmus.cli.progress import ProgressBar
 
 if TYPE_CHECKING:
     from cosim.baselines import Baseline, Regression
@@ -31,9 +40,7 @@ def register(commands: Any) -> None:
         commands: subparsers of the program.
     """
     description = "Keep a result as a baseline, and check later ones against it."
-    parser = commands.add_parser(
-        "baseline", help="make, check and update baselines", description=description, epilog=EPILOG
-    )
+    parser = commands.add_parser("baseline", description=description, epilog=EPILOG)
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     _register_make(actions)
     _register_check(actions)
@@ -120,10 +127,6 @@ def _add_tolerances(parser: argparse.ArgumentParser) -> None:
 
 
 def _make(options: argparse.Namespace) -> int:
-    from cosim.baselines.files import baseline_path  # noqa: PLC0415 - NumPy only for those who run
-    from cosim.baselines.update import plan_update  # noqa: PLC0415
-    from cosim.comparison.tolerance import Tolerances  # noqa: PLC0415
-
     path = _free(baseline_path(options.file), options.force)
     tolerances = chosen_tolerances(options, asked_tolerances(options), Tolerances())
     subject = _subject(options)
@@ -133,10 +136,6 @@ def _make(options: argparse.Namespace) -> int:
 
 
 def _subject(options: argparse.Namespace) -> Subject:
-    from cosim.baselines.recipe import Recipe  # noqa: PLC0415 - NumPy only for those who run
-    from cosim.baselines.subject import Subject, make_subject  # noqa: PLC0415
-    from cosim.results.load import load_result  # noqa: PLC0415
-
     if Path(options.subject).is_dir():
         return Subject(Recipe(), load_result(options.subject))
     with _progress(options) as bar:
@@ -155,8 +154,6 @@ def _subject(options: argparse.Namespace) -> Subject:
 
 def _values(options: argparse.Namespace) -> dict[str, Any]:
     """What ``--set`` and ``--inputs`` mean: overrides of a scenario; constant inputs and start values of an FMU."""
-    from cosim.components.loading import read_description  # noqa: PLC0415 - fmpy only for those who run
-
     values = dict(parse_setting(setting) for setting in options.settings)
     if Path(options.subject).suffix.lower() != ".fmu":
         return {"overrides": values, "inputs": options.inputs}
@@ -183,9 +180,6 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def _baselines(options: argparse.Namespace) -> list[Baseline]:
-    from cosim.baselines import read_baseline  # noqa: PLC0415 - NumPy only for those who run
-    from cosim.baselines.references import find_references, read_reference  # noqa: PLC0415
-
     if Path(options.file).suffix.lower() != ".fmu":
         return [read_baseline(options.file)]
     names = [reference.name for reference in find_references(options.file)]
@@ -195,10 +189,6 @@ def _baselines(options: argparse.Namespace) -> list[Baseline]:
 
 
 def _check_one(baseline: Baseline, asked: Asked, options: argparse.Namespace) -> Regression:
-    from cosim.baselines import check  # noqa: PLC0415 - NumPy only for those who run
-    from cosim.baselines.subject import run_again  # noqa: PLC0415
-    from cosim.results.load import load_result  # noqa: PLC0415
-
     tolerances: Tolerances = chosen_tolerances(options, asked, baseline.tolerances)
     other = options.against
     if other is not None and Path(other).suffix.lower() != ".fmu":
@@ -220,9 +210,6 @@ def _draw(found: list[Regression], options: argparse.Namespace) -> None:
 
 
 def _show(options: argparse.Namespace) -> int:
-    from cosim.baselines import read_baseline  # noqa: PLC0415 - NumPy only for those who look
-    from cosim.baselines.data import header_data  # noqa: PLC0415
-
     baseline = read_baseline(options.file)
     if options.json:
         print_json(header_data(baseline.header, baseline.path.parent) | {"notes": list(baseline.notes)})
@@ -232,10 +219,6 @@ def _show(options: argparse.Namespace) -> int:
 
 
 def _update(options: argparse.Namespace) -> int:
-    from cosim.baselines import read_baseline  # noqa: PLC0415 - NumPy only for those who run
-    from cosim.baselines.subject import run_again  # noqa: PLC0415
-    from cosim.baselines.update import plan_update  # noqa: PLC0415
-
     baseline = read_baseline(options.file)
     tolerances = chosen_tolerances(options, asked_tolerances(options), baseline.tolerances)
     with _progress(options) as bar:
@@ -253,8 +236,6 @@ def _update(options: argparse.Namespace) -> int:
 
 
 def _write(update: Any, path: Path, options: argparse.Namespace) -> int:
-    from cosim.baselines.files import write_texts  # noqa: PLC0415 - NumPy only for those who run
-
     if update.texts:
         write_texts(update.texts, path)
     tell_change(update, path, options.json)
@@ -262,9 +243,6 @@ def _write(update: Any, path: Path, options: argparse.Namespace) -> int:
 
 
 def _embed(options: argparse.Namespace) -> int:
-    from cosim.baselines import read_baseline  # noqa: PLC0415 - NumPy only for those who run
-    from cosim.baselines.references import embed_baseline  # noqa: PLC0415
-
     target = embed_baseline(read_baseline(options.file), options.fmu, options.output, options.name)
     print_json({"file": str(target)}) if options.json else print(
         f"{target} holds {options.name or Path(options.file).stem}."
@@ -273,9 +251,6 @@ def _embed(options: argparse.Namespace) -> int:
 
 
 def _extract(options: argparse.Namespace) -> int:
-    from cosim.baselines.files import baseline_path  # noqa: PLC0415 - NumPy only for those who run
-    from cosim.baselines.references.extract import extract_reference  # noqa: PLC0415
-
     path = _free(baseline_path(options.file), options.force)
     extract_reference(options.fmu, path, options.reference)
     print_json({"file": str(path)}) if options.json else print(f"{path} written.")
@@ -295,14 +270,8 @@ def _free(path: Path, force: bool) -> Path:
     return path
 
 
-@contextmanager
-def _progress(options: argparse.Namespace) -> Iterator[ProgressBar | None]:
-    bar = None if options.quiet or options.json else ProgressBar()
-    try:
-        yield bar
-    finally:
-        if bar is not None:
-            bar.close()
+def _progress(options: argparse.Namespace) -> ProgressBar:
+    return simulated_time_bar(silent=options.quiet or options.json)
 
 
 def _warn(text: str) -> None:

@@ -6,6 +6,10 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cosim.baselines.call import Call
+from cosim.baselines.draft import value_range
+from cosim.comparison.text import comparison_text
+from cosim.results.summary_file import jsonable
 from fmus.text_table import text_table
 
 if TYPE_CHECKING:
@@ -15,8 +19,6 @@ if TYPE_CHECKING:
 
 def print_json(data: Any) -> None:
     """Print plain data as JSON; NaN becomes null."""
-    from cosim.results.summary_file import jsonable  # noqa: PLC0415 - NumPy only for those who ran
-
     print(json.dumps(jsonable(data), indent=2))
 
 
@@ -26,8 +28,6 @@ def tell_comparison(found: Regression, verbose: bool) -> None:
     Args:
         found: what the check found. verbose: all signals, not only those that differ.
     """
-    from cosim.comparison.text import comparison_text  # noqa: PLC0415 - NumPy only for those who ran
-
     print(comparison_text(found, verbose=verbose))
 
 
@@ -37,8 +37,6 @@ def tell_change(update: Update, path: Path, as_json: bool) -> None:
     Args:
         update: what was changed. path: of the baseline. as_json: print JSON.
     """
-    from cosim.baselines.call import Call  # noqa: PLC0415 - NumPy only for those who ran
-
     worst = Call.worst(update.before) if update.before is not None else []
     if as_json:
         print_json({"file": str(path), "change": update.change, "notes": [*update.notes, *worst]})
@@ -73,7 +71,5 @@ def tell_header(baseline: Baseline) -> None:
 
 
 def _allowed(baseline: Baseline, name: str) -> str:
-    from cosim.baselines.draft import value_range  # noqa: PLC0415 - NumPy only for those who look
-
     allowed = baseline.tolerances.for_signal(name).value_for(value_range(baseline.result.table[name]))
     return f"+- {allowed:.3g}"

@@ -9,6 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cosim.cli.scenarios import add_scenario, load_scenario, positive
+from cosim.observer_benchmark.observers import benchmark_observers
+from cosim.results.folder import check_writable
+from cosim.results.summary_file import jsonable
+from fmus.cli.progress import ProgressBar
 
 if TYPE_CHECKING:
     from cosim.observer_benchmark.observers import ObserverBenchmark
@@ -31,9 +35,7 @@ def register(commands: Any) -> None:
         "Exit codes: 0 done, 1 an observer failed or could not be coupled, 2 error or interrupted; what was "
         "judged is told."
     )
-    parser = commands.add_parser(
-        "benchmark-observers", help="compare observers on one recorded run", description=description, epilog=epilog
-    )
+    parser = commands.add_parser("benchmark-observers", description=description, epilog=epilog)
     add_scenario(parser)
     parser.add_argument(
         "--observers",
@@ -63,13 +65,10 @@ def execute(options: argparse.Namespace) -> int:
     Args:
         options: of the command line.
     """
-    from cosim.observer_benchmark.observers import benchmark_observers  # noqa: PLC0415
-    from cosim.results.folder import check_writable  # noqa: PLC0415 - scipy is loaded only by those who run
-
     for folder in (options.out, options.record):
         if folder is not None:
             check_writable(folder)
-    bar = _Bar(silent=options.quiet or options.json)
+    bar = ProgressBar("run", silent=options.quiet or options.json)
     try:
         benchmark = benchmark_observers(
             load_scenario(options),
@@ -77,7 +76,7 @@ def execute(options: argparse.Namespace) -> int:
             record=options.record,
             recorded=options.recorded,
             repeat=options.repeat,
-            progress=bar,
+            progress=lambda what, done, total: bar(done, total, what),
             warn=_warn,
         )
     finally:
@@ -91,35 +90,11 @@ def execute(options: argparse.Namespace) -> int:
 
 def _tell(benchmark: ObserverBenchmark, paths: dict[str, Path], *, as_json: bool) -> None:
     if as_json:
-        from cosim.results.summary_file import jsonable  # noqa: PLC0415 - only here
-
         print(json.dumps(jsonable(benchmark.to_data() | {"files": {k: str(p) for k, p in paths.items()}}), indent=2))
         return
     print(benchmark.text())
     for kind, path in paths.items():
         print(f"{kind:>10}: {path}")
-
-
-class _Bar:
-    """A progress bar in runs; appears only where somebody can see it."""
-
-    def __init__(self, *, silent: bool) -> None:
-        self._silent = silent
-        self._bar: Any = None
-
-    def __call__(self, what: str, done: int, total: int) -> None:
-        if self._bar is None:
-            from tqdm import tqdm  # noqa: PLC0415 - only for those who watch
-
-            hidden = self._silent or not sys.stderr.isatty()
-            self._bar = tqdm(total=total, unit="run", disable=hidden, leave=False, file=sys.stderr)
-        self._bar.set_description_str(what)
-        self._bar.update(done - self._bar.n)
-
-    def close(self) -> None:
-        """Remove the bar."""
-        if self._bar is not None:
-            self._bar.close()
 
 
 def _warn(text: str) -> None:

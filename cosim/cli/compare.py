@@ -5,14 +5,20 @@ error.
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
 
+from cosim.baselines import check, is_baseline, read_baseline
 from cosim.cli.tolerances import Asked, add_tolerances, asked_tolerances, chosen_tolerances
+from cosim.comparison.compare import compare_results
+from cosim.comparison.text import comparison_text
 from cosim.comparison.tolerance import Tolerances
 from cosim.errors import ComparisonError, nearest
+from cosim.results.load import load_result
+from cosim.results.summary_file import jsonable
 
 if TYPE_CHECKING:
     from cosim.baselines import Baseline
@@ -37,9 +43,7 @@ def register(commands: Any) -> None:
         commands: subparsers of the program.
     """
     description = "Compare a result with a reference: signals in tolerance tubes, telegrams as events."
-    parser = commands.add_parser(
-        "compare", help="compare a result with a reference", description=description, epilog=EPILOG
-    )
+    parser = commands.add_parser("compare", description=description, epilog=EPILOG)
     what = "a results folder, a table (CSV, MAT, ...) or a baseline (JSON)"
     parser.add_argument("reference", metavar="A", help=f"what is right: {what}")
     parser.add_argument("result", metavar="B", help=f"what is compared with it: {what}")
@@ -77,9 +81,6 @@ def execute(options: argparse.Namespace) -> int:
 
 def _compare(options: argparse.Namespace, asked: Asked) -> Comparison:
     """The comparison; against a baseline it is that of the baseline, which knows its models and its tolerances."""
-    from cosim.baselines import check  # noqa: PLC0415 - NumPy and scipy only for those who compare
-    from cosim.comparison.compare import compare_results  # noqa: PLC0415
-
     reference, baseline = _load(options.reference)
     result, other = _load(options.result)
     tolerances = chosen_tolerances(options, asked, baseline.tolerances if baseline is not None else Tolerances())
@@ -98,9 +99,6 @@ def _compare(options: argparse.Namespace, asked: Asked) -> Comparison:
 
 def _load(path: str) -> tuple[Result, Baseline | None]:
     """A result, and the baseline where it is of one."""
-    from cosim.baselines import is_baseline, read_baseline  # noqa: PLC0415 - only here
-    from cosim.results.load import load_result  # noqa: PLC0415
-
     if not is_baseline(path):
         return load_result(path), None
     baseline = read_baseline(path)
@@ -136,13 +134,7 @@ def _columns(side: Result, names: Sequence[str]) -> Result:
 
 def _tell(comparison: Comparison, options: argparse.Namespace) -> None:
     """Text or JSON first, so that it is seen also where a file cannot be written."""
-    from cosim.comparison.text import comparison_text  # noqa: PLC0415 - only here
-
     if options.json:
-        import json  # noqa: PLC0415 - only here
-
-        from cosim.results.summary_file import jsonable  # noqa: PLC0415
-
         print(json.dumps(jsonable(comparison.to_dict()), indent=2))
     else:
         text = comparison_text(comparison, verbose=options.verbose)

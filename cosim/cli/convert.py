@@ -6,6 +6,12 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from cosim.errors import OutputError
+from cosim.results.formats.catalogue import format_of
+from cosim.results.load import load_result
+from cosim.results.save import save_result
+from cosim.results.selection import selected
+
 DONE = 0
 
 
@@ -21,7 +27,7 @@ def register(commands: Any) -> None:
         "OpenModelica), .npy, .parquet, .h5. SOURCE is a results folder or a table of ours or of another tool."
     )
     epilog = "Exit codes: 0 written, 2 error."
-    parser = commands.add_parser("convert", help="write a result in another format", description=text, epilog=epilog)
+    parser = commands.add_parser("convert", description=text, epilog=epilog)
     parser.add_argument("source", metavar="SOURCE", help="results folder or file")
     parser.add_argument("target", metavar="TARGET", help="file to write")
     parser.add_argument(
@@ -37,12 +43,6 @@ def execute(options: argparse.Namespace) -> int:
     Args:
         options: of the command line.
     """
-    from cosim.errors import OutputError  # noqa: PLC0415 - NumPy is loaded only by those who convert
-    from cosim.results.formats.catalogue import format_of  # noqa: PLC0415
-    from cosim.results.load import load_result  # noqa: PLC0415
-    from cosim.results.save import save_result  # noqa: PLC0415
-    from cosim.results.selection import selected  # noqa: PLC0415
-
     target = Path(options.target)
     wanted = format_of(target)
     if target.exists() and Path(options.source).exists() and target.samefile(options.source):

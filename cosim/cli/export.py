@@ -17,7 +17,6 @@ def register(commands: Any) -> None:
     """
     parser = commands.add_parser(
         "export",
-        help="write a scenario as SSP",
         description="Write a scenario as a system structure package (SSP) for other tools.",
     )
     add_scenario(parser, default=None)

@@ -11,6 +11,7 @@ from typing import Any
 
 from cosim.components.loading import read_description, runs_here
 from cosim.scenario.package_names import is_package
+from cosim.ssp.describe import describe_package, text_of_package
 from fmus.fmi.capabilities import read_capabilities
 from fmus.text_table import text_table
 
@@ -23,7 +24,6 @@ def register(commands: Any) -> None:
     """
     parser = commands.add_parser(
         "info",
-        help="describe an FMU or SSP file",
         description="Interfaces, platforms and variables of an FMU, or the systems, components and connections in an "
         "SSP.",
     )
@@ -58,8 +58,6 @@ def execute(options: argparse.Namespace) -> int:
 
 
 def _execute_package(options: argparse.Namespace) -> int:
-    from cosim.ssp.describe import describe_package, text_of_package  # noqa: PLC0415 - lxml only for those who read SSP
-
     data = describe_package(str(options.file))
     print(json.dumps(data, indent=2) if options.json else text_of_package(data))
     return 0

@@ -7,9 +7,13 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+import fmu_observer
+import plant_models
 from cosim.scenario.includes import shipped_scenarios
 from cosim.scenario.package_names import is_package
 from cosim.simulation.scenario import Scenario
+from cosim.ssp.load import list_variants
+from fmus.recipes import RECIPES, by_room, legal_values, recipe_presets
 from fmus.text_table import text_table
 
 KINDS = ("scenarios", "models", "observers", "all")
@@ -21,9 +25,7 @@ def register(commands: Any) -> None:
     Args:
         commands: subparsers of the program.
     """
-    parser = commands.add_parser(
-        "list", help="list what ships", description="Scenarios, plants and observers with their sources."
-    )
+    parser = commands.add_parser("list", description="Scenarios, plants and observers with their sources.")
     parser.add_argument("what", nargs="?", type=_what, default="all", help=f"{', '.join(KINDS)}, or an .ssp file")
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.set_defaults(execute=execute)
@@ -60,8 +62,6 @@ def _rooms(kind: str, entries: Mapping[str, Any]) -> dict[str, list[str]]:
     """Names by the room they live in; scenarios live in none."""
     if kind == "scenarios":
         return {"": list(entries)}
-    from fmus.recipes import by_room  # noqa: PLC0415 - CasADi is loaded only by those who list
-
     return by_room(entries)
 
 
@@ -70,15 +70,13 @@ def _details(kind: str, name: str, entry: Mapping[str, Any]) -> list[str]:
     lines = [f"[{entry['source']}]"] if entry["source"] else []
     if kind == "scenarios":
         return lines
-    from fmus.cli.build import legal  # noqa: PLC0415
-    from fmus.recipes import RECIPES  # noqa: PLC0415
-
     choices = RECIPES[name].option_choices
     if entry["presets"]:
         lines.append(f"presets: {', '.join(entry['presets'])}")
     if entry["options"]:
         words = {
-            option: legal(choices[option]).removeprefix(", ").removeprefix("one of ") for option in entry["options"]
+            option: legal_values(choices[option]).removeprefix(", ").removeprefix("one of ")
+            for option in entry["options"]
         }
         lines.append(
             "options: " + ", ".join(f"{option} ({values})" if values else option for option, values in words.items())
@@ -93,8 +91,6 @@ def _what(text: str) -> str:
 
 
 def _execute_package(options: argparse.Namespace) -> int:
-    from cosim.ssp.load import list_variants  # noqa: PLC0415 - lxml only for those who read SSP
-
     variants = list_variants(options.what)
     if options.json:
         print(json.dumps({"variants": variants}, indent=2))
@@ -107,9 +103,6 @@ def _execute_package(options: argparse.Namespace) -> int:
 
 def catalogue() -> dict[str, dict[str, dict[str, Any]]]:
     """Everything that ships, as plain data."""
-    import fmu_observer  # noqa: PLC0415 - CasADi is loaded only by those who list
-    import plant_models  # noqa: PLC0415
-
     scenarios = {}
     for name in shipped_scenarios():
         table = Scenario.load(name).table()
@@ -122,8 +115,6 @@ def catalogue() -> dict[str, dict[str, dict[str, Any]]]:
 
 
 def _systems(registry: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    from fmus.recipes import recipe_presets  # noqa: PLC0415
-
     return {
         name: {
             "description": " ".join(system.description.split()),

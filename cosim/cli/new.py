@@ -7,6 +7,8 @@ import shlex
 from pathlib import Path
 from typing import Any
 
+from cosim.starter.starter import write_starter
+
 
 def register(commands: Any) -> None:
     """Add the command to the parser.
@@ -18,9 +20,7 @@ def register(commands: Any) -> None:
     speed, wheel speed and effort, to be confirmed by editing. Only the description is read; nothing of the FMU is
     executed."""
     epilog = "Exit codes: 0 written, 2 error."
-    parser = commands.add_parser(
-        "new", help="write a starter scenario for an FMU", description=description, epilog=epilog
-    )
+    parser = commands.add_parser("new", description=description, epilog=epilog)
     parser.add_argument("fmu", type=Path, help="the FMU")
     parser.add_argument("-o", "--out", type=Path, metavar="FILE", help="scenario file to write (default: NAME.toml)")
     parser.add_argument(
@@ -36,8 +36,6 @@ def execute(options: argparse.Namespace) -> int:
     Args:
         options: of the command line.
     """
-    from cosim.starter.starter import write_starter  # noqa: PLC0415 - only for those who begin
-
     target = options.out if options.out is not None else Path(f"{options.fmu.stem}.toml")
     made = write_starter(options.fmu, target, options.observer, force=options.force)
     for remark in made.remarks:

@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cosim.errors import ComparisonError, nearest
+from cosim.evaluation.stored_spec import is_guessed, spec_of
+from cosim.results.load import load_result
 
 if TYPE_CHECKING:
     from cosim.evaluation.spec import ReportSpec
@@ -33,7 +35,6 @@ def register(commands: Any) -> None:
     )
     parser = commands.add_parser(
         "report",
-        help="report of results, or of several laid over each other",
         description=description,
         epilog="Exit codes: 0 written, 2 error.",
     )
@@ -62,9 +63,6 @@ def execute(options: argparse.Namespace) -> int:
     Args:
         options: of the command line.
     """
-    from cosim.evaluation.stored_spec import is_guessed, spec_of  # noqa: PLC0415 - NumPy is loaded only by those who ask
-    from cosim.results.load import load_result  # noqa: PLC0415
-
     paths = [Path(text) for text in options.results]
     labels = _labels(options.labels, paths)
     results = [load_result(path) for path in paths]

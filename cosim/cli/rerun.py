@@ -8,7 +8,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from cosim.cli.scenarios import OVERRIDES, parse_setting
+from cosim.cli.scenarios import OVERRIDES, parse_setting, simulated_time_bar
+from cosim.provenance import rerun
+from cosim.results.summary_file import jsonable
 
 EQUAL, DIFFERS, ERROR = 0, 1, 2
 DESCRIPTION = (
@@ -25,7 +27,7 @@ def register(commands: Any) -> None:
     Args:
         commands: subparsers of the program.
     """
-    parser = commands.add_parser("rerun", help="run results again and compare", description=DESCRIPTION)
+    parser = commands.add_parser("rerun", description=DESCRIPTION)
     parser.add_argument("directory", metavar="DIR", help="a results folder")
     parser.add_argument("--out", metavar="OTHER", help="folder for the new results (default: only the verdict is kept)")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="settings", help=OVERRIDES)
@@ -47,12 +49,8 @@ def execute(options: argparse.Namespace) -> int:
     Args:
         options: of the command line.
     """
-    from cosim.cli.run import ProgressBar  # noqa: PLC0415 - what runs is loaded only by those who run
-    from cosim.provenance import rerun  # noqa: PLC0415
-    from cosim.results.summary_file import jsonable  # noqa: PLC0415
-
     settings = dict(parse_setting(setting) for setting in options.settings)
-    bar = None if options.quiet or options.json else ProgressBar()
+    bar = simulated_time_bar(silent=options.quiet or options.json)
     out = None if options.out is None else Path(options.out).absolute()
     try:
         again = rerun(
@@ -66,8 +64,7 @@ def execute(options: argparse.Namespace) -> int:
             building=_ignore if options.quiet else _say,
         )
     finally:
-        if bar is not None:
-            bar.close()
+        bar.close()
     if options.json:
         print(json.dumps(jsonable(again.to_dict()), indent=2))
     else:

@@ -11,12 +11,18 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from cosim.cli.scenarios import add_scenario, load_scenario, positive
+from cosim.cli.scenarios import add_scenario, load_scenario, positive, simulated_time_bar
 from cosim.errors import OutputError
+from cosim.evaluation.cost import cost_text
+from cosim.evaluation.error_table import error_text
+from cosim.evaluation.metrics import phase_metrics
 from cosim.process.last_call import LAST_CALL
+from cosim.results.folder import check_writable
+from cosim.results.summary_file import jsonable
 from cosim.results.unfinished import SPARE
 from cosim.scenario.outcome import Outcome
 from cosim.simulation.scenario import Scenario
+from cosim.studies.seeds import seed_study
 from fmus.plain import plain
 
 DONE, NOT_AS_ASKED, ERROR = 0, 1, 2
@@ -34,7 +40,7 @@ def register(commands: Any) -> None:
         "Exit codes: 0 done, 1 an expectation of the scenario is not met (or --strict), 2 the run failed or could "
         "not begin."
     )
-    parser = commands.add_parser("run", help="run a scenario", description=description, epilog=epilog)
+    parser = commands.add_parser("run", description=description, epilog=epilog)
     add_scenario(parser)
     parser.add_argument(
         "--out", metavar="DIR", default=None, help="folder for results and report (default: results/NAME)"
@@ -69,14 +75,12 @@ def execute(options: argparse.Namespace) -> int:
     Args:
         options: of the command line.
     """
-    from cosim.results.folder import check_writable  # noqa: PLC0415 - scipy is loaded only by those who run
-
     scenario = load_scenario(options)
     formats = scenario.table().report.tables
     directory = (Path(options.out) if options.out is not None else Path("results") / scenario.name).absolute()
     check_writable(directory, formats)
     call_log = _call_log(options, scenario, directory)
-    bar = None if options.quiet or options.json else ProgressBar()
+    bar = simulated_time_bar(silent=options.quiet or options.json)
     results = _Results(directory, options)
     try:
         building = _ignore if options.quiet else _say
@@ -96,8 +100,7 @@ def execute(options: argparse.Namespace) -> int:
             _tell(results.outcome, None, {}, options)  # what the disk did not take is at least on the screen
         raise
     finally:
-        if bar is not None:
-            bar.close()
+        bar.close()
     assert results.outcome is not None
     outcome, paths = results.outcome, results.paths
     study = None
@@ -145,29 +148,6 @@ def _kept(directory: Path, streamed: bool, formats: Sequence[str]) -> Iterator[P
         LAST_CALL.note("")
 
 
-class ProgressBar:
-    """A progress bar in simulated seconds; appears only where somebody can see it."""
-
-    def __init__(self) -> None:
-        self._bar: Any = None
-
-    def __call__(self, t: float, stop: float) -> None:
-        """Move to `t` of `stop` [s]."""
-        if self._bar is None:
-            from tqdm import tqdm  # noqa: PLC0415 - only for those who watch
-
-            shape = "{percentage:3.0f}%|{bar}| {n:.1f}/{total:.1f} s simulated, {elapsed} elapsed"
-            self._bar = tqdm(
-                total=stop, bar_format=shape, disable=not sys.stderr.isatty(), leave=False, file=sys.stderr
-            )
-        self._bar.update(t - self._bar.n)
-
-    def close(self) -> None:
-        """Remove the bar."""
-        if self._bar is not None:
-            self._bar.close()
-
-
 def _call_log(options: argparse.Namespace, scenario: Scenario, directory: Path) -> Path | None:
     """Where calls are logged, if they are; a log that an earlier run left there would not belong to these results."""
     if options.log_calls:
@@ -190,8 +170,6 @@ def _warn(text: str) -> None:
 
 
 def _study(scenario: Scenario, options: argparse.Namespace) -> Any:
-    from cosim.studies.seeds import seed_study  # noqa: PLC0415 - only for those who ask
-
     def tell(done: int, count: int) -> None:
         if not (options.quiet or options.json) and sys.stderr.isatty():
             print(f"\rseed {done} of {count}", end="" if done < count else "\n", file=sys.stderr)
@@ -202,18 +180,11 @@ def _study(scenario: Scenario, options: argparse.Namespace) -> Any:
 def _tell(outcome: Outcome, study: Any, paths: dict[str, Path], options: argparse.Namespace) -> None:
     summary = outcome.result.summary
     if options.json:
-        from cosim.results.summary_file import jsonable  # noqa: PLC0415 - only here
-
         data = dict(summary) | {"failure": outcome.failure, "files": {k: str(p) for k, p in paths.items()}}
         print(json.dumps(jsonable(data), indent=2))
         return
-    from cosim.report.cost import cost_text  # noqa: PLC0415 - only here
-
     print(_headline(summary))
     if outcome.result.table.size:
-        from cosim.evaluation.metrics import phase_metrics  # noqa: PLC0415 - only here
-        from cosim.report.error_table import error_text  # noqa: PLC0415
-
         metrics = phase_metrics(outcome.result, outcome.spec)
         if metrics:
             print(error_text(metrics, outcome.spec))

@@ -8,6 +8,7 @@ from typing import Any
 
 from cosim.errors import ScenarioError
 from cosim.simulation.scenario import Scenario
+from fmus.cli.progress import ProgressBar
 
 DEFAULT = "freight_profile_d"
 OVERRIDES = "override component.parameter, master.KEY, balises.KEY, report.KEY or a top-level key; may be repeated"
@@ -40,6 +41,16 @@ def load_scenario(options: argparse.Namespace) -> Scenario:
     for setting in options.settings:
         scenario.set(*parse_setting(setting))
     return scenario
+
+
+def simulated_time_bar(*, silent: bool) -> ProgressBar:
+    """A progress bar in simulated seconds.
+
+    Args:
+        silent: whether it stays away in any case.
+    """
+    shape = "{percentage:3.0f}%|{bar}| {n:.1f}/{total:.1f} s simulated, {elapsed} elapsed"
+    return ProgressBar(silent=silent, shape=shape)
 
 
 def parse_setting(text: str) -> tuple[str, Any]:

@@ -20,7 +20,6 @@ def register(commands: Any) -> None:
     """
     parser = commands.add_parser(
         "show",
-        help="show how components hang together",
         description="Components, connections, order and loops, without a run.",
     )
     add_scenario(parser)

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import argparse
 import re
-import sys
 import tomllib
 from pathlib import Path
 from typing import Any
 
 from cosim.cli.scenarios import add_scenario, load_scenario, parse_setting
 from cosim.errors import ScenarioError
+from cosim.results.folder import check_writable
+from cosim.studies.sampling import MOST, Range, uniform
+from fmus.cli.progress import ProgressBar
 
 DONE, SOME_FAILED = 0, 1
 RANGE = re.compile(r"(-?\d+):(-?\d+)(?::(-?\d+))?")
@@ -30,9 +32,7 @@ def register(commands: Any) -> None:
     epilog = (
         "Exit codes: 0 all runs done, 1 a run failed, 2 error or interrupted; runs that were done are in the folder."
     )
-    parser = commands.add_parser(
-        "sweep", help="run a scenario with varied values", description=description, epilog=epilog
-    )
+    parser = commands.add_parser("sweep", description=description, epilog=epilog)
     add_scenario(parser, default=None)
     parser.add_argument("--vary", action="append", required=True, metavar="NAME=VALUES", help=VARY)
     parser.add_argument(
@@ -55,9 +55,6 @@ def execute(options: argparse.Namespace) -> int:
     Args:
         options: of the command line.
     """
-    from cosim.results.folder import check_writable  # noqa: PLC0415 - only for those who run
-    from cosim.studies.sampling import Range  # noqa: PLC0415
-
     scenario = load_scenario(options)
     if options.zip and options.samples is not None:
         raise ScenarioError("--zip and --samples exclude each other.")
@@ -71,8 +68,8 @@ def execute(options: argparse.Namespace) -> int:
     directory = check_writable(
         Path(options.out) if options.out is not None else Path("results") / f"{scenario.name}_sweep"
     )
-    with _Bar(len(sweep), visible=not (options.quiet or options.json)) as bar:
-        result = sweep.run(options.workers, progress=bar.move, keep=False, directory=directory.absolute())
+    with ProgressBar("run", silent=options.quiet or options.json) as bar:
+        result = sweep.run(options.workers, progress=bar, keep=False, directory=directory.absolute())
     if options.json:
         print((directory / "index.json").read_text(encoding="utf-8"), end="")
     else:
@@ -107,8 +104,6 @@ def parse_values(text: str) -> Any:
     Raises:
         ScenarioError: a range without numbers in it.
     """
-    from cosim.studies.sampling import MOST, uniform  # noqa: PLC0415 - only here
-
     if (match := RANGE.fullmatch(text)) is not None:
         numbers = range(int(match[1]), int(match[2]), int(match[3] or 1) or 1)
         if not numbers:
@@ -123,23 +118,3 @@ def parse_values(text: str) -> Any:
         return list(tomllib.loads(f"value = [{text}]")["value"])
     except tomllib.TOMLDecodeError:
         return [parse_setting(f"value={part}")[1] for part in text.split(",")]
-
-
-class _Bar:
-    """A progress bar over runs; appears only where somebody can see it."""
-
-    def __init__(self, count: int, visible: bool) -> None:
-        from tqdm import tqdm  # noqa: PLC0415 - only for those who watch
-
-        hidden = not (visible and sys.stderr.isatty())
-        self._bar = tqdm(total=count, unit="run", disable=hidden, leave=False, file=sys.stderr)
-
-    def move(self, done: int, _count: int) -> None:
-        """To a number of runs."""
-        self._bar.update(done - self._bar.n)
-
-    def __enter__(self) -> _Bar:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.close()

@@ -9,8 +9,6 @@ from tempfile import mkdtemp
 from typing import Any, Literal
 
 import fmpy
-import fmpy.fmi2
-import fmpy.fmi3
 from fmpy.model_description import ModelDescription
 
 from cosim.components.component import Component
@@ -26,13 +24,12 @@ from fmu_observer.block import make_block
 from fmus.fmi.archive import MAX_UNPACKED_BYTES, Archive, NotAnFmuError, open_archive
 from fmus.fmi.binaries import platform_folder
 from fmus.fmi.description import negated_aliases
-from fmus.fmi.fmi1_library import FMU1SlaveRepaired
+from fmus.fmi.library import load
 from fmus.fmi.standard import CO_SIMULATION, fmi_version
 from plant_models.hybrid import HybridSystem
 
 VERSIONS = ("1.0", "2.0", "3.0")
 COMPONENTS: dict[int, Any] = {1: FMI1Component, 2: FMI2Component, 3: FMI3Component}
-SLAVES: dict[int, Any] = {1: FMU1SlaveRepaired, 2: fmpy.fmi2.FMU2Slave, 3: fmpy.fmi3.FMU3Slave}
 
 
 def load_fmu(path: str | Path, name: str, tolerance: float | str | None = None) -> Component:
@@ -64,7 +61,7 @@ def load_fmu(path: str | Path, name: str, tolerance: float | str | None = None) 
         fmpy.extract(str(path), unzipdir=str(folder))
         refuse_foreign_libraries(_library(folder, description), path, name)
         with LAST_CALL.making(name, "loading its library"):
-            slave = _slave(folder, description, name)
+            slave = load(folder, description, CO_SIMULATION, name, complete=True)
     except FmuLoadError:
         shutil.rmtree(folder, ignore_errors=True)
         raise
@@ -145,13 +142,3 @@ def load_block(system: HybridSystem, name: str, fmi_version: Literal[2, 3] = 3, 
 def _library(folder: Path, description: ModelDescription) -> Path:
     name = f"{description.coSimulation.modelIdentifier}{fmpy.sharedLibraryExtension}"
     return folder / "binaries" / platform_folder(description) / name
-
-
-def _slave(folder: Path, description: ModelDescription, name: str) -> Any:
-    arguments = {
-        "guid": description.guid,
-        "modelIdentifier": description.coSimulation.modelIdentifier,
-        "unzipDirectory": str(folder),
-        "instanceName": name,
-    }
-    return SLAVES[fmi_version(description)](**arguments)

@@ -13,6 +13,7 @@ import fmu_observer
 from cosim.balises.recorded import read_layout
 from cosim.coupling.connection import Link
 from cosim.errors import CosimError, RunError, ScenarioError, nearest
+from cosim.evaluation.error_table import error_text
 from cosim.evaluation.numbers import cell
 from cosim.evaluation.spec import ReportSpec
 from cosim.observer_benchmark.observer_scores import CertifiedGap, ObserverScore, divergence, longest_gap, measured
@@ -26,18 +27,20 @@ from cosim.observer_benchmark.playback import (
     recording_scenario,
     train_observers,
 )
-from cosim.report.error_table import error_text
 from cosim.results.folder import write_results
 from cosim.results.load import load_result
 from cosim.results.result import Result
 from cosim.scenario.balise_service import BALISE_EVENT
 from cosim.scenario.certificates import check_certificates, expected_gap
 from cosim.scenario.layouts import make_layout
-from cosim.scenario.models import make_system
+from cosim.scenario.model_name import ModelName
+from cosim.scenario.models import make_declared
 from cosim.scenario.outcome import INTERRUPTED, Outcome
+from cosim.scenario.paths import absolute, move_file
 from cosim.scenario.schema import step_count
 from cosim.scenario.tables import ComponentTable
 from cosim.simulation.scenario import Scenario
+from plant_models.user_file import names_code
 
 Progress = Callable[[str, int, int], None]
 MICROSECONDS = 1e6
@@ -136,7 +139,7 @@ class ObserverBenchmark:
 
 def benchmark_observers(
     scenario: Scenario,
-    observers: Sequence[str] | None = None,
+    observers: Sequence[Any] | None = None,
     *,
     record: str | Path | None = None,
     recorded: str | Path | None = None,
@@ -148,8 +151,8 @@ def benchmark_observers(
 
     Args:
         scenario: with or without observers of its own.
-        observers: names of components of the scenario or of shipped observers. None: the scenario's own, and all
-            shipped train observers whose inputs and event the scenario can serve.
+        observers: names of components of the scenario or of shipped observers, ``file.py:Class``, classes or instances.
+            None: the scenario's own, and all shipped train observers whose inputs and event the scenario can serve.
         record: folder for the recording, an ordinary results folder; by default it is thrown away.
         recorded: folder of an earlier recording (or of any run of this scenario) to be played back instead of a new
             run.
@@ -233,7 +236,7 @@ def _loop_notes(sides: Sides, recording: Result) -> list[str]:
 # -----------------------------------------------------------------------------------------------------
 
 
-def find_candidates(scenario: Scenario, sides: Sides, names: Sequence[str] | None) -> tuple[list[Candidate], list[str]]:
+def find_candidates(scenario: Scenario, sides: Sides, names: Sequence[Any] | None) -> tuple[list[Candidate], list[str]]:
     """The observers to be judged, and notes on what was assumed and left out.
 
     Args:
@@ -254,26 +257,32 @@ def find_candidates(scenario: Scenario, sides: Sides, names: Sequence[str] | Non
     return found, [*(f"{c.name}: {text}" for c in found for text in c.settings), *left_out]
 
 
-def _named(scenario: Scenario, sides: Sides, name: str) -> Candidate:
-    if name in sides.observers:
-        return _own(sides, name)
-    if name not in fmu_observer.OBSERVERS:
+def _named(scenario: Scenario, sides: Sides, given: Any) -> Candidate:
+    """An observer of the scenario, or one by the name of its model, or a class or an instance from a script."""
+    if isinstance(given, str) and given in sides.observers:
+        return _own(sides, given)
+    try:
+        name = ModelName.of(given)
+    except ValueError as error:
+        raise ScenarioError(f"{scenario.where}: {error}") from error
+    if name.given is None and not names_code(name) and name not in fmu_observer.OBSERVERS:
         known = [*sides.observers, *(n for n in train_observers() if n not in sides.observers)]
         raise ScenarioError(f"{scenario.where}: unknown observer {name!r}; {nearest(name, known)}")
-    return _shipped(sides, name)
+    return _shipped(sides, ModelName.of(move_file(name, lambda path: absolute(path, "."))))
 
 
 def _own(sides: Sides, name: str) -> Candidate:
     return Candidate(name, sides.table.components[name], sides.sources(name), "scenario")
 
 
-def _shipped(sides: Sides, name: str) -> Candidate:
-    """A shipped observer with its own defaults and what the scenario says of the train."""
-    system = make_system(ComponentTable(observer=name), name)
-    assert system is not None
+def _shipped(sides: Sides, model: str) -> Candidate:
+    """An observer with its own defaults and what the scenario says of the train."""
+    table = ComponentTable.model_validate({"observer": model})
+    system = make_declared(table, model)
+    name = model.rpartition(":")[2].replace(".", "_")
     parameters = {s.name for s in system.parameter_signals}
     facts = {fact: known for fact, known in known_facts(sides).items() if fact in parameters}
-    table = ComponentTable(observer=name, parameters={fact: value for fact, (value, _) in facts.items()})
+    table = table.model_copy(update={"parameters": {fact: value for fact, (value, _) in facts.items()}})
     template = sides.template()
     sources = {s.name: template[s.name] for s in system.inputs if s.name in template}
     unique = name if name not in sides.table.components else f"{name}_with_defaults"
@@ -297,12 +306,12 @@ def _assumed(system: Any, facts: Mapping[str, tuple[float, str]]) -> str:
 
 def _misfit(sides: Sides, system: Any, sources: Iterable[str]) -> str:
     """Why an observer cannot listen here, or an empty text."""
-    payload = {s.name for event in system.triggered_events for s in event.payload}
+    triggered = getattr(system, "triggered_events", ())  # plain Python says with its `balise` what it takes
+    payload = {s.name for event in triggered for s in event.payload}
     missing = [s.name for s in system.inputs if s.name not in sources and s.name not in payload]
     if missing:
         return f"nothing in this scenario gives its input{'s' if len(missing) > 1 else ''} {', '.join(missing)}"
-    events = [event.name for event in system.triggered_events]
-    if BALISE_EVENT in events and sides.table.balises is None:
+    if BALISE_EVENT in [event.name for event in triggered] and sides.table.balises is None:
         return "it is corrected by balises, and this scenario has none"
     return ""
 

@@ -17,7 +17,7 @@ from cosim.coupling.connection import Link
 from cosim.errors import ScenarioError
 from cosim.scenario.balise_service import BALISE_EVENT
 from cosim.scenario.connections import parse_connections
-from cosim.scenario.models import make_system
+from cosim.scenario.models import make_declared, make_system
 from cosim.scenario.roles import ROLES, roles_of_balises
 from cosim.scenario.schema import ScenarioTable
 from cosim.scenario.structure import describe_component
@@ -90,8 +90,7 @@ def _is_observer(scenario: Scenario, table: ScenarioTable, name: str) -> bool:
     if name in (table.report.observers or []):
         return True
     if component.observer is not None:
-        system = make_system(component, where)
-        return system is not None and any(signal.name in ESTIMATES for signal in system.outputs)
+        return any(signal.name in ESTIMATES for signal in make_declared(component, where).outputs)
     if component.fmu is None:
         return False
     described = describe_component(name, component, scenario.folder, where)

@@ -22,7 +22,7 @@ from cosim.scenario.manifest import FILES, FORMAT, MADE_FROM, MANIFEST, SCENARIO
 from cosim.scenario.origin import ForeignFile, Origin, stamp
 from cosim.scenario.paths import map_paths
 from cosim.scenario.save import plain
-from cosim.scenario.summary import versions
+from fmus.versions import versions
 
 FILES_UP_TO = 50e6
 """Files of others up to this size are copied into the results [bytes]."""

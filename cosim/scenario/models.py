@@ -12,26 +12,44 @@ import fmus
 import plant_models
 from cosim.components.component import Component
 from cosim.components.loading import load_block, load_fmu
+from cosim.components.python import PythonComponent
+from cosim.components.python_model import PythonModel
 from cosim.components.recording import RecordingComponent, load_recording
 from cosim.components.recording_data import Recording
 from cosim.errors import ScenarioError, nearest
 from cosim.scenario.backends import FAULTS, Request, Tell, cannot_build, realise
+from cosim.scenario.model_name import ModelName
 from cosim.scenario.tables import Backend, ComponentTable
 from fmu_observer.event_protocol import EventProtocol
 from plant_models.hybrid import HybridSystem
+from plant_models.registry import descends_from
+from plant_models.user_file import UserFileError, make
 
+OWN_PACKAGES = ("plant_models", "fmu_observer")
 LATE_PARAMETERS = frozenset({"late_policy", "replay_horizon"})
 
 _systems: dict[tuple[type[HybridSystem], str], HybridSystem] = {}
 
 
-def shipped() -> Mapping[str, type[HybridSystem]]:
-    """All shipped systems by name, plants and observers."""
-    return {**plant_models.PLANTS, **fmu_observer.OBSERVERS}
+def model_of(table: ComponentTable, where: str) -> Any:
+    """The class or instance that a component's table names as ``model`` or ``observer``; None where it names neither.
+
+    Args:
+        table: of the component. where: place for messages.
+
+    Raises:
+        ScenarioError: there is no such model, or it cannot be loaded.
+    """
+    if table.model is not None:
+        return table.model.load(plant_models.PLANTS, "model", where)
+    return None if table.observer is None else table.observer.load(fmu_observer.OBSERVERS, "observer", where)
 
 
 def make_system(table: ComponentTable, where: str) -> HybridSystem | None:
-    """The hybrid system of a component, or None for an FMU by path and for a recording.
+    """The hybrid system of a component, or None for an FMU by path, for a recording and for plain Python.
+
+    Args:
+        table: of the component. where: place for messages.
 
     Args:
         table: of the scenario. where: name of the scenario, for messages.
@@ -39,18 +57,35 @@ def make_system(table: ComponentTable, where: str) -> HybridSystem | None:
     Raises:
         ScenarioError: unknown model, option or preset.
     """
-    if table.fmu is not None or table.recording is not None:
+    model = model_of(table, where)
+    if not descends_from(model, plant_models.SYSTEM):
         return None
-    registry = plant_models.PLANTS if table.model is not None else fmu_observer.OBSERVERS
-    name = table.model or table.observer or ""
-    if name not in registry:
-        kind = "model" if table.model is not None else "observer"
-        raise ScenarioError(f"{where}: unknown {kind} {name!r}; {nearest(name, registry)}")
-    factory = registry[name]
-    system = factory(**_chosen_options(factory, table.options, where))
+    name = table.model or table.observer
+    if isinstance(model, type):
+        system: HybridSystem = _made(model, _chosen_options(model, table.options, where), where)
+    elif table.options != dict(model.options):
+        raise ScenarioError(f"{where}: {name} is an instance, which has its options already; give the class instead.")
+    else:
+        system = model
     if table.preset is not None and table.preset not in system.presets:
         raise ScenarioError(f"{where}: {name} has no preset {table.preset!r}; {nearest(table.preset, system.presets)}")
     return system
+
+
+def make_declared(table: ComponentTable, where: str) -> Any:
+    """What a component's model declares: a hybrid system or a model of plain Python, both with `inputs`, `outputs` and
+    `parameter_signals`; None for an FMU by path and for a recording.
+
+    Args:
+        table: of the component. where: place for messages.
+
+    Raises:
+        ScenarioError: the model cannot be had, or its declarations cannot be.
+    """
+    system = make_system(table, where)
+    if system is not None or (table.model or table.observer) is None:
+        return system
+    return PythonModel(model_of(table, where), table.options, where)
 
 
 def component_factories(
@@ -85,6 +120,8 @@ def component_factories(
             recording = open_recording(name, table, folder, places[name], span)
             factories[name] = partial(RecordingComponent, name, recording)
             made.notes += left_out_note(name, recording)
+        elif name not in systems and table.fmu is None:
+            factories[name] = partial(python_component, name, table, places[name])
         elif name in systems and name not in made.files:
             factories[name] = partial(
                 load_block, systems[name], name, _version(made.kinds[name]), **_block_arguments(table)
@@ -94,6 +131,22 @@ def component_factories(
             told = None if name in systems else tolerance if table.tolerance is None else table.tolerance
             factories[name] = partial(load_fmu, path, name, told)
     return factories, made.notes
+
+
+def python_component(name: str, table: ComponentTable, where: str) -> PythonComponent:
+    """A component of plain Python.
+
+    Args:
+        name: of the component. table: its table. where: place for messages.
+
+    Raises:
+        ScenarioError: the class cannot be loaded, or its declarations cannot be.
+    """
+    if table.preset is not None or table.backend is not None:
+        raise ScenarioError(
+            f"{where}: 'preset' and 'as' belong to hybrid systems; plain Python takes 'parameters' and 'options'."
+        )
+    return PythonComponent(name, make_declared(table, where), str(table.model or table.observer))
 
 
 def open_recording(
@@ -130,11 +183,22 @@ def _block_arguments(table: ComponentTable) -> dict[str, Any]:
     return {"preset": table.preset, "late_policy": table.late_policy, "replay_horizon": table.replay_horizon}
 
 
+def _made(model: type[HybridSystem], options: Mapping[str, Any], where: str) -> HybridSystem:
+    if model.__module__.partition(".")[0] in OWN_PACKAGES:
+        return model(**options)
+    try:
+        made: HybridSystem = make(model, options)
+    except UserFileError as error:
+        raise ScenarioError(f"{where}: {error}") from error
+    return made
+
+
 def _lasting(table: ComponentTable, system: HybridSystem) -> HybridSystem:
     """The first system of the same class and options in this process: what has been traced need not be traced for each
-    run.
+    run. An instance that a script gave may differ from others of its class, and lasts itself.
     """
-    return _systems.setdefault((type(system), repr(sorted(table.options.items()))), system)
+    given = (table.model or table.observer or ModelName()).given is system
+    return system if given else _systems.setdefault((type(system), repr(sorted(table.options.items()))), system)
 
 
 def protocol_parameters(table: ComponentTable, component: Component, where: str) -> dict[str, float | str]:

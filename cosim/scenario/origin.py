@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cosim.scenario.paths import BALISE_PATHS, COMPONENT_PATHS
+from cosim.scenario.paths import BALISE_PATHS, COMPONENT_PATHS, MODEL_KEYS
+from plant_models.user_file import names_a_file, split_name
 
 if TYPE_CHECKING:
     from cosim.scenario.schema import ScenarioTable
@@ -111,6 +112,9 @@ def _paths(table: ScenarioTable) -> Iterator[tuple[str, str]]:
         for key in COMPONENT_PATHS:
             if getattr(component, key) is not None:
                 yield f"components.{name}.{key}", str(getattr(component, key))
+        for key in MODEL_KEYS:
+            if names_a_file(getattr(component, key) or ""):
+                yield f"components.{name}.{key}", split_name(getattr(component, key))[0]
     for key in BALISE_PATHS:
         if table.balises is not None and getattr(table.balises, key) is not None:
             yield f"balises.{key}", str(getattr(table.balises, key))

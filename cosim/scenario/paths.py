@@ -10,7 +10,11 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
+from plant_models.user_file import names_a_file, split_name
+
 COMPONENT_PATHS = ("fmu", "recording")
+MODEL_KEYS = ("model", "observer")
+"""Keys that hold the name of a model, perhaps ``file.py:Class``."""
 BALISE_PATHS = ("file",)
 
 
@@ -25,6 +29,7 @@ def map_paths(tables: Mapping[str, Any], move: Callable[[str], str]) -> dict[str
     components = moved.get("components")
     for table in components.values() if isinstance(components, dict) else ():
         _map_keys(table, COMPONENT_PATHS, move)
+        _map_keys(table, MODEL_KEYS, lambda name: move_file(name, move))
     _map_keys(moved.get("balises"), BALISE_PATHS, move)
     return moved
 
@@ -35,6 +40,18 @@ def _map_keys(table: Any, keys: tuple[str, ...], move: Callable[[str], str]) -> 
     for key in keys:
         if isinstance(table.get(key), str | os.PathLike):
             table[key] = move(os.fspath(table[key]))
+
+
+def move_file(name: str, move: Callable[[str], str]) -> str:
+    """The name of a model with the path of its file replaced; another name as it is.
+
+    Args:
+        name: of the model. move: from a path as it is written to the one to write.
+    """
+    if not names_a_file(name):
+        return name
+    path, wanted = split_name(name)
+    return f"{move(path)}:{wanted}" if wanted else move(path)
 
 
 def absolute(path: str | Path, folder: str | Path) -> str:

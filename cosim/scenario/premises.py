@@ -12,7 +12,7 @@ import numpy as np
 
 from cosim.coupling.connection import Connection
 from cosim.scenario.certificates import given_parameters
-from cosim.scenario.models import make_system, shipped
+from cosim.scenario.models import make_system
 from cosim.scenario.tables import ComponentTable
 from fmu_observer.observers.parameter_values import parameter_values
 
@@ -69,9 +69,9 @@ def _seen(
     table: np.ndarray, name: str, component: ComponentTable, connections: Sequence[Connection]
 ) -> dict[str, Any] | None:
     """What the recorded rows tell of a train observer: each value counts until the next row."""
-    if not hasattr(shipped().get(component.observer or ""), "premise_range"):
+    system: Any = make_system(component, name) if component.observer is not None else None
+    if not hasattr(system, "premise_range"):
         return None
-    system: Any = make_system(component, name)
     values = system.unpack_parameters(parameter_values(system, given_parameters(component, system), component.preset))
     signal, low, high = system.premise_range(values)
     column = _column(table, name, signal, connections)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from math import ulp
+from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import Field, ValidationError, model_validator
@@ -117,18 +118,19 @@ def check_resolution(what: str, step: float, start: float, stop: float) -> None:
         raise ValueError(f"{what} {step!r} s is too short: {why}, and {least}")
 
 
-def parse_scenario(data: dict[str, Any], where: str) -> ScenarioTable:
+def parse_scenario(data: dict[str, Any], where: str, folder: Path | None = None) -> ScenarioTable:
     """A validated scenario.
 
     Args:
         data: as read from TOML or built by a script.
         where: file name or 'script', for messages.
+        folder: start of relative paths; None for the working folder.
 
     Raises:
         ScenarioError: with one line for each thing that is wrong.
     """
     try:
-        return ScenarioTable.model_validate(data)
+        return ScenarioTable.model_validate(data, context={"folder": folder})
     except ValidationError as error:
         lines = [
             _explain(dict(item))

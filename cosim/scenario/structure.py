@@ -19,7 +19,7 @@ from cosim.scenario.backends import intended
 from cosim.scenario.balise_service import find_receivers, watched_plant
 from cosim.scenario.connections import parse_connections
 from cosim.scenario.master import stepping_groups
-from cosim.scenario.models import make_system, open_recording
+from cosim.scenario.models import make_system, open_recording, python_component
 from cosim.scenario.movement import movement_chains
 from cosim.scenario.schema import ScenarioTable
 from cosim.scenario.starts import given_values
@@ -93,6 +93,8 @@ def describe_component(
     component: Component
     if table.recording is not None:
         component = RecordingComponent(name, open_recording(name, table, folder, where, span))
+    elif system is None and table.fmu is None:
+        component = python_component(name, table, where)
     elif system is None:
         component = describe_fmu((folder / str(table.fmu)).resolve(), name)
     else:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import platform
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from cosim.components.component import Component
@@ -13,6 +11,7 @@ from cosim.diagnostics.call_statistics import call_statistics_table
 from cosim.master.master import Master
 from cosim.scenario.schema import ScenarioTable
 from cosim.scenario.tables import ComponentTable
+from fmus.versions import versions
 
 MESSAGES_SHOWN = 20
 
@@ -69,19 +68,6 @@ def run_summary(name: str, table: ScenarioTable, plan: Plan, master: Master, set
             "events": None if master.system.events is None else master.system.events.summary(),
         },
     }
-
-
-def versions() -> dict[str, str]:
-    """Versions of everything that can change a number."""
-    packages = ("fmu-observer", "fmpy", "numpy", "scipy", "casadi")
-    return {"python": platform.python_version(), "platform": platform.platform(), **{p: _version(p) for p in packages}}
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "not installed"
 
 
 def _component(component: Component, table: ComponentTable) -> dict[str, Any]:

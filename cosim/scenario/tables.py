@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, PlainValidator, Tag, model_validator
 
+from cosim.scenario.model_name import Model
 from fmu_observer.block import LatePolicy
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
@@ -49,8 +50,8 @@ class ComponentTable(Table):
     """One component: an FMU by path, or a shipped plant, sensor, driver or observer by name."""
 
     fmu: str | None = None
-    model: str | None = None
-    observer: str | None = None
+    model: Model | None = None
+    observer: Model | None = None
     recording: str | None = None
     component: str | None = None
     interpolation: Literal["linear", "hold"] = "linear"
@@ -72,9 +73,8 @@ class ComponentTable(Table):
         given = [k for k in ("fmu", "model", "observer", "recording") if getattr(self, k) is not None]
         if len(given) != 1:
             raise ValueError(
-                "give exactly one of 'fmu' (a path), 'model' (a shipped plant), 'observer' (a shipped observer) or "
-                "'recording' "
-                "(a results folder or a table)"
+                "give exactly one of 'fmu' (a path), 'model' (a plant), 'observer' (an observer; both by name or "
+                "file.py:Class) or 'recording' (a results folder or a table)"
             )
         if given == ["fmu"] and (self.preset or self.options or self.backend):
             raise ValueError("'preset', 'options' and 'as' belong to shipped models; an FMU takes 'parameters' only")

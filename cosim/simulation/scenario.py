@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any, Self
 from cosim.errors import CosimError, ScenarioError
 from cosim.scenario.includes import Key, attribute, find_file, read_tables, shipped_scenarios
 from cosim.scenario.manifest import read_manifest
+from cosim.scenario.model_name import ModelName, is_model, settings_of
 from cosim.scenario.origin import Origin
 from cosim.scenario.outcome import Outcome
 from cosim.scenario.override import override
 from cosim.scenario.package_names import is_package, stem
-from cosim.scenario.paths import COMPONENT_PATHS, absolute
+from cosim.scenario.paths import COMPONENT_PATHS, MODEL_KEYS, absolute, move_file
 from cosim.scenario.run import run_scenario
 from cosim.scenario.save import plain, save_scenario, scenario_text
 from cosim.scenario.schema import ScenarioTable, parse_scenario
@@ -182,14 +183,23 @@ class Scenario:
         return self._name or stem(self.where)
 
     def add(self, name: str, **table: Any) -> Self:
-        """Add a component; keys as in a file: `fmu`, `model` or `observer`, `parameters`, `preset`, `options`, ...
+        """Add a component.
 
         Args:
-            table: of the scenario.
+            name: of the component. table: its keys as in a file: `fmu`, `model` or `observer`, `parameters`, `preset`,
+                `options`, ... `model` and `observer` take a name, ``file.py:Class``, a class, or an instance, of which
+                each run has a copy; `fmu` and `recording` a path.
+
+        Raises:
+            ScenarioError: there is a component of this name already.
         """
         if name in self._data["components"]:
             raise ScenarioError(f"{self.where}: there is a component {name!r} already.")
-        self._data["components"][name] = plain(table)
+        given = {key: _given(table[key]) for key in MODEL_KEYS if key in table}
+        for model in given.values():
+            for key, settings in settings_of(getattr(model, "given", "")).items():
+                table[key] = {**settings, **table.get(key, {})}
+        self._data["components"][name] = plain(table | given)
         return self
 
     def connect(self, *lines: str) -> Self:
@@ -233,12 +243,18 @@ class Scenario:
         That is ``component.parameter``, ``balises.key``, ``master.key``, ``report.key`` or a top-level key such as
         ``stop``.
 
+        Args:
+            name: of the value. value: what it becomes; paths are relative to the working folder.
+
         Raises:
             ScenarioError: there is no such component or table.
         """
-        value = plain(value)
-        if name.rpartition(".")[2] in COMPONENT_PATHS and name.count(".") == 1:
+        key = name.rpartition(".")[2] if name.count(".") == 1 else ""
+        value = _given(value) if key in MODEL_KEYS else plain(value)
+        if key in COMPONENT_PATHS:
             value = absolute(str(value), ".")  # given here, so relative to where the user stands
+        if key in MODEL_KEYS and isinstance(value, str):
+            value = move_file(value, lambda path: absolute(path, "."))
         try:
             override(self._data, name, value)
         except ScenarioError as error:
@@ -263,7 +279,7 @@ class Scenario:
             ScenarioError: something in it cannot be; every fault is named.
         """
         with self._places_named():
-            return parse_scenario(self._data, self.where)
+            return parse_scenario(self._data, self.where, self.folder)
 
     def vary(
         self,
@@ -380,3 +396,8 @@ class Scenario:
         except CosimError as error:
             error.args = (attribute(str(error), self.where, self._places), *error.args[1:])
             raise
+
+
+def _given(model: Any) -> Any:
+    """A class or an instance as a name that remembers it; anything else as it is."""
+    return model if isinstance(model, str) or not is_model(model) else ModelName.of(model)

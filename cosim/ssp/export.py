@@ -165,6 +165,8 @@ class _Exporter:
                 "that was recorded, or leave the recording out and connect its signals in the other tool."
             )
         system = make_system(component, place)
+        if system is None and component.fmu is None:
+            raise ScenarioError(f"{place}: plain Python is no FMU, and a system structure package holds FMUs.")
         if system is None:
             fmu = (self.folder / str(component.fmu)).resolve()
         else:

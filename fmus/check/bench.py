@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from fmpy.model_description import ModelDescription
 
-from fmus.check.steppable import FAILURES, Steppable
+from fmus.fmi.instance import FAILURES
+from fmus.fmi.slave import Slave
 
 WARM_UP_STEPS = 5
 SLOW_STEPS = 25  # a quarter of a second at the usual step: what is sampled at 10 Hz moves in it
@@ -37,11 +38,11 @@ class Bench:
 
     def __init__(
         self,
-        make: Callable[[], Steppable],
+        make: Callable[[], Slave],
         starts: Mapping[str, Any],
         start_time: float,
         h: float,
-        component: Steppable | None = None,
+        component: Slave | None = None,
         until: float | None = None,
     ) -> None:
         self._make, self.starts, self.t0, self.h = make, starts, start_time, h
@@ -53,11 +54,11 @@ class Bench:
         self._best = 0, 0.0, 0.0  # outputs that moved, amplitude, spread
         self._started = False
 
-    def fresh(self) -> Steppable:
+    def fresh(self) -> Slave:
         """A fresh component, not yet instantiated."""
         return self._make()
 
-    def twin(self, make: Callable[[], Steppable] | None = None) -> Bench:
+    def twin(self, make: Callable[[], Slave] | None = None) -> Bench:
         """A second bench with an instance of its own and the same inputs."""
         other = Bench(make or self._make, self.starts, self.t0, self.h, until=self.end)
         other.amplitude, other.spread, other.excited = self.amplitude, self.spread, self.excited

@@ -11,8 +11,8 @@ from pathlib import Path
 from fmpy.model_description import ModelDescription
 
 from fmus.check.bench import Bench
-from fmus.check.model import FmuModel
-from fmus.check.slave import FmuSlave
+from fmus.check.model import FmuModel, make_model
+from fmus.check.slave import FmuSlave, make_slave
 
 SHARE_OF_BUDGET = 0.3
 """Of the time of a check, for finding inputs that move something."""
@@ -48,12 +48,12 @@ class Context:
     def slave(self, *, logging: bool = False) -> FmuSlave:
         """A fresh co-simulation instance, not yet instantiated, with a name of its own."""
         self._made += 1
-        return FmuSlave(self.folder, self.description, f"checked_{self._made}", logging=logging)
+        return make_slave(self.folder, self.description, f"checked_{self._made}", logging=logging)
 
     def model(self) -> FmuModel:
         """A fresh model exchange instance, not yet instantiated."""
         self._made += 1
-        return FmuModel(self.folder, self.description, f"checked_{self._made}")
+        return make_model(self.folder, self.description, f"checked_{self._made}")
 
     def quiet_bench(self) -> Bench:
         """A bench that has not been stepped to find an excitation; the caller puts it away."""

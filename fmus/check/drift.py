@@ -8,7 +8,7 @@ import numpy as np
 
 from fmus.check.bench import Bench
 from fmus.check.restoring import solver_tolerance
-from fmus.check.steppable import Steppable
+from fmus.fmi.slave import Slave
 
 STEPS = 100
 FINER = 0.01
@@ -27,7 +27,7 @@ def drift(bench: Bench) -> np.ndarray:
     bench.begin()
     coarse = np.array(bench.steps(pattern))
 
-    def make() -> Steppable:
+    def make() -> Slave:
         component = bench.fresh()
         component.tolerance = FINER * (component.tolerance or solver_tolerance(bench))
         return component

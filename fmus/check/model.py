@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from fmpy.model_description import ModelDescription
 
 from fmus.check.instance import FmuInstance
-from fmus.fmi.standard import MAX_EVENT_ITERATIONS, MODEL_EXCHANGE
+from fmus.fmi.fmi2 import FMI2Instance
+from fmus.fmi.fmi3 import FMI3Instance
+from fmus.fmi.standard import MODEL_EXCHANGE, fmi_version
 
 
 class FmuModel(FmuInstance):
@@ -29,49 +33,76 @@ class FmuModel(FmuInstance):
 
     def initialize(self, start_time: float) -> None:
         """Through initialisation and the first event iteration to continuous-time mode; `start_time` in [s]."""
-        self._enter_initialization(start_time, start_time + 1e6)
-        self.guarded("exitInitializationMode", self.slave.exitInitializationMode)
+        self.begin_initialization(start_time, start_time + 1e6)
+        self.guard("exitInitializationMode", self.slave.exitInitializationMode)
         self._running = True
-        update = self.slave.newDiscreteStates if self.version == 2 else self.slave.updateDiscreteStates
-        for _ in range(MAX_EVENT_ITERATIONS):
-            again, end, *_ = self.guarded("updating discrete states", update)
-            self.terminated |= bool(end)
-            if not again:
-                break
-        else:
-            raise self.failure(f"discrete states do not settle in {MAX_EVENT_ITERATIONS} updates")
-        self.guarded("enterContinuousTimeMode", self.slave.enterContinuousTimeMode)
+        self.settle()
+        self.guard("enterContinuousTimeMode", self.slave.enterContinuousTimeMode)
 
     def set_time(self, t: float) -> None:
-        """The independent variable [s].
+        """Set the independent variable.
 
         Args:
-            t: time at which it happened [s].
+            t: [s].
         """
-        self.guarded("setTime", lambda: self.slave.setTime(t))
+        self.guard("setTime", lambda: self.slave.setTime(t))
 
     def states(self) -> np.ndarray:
         """Continuous states, shape (n,)."""
         return self._filled("getContinuousStates", self.slave.getContinuousStates, self.state_count)
 
     def set_states(self, x: np.ndarray) -> None:
-        """Continuous states, shape (n,)."""
+        """Set the continuous states.
+
+        Args:
+            x: shape (n,).
+        """
         held = np.ascontiguousarray(x, dtype=float)
-        self.guarded("setContinuousStates", lambda: self.slave.setContinuousStates(_pointer(held), len(held)))
+        self.guard("setContinuousStates", lambda: self.slave.setContinuousStates(_pointer(held), len(held)))
 
     def derivatives(self) -> np.ndarray:
         """Derivatives of the continuous states, shape (n,)."""
-        call = self.slave.getDerivatives if self.version == 2 else self.slave.getContinuousStateDerivatives
+        call = self.slave.getDerivatives if self.fmi_version == 2 else self.slave.getContinuousStateDerivatives
         return self._filled("getting derivatives", call, self.state_count)
 
     def indicators(self) -> np.ndarray:
         """Event indicators, shape (number of them,)."""
         return self._filled("getEventIndicators", self.slave.getEventIndicators, self.indicator_count)
 
+    def update_discrete_states(self) -> bool:
+        """End a super-dense instant; True where the FMU needs another one."""
+        update = self.slave.newDiscreteStates if self.fmi_version == 2 else self.slave.updateDiscreteStates
+        again, end, *_ = self.guard("updating discrete states", update)
+        self.terminated |= bool(end)
+        return bool(again)
+
     def _filled(self, what: str, call: Callable[[Any, int], Any], count: int) -> np.ndarray:
         values = np.zeros(count)
-        self.guarded(what, lambda: call(_pointer(values), count))
+        self.guard(what, lambda: call(_pointer(values), count))
         return values
+
+
+class FmuModel2(FmuModel, FMI2Instance):
+    """A model exchange instance of FMI 2.0; arguments as for `FmuInstance`."""
+
+
+class FmuModel3(FmuModel, FMI3Instance):
+    """A model exchange instance of FMI 3.0; arguments as for `FmuInstance`."""
+
+
+def make_model(folder: Path, description: ModelDescription, name: str) -> FmuModel:
+    """A model exchange instance of an unpacked FMU, not yet instantiated.
+
+    Args:
+        folder: where the FMU was unpacked.
+        description: its model description.
+        name: instance name.
+
+    Raises:
+        SlaveError: the library cannot be loaded.
+    """
+    version = FmuModel2 if fmi_version(description) == 2 else FmuModel3
+    return version(folder, description, name)
 
 
 def _pointer(values: np.ndarray) -> Any:

@@ -16,7 +16,8 @@ from fmus.check.behaviour import ends_of_divided_steps, honest_step, repeatable
 from fmus.check.bench import Bench
 from fmus.check.drift import drift
 from fmus.check.restoring import ROUNDING, Restores, Restoring, largest, restoring
-from fmus.check.steppable import FAILURES, Steppable
+from fmus.fmi.instance import FAILURES
+from fmus.fmi.slave import Slave
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ class ProbeReport:
         return asdict(self) | {"remarks": list(self.remarks)} | numbers
 
 
-def probe(make: Callable[[], Steppable], starts: Mapping[str, Any], start_time: float, h: float) -> ProbeReport:
+def probe(make: Callable[[], Slave], starts: Mapping[str, Any], start_time: float, h: float) -> ProbeReport:
     """Probe a component.
 
     Args:

@@ -16,7 +16,7 @@ import numpy as np
 
 from fmus.check.behaviour import again, continuation, difference, go_elsewhere
 from fmus.check.bench import WARM_UP_STEPS, Bench
-from fmus.check.steppable import FAILURES
+from fmus.fmi.instance import FAILURES
 
 Restores = Literal["exact", "within_tolerance", "no"]
 Trip = tuple[list[np.ndarray], np.ndarray]

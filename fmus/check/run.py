@@ -15,11 +15,12 @@ from fmus.check.bench import end_of_experiment
 from fmus.check.catalogue import CATALOGUE
 from fmus.check.checks.static import platforms, validation
 from fmus.check.findings import Class, Finding, Verdict, class_of
-from fmus.check.instance import INSTANTIATING, LOADING
+from fmus.check.instance import LOADING
 from fmus.check.isolated import run_isolated
 from fmus.check.job import Job
 from fmus.check.trust import what_to_trust
 from fmus.fmi.archive import Archive, NotAnFmuError, open_archive
+from fmus.fmi.instance import INSTANTIATING
 from fmus.fmi.standard import CO_SIMULATION, SCHEDULED_EXECUTION
 from fmus.fmi.types import NUMERIC_TYPES
 

@@ -1,17 +1,19 @@
-"""Slaves: an FMU for co-simulation driven under test: steps, early returns, event mode, discarded steps."""
+"""Slaves driven under test: co-simulation of FMI 2.0 and 3.0, with single steps whose refusal is an answer."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
 
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import fmi2Discard, fmi2Terminated
+from fmpy.model_description import ModelDescription
 
 from fmus.check.instance import FmuInstance
-from fmus.fmi.standard import CO_SIMULATION, FATAL, MAX_EVENT_ITERATIONS, MAX_RETURNS_PER_STEP, STATUS, TIME_TOLERANCE
+from fmus.fmi.fmi2 import FMI2Slave
+from fmus.fmi.fmi3 import FMI3Slave
+from fmus.fmi.slave import Slave
+from fmus.fmi.standard import OK, STATUS, WARNING, fmi_version
 
 
 @dataclass(frozen=True)
@@ -20,7 +22,8 @@ class RawStep:
 
     Args:
         status: FMI status by name.
-        event: event handling is needed. terminate: the FMU asks for the end.
+        event: event handling is needed.
+        terminate: the FMU asks for the end.
         reached: where it says it stands [s], NaN where it did the whole step.
     """
 
@@ -32,51 +35,18 @@ class RawStep:
     @property
     def refused(self) -> bool:
         """Whether the step was not done."""
-        return self.status not in STATUS[:2]
+        return self.status not in {STATUS[OK], STATUS[WARNING]}
 
 
-class FmuSlave(FmuInstance):
-    """A co-simulation instance; see `fmus.check.steppable.Steppable`."""
-
-    interface = CO_SIMULATION
-
-    @property
-    def can_vary_step(self) -> bool:
-        """Whether it says that the communication step may vary."""
-        return bool(self.declared.canHandleVariableCommunicationStepSize)
-
-    @property
-    def has_event_mode(self) -> bool:
-        """Whether it declares event mode (FMI 3)."""
-        return self.version == 3 and bool(self.declared.hasEventMode)
-
-    @property
-    def clocks(self) -> list[str]:
-        """Names of its triggered input clocks."""
-        return [
-            v.name
-            for v in self.description.modelVariables
-            if v.type == "Clock" and v.causality == "input" and v.intervalVariability == "triggered"
-        ]
-
-    def enter_initialization(self, start_time: float, stop_time: float) -> None:
-        """Begin initialisation; times in [s].
-
-        Args:
-            start_time: [s]. stop_time: [s], without effect.
-        """
-        self._next_event = math.inf
-        self._enter_initialization(start_time, stop_time)
-
-    def exit_initialization(self) -> None:
-        """End initialisation, discrete states settled."""
-        self.guarded("exitInitializationMode", self.slave.exitInitializationMode)
-        self._running = True
-        if self.has_event_mode:
-            self._settle()
+class FmuSlave(FmuInstance, Slave):
+    """A co-simulation instance; arguments as for `FmuInstance`."""
 
     def raw_step(self, t: float, h: float) -> RawStep:
-        """One doStep from `t` by `h` [s] and nothing else; a refusal is returned, not raised.
+        """One doStep and nothing else; a refusal is returned, not raised.
+
+        Args:
+            t: from when [s].
+            h: length [s].
 
         Raises:
             SlaveError: the call could not be made.
@@ -84,95 +54,49 @@ class FmuSlave(FmuInstance):
         try:
             said = self._do_step(t, h)
         except FMICallException as error:
-            self._alive = self._running = self._alive and error.status != FATAL
+            self.explained("doStep", error)
             return RawStep(STATUS[error.status] if error.status in range(len(STATUS)) else f"status {error.status}")
+        except self.mistakes:
+            raise
         except Exception as error:
-            raise self.failure(f"doStep failed: {error}", t) from error
-        if self.version == 2:
-            return RawStep("ok")
+            raise self.explained("doStep", error, t) from error
+        if said is None:
+            return RawStep(STATUS[OK])
         event, terminate, early, reached = said
-        return RawStep("ok", bool(event), bool(terminate), float(reached) if early or terminate else math.nan)
+        return RawStep(STATUS[OK], bool(event), bool(terminate), float(reached) if early or terminate else math.nan)
 
-    def advance(self, t: float, until: float) -> None:
-        """Step from `t` to `until` [s], own time events on the way included.
 
-        Raises:
-            SlaveError: the FMU failed or did not get there.
-        """
-        for _ in range(MAX_RETURNS_PER_STEP):
-            stop = self._next_event if t + TIME_TOLERANCE < self._next_event < until - TIME_TOLERANCE else until
-            t = self._towards(t, stop)
-            if self.terminated or until - t <= TIME_TOLERANCE:
-                return
-        raise self.failure(f"returned early {MAX_RETURNS_PER_STEP} times without reaching {until:g} s", t)
+class FmuSlave2(FmuSlave, FMI2Slave):
+    """A co-simulation instance of FMI 2.0; arguments as for `FmuInstance`."""
+
+
+class FmuSlave3(FmuSlave, FMI3Slave):
+    """A co-simulation instance of FMI 3.0; arguments as for `FmuInstance`."""
 
     def activate(self, clock: str) -> None:
-        """Let a triggered input clock tick, with the values its clocked inputs have."""
-        reference = self.variables[clock].valueReference
-        self.guarded("enterEventMode", self.slave.enterEventMode)
-        self.guarded(f"setClock of {clock}", lambda: self.slave.setClock([reference], [True]))
-        self._settle()
+        """Let a triggered input clock tick, with the values its clocked inputs have.
 
-    def save(self) -> Any:
-        """The state."""
-        return super().save(), self._next_event
+        Args:
+            clock: its name.
+        """
+        self.enter_event_mode()
+        self.set_clocks([self.events[clock].trigger])
+        self.settle()
 
-    def restore(self, state: Any) -> None:
-        """Return to a saved state."""
-        super().restore(state[0])
-        self._next_event = state[1]
 
-    def release(self, state: Any) -> None:
-        """Free a saved state."""
-        super().release(state[0])
+def make_slave(
+    folder: Path, description: ModelDescription, name: str = "checked", *, logging: bool = False
+) -> FmuSlave:
+    """A co-simulation instance of an unpacked FMU, not yet instantiated.
 
-    def serialize(self, state: Any) -> bytes:
-        """A saved state as bytes."""
-        return super().serialize(state[0])
+    Args:
+        folder: where the FMU was unpacked.
+        description: its model description.
+        name: instance name.
+        logging: whether the FMU is asked to log.
 
-    def deserialize(self, content: bytes) -> Any:
-        """A saved state from bytes; the next time event is the one known here."""
-        return super().deserialize(content), self._next_event
-
-    # -- internals --------------------------------------------------------------------------------------------------
-
-    def _arguments(self) -> Mapping[str, Any]:
-        early = bool(self.declared.mightReturnEarlyFromDoStep)
-        return {"eventModeUsed": self.has_event_mode, "earlyReturnAllowed": early}
-
-    def _do_step(self, t: float, h: float) -> Any:
-        """noSetFMUStatePriorToCurrentPoint is false: states before this point will be restored."""
-        return self.slave.doStep(t, h, noSetFMUStatePriorToCurrentPoint=False)
-
-    def _towards(self, t: float, stop: float) -> float:
-        said = self.raw_step(t, stop - t)
-        if said.refused:
-            if said.status == STATUS[fmi2Discard] and self.version == 2 and self._says_terminated():
-                self.terminated = True
-                return stop
-            raise self.failure(f"doStep from {t:g} to {stop:g} s was refused with status {said.status}")
-        self.terminated |= said.terminate
-        reached = stop if math.isnan(said.reached) else said.reached
-        if not t - TIME_TOLERANCE <= reached <= stop + TIME_TOLERANCE:
-            raise self.failure(f"doStep from {t:g} to {stop:g} s says that it reached {reached!r} s")
-        if self.has_event_mode and not self.terminated and (said.event or reached >= self._next_event - TIME_TOLERANCE):
-            self.guarded("enterEventMode", self.slave.enterEventMode)
-            self._settle()
-        return reached
-
-    def _says_terminated(self) -> bool:
-        try:
-            return bool(self.slave.getBooleanStatus(fmi2Terminated))
-        except Exception:  # one that cannot say why it discarded a step has simply not terminated
-            return False
-
-    def _settle(self) -> None:
-        for _ in range(MAX_EVENT_ITERATIONS):
-            again, end, _, _, defined, at = self.guarded("updateDiscreteStates", self.slave.updateDiscreteStates)
-            self.terminated |= bool(end)
-            if not again:
-                break
-        else:
-            raise self.failure(f"discrete states do not settle in {MAX_EVENT_ITERATIONS} updates")
-        self._next_event = float(at) if defined else math.inf
-        self.guarded("enterStepMode", self.slave.enterStepMode)
+    Raises:
+        SlaveError: the library cannot be loaded.
+    """
+    version = FmuSlave2 if fmi_version(description) == 2 else FmuSlave3
+    return version(folder, description, name, logging=logging)

@@ -5,14 +5,21 @@ from __future__ import annotations
 import argparse
 import ast
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib import import_module
+from itertools import count
 from pathlib import Path
 from typing import Any, Literal
 
 from fmu_observer.event_protocol import LATE_POLICIES, EventProtocol
+from fmus.build import build_fmu, fmu_path
+from fmus.cli.progress import ProgressBar
+from fmus.hosted import build_hosted_fmu
+from fmus.pack import check_target
+from fmus.recipes import RECIPES, SYSTEM, legal_values, recipe
+from fmus.report import platforms_of
+from fmus.toolchain.targets import choose_targets
+from plant_models.user_file import load_class, make, names_a_file, names_code
 
 Version = Literal[2, 3]
 VERSIONS: dict[str, tuple[Version, ...]] = {"2": (2,), "3": (3,), "both": (2, 3)}
@@ -34,15 +41,14 @@ class Job:
     target: Path
 
 
-def add_parser(commands: Any) -> None:
-    """Add the subcommand to what `argparse.ArgumentParser.add_subparsers` returned.
+def register(commands: Any) -> None:
+    """Add the command to the parser.
 
     Args:
         commands: subparsers of the program.
     """
     parser: argparse.ArgumentParser = commands.add_parser(
         "build",
-        help="export models as native FMUs",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -82,10 +88,10 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--hosted", action="store_true", help="FMI 2.0 with Python inside, for a model that cannot be traced"
     )
-    parser.set_defaults(run=run)
+    parser.set_defaults(execute=execute)
 
 
-def run(options: argparse.Namespace) -> int:
+def execute(options: argparse.Namespace) -> int:
     """Build what was asked for; the paths go to standard output, everything else to standard error.
 
     Args:
@@ -96,20 +102,19 @@ def run(options: argparse.Namespace) -> int:
     """
     if options.hosted:
         return _run_hosted(options)
-    building, targets = import_module("fmus.build"), import_module("fmus.toolchain.targets")
     jobs, protocol = _jobs(options), EventProtocol(options.events, options.late_policy)
     for job in jobs:
         protocol.counts(job.fmi_version)  # refuses clocks in FMI 2 before anything is built
-        import_module("fmus.pack").check_target(building.fmu_path(job.system, job.target))
-    libraries = len(targets.choose_targets(options.platform)) * len(jobs)
-    with _bar(libraries) as bar:
+        check_target(fmu_path(job.system, job.target))
+    libraries = len(choose_targets(options.platform)) * len(jobs)
+    number = count(1)
+    with ProgressBar("library", silent=libraries < 2) as bar:
         for job in jobs:
 
             def progress(platform: str, job: Job = job) -> None:
-                bar.set_description(f"{job.system.name} {platform}")
-                bar.update()
+                bar(next(number), libraries, f"{job.system.name} {platform}")
 
-            path = building.build_fmu(
+            path = build_fmu(
                 job.system,
                 job.target,
                 job.fmi_version,
@@ -126,17 +131,16 @@ def run(options: argparse.Namespace) -> int:
 
 def _run_hosted(options: argparse.Namespace) -> int:
     """FMUs with Python inside, see `fmus.hosted`; a file of the user's goes into them."""
-    hosted, own = import_module("fmus.hosted"), import_module("fmus.cli.user_system")
     if options.platform != "host":
         raise ValueError("--hosted builds for this machine only; leave --platform out.")
     for name in _names(options):
         model = _system(name, options.option)
-        if own.names_a_file(name):
+        if names_a_file(name):
             chosen = dict(_option(text, type(model).option_choices) for text in options.option)
             place = f"{name.rpartition('.py')[0]}.py:{type(model).__name__}"
-            path = hosted.build_hosted_fmu(place, options.output, options=chosen, preset=options.preset)
+            path = build_hosted_fmu(place, options.output, options=chosen, preset=options.preset)
         else:
-            path = hosted.build_hosted_fmu(model, options.output, preset=options.preset)
+            path = build_hosted_fmu(model, options.output, preset=options.preset)
         print(
             f"{model.name}: FMI 2.0, {path.stat().st_size / 1000:.0f} kB, runs in Python", file=sys.stderr, flush=True
         )
@@ -144,17 +148,8 @@ def _run_hosted(options: argparse.Namespace) -> int:
     return 0
 
 
-@contextmanager
-def _bar(libraries: int) -> Iterator[Any]:
-    """A progress bar in libraries; appears only where somebody can see it and there is something to wait for."""
-    tqdm = import_module("tqdm").tqdm
-    hidden = libraries < 2 or not sys.stderr.isatty()
-    with tqdm(total=libraries, unit="library", leave=False, disable=hidden, file=sys.stderr) as bar:
-        yield bar
-
-
 def _summary(job: Job, path: Path) -> str:
-    platforms = import_module("fmus.report").platforms_of(path)
+    platforms = platforms_of(path)
     return f"{job.system.name}: FMI {job.fmi_version}.0, {path.stat().st_size / 1000:.0f} kB, {', '.join(platforms)}"
 
 
@@ -184,20 +179,18 @@ def _names(options: argparse.Namespace) -> list[str]:
         raise ValueError("Give the names of models, see 'fmus list', or --all.")
     if not options.all:
         return list(options.names)
-    recipes = import_module("fmus.recipes").RECIPES
-    return [name for name in recipes if recipes[name].traceable]
+    return [name for name in RECIPES if RECIPES[name].traceable]
 
 
 def _system(name: str, words: Sequence[str]) -> Any:
-    own, recipes = import_module("fmus.cli.user_system"), import_module("fmus.recipes")
-    if own.names_a_file(name):
-        cls = own.load_class(name)
-        return own.make_system(cls, dict(_option(text, cls.option_choices) for text in words))
-    choices = recipes.RECIPES[name].option_choices if name in recipes.RECIPES else {}
-    return recipes.recipe(name, **dict(_option(text, choices) for text in words))
+    if name not in RECIPES and names_code(name):
+        cls = load_class(name, SYSTEM)
+        return make(cls, dict(_option(text, cls.option_choices) for text in words))
+    choices = RECIPES[name].option_choices if name in RECIPES else {}
+    return recipe(name, **dict(_option(text, choices) for text in words))
 
 
-def _option(text: str, known: dict[str, Sequence[Any]]) -> tuple[str, Any]:
+def _option(text: str, known: Mapping[str, Sequence[Any]]) -> tuple[str, Any]:
     key, equals, value = text.partition("=")
     if not equals or not key:
         raise ValueError(f"--option {text!r}: write it as name=value, e.g. --option premise=live.")
@@ -206,21 +199,8 @@ def _option(text: str, known: dict[str, Sequence[Any]]) -> tuple[str, Any]:
         if str(choice) == value:
             return key, choice
     if choices:
-        raise ValueError(f"--option {text!r} is not legal: {key}{legal(choices)}.")
+        raise ValueError(f"--option {text!r} is not legal: {key}{legal_values(choices)}.")
     return key, _literal(value)
-
-
-def legal(choices: Sequence[Any] | None) -> str:
-    """The legal values of an option in words; empty where any is legal.
-
-    Args:
-        choices: allowed values; None where anything is.
-    """
-    if not choices:
-        return ""
-    if isinstance(choices, range):
-        return f", {choices[0]} to {choices[-1]}"
-    return f", one of {', '.join(map(str, choices))}"
 
 
 def _literal(text: str) -> Any:

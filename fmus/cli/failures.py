@@ -9,7 +9,7 @@ EXPECTED = (ValueError, LookupError, OSError, RuntimeError, TypeError)
 """What a mistake of the user or of a model's author, a full disk or a compiler ends with."""
 
 
-def words(error: BaseException, options: argparse.Namespace) -> str:
+def in_words(error: BaseException, options: argparse.Namespace) -> str:
     """What the user is told.
 
     Args:

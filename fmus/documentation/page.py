@@ -3,136 +3,79 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
 from importlib.metadata import PackageNotFoundError, version
+from typing import Any
 
 from fmpy.model_description import ModelDescription
 
-from fmus.documentation.events import event_section
+from fmu_observer.event_protocol import LATE_POLICIES, OUTCOME_VARIABLES
 from fmus.documentation.licences import model_terms
-from fmus.documentation.prose import first_paragraph, prose
+from fmus.documentation.prose import blocks, pieces
 from fmus.documentation.rebuild import rebuild_commands
-from fmus.documentation.tables import certificate_section, preset_table, variable_table
+from fmus.documentation.tables import certificate_rows, preset_rows, variable_rows
+from fmus.templates import environment
 from fmus.toolchain.targets import Target
 from plant_models.hybrid import HybridSystem
 
-STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; color: #222; background: #fff;
-       max-width: 60rem; margin: 0 auto; padding: 1rem; }
-h1, h2, h3 { line-height: 1.2; } h2 { margin-top: 2rem; border-bottom: 1px solid #ccc; }
-code { font-size: 0.95em; background: #f3f3f3; padding: 0 0.2em; overflow-wrap: anywhere; }
-code.formula { background: #eef4fb; }
-pre { background: #f3f3f3; padding: 0.5rem; overflow-x: auto; }
-.wide { overflow-x: auto; } table { border-collapse: collapse; }
-th, td { text-align: left; vertical-align: top; padding: 0.2rem 0.6rem; border-bottom: 1px solid #ddd; }
-dt { font-weight: bold; }
-"""
 INTERFACES = (("coSimulation", "co-simulation"), ("modelExchange", "model exchange"))
+CAUSALITIES = ("input", "output", "parameter")
 
 
 def page(system: HybridSystem, description: ModelDescription, preset: str | None, targets: Sequence[Target]) -> str:
     """The whole page.
 
     Args:
-        system: the hybrid system. description: its model description. preset: preset of the start values.
+        system: the hybrid system.
+        description: its model description.
+        preset: preset of the start values; None for the system's default.
         targets: platforms of the libraries and the compilers that built them.
+
+    Returns:
+        HTML that is well-formed XML too.
     """
-    chosen = preset if preset is not None else system.default_preset
-    sections = {
-        "Equations": _equations(system),
-        "Inputs": variable_table(description, "input"),
-        "Outputs": variable_table(description, "output"),
-        "Parameters": variable_table(description, "parameter"),
-        "Events": event_section(system, description),
-        "Presets": preset_table(system, chosen),
-        "Certificates": certificate_section(system),
-        "Limits": _list(_limits(system, targets)),
-        "Platforms": _platforms(targets) + _rebuild(system),
-        "Source and licence": _origin(system),
-    }
-    body = "\n".join(f"<h2>{escape(title)}</h2>\n{content}" for title, content in sections.items() if content)
-    return f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8"/>
-<meta name="viewport" content="width=device-width, initial-scale=1"/>
-<title>{escape(description.modelName)}</title>
-<style>{STYLE}</style>
-</head>
-<body>
-<h1>{escape(description.modelName)}</h1>
-{_head(description, chosen)}
-{body}
-</body>
-</html>
-"""
+    by_name = {v.name: v for v in description.modelVariables}
+    policy = by_name.get("late_policy")
+    return render(
+        "index.html.j2",
+        description,
+        system=system,
+        preset=preset if preset is not None else system.default_preset,
+        targets=targets,
+        interfaces=[text for name, text in INTERFACES if getattr(description, name) is not None],
+        equations=_equations(system),
+        names=by_name.keys(),
+        late=LATE_POLICIES[int(policy.start) - 1] if policy is not None else None,
+        counts=[name for name in OUTCOME_VARIABLES if name in by_name],
+        presets=preset_rows(system),
+        checked=certificate_rows(system),
+        commands=rebuild_commands(system.name),
+        tool=_tool(),
+        terms=model_terms(system),
+    )
 
 
-def _head(description: ModelDescription, preset: str | None) -> str:
-    interfaces = " and ".join(text for name, text in INTERFACES if getattr(description, name) is not None)
-    values = f" Start values: preset <code>{escape(preset)}</code>." if preset else ""
-    words = f"<p>{escape(description.description)}</p>" if description.description else ""
-    return f"{words}\n<p>FMI {escape(description.fmiVersion)}, {interfaces}.{values}</p>"
+def render(template: str, description: ModelDescription, **values: Any) -> str:
+    """A page of an FMU from its template.
+
+    Args:
+        template: its file among the templates of this room.
+        description: of the FMU; its inputs, outputs and parameters are known to the template.
+        values: what else the template inserts, by name.
+
+    Returns:
+        The page.
+    """
+    pages = environment("fmus.documentation")
+    filters: dict[str, Any] = {"pieces": pieces}
+    pages.filters |= filters
+    rows = {f"{causality}s": variable_rows(description, causality) for causality in CAUSALITIES}
+    return pages.get_template(template).render(description=description, **rows, **values)
 
 
-def _equations(system: HybridSystem) -> str:
+def _equations(system: HybridSystem) -> list[Any]:
+    """The docstring of the system, and the first paragraphs of those it inherits from."""
     classes = type(system).__mro__[: type(system).__mro__.index(HybridSystem)]
-    texts = [
-        prose(cls.__doc__) if cls is type(system) else first_paragraph(cls.__doc__) for cls in classes if cls.__doc__
-    ]
-    options = ", ".join(f"<code>{escape(name)} = {escape(str(value))}</code>" for name, value in system.options.items())
-    texts += [f"<p>This FMU was built with {options}.</p>"] if options else []
-    return "\n".join(texts) or "<p>The author of the model gave no description of its equations.</p>"
-
-
-def _limits(system: HybridSystem, targets: Sequence[Target]) -> list[str]:
-    limits = [
-        f"Between events it integrates with the method <code>{escape(system.method)}</code> on the fixed grid "
-        "<code>start + k * internal_step</code>; splitting a communication step changes nothing there."
-    ]
-    if system.noises:
-        limits.append(
-            "Its noise is a function of <code>seed</code>, signal and index: the same numbers in every run, whatever "
-            "was saved, "
-            "restored or repeated. Two instances with the same seed have the same noise."
-        )
-    if len(targets) > 1:
-        limits.append("Results on different platforms may differ in the last digits: their mathematical libraries do.")
-    if hasattr(system, "certify"):
-        limits.append(
-            "The certificates are those of the presets; other values of the parameters are not covered by them."
-        )
-    return limits
-
-
-def _platforms(targets: Sequence[Target]) -> str:
-    items = []
-    for target in targets:
-        needs = f"; needs {escape(target.platform.needs)}" if target.platform.needs and target.compiler.zig else ""
-        items.append(
-            f"<code>{escape(target.platform.name)}</code>, compiled by {escape(target.compiler.version)}{needs}"
-        )
-    return _list(items)
-
-
-def _rebuild(system: HybridSystem) -> str:
-    commands = "".join(
-        f"{escape(f'# {name}')}\n{escape(line)}\n" for name, line in rebuild_commands(system.name).items()
-    )
-    return (
-        "<p>On any other platform one command in the folder <code>sources</code> builds it again; how to link it "
-        "statically says "
-        f"<code>staticLinking.txt</code>.</p>\n<pre>{commands}</pre>"
-    )
-
-
-def _origin(system: HybridSystem) -> str:
-    source = f"<p>Source: {escape(system.source)}.</p>" if system.source else ""
-    return (
-        f"{source}\n<p>Built by {escape(_tool())}.</p>\n<p>{escape(model_terms(system))} All licences are in the "
-        f"folder "
-        "<code>licenses</code>.</p>"
-    )
+    return [blocks(cls.__doc__) if cls is type(system) else blocks(cls.__doc__)[:1] for cls in classes if cls.__doc__]
 
 
 def _tool() -> str:
@@ -140,7 +83,3 @@ def _tool() -> str:
         return f"fmu-observer {version('fmu-observer')}"
     except PackageNotFoundError:
         return "fmu-observer"
-
-
-def _list(items: Sequence[str]) -> str:
-    return f"<ul>{''.join(f'<li>{item}</li>' for item in items)}</ul>"

@@ -1,63 +1,63 @@
-"""Prose: the docstring of a system becomes HTML. Knows the few forms that docstrings of this project have."""
+"""Prose: the docstring of a system as blocks of text. Knows the few forms that docstrings of this project have."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from html import escape
 from inspect import cleandoc
 from textwrap import dedent
+from typing import Literal
+
+Block = tuple[Literal["p", "ul", "ol", "options"], list[str]]
+"""What it is, a paragraph, one of two lists, or the options of the model as ``name: meaning``; and its texts."""
 
 PYTHON_ONLY = ("Raises:", "Returns:", "Yields:", "Example:")
 """Sections that say nothing to the user of an FMU."""
+CODE = re.compile(r"``(.+?)``|`([^`]+?)`")
 
 
-def prose(docstring: str) -> str:
-    """Paragraphs, lists and formulae of a docstring as HTML.
+def blocks(docstring: str) -> list[Block]:
+    """Paragraphs, lists and options of a docstring, as far as they say something to the user of an FMU.
 
     Args:
         docstring: with ``code`` in double or single backquotes, lists that begin with ``- `` or ``1. ``, and ``Args:``.
+
+    Returns:
+        The blocks in their order.
     """
-    return "\n".join(filter(None, map(_block, _blocks(docstring))))
+    return [_block(lines) for lines in _paragraphs(docstring) if lines[0].strip() not in PYTHON_ONLY]
 
 
-def first_paragraph(docstring: str) -> str:
-    """The first paragraph of a docstring as HTML."""
-    return _block(next(_blocks(docstring), []))
+def pieces(text: str) -> list[tuple[str, bool]]:
+    """A text cut at its code.
+
+    Args:
+        text: with code in double or single backquotes.
+
+    Returns:
+        Pieces on one line, and of each whether it is code.
+    """
+    found: list[tuple[str, bool]] = []
+    for place, piece in enumerate(CODE.split(" ".join(text.split()))):
+        if piece:
+            found.append((piece, place % 3 != 0))
+    return found
 
 
-def inline(text: str) -> str:
-    """One line: text with code, formulae (code with an equals sign) marked as such."""
-    pieces = re.split(r"``(.+?)``|`([^`]+?)`", " ".join(text.split()))
-    html = ""
-    for i in range(0, len(pieces), 3):
-        html += escape(pieces[i])
-        code = next((p for p in pieces[i + 1 : i + 3] if p is not None), None)
-        if code is not None:
-            html += f'<code class="formula">{escape(code)}</code>' if " = " in code else f"<code>{escape(code)}</code>"
-    return html
+def _paragraphs(docstring: str) -> Iterator[list[str]]:
+    for paragraph in re.split(r"\n\s*\n", cleandoc(docstring)):
+        if paragraph.strip():
+            yield paragraph.strip("\n").splitlines()
 
 
-def _blocks(docstring: str) -> Iterator[list[str]]:
-    block: list[str] = []
-    for line in [*cleandoc(docstring).splitlines(), ""]:
-        if line.strip():
-            block.append(line)
-        elif block:
-            yield block
-            block = []
-
-
-def _block(lines: list[str]) -> str:
-    if not lines or lines[0].strip() in PYTHON_ONLY:
-        return ""
+def _block(lines: list[str]) -> Block:
     if lines[0].strip() == "Args:":
-        return "<h3>Options of the model</h3>\n" + _definitions(lines[1:])
-    for marker, tag in ((r"- ", "ul"), (r"\d+\. ", "ol")):
-        if re.match(marker, lines[0]):
-            items = "".join(f"<li>{inline(item)}</li>" for item in _items(lines, marker))
-            return f"<{tag}>{items}</{tag}>"
-    return f"<p>{inline(' '.join(lines))}</p>"
+        return "options", _items(dedent("\n".join(lines[1:])).splitlines(), r"(?=\w+: )")
+    if re.match(r"- ", lines[0]):
+        return "ul", _items(lines, r"- ")
+    if re.match(r"\d+\. ", lines[0]):
+        return "ol", _items(lines, r"\d+\. ")
+    return "p", [" ".join(lines)]
 
 
 def _items(lines: list[str], marker: str) -> list[str]:
@@ -68,13 +68,3 @@ def _items(lines: list[str], marker: str) -> list[str]:
         else:
             items[-1] += " " + line.strip()
     return items
-
-
-def _definitions(lines: list[str]) -> str:
-    items = _items(dedent("\n".join(lines)).splitlines(), r"(?=\w+: )")
-    pairs = (item.partition(": ") for item in items)
-    return (
-        "<dl>"
-        + "".join(f"<dt><code>{escape(name)}</code></dt><dd>{inline(text)}</dd>" for name, _, text in pairs)
-        + "</dl>"
-    )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from fmpy.model_description import ModelDescription
 
+from fmus.templates import environment
+
 COMMANDS = {
     "Linux": "cc -std=c11 -O2 -ffp-contract=off -shared -fPIC all.c -o {name}.so -lm",
     "macOS": "cc -std=c11 -O2 -ffp-contract=off -shared all.c -o {name}.dylib",
@@ -16,6 +18,9 @@ def rebuild_commands(identifier: str) -> dict[str, str]:
 
     Args:
         identifier: model identifier.
+
+    Returns:
+        Commands by name of the system.
     """
     return {system: command.format(name=identifier) for system, command in COMMANDS.items()}
 
@@ -24,25 +29,9 @@ def rebuild_text(description: ModelDescription) -> str:
     """The text of ``documentation/staticLinking.txt``.
 
     Args:
-        description: model description of the FMU.
+        description: of the FMU.
     """
     interface = description.coSimulation or description.modelExchange
     name, version = interface.modelIdentifier, str(description.fmiVersion)[0]
-    shared = "\n".join(f"    {system}:\n        {command}" for system, command in rebuild_commands(name).items())
-    return f"""Building this FMU again
-
-sources/ holds all that is needed, the headers of FMI included. One file is compiled, all.c; it includes the others.
-
-A shared library, in sources/:
-
-{shared}
-
-A part of a larger program: every function of FMI gets a prefix, and nothing else is visible outside, so that several FMUs can
-be linked into one program:
-
-    cc -std=c11 -O2 -ffp-contract=off -DFMI{version}_FUNCTION_PREFIX={name}_ -c all.c -o {name}.o
-
-    {name}_fmi{version}{"Instantiate" if version == "2" else "InstantiateCoSimulation"}(...);
-
-It needs the C library and its mathematical functions, and nothing else.
-"""  # noqa: E501
+    template = environment("fmus.documentation").get_template("staticLinking.txt.j2")
+    return template.render(name=name, version=version, commands=rebuild_commands(name))

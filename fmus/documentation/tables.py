@@ -1,132 +1,139 @@
-"""Tables of the page: variables, presets, certificates."""
+"""What the tables of the page hold: variables, presets, certificates, as data."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from html import escape
+from dataclasses import dataclass
 from math import isinf
 from typing import Any
 from weakref import WeakKeyDictionary
 
 from fmpy.model_description import ModelDescription, ModelVariable
 
-from fmus.documentation.prose import inline
 from plant_models.hybrid import HybridSystem
 
 UNITS_OF_TYPES = {"Clock": "clock", "Integer": "whole number", "Int32": "whole number", "Enumeration": "choice"}
 
-_known: WeakKeyDictionary[HybridSystem, tuple[tuple[str, tuple[str, str], str, str], ...]] = WeakKeyDictionary()
 
-
-def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """An HTML table that scrolls sideways on a small screen.
-
-    Args:
-        head: column titles, plain text.
-        rows: cells, already HTML.
-    """
-    titles = "".join(f"<th>{escape(title)}</th>" for title in head)
-    body = "\n".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
-    return f'<div class="wide"><table>\n<thead><tr>{titles}</tr></thead>\n<tbody>\n{body}\n</tbody></table></div>'
-
-
-def variable_table(description: ModelDescription, causality: str) -> str:
-    """The variables of one causality; empty where there are none.
+@dataclass(frozen=True, slots=True)
+class VariableRow:
+    """A variable in words.
 
     Args:
-        description: model description of the FMU.
+        name: of the variable.
+        unit: with the unit in which it is to be shown, if any.
+        start: its start value; empty without one.
+        range: from its least to its largest value; empty without bounds.
+        meaning: its description.
+        has_start: whether it has a start value.
     """
-    chosen = [v for v in description.modelVariables if v.causality == causality]
-    if not chosen:
-        return ""
-    with_start = any(v.start is not None for v in chosen)
-    head = ["name", "unit", *(["start", "range"] if with_start else []), "meaning"]
-    return table(head, (_variable(v, with_start) for v in chosen))
+
+    name: str
+    unit: str
+    start: str
+    range: str
+    meaning: str
+    has_start: bool
 
 
-def _variable(variable: ModelVariable, with_start: bool) -> list[str]:
+@dataclass(frozen=True, slots=True)
+class CertificateRow:
+    """What the stability check says of a preset.
+
+    Args:
+        preset: its name.
+        aperiodic: up to which mixed gaps it is certified, in words.
+        constant: from which constant gap on it is unstable, in words.
+        text: what was checked.
+        event: the event that gaps lie between; empty where the check failed.
+    """
+
+    preset: str
+    aperiodic: str
+    constant: str
+    text: str
+    event: str
+
+
+_known: WeakKeyDictionary[HybridSystem, list[CertificateRow]] = WeakKeyDictionary()
+
+
+def variable_rows(description: ModelDescription, causality: str) -> list[VariableRow]:
+    """The variables of one causality.
+
+    Args:
+        description: of the FMU.
+        causality: ``input``, ``output`` or ``parameter``.
+    """
+    return [_variable(v) for v in description.modelVariables if v.causality == causality]
+
+
+def _variable(variable: ModelVariable) -> VariableRow:
     unit = variable.unit or UNITS_OF_TYPES.get(str(variable.type), "1")
     shown = f"{unit} ({variable.displayUnit})" if variable.displayUnit else unit
-    middle = [_start(variable), _range(variable)] if with_start else []
-    return [f"<code>{escape(variable.name)}</code>", escape(shown), *middle, inline(variable.description or "")]
+    has_start = variable.start is not None
+    return VariableRow(variable.name, shown, _start(variable), _range(variable), variable.description or "", has_start)
 
 
 def _start(variable: ModelVariable) -> str:
     items = variable.declaredType.items if variable.type == "Enumeration" and variable.declaredType else ()
     names = [item.name for item in items if str(item.value) == str(variable.start)]
-    return _number(variable.start) + (f" ({escape(names[0])})" if names else "")
+    return _number(variable.start) + (f" ({names[0]})" if names else "")
 
 
 def _number(value: object) -> str:
     try:
         return f"{float(str(value)):.12g}"
     except ValueError:
-        return "" if value is None else escape(str(value))
+        return "" if value is None else str(value)
 
 
 def _range(variable: ModelVariable) -> str:
     low, high = variable.min, variable.max
     if low is None and high is None:
         return ""
-    return escape(f"{'…' if low is None else _number(low)} to {'…' if high is None else _number(high)}")
+    return f"{'…' if low is None else _number(low)} to {'…' if high is None else _number(high)}"
 
 
-def preset_table(system: HybridSystem, chosen: str | None) -> str:
-    """Values of all presets, and those of this FMU marked; empty for a system without presets.
+def preset_rows(system: HybridSystem) -> list[list[str]]:
+    """Name and unit of each parameter that a preset sets, and its value in every preset.
 
     Args:
-        chosen: preset that the FMU has as its start values.
+        system: the hybrid system.
     """
-    if not system.presets:
-        return ""
     values = {name: system.preset_values(name) for name in system.presets}
-    names = dict.fromkeys(name for preset in values.values() for name in preset)
     signals = (*system.parameter_signals, *system.states)
     starts = {name: start for s in signals for name, start in zip(s.scalar_names, s.start_values, strict=True)}
     units = {name: s.unit for s in signals for name in s.scalar_names}
-    head = ["parameter", "unit", *(f"{name} (this FMU)" if name == chosen else name for name in system.presets)]
-    rows = (
-        [
-            f"<code>{escape(name)}</code>",
-            escape(units[name]),
-            *(_number(preset.get(name, starts[name])) for preset in values.values()),
-        ]
-        for name in names
-    )
-    return table(head, rows)
+    names = dict.fromkeys(name for preset in values.values() for name in preset)
+    return [
+        [name, units[name], *(_number(preset.get(name, starts[name])) for preset in values.values())] for name in names
+    ]
 
 
-def certificate_section(system: HybridSystem) -> str:
-    """What the stability check says of each preset; empty where the system has none.
+def certificate_rows(system: HybridSystem) -> list[CertificateRow] | None:
+    """What the stability check says of each preset; None where the system has none.
 
     A certificate is found with the values of the preset; whoever changes a gain in the FMU asks again.
+
+    Args:
+        system: the hybrid system.
     """
-    certify = getattr(system, "certify", None)
-    if certify is None:
-        return ""
+    if not hasattr(system, "certify"):
+        return None
     if system not in _known:  # it takes up to half a second; FMI 2 and FMI 3 say the same
-        _known[system] = _certificates(system)
-    found = _known[system]
-    rows = [[f"<code>{escape(name)}</code>", *limits] for name, limits, *_ in found]
-    event = next((event for *_, event in found if event), "sample")
-    head = ["preset", f"mixed {event} gaps certified up to", "constant gap unstable from"]
-    texts = "".join(f"<p>{inline(text)}</p>" for text in dict.fromkeys(text for _, _, text, _ in found))
-    return table(head, rows) + texts
+        _known[system] = [_certificate(system, preset) for preset in (*system.presets,) or (None,)]
+    return _known[system]
 
 
-def _certificates(system: HybridSystem) -> tuple[tuple[str, tuple[str, str], str, str], ...]:
-    """Preset, its two limits, what was checked, and the event that gaps lie between."""
-    found = []
-    for preset in (*system.presets,) or (None,):
-        try:
-            certificate = system.certify(0.1, preset=preset)  # type: ignore[attr-defined] # the limits do not depend on the gap asked for
-            limits = (_limit(certificate.aperiodic_limit, certificate), _limit(certificate.constant_limit, certificate))
-            notes = f" Also checked: {'; '.join(certificate.notes)}." if certificate.notes else ""
-            text, event = f"Checked on the {certificate.error_model}.{notes}", certificate.event
-        except Exception as error:  # a user's own check may fail in any way; the FMU is none the worse
-            limits, text, event = ("unknown", "unknown"), f"The check failed: {error}", ""
-        found.append((preset or "declared starts", limits, text, event))
-    return tuple(found)
+def _certificate(system: Any, preset: str | None) -> CertificateRow:
+    name = preset or "declared starts"
+    try:
+        certificate = system.certify(0.1, preset=preset)  # the limits do not depend on the gap asked for
+        limits = (_limit(certificate.aperiodic_limit, certificate), _limit(certificate.constant_limit, certificate))
+        notes = f" Also checked: {'; '.join(certificate.notes)}." if certificate.notes else ""
+        return CertificateRow(name, *limits, f"Checked on the {certificate.error_model}.{notes}", certificate.event)
+    except Exception as error:  # a user's own check may fail in any way; the FMU is none the worse
+        return CertificateRow(name, "unknown", "unknown", f"The check failed: {error}", "")
 
 
 def _limit(limit: float, certificate: Any) -> str:

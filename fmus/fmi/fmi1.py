@@ -63,14 +63,14 @@ class FMI1Slave(Slave):
     def _find_events(self) -> dict[str, EventPort]:
         return {}
 
-    def enter_initialization(self, start_time: float, stop_time: float) -> None:
-        """Only note the times: the slave is initialised when all start values and inputs are known.
+    def begin_initialization(self, start_time: float, stop_time: float) -> None:
+        """Only note the end: the slave is initialised when all start values and inputs are known.
 
         Args:
             start_time: [s].
             stop_time: [s].
         """
-        self.time, self._stop_time = start_time, stop_time
+        self._stop_time = stop_time
 
     def exit_initialization(self) -> None:
         """Initialise the slave with the inputs and start values set so far."""
@@ -79,7 +79,7 @@ class FMI1Slave(Slave):
         self._initialized = self._running = True
 
     def advance(self, t: float, until: float) -> None:  # noqa: D102 - see Slave
-        self._step_whole(self._do_step, self._after_refusal, t, until)
+        self._step_whole(self._after_refusal, t, until)
 
     def _after_refusal(self, error: FMICallException, t: float, until: float) -> None:
         self._raise_unless_discarded(error, t)

@@ -40,13 +40,7 @@ class FMI2Instance(Instance):
                 )
         return events
 
-    def begin_initialization(self, start_time: float, stop_time: float) -> None:
-        """Set up the experiment and enter Initialization Mode.
-
-        Args:
-            start_time: [s].
-            stop_time: announced to the FMU [s].
-        """
+    def begin_initialization(self, start_time: float, stop_time: float) -> None:  # noqa: D102 - see Instance
         slave = self.slave
         tolerance, words = self.tolerance_argument()
         self.guard(
@@ -68,16 +62,12 @@ class FMI2Slave(FMI2Instance, Slave):
     def _forget(self) -> None:
         self._counts = dict.fromkeys(self.events, 0)
 
-    def enter_initialization(self, start_time: float, stop_time: float) -> None:  # noqa: D102 - see Slave
-        self.time = start_time
-        self.begin_initialization(start_time, stop_time)
-
     def exit_initialization(self) -> None:  # noqa: D102 - see Slave
         self.guard("exitInitializationMode", self.slave.exitInitializationMode)
         self._running = True
 
     def advance(self, t: float, until: float) -> None:  # noqa: D102 - see Slave
-        self._step_whole(self._do_step, self._after_refusal, t, until)
+        self._step_whole(self._after_refusal, t, until)
 
     def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Slave
         self._counts[event.name] += 1

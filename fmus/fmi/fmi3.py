@@ -19,7 +19,7 @@ from fmus.fmi.native_calls import prepared_call
 from fmus.fmi.ports import is_native
 from fmus.fmi.quick_calls import quicken
 from fmus.fmi.slave import Slave
-from fmus.fmi.standard import DISCARD, MAX_EVENT_ITERATIONS, MAX_RETURNS_PER_STEP, NEVER, TIME_TOLERANCE
+from fmus.fmi.standard import DISCARD, MAX_RETURNS_PER_STEP, NEVER, TIME_TOLERANCE
 
 
 class FMI3Instance(Instance):
@@ -53,13 +53,7 @@ class FMI3Instance(Instance):
                 )
         return events
 
-    def begin_initialization(self, start_time: float, stop_time: float) -> None:
-        """Enter Initialization Mode.
-
-        Args:
-            start_time: [s].
-            stop_time: announced to the FMU [s].
-        """
+    def begin_initialization(self, start_time: float, stop_time: float) -> None:  # noqa: D102 - see Instance
         call = self.slave.enterInitializationMode
         tolerance, words = self.tolerance_argument()
         self.guard(
@@ -90,17 +84,13 @@ class FMI3Slave(FMI3Instance, Slave):
         if native:
             quicken(self.slave)
 
-    def enter_initialization(self, start_time: float, stop_time: float) -> None:  # noqa: D102 - see Slave
-        self.time = start_time
-        self.begin_initialization(start_time, stop_time)
-
     def exit_initialization(self) -> None:  # noqa: D102 - see Slave
         if self.clocks:
             self.guard("intervals of clocks", lambda: self.clocks.begin(self.time))
         self.guard("exitInitializationMode", self.slave.exitInitializationMode)
         self._running = True
         if self.has_event_mode:
-            self._settle()
+            self.settle()
 
     def step(self, t: float, until: float) -> tuple[float, bool]:
         """One doStep from `t` towards `until` [s]; returns the time reached and whether event handling is needed.
@@ -140,7 +130,7 @@ class FMI3Slave(FMI3Instance, Slave):
             return self.explained("doStep", error, t)
         return self.failure(f"doStep was discarded: asked for {until:g} s; try a smaller communication step", t)
 
-    def advance(self, t: float, until: float) -> None:  # noqa: D102 - see Component
+    def advance(self, t: float, until: float) -> None:  # noqa: D102 - see Slave
         if self.next_event == NEVER:  # the ordinary step: nothing is due, and mostly nothing happens
             reached, event = self.step(t, until)
             if event and self.has_event_mode and not self.terminated:
@@ -178,7 +168,7 @@ class FMI3Slave(FMI3Instance, Slave):
         """Enter event mode, let due clocks tick, settle, and return to step mode."""
         self.enter_event_mode()
         self.tick_due_clocks()
-        self._settle()
+        self.settle()
 
     def enter_event_mode(self) -> None:
         """From Step Mode to Event Mode."""
@@ -200,8 +190,7 @@ class FMI3Slave(FMI3Instance, Slave):
         """In Event Mode: which of these output clocks are active."""
         return [bool(x) for x in self.guard("getClock", lambda: self.slave.getClock(list(references)))]
 
-    def update_discrete_states(self) -> bool:
-        """In Event Mode: end a super-dense instant; True where the slave needs another one."""
+    def update_discrete_states(self) -> bool:  # noqa: D102 - see Instance
         again, terminate, _, _, defined, next_time = self.guard("updateDiscreteStates", self.slave.updateDiscreteStates)
         self.terminated |= bool(terminate)
         if defined and math.isnan(next_time):
@@ -231,7 +220,7 @@ class FMI3Slave(FMI3Instance, Slave):
         self.enter_event_mode()
         self.tick_due_clocks()
         ticked = self.ticking([clock])[0]
-        self._settle()
+        self.settle()
         return ticked
 
     def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Slave
@@ -243,14 +232,11 @@ class FMI3Slave(FMI3Instance, Slave):
         slave.setClock([event.trigger], [True])
         if fields:
             slave.setFloat64(list(fields), list(fields.values()))
-        self._settle()
+        self.settle()
 
-    def _settle(self) -> None:
-        for _ in range(MAX_EVENT_ITERATIONS):
-            if not self.update_discrete_states():
-                break
-        else:
-            raise self.failure(f"discrete states do not settle in {MAX_EVENT_ITERATIONS} updates")
+    def settle(self) -> None:
+        """In Event Mode: update the discrete states until they do not change any more, and return to Step Mode."""
+        super().settle()
         self.enter_step_mode()
 
     def _remember(self) -> tuple[Any, ...]:

@@ -21,10 +21,12 @@ from fmus.fmi.elements import layout
 from fmus.fmi.exact_ports import Values
 from fmus.fmi.native_log import forget
 from fmus.fmi.ports import is_native
-from fmus.fmi.standard import FATAL
+from fmus.fmi.standard import FATAL, MAX_EVENT_ITERATIONS
 from fmus.fmi.values import element_reader, element_writer, exact_reader, exact_writer
 
 INSTANTIATING = "instantiate"
+FAILURES = (RuntimeError, ValueError, OSError)
+"""What the calls of an instance raise: nothing else may come out of one, whatever its slave throws."""
 NAMES_SHOWN = 6
 
 
@@ -94,6 +96,37 @@ class Instance(Described):
             self._quietly("unloading", self.slave.freeLibrary)  # never instantiated: freeInstance did not do it
         self._loaded = False
         forget(self)
+
+    def set_start(self, name: str, value: Any) -> None:
+        """Set a numeric scalar or element before initialisation.
+
+        Args:
+            name: what is set.
+            value: a number.
+        """
+        write, buffer = self.writer([name])
+        buffer[0] = value
+        write()
+
+    @abstractmethod
+    def begin_initialization(self, start_time: float, stop_time: float) -> None:
+        """Set up the experiment and enter Initialization Mode, where the FMI version has one.
+
+        Args:
+            start_time: [s].
+            stop_time: announced to the FMU [s].
+        """
+
+    def settle(self) -> None:
+        """In Event Mode: update the discrete states until they do not change any more."""
+        for _ in range(MAX_EVENT_ITERATIONS):
+            if not self.update_discrete_states():
+                return
+        raise self.failure(f"discrete states do not settle in {MAX_EVENT_ITERATIONS} updates")
+
+    def update_discrete_states(self) -> bool:
+        """In Event Mode: end a super-dense instant; True where the slave needs another one."""
+        raise NotImplementedError
 
     # -- values -----------------------------------------------------------------------------------------------------
 
@@ -281,10 +314,11 @@ class Instance(Described):
 
     def _remember(self) -> tuple[Any, ...]:
         """What belongs to a state beside the slave's own."""
-        return ()
+        return (self.terminated,)
 
     def _recall(self, remembered: tuple[Any, ...]) -> None:
         """Return to what `_remember` gave."""
+        self.terminated = remembered[0]
 
     # -- internals --------------------------------------------------------------------------------------------------
 

@@ -16,9 +16,11 @@ from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.fmi3 import FMU3Model, FMU3ScheduledExecution, FMU3Slave
 from fmpy.model_description import ModelDescription
 
+from fmus.fmi.fmi1_library import FMU1SlaveRepaired
 from fmus.fmi.standard import CO_SIMULATION, MODEL_EXCHANGE, SCHEDULED_EXECUTION, fmi_version
 
 FACES: dict[tuple[int, str], type] = {
+    (1, CO_SIMULATION): FMU1SlaveRepaired,
     (2, CO_SIMULATION): FMU2Slave,
     (2, MODEL_EXCHANGE): FMU2Model,
     (3, CO_SIMULATION): FMU3Slave,
@@ -54,7 +56,7 @@ def functions_of_capabilities(description: ModelDescription, interface: str) -> 
             yield from ((capability, f"fmi{fmi_version(description)}{name}".lower()) for name in functions)
 
 
-def load(folder: Path, description: ModelDescription, interface: str, name: str) -> Any:
+def load(folder: Path, description: ModelDescription, interface: str, name: str, *, complete: bool = False) -> Any:
     """An object with fmpy's call surface over the library of an unpacked FMU; not yet instantiated.
 
     Args:
@@ -62,11 +64,13 @@ def load(folder: Path, description: ModelDescription, interface: str, name: str)
         description: its model description.
         interface: ``coSimulation`` or ``modelExchange``.
         name: instance name.
+        complete: whether a library that lacks a function of the standard is refused.
 
     Raises:
         Exception: the library cannot be loaded.
     """
-    face = _tolerant(FACES[fmi_version(description), interface])
+    face: Any = FACES[fmi_version(description), interface]
+    face = face if complete else _tolerant(face)
     identifier = getattr(description, interface).modelIdentifier
     return face(guid=description.guid, modelIdentifier=identifier, unzipDirectory=str(folder), instanceName=name)
 

@@ -15,6 +15,7 @@ from typing import Any
 from fmpy.fmi1 import FMICallException
 
 WARNING = 1  # FMI status: the last one that is no failure
+FUNCTION: Any = ctypes.CFUNCTYPE(None).__bases__[0]
 BY_REFERENCE = type(ctypes.byref(ctypes.c_int()))
 
 
@@ -32,6 +33,8 @@ def prepared_call(slave: Any, name: str, *arguments: Any) -> Callable[[], None]:
     """
     functions, checked = slave._functions, getattr(slave, name)
     function = functions[name]
+    if not isinstance(function, FUNCTION):  # the library lacks it: fmpy's own call tells
+        return lambda: checked(*map(_plain, arguments))
     typed = tuple(_typed(argument, kind) for argument, kind in zip(arguments, function.argtypes, strict=True))
     raw = ctypes.CFUNCTYPE(ctypes.c_int)(ctypes.cast(function, ctypes.c_void_p).value or 0)
 

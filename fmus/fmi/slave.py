@@ -36,14 +36,18 @@ class Slave(Instance):
     """A co-simulation instance. Its life: `instantiate`, `enter_initialization`, readers and writers in turn,
     `exit_initialization`, then `advance` and `notify` in turn, `terminate`, `free`.
 
-    `time` is where it stands [s], `next_event` when something known in advance is due [s]; `seconds` were spent in
-    `calls` calls of doStep; `terminated` says that the slave asked for the end of the run.
+    `reset` leads back to the state after `instantiate`. `time` is where it stands [s], `next_event` when something
+    known in advance is due [s]; `seconds` were spent in `calls` calls of doStep; `terminated` says that the slave asked
+    for the end of the run.
 
     Args:
         name: of the instance.
         slave: object with fmpy's slave call surface, not yet instantiated.
         description: its model description.
     """
+
+    _do_step: Callable[[float, float], Any]
+    """The slave's doStep from a time by a length [s], prepared by `instantiate`."""
 
     def __init__(self, name: str, slave: Any, description: ModelDescription) -> None:
         super().__init__(name, slave, description)
@@ -57,7 +61,6 @@ class Slave(Instance):
         super().reset()
         self.time, self.next_event = math.nan, NEVER
 
-    @abstractmethod
     def enter_initialization(self, start_time: float, stop_time: float) -> None:
         """Begin initialisation.
 
@@ -65,6 +68,8 @@ class Slave(Instance):
             start_time: [s].
             stop_time: announced to the slave [s].
         """
+        self.time = start_time
+        self.begin_initialization(start_time, stop_time)
 
     @abstractmethod
     def exit_initialization(self) -> None:
@@ -110,13 +115,13 @@ class Slave(Instance):
 
     # -- internals --------------------------------------------------------------------------------------------------
 
-    def _step_whole(self, do_step: Callable[[float, float], Any], refused: Refused, t: float, until: float) -> None:
+    def _step_whole(self, refused: Refused, t: float, until: float) -> None:
         """One timed doStep of a slave that gets to `until` [s] or refuses (FMI 1, 2)."""
         note = self._call_note
         note.call[0], note.time[0] = self._step_number, t
         begin = perf_counter()
         try:
-            do_step(t, until - t)
+            self._do_step(t, until - t)
             self.time = until
         except FMICallException as error:
             refused(error, t, until)

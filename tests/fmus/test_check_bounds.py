@@ -98,7 +98,7 @@ def test_a_wrong_call_of_ours_is_no_failure_of_the_fmu() -> None:
         len(5)  # type: ignore[arg-type]
 
     with pytest.raises(TypeError):
-        FmuInstance.guarded(None, "getReal", call)  # type: ignore[arg-type]
+        FmuInstance.guard(FmuInstance, "getReal", call)  # type: ignore[arg-type]
 
 
 def test_where_equal_runs_differ_nothing_is_compared() -> None:

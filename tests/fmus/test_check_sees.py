@@ -19,7 +19,7 @@ from test_fmus.typed import expected, typed_fmu
 from fmus.check import Class, Verdict, check_fmu
 from fmus.check.bench import END, Bench, end_of_experiment
 from fmus.check.instance import FmuInstance
-from fmus.check.slave import FmuSlave
+from fmus.check.slave import FmuSlave, make_slave
 from fmus.fmi.archive import open_archive
 
 pytestmark = pytest.mark.compiler
@@ -31,7 +31,7 @@ OUTPUTS = '<Outputs><Unknown index="2"/><Unknown index="3"/></Outputs>'
 def bench_of(path: Path, starts: Mapping[str, Any] | None = None, until: float | None = None) -> Iterator[Bench]:
     archive = open_archive(path)
     with archive.unpacked() as folder:
-        bench = Bench(lambda: FmuSlave(folder, archive.description), starts or {}, 0.0, 0.01, until=until)
+        bench = Bench(lambda: make_slave(folder, archive.description), starts or {}, 0.0, 0.01, until=until)
         try:
             yield bench
         finally:
@@ -58,7 +58,7 @@ def test_inputs_begin_at_their_start_values_and_stay_in_their_range(tmp_path: Pa
 def test_elements_of_arrays_are_outputs_and_inputs(tmp_path: Path) -> None:
     archive = open_archive(typed_fmu(tmp_path, version=3))
     with archive.unpacked() as folder:
-        slave = FmuSlave(folder, archive.description)
+        slave = make_slave(folder, archive.description)
         try:
             slave.instantiate()
             slave.enter_initialization(0.0, 1.0)

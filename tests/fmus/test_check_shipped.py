@@ -9,7 +9,7 @@ import pytest
 from fmus import RECIPES, cached_fmu, recipe
 from fmus.check import Class, Verdict, check_fmu
 from fmus.check.probe import probe
-from fmus.check.slave import FmuSlave
+from fmus.check.slave import make_slave
 from fmus.fmi.archive import open_archive
 
 pytestmark = pytest.mark.compiler
@@ -44,5 +44,5 @@ def test_directional_derivatives_are_found_and_compared(version: Any) -> None:
 def test_the_probe_takes_the_instances_of_the_check(version: Any) -> None:
     archive = open_archive(cached_fmu(recipe("locomotive"), version))
     with archive.unpacked() as folder:
-        report = probe(lambda: FmuSlave(folder, archive.description), {"mass": 60e3}, 0.0, 0.1)
+        report = probe(lambda: make_slave(folder, archive.description), {"mass": 60e3}, 0.0, 0.1)
     assert (report.honest_step, report.exact_state, report.repeatable, report.excited) == (True,) * 4, report.remarks

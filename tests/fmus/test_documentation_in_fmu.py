@@ -18,7 +18,7 @@ from fmu_observer import OBSERVERS
 from fmus import RECIPES, cached_fmu, recipe
 from fmus.documentation.licences import licence_files, licence_texts
 from fmus.documentation.page import page
-from fmus.documentation.prose import prose
+from fmus.documentation.prose import blocks, pieces
 from fmus.toolchain.platforms import host_platform
 from fmus.toolchain.targets import Target, choose_targets
 from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, output_signal, parameter, state, vector
@@ -169,14 +169,22 @@ def test_nothing_of_a_users_text_becomes_html(version: int) -> None:
 
 
 def test_a_docstring_becomes_paragraphs_lists_and_formulae() -> None:
-    assert prose("One ``x = 1`` two\nlines.\n\n1. a\n2. b") == (
-        '<p>One <code class="formula">x = 1</code> two lines.</p>\n<ol><li>a</li><li>b</li></ol>'
-    )
-    assert (
-        prose("Args:\n    gain: of it.")
-        == "<h3>Options of the model</h3>\n<dl><dt><code>gain</code></dt><dd>of it.</dd></dl>"
-    )
-    assert prose("") == ""
+    assert blocks("One ``x = 1`` two\nlines.\n\n1. a\n2. b\n   and more") == [
+        ("p", ["One ``x = 1`` two lines."]),
+        ("ol", ["a", "b and more"]),
+    ]
+    assert pieces("One ``x = 1`` two `y`") == [("One ", False), ("x = 1", True), (" two ", False), ("y", True)]
+    assert blocks("Args:\n    gain: of it.\n\nRaises:\n    ValueError: never.") == [("options", ["gain: of it."])]
+    assert blocks("") == []
+
+
+def test_a_formula_is_told_from_other_code() -> None:
+    tree = html.document_fromstring(documentation(recipe("locomotive"), 2)["index.html"])
+    formulae = {code.text_content() for code in tree.xpath("//code[@class='formula']")}
+    others = {code.text_content() for code in tree.xpath("//code[not(@class)]")}
+    assert "gradient_shape = constant" in others
+    assert formulae
+    assert all(" = " in formula for formula in formulae)
 
 
 def test_a_page_names_every_platform_and_compiler() -> None:

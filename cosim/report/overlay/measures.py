@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import isfinite, isnan
 
+from cosim.evaluation.error_table import MEASURED
 from cosim.evaluation.metrics import PhaseMetrics, phase_metrics
 from cosim.evaluation.numbers import DASH, error_number, number
 from cosim.evaluation.phase_details import phase_details
 from cosim.evaluation.roles import label, phases
-from cosim.report.error_table import MEASURED
 from cosim.report.overlay.runs import Run, observers_of, one_each
 from cosim.report.page.phases import COLUMNS
 

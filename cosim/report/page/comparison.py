@@ -6,10 +6,9 @@ from __future__ import annotations
 
 import json
 import re
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from html import escape
+from dataclasses import replace
 from math import inf, isfinite
 from pathlib import Path
 
@@ -18,7 +17,10 @@ from cosim.drawing.style import png
 from cosim.errors import OutputError
 from cosim.evaluation.numbers import DASH, number
 from cosim.report.figures.comparison_figure import comparison_picture
-from cosim.report.page.parts import box, bullets, chapters, facts, page, paragraph, picture, scrolling
+from cosim.report.page.files import write_file
+from cosim.report.page.render import render
+from cosim.report.page.table import Table, simple_table
+from cosim.report.page.verdict import Fact
 from cosim.results.summary_file import jsonable
 
 PAGE, DATA, PICTURES = "comparison.html", "comparison.json", "comparison_pictures"
@@ -52,7 +54,8 @@ def write_comparison(
     """Write a comparison to a folder: page, data, and one picture for each of the worst signals.
 
     Args:
-        comparison: what to write. directory: the folder; created where it does not exist.
+        comparison: what to write.
+        directory: the folder; created where it does not exist.
         most_pictures: number of pictures at most, of the worst signals.
 
     Returns:
@@ -67,38 +70,74 @@ def write_comparison(
     with _explained(folder):
         _remove_pictures(folder / PICTURES)
         drawn = _write_pictures(pictures, folder / PICTURES)
-        _write(folder / PAGE, comparison_page(comparison, pictures))
-        _write(folder / DATA, comparison_json(comparison))
+        write_file(folder / PAGE, _bytes(comparison_page(comparison, pictures)))
+        write_file(folder / DATA, _bytes(comparison_json(comparison)))
     paths = {"html": folder / PAGE, "json": folder / DATA}
     return paths | ({"png": next(iter(drawn.values())), "pictures": folder / PICTURES} if drawn else {})
 
 
 def write_page(comparison: Comparison, path: str | Path, most_pictures: int = MOST_PICTURES) -> Path:
-    """Write the page alone, with the pictures inside; raises as `write_comparison` does."""
+    """Write the page alone, with the pictures inside.
+
+    Args:
+        comparison: what to write.
+        path: the file; its folder is created.
+        most_pictures: number of pictures at most, of the worst signals.
+
+    Returns:
+        Path of the page.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
     file = Path(path)
     text = comparison_page(comparison, draw_pictures(comparison, most_pictures))
     with _explained(file):
-        _write(file, text)
+        write_file(file, _bytes(text))
     return file
 
 
 def write_pictures(
     comparison: Comparison, directory: str | Path, most_pictures: int = MOST_PICTURES
 ) -> dict[str, Path]:
-    """Write the pictures alone: paths by signal, the worst first; raises as `write_comparison` does."""
+    """Write the pictures alone.
+
+    Args:
+        comparison: what to draw.
+        directory: the folder; created where it does not exist.
+        most_pictures: number of pictures at most, of the worst signals.
+
+    Returns:
+        Paths by signal, the worst first.
+
+    Raises:
+        OutputError: the folder cannot be written.
+    """
     pictures = draw_pictures(comparison, most_pictures)
     with _explained(Path(directory)):
         return _write_pictures(pictures, Path(directory))
 
 
 def draw_pictures(comparison: Comparison, most: int = MOST_PICTURES) -> dict[str, bytes]:
-    """Pictures of the worst signals that can be drawn, as PNG by signal, the worst first."""
+    """Pictures of the worst signals that can be drawn.
+
+    Args:
+        comparison: what to draw.
+        most: number of pictures at most.
+
+    Returns:
+        PNG by signal, the worst first.
+    """
     drawable = [s for s in comparison.failed if s.curves is not None]
     return {s.name: png(comparison_picture(s).figure) for s in drawable[:most]}
 
 
 def comparison_json(comparison: Comparison) -> str:
-    """The comparison as JSON, without curves."""
+    """The comparison as JSON, without curves.
+
+    Args:
+        comparison: what was found.
+    """
     return json.dumps(jsonable(comparison.to_dict()), indent=2) + "\n"
 
 
@@ -106,35 +145,40 @@ def comparison_page(comparison: Comparison, pictures: Mapping[str, bytes]) -> st
     """The page as text.
 
     Args:
-        comparison: what was found. pictures: PNG by signal, from `draw_pictures`.
+        comparison: what was found.
+        pictures: PNG by signal, from `draw_pictures`.
+
+    Returns:
+        The page.
     """
-    title = f"{comparison.result} against {comparison.reference}"
-    return page(
-        title,
-        [
-            f"<header>\n<h1>{escape(title)}</h1>\n{facts(_facts(comparison))}</header>",
-            _verdict(comparison),
-            chapters(
-                {
-                    "Signals that differ": [
-                        *(_signal(s, pictures) for s in comparison.failed),
-                        _left_out(comparison, pictures),
-                    ],
-                    "Balise telegrams": _events(comparison),
-                    "All signals": [_table(comparison)],
-                    "Notes": [bullets(comparison.notes)],
-                }
-            ),
-        ],
+    return render(
+        "comparison.html.j2",
+        f"{comparison.result} against {comparison.reference}",
+        comparison=comparison,
+        facts=_facts(comparison),
+        verdict=verdict_text(comparison),
+        worst=_cut(
+            [f"{s.name}: {_in_words(s)}" for s in comparison.failed], FINDINGS_SHOWN, "... and {} more, listed below"
+        ),
+        found={s.name: _cut([_text(s, f) for f in s.findings] or [_in_words(s)]) for s in comparison.failed},
+        pictures=pictures,
+        not_drawn=sum(s.curves is not None for s in comparison.failed) - len(pictures),
+        differences=_cut([d.text for d in comparison.events.differences], EVENTS_SHOWN),
+        table=_table(comparison),
     )
 
 
-def _facts(comparison: Comparison) -> list[tuple[str, str, str, str]]:
+def _cut(lines: list[str], most: int = FINDINGS_SHOWN, rest: str = "and {} more") -> list[str]:
+    """The first lines, and how many more there are."""
+    return lines if len(lines) <= most else [*lines[:most], rest.format(len(lines) - most)]
+
+
+def _facts(comparison: Comparison) -> list[Fact]:
     """The numbers at the head of the page."""
     compared = [s for s in comparison.signals if s.status in ("equal", "within", "differs")]
     failed, events = comparison.failed, comparison.events
     used = max(map(_use_of_tolerance, comparison.signals), default=-1.0)
-    cards = [
+    cards: list[Fact] = [
         (
             "Verdict",
             "equal" if comparison.equal else "different",
@@ -162,7 +206,11 @@ def _mood(good: bool) -> str:
 
 
 def verdict_text(comparison: Comparison) -> str:
-    """The outcome in a sentence or two."""
+    """The outcome in a sentence or two.
+
+    Args:
+        comparison: what was found.
+    """
     compared = [s for s in comparison.signals if s.status in ("equal", "within", "differs")]
     failed, telegrams = comparison.failed, comparison.events
     text = f"{len(compared)} signals were compared; "
@@ -179,16 +227,6 @@ def verdict_text(comparison: Comparison) -> str:
     return text
 
 
-def _verdict(comparison: Comparison) -> str:
-    content = paragraph(verdict_text(comparison))
-    if comparison.equal:
-        return box("success", "Equal within tolerance", content)
-    worst = [f"{s.name}: {_in_words(s)}" for s in comparison.failed[:FINDINGS_SHOWN]]
-    if len(comparison.failed) > FINDINGS_SHOWN:
-        worst.append(f"... and {len(comparison.failed) - FINDINGS_SHOWN} more, listed below")
-    return box("failure", "Different", content + bullets(worst))
-
-
 def _in_words(signal: SignalComparison) -> str:
     """What is wrong with a signal, in a line."""
     if signal.findings:
@@ -202,48 +240,13 @@ def _text(signal: SignalComparison, finding: Finding) -> str:
     return finding.text.removeprefix(f"{signal.name}: ")
 
 
-def _signal(signal: SignalComparison, pictures: Mapping[str, bytes]) -> str:
-    """One signal that differs: what was found, and its picture."""
-    found = [_text(signal, f) for f in signal.findings[:FINDINGS_SHOWN]] or [_in_words(signal)]
-    if len(signal.findings) > FINDINGS_SHOWN:
-        found.append(f"and {len(signal.findings) - FINDINGS_SHOWN} more")
-    if signal.name not in pictures:
-        return f"<h3>{escape(signal.name)}</h3>\n{bullets(found)}"
-    caption = "Both curves over the tolerance tube; the error in the band it may lie in; the worst point enlarged."
-    return f"<h3>{escape(signal.name)}</h3>\n{bullets(found)}\n{picture(pictures[signal.name], signal.name, caption)}"
-
-
-def _left_out(comparison: Comparison, pictures: Mapping[str, bytes]) -> str:
-    drawable = sum(1 for s in comparison.failed if s.curves is not None)
-    left = drawable - len(pictures)
-    return (
-        paragraph(f"Only the {len(pictures)} worst signals are drawn; {left} more could be drawn.") if left > 0 else ""
-    )
-
-
-def _events(comparison: Comparison) -> list[str]:
-    events = comparison.events
-    if not events.compared:
-        return [paragraph("Not compared: one side keeps no telegrams.")]
-    if not events.matched and not events.differences:
-        return []
-    shift = f", largest difference of two stamps {number(events.max_shift)} s" if events.max_shift > 0.0 else ""
-    lines = [d.text for d in events.differences[:EVENTS_SHOWN]]
-    left = len(events.differences) - len(lines)
-    return [
-        paragraph(f"{events.matched} match{shift}."),
-        bullets([*lines, *([f"and {left} more"] if left > 0 else [])]),
-    ]
-
-
-def _table(comparison: Comparison) -> str:
+def _table(comparison: Comparison) -> Table:
     """All signals, the worst first; those that fail stand out by colour and by word."""
     failed = comparison.failed
     others = [s for s in comparison.signals if not any(s is f for f in failed)]
     others.sort(key=_use_of_tolerance, reverse=True)
-    head = "".join(f'<th scope="col">{escape(text)}</th>' for text in HEADINGS)
-    rows = "\n".join([*(_row(s, True) for s in failed), *(_row(s, False) for s in others)])
-    return scrolling(f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{rows}\n</tbody>\n</table>") if rows else ""
+    table = simple_table(HEADINGS, [_row(s) for s in (*failed, *others)], range(3, len(HEADINGS)))
+    return replace(table, bad={VERDICTS[s.status] for s in failed})
 
 
 def _use_of_tolerance(signal: SignalComparison) -> float:
@@ -253,21 +256,19 @@ def _use_of_tolerance(signal: SignalComparison) -> float:
     return signal.max_error / signal.allowed if signal.allowed > 0.0 else (inf if signal.max_error > 0.0 else 0.0)
 
 
-def _row(signal: SignalComparison, failed: bool) -> str:
+def _row(signal: SignalComparison) -> list[str]:
     compared = signal.status in ("equal", "within", "differs")
-    outside = number(100.0 * signal.share_outside) if compared else DASH
-    shift = number(signal.max_shift) if compared else DASH
-    sizes = (
+    return [
+        signal.name,
+        signal.unit,
+        VERDICTS[signal.status],
         number(signal.max_error),
         number(signal.allowed),
         number(signal.max_error_at, 6),
-        shift,
+        number(signal.max_shift) if compared else DASH,
         number(signal.rms_error),
-        outside,
-    )
-    cells = "".join(f'<td class="number">{escape(text)}</td>' for text in sizes)
-    verdict = f'<td class="bad">{VERDICTS[signal.status]}</td>' if failed else f"<td>{VERDICTS[signal.status]}</td>"
-    return f'<tr><th scope="row">{escape(signal.name)}</th><td>{escape(signal.unit)}</td>{verdict}{cells}</tr>'
+        number(100.0 * signal.share_outside) if compared else DASH,
+    ]
 
 
 # -- files ------------------------------------------------------------------------------------------------------------
@@ -283,23 +284,14 @@ def _explained(place: Path) -> Iterator[None]:
         raise OutputError(f"The comparison cannot be written to {place}: {reason}. Choose another place.") from error
 
 
-def _write(path: Path, text: str) -> None:
-    _write_bytes(path, text.encode("utf-8", "backslashreplace"))
-
-
-def _write_bytes(path: Path, data: bytes) -> None:
-    """Write a file beside its place first, so that no half of it is ever seen."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".writing-") as scratch:
-        part = Path(scratch) / path.name
-        part.write_bytes(data)
-        part.replace(path)
+def _bytes(text: str) -> bytes:
+    return text.encode("utf-8", "backslashreplace")
 
 
 def _write_pictures(pictures: Mapping[str, bytes], folder: Path) -> dict[str, Path]:
     names = dict(zip(pictures, _file_names(list(pictures)), strict=True))
     for signal, data in pictures.items():
-        _write_bytes(folder / names[signal], data)
+        write_file(folder / names[signal], data)
     return {signal: folder / name for signal, name in names.items()}
 
 

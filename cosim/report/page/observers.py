@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import json
-import tempfile
-from base64 import b64encode
 from dataclasses import replace
-from html import escape
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 
+from cosim.drawing.style import png
 from cosim.errors import OutputError
-from cosim.evaluation.event_counts import outcome_columns
 from cosim.evaluation.numbers import DASH, cell, number
-from cosim.report.error_table import html_table
 from cosim.report.figures.error_figures import speed_error_figure
 from cosim.report.figures.observers_figure import observers_picture
-from cosim.report.page.parts import box, bullets, page, paragraph, scrolling, section, simple_table
+from cosim.report.page.files import write_file
+from cosim.report.page.phases import errors_table
+from cosim.report.page.render import render
+from cosim.report.page.run_tables import HOLDS, telegrams_table
+from cosim.report.page.table import Table, simple_table
 from cosim.results.result import Result
 from cosim.results.summary_file import jsonable
 
@@ -34,6 +32,10 @@ DPI = 120
 def write_benchmark(benchmark: ObserverBenchmark, directory: str | Path) -> dict[str, Path]:
     """Write page, picture and data of a comparison of observers.
 
+    Args:
+        benchmark: what to write.
+        directory: the folder; created where it does not exist.
+
     Returns:
         Paths by kind: ``page``, ``picture``, ``data``.
 
@@ -41,16 +43,12 @@ def write_benchmark(benchmark: ObserverBenchmark, directory: str | Path) -> dict
         OutputError: the folder cannot be written; former files are then still whole.
     """
     folder = Path(directory)
-    picture = _png(observers_picture(benchmark.scores))
+    picture = png(observers_picture(benchmark.scores), DPI)
     data = json.dumps(jsonable(benchmark.to_data()), indent=2) + "\n"
     contents = {PAGE: benchmark_page(benchmark, picture).encode("utf-8"), PICTURE: picture, DATA: data.encode("utf-8")}
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as scratch:
-            for name, content in contents.items():
-                (Path(scratch) / name).write_bytes(content)
-            for name in contents:
-                (Path(scratch) / name).replace(folder / name)
+        for name, content in contents.items():
+            write_file(folder / name, content)
     except OSError as error:
         reason = error.strerror or str(error)
         raise OutputError(
@@ -63,96 +61,69 @@ def benchmark_page(benchmark: ObserverBenchmark, picture: bytes) -> str:
     """The page as text.
 
     Args:
-        benchmark: scores of the observers. picture: PNG of `observers_picture`.
+        benchmark: scores of the observers.
+        picture: PNG of `observers_picture`.
+
+    Returns:
+        The page.
     """
-    title = f"Observers on one run: {benchmark.spec.title}"
-    failures = [f"{score.label}: {score.failure}" for score in benchmark.scores if score.failure is not None]
-    caption = "Speed errors of each observer, and what a communication step costs against the rms speed error."
-    return page(
-        title,
-        [
-            f"<header>\n<h1>{escape(title)}</h1>\n{paragraph(_statement(benchmark))}\n</header>",
-            box("warning", "Without numbers, or cut short", bullets(failures)) if failures else "",
-            section("Overview", _overview(benchmark)),
-            section("Errors and cost", _figure(picture, "Errors and cost", caption)),
-            section("Errors by phase", _phases(benchmark)),
-            section("Speed error against time", _over_time(benchmark)),
-            section("Certificates", _certificates(benchmark)),
-            section("Telegrams", _telegrams(benchmark)),
-            section("How it was done", bullets(benchmark.notes)),
-        ],
-    )
-
-
-def _statement(benchmark: ObserverBenchmark) -> str:
-    return (
-        f"{len(benchmark.scores)} observers, each alone beside the same recorded run of {benchmark.steps} "
-        f"communication steps. "
-        "v is the speed error, p the position error, estimate minus true value, from the start of the evaluation on. "
-        "'At "
-        "balises' is just before a telegram is used. 'Holds' says whether the certificate covers the gaps expected "
-        "before the "
-        "run, and those seen in it. The cost is the time spent in the observer per communication step, called from "
-        "Python."
-    )
-
-
-def _overview(benchmark: ObserverBenchmark) -> str:
-    rows = benchmark.rows()
-    if not rows:
-        return ""
-    return simple_table(
-        list(rows[0]), [[cell(value) for value in row.values()] for row in rows], range(1, len(rows[0]))
-    )
-
-
-def _phases(benchmark: ObserverBenchmark) -> str:
     metrics = [phase for score in benchmark.scores for phase in score.phases]
-    return scrolling(html_table(metrics, benchmark.labelled_spec())) if metrics else ""
+    return render(
+        "observers.html.j2",
+        f"Observers on one run: {benchmark.spec.title}",
+        benchmark=benchmark,
+        overview=_overview(benchmark),
+        picture=picture,
+        phases=errors_table(metrics, benchmark.labelled_spec()),
+        over_time=_over_time(benchmark),
+        certificates=_certificates(benchmark),
+        telegrams=telegrams_table({s.label: s.telegrams for s in benchmark.scores if s.telegrams}, {}, "Observer"),
+    )
 
 
-def _certificates(benchmark: ObserverBenchmark) -> str:
-    words = {True: "holds", False: "does not hold", None: DASH}
+def _overview(benchmark: ObserverBenchmark) -> Table:
+    rows = benchmark.rows()
+    headings = list(rows[0]) if rows else []
+    return simple_table(headings, [[cell(value) for value in row.values()] for row in rows], range(1, len(headings)))
+
+
+def _certificates(benchmark: ObserverBenchmark) -> Table:
     rows = [
         [
             score.label,
             number(c.limit),
             number(c.expected),
-            words[c.holds_expected],
+            HOLDS.get(str(c.holds_expected), DASH),
             number(c.seen),
-            words[c.holds_seen],
+            HOLDS.get(str(c.holds_seen), DASH),
         ]
         for score in benchmark.scores
         if (c := score.certificate) is not None
     ]
     headings = ["Observer", "Certified [s]", "Expected gap [s]", "For it", "Longest gap seen [s]", "For it"]
-    return simple_table(headings, rows, (1, 2, 4)).replace(
-        "<td>does not hold</td>", '<td class="bad">does not hold</td>'
-    )
+    return simple_table(headings, rows, (1, 2, 4))
 
 
-def _telegrams(benchmark: ObserverBenchmark) -> str:
-    chosen = outcome_columns(score.telegrams for score in benchmark.scores)
-    rows = [
-        [s.label, *(str(s.telegrams.get(outcome, 0)) for outcome in chosen)] for s in benchmark.scores if s.telegrams
-    ]
-    return simple_table(["Observer", *chosen.values()], rows, range(1, len(chosen) + 1))
-
-
-def _over_time(benchmark: ObserverBenchmark) -> str:
+def _over_time(benchmark: ObserverBenchmark) -> bytes | None:
+    """The speed errors of all observers as PNG; None where nothing can be drawn."""
     result = merged_result(benchmark)
     if result is None or benchmark.spec.true_speed is None:
-        return ""
+        return None
     names = {signal.name.partition(".")[0] for signal in result.signals}
     spec = benchmark.labelled_spec()
     shown = replace(spec, observers=[name for name in spec.observers if name in names])
-    figure = speed_error_figure(result, shown).get_figure(root=True)
-    assert figure is not None
-    return _figure(_png(figure), "Speed error", "Estimated minus true speed of all observers against time.")
+    return png(speed_error_figure(result, shown).figure, DPI)
 
 
 def merged_result(benchmark: ObserverBenchmark) -> Result | None:
-    """One result with the columns of all observers whose rows are at the same times as those of the first one."""
+    """One result with the columns of all observers whose rows are at the same times as those of the first one.
+
+    Args:
+        benchmark: with the runs of the observers.
+
+    Returns:
+        The result, or None where no run has rows.
+    """
     columns: dict[str, np.ndarray] = {}
     first: Result | None = None
     signals = []
@@ -171,17 +142,3 @@ def merged_result(benchmark: ObserverBenchmark) -> Result | None:
     for name, values in columns.items():
         table[name] = values
     return Result(table, signals, first.events)
-
-
-def _png(figure: Figure) -> bytes:
-    stream = BytesIO()
-    figure.savefig(stream, format="png", dpi=DPI)
-    return stream.getvalue()
-
-
-def _figure(data: bytes, title: str, caption: str) -> str:
-    source = b64encode(data).decode("ascii")
-    return (
-        f'<figure>\n<img alt="{escape(f"{title}. {caption}")}" src="data:image/png;base64,{source}">\n'
-        f"<figcaption><b>{escape(title)}.</b> {escape(caption)}</figcaption>\n</figure>"
-    )

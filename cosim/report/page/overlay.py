@@ -5,7 +5,6 @@ given.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
 from math import isfinite
 from pathlib import Path
 
@@ -18,18 +17,8 @@ from cosim.report.overlay.differences import differences, layout_note
 from cosim.report.overlay.measures import DETAIL_HEADINGS, ERROR_HEADINGS, Measured, cell, detailed, headings, measured
 from cosim.report.overlay.runs import Run, make_runs
 from cosim.report.page.files import write_file, write_page
-from cosim.report.page.parts import (
-    box,
-    bullets,
-    chapters,
-    details,
-    facts,
-    grouped_table,
-    page,
-    paragraph,
-    picture,
-    simple_table,
-)
+from cosim.report.page.render import render
+from cosim.report.page.table import Table, grouped_table, simple_table
 from cosim.report.page.verdict import Fact
 from cosim.results.result import Result
 
@@ -49,8 +38,10 @@ def write_overlay(
     """Lay several runs over each other: ``overlay.html`` with the figures inside, and these as files in ``figures/``.
 
     Args:
-        results: the runs; the first is what the others are compared with. specs: roles of the signals of each.
-        labels: text for each. directory: the folder; created where it does not exist.
+        results: the runs; the first is what the others are compared with.
+        specs: roles of the signals of each.
+        labels: text for each.
+        directory: the folder; created where it does not exist.
         signals: names of recorded signals to draw besides those that have a role.
 
     Returns:
@@ -81,8 +72,16 @@ def write_overlay_page(
     """Write the page alone; it needs no other file.
 
     Args:
-        runs: from `make_runs`. path: the file; its folder is created. pictures: from `draw_overlays`, drawn where None.
+        runs: from `make_runs`.
+        path: the file; its folder is created.
+        pictures: from `draw_overlays`, drawn where None.
         signals: as for `write_overlay`.
+
+    Returns:
+        Path of the page.
+
+    Raises:
+        OutputError: the file cannot be written.
     """
     return write_page(path, overlay_page(runs, _pictures(runs, signals) if pictures is None else pictures))
 
@@ -96,27 +95,25 @@ def overlay_page(runs: Sequence[Run], pictures: Sequence[OverlayPicture]) -> str
     """The page as text.
 
     Args:
-        runs: from `make_runs`. pictures: from `draw_overlays`.
+        runs: from `make_runs`.
+        pictures: from `draw_overlays`.
+
+    Returns:
+        The page.
     """
-    errors = measured(runs)
-    title = _title(runs)
-    failures = [f"{run.label}: {run.result.failure}" for run in runs if run.result.failure]
-    return page(
-        title,
-        [
-            f"<header>\n<h1>{escape(title)}</h1>\n{paragraph(_lead(runs))}{facts(_facts(runs, errors))}\n</header>",
-            box("failure", "Not all runs came to their end", bullets(failures)) if failures else "",
-            chapters(
-                {
-                    "Runs": [_runs_table(runs)],
-                    "Errors, phase by phase": _numbers(runs, errors, ERROR_HEADINGS, "Estimate minus true value."),
-                    "Figures": [picture(p.png, p.title, p.caption) for p in pictures],
-                    "More, phase by phase": _details(runs),
-                    "What differs between the runs": _differences(runs),
-                    "Notes": [bullets(_notes(runs))],
-                }
-            ),
-        ],
+    errors, different = measured(runs), differences(runs)
+    return render(
+        "overlay.html.j2",
+        _title(runs),
+        runs=runs,
+        facts=_facts(runs, errors, len(different)),
+        ended=_runs_table(runs),
+        errors=_numbers(runs, errors, ERROR_HEADINGS),
+        pictures=pictures,
+        details=_numbers(runs, detailed(runs), DETAIL_HEADINGS),
+        different=[simple_table(["What", *(run.label for run in runs)], rows) for rows in _cut(different)],
+        layout_note=layout_note(runs),
+        notes=_notes(runs),
     )
 
 
@@ -125,16 +122,15 @@ def _title(runs: Sequence[Run]) -> str:
     return f"{titles[0]}: {len(runs)} runs" if len(titles) == 1 else f"{len(runs)} runs over each other"
 
 
-def _lead(runs: Sequence[Run]) -> str:
-    others = ", ".join(run.label for run in runs[1:])
-    return f"{runs[0].label} is what the others are compared with: {others}." if others else ""
+def _cut(rows: list[list[str]]) -> tuple[list[list[str]], list[list[str]]]:
+    """The rows that are shown, and those that unfold."""
+    return rows[:DIFFERENCES_SHOWN], rows[DIFFERENCES_SHOWN:]
 
 
-def _facts(runs: Sequence[Run], errors: Sequence[Measured]) -> list[Fact]:
+def _facts(runs: Sequence[Run], errors: Sequence[Measured], different: int) -> list[Fact]:
     ended = sum(run.result.failure is None for run in runs)
     complete: Fact = ("Runs", f"{ended} of {len(runs)} complete", "", "good" if ended == len(runs) else "bad")
-    different = differences(runs)
-    settings: Fact = ("Settings that differ", str(len(different)), "see below" if different else "none is known", "")
+    settings: Fact = ("Settings that differ", str(different), "see below" if different else "none is known", "")
     return [complete, settings, *_largest_changes(runs, errors)]
 
 
@@ -159,7 +155,7 @@ def _largest_changes(runs: Sequence[Run], errors: Sequence[Measured]) -> list[Fa
     return found
 
 
-def _runs_table(runs: Sequence[Run]) -> str:
+def _runs_table(runs: Sequence[Run]) -> Table:
     head = ["Run", "Scenario", "From [s]", "To [s]", "Step [ms]", "Rows", "Wall time [s]", "Made"]
     rows = []
     for run in runs:
@@ -180,44 +176,19 @@ def _runs_table(runs: Sequence[Run]) -> str:
     return simple_table(head, rows, range(2, 7))
 
 
-def _numbers(runs: Sequence[Run], rows: Sequence[Measured], names: Sequence[str], text: str) -> list[str]:
-    """A group of rows for each observer and phase, in it one row for each run."""
+def _numbers(runs: Sequence[Run], rows: Sequence[Measured], names: Sequence[str]) -> Table:
+    """A group of rows for each observer and phase, in it one row for each run, with the difference to the first."""
     shown, kept = headings(rows, names)
-    if not shown:
-        return []
     reference = runs[0].label
     groups = []
-    for row in rows:
+    for row in rows if shown else ():
         first = row.values.get(reference)
         lines = [
-            [name, *(_cell(values[i], first, i, name == reference) for i in kept)]
+            [name, *(cell(values[i], None if first is None or name == reference else first[i]) for i in kept)]
             for name, values in row.values.items()
         ]
         groups.append((f"{row.observer}, {row.phase}", lines))
-    said = f"{text} Below each number: the difference to {reference}.".strip()
-    return [paragraph(said), grouped_table(["Observer and phase", "Run", *shown], groups)]
-
-
-def _details(runs: Sequence[Run]) -> list[str]:
-    content = "\n".join(_numbers(runs, detailed(runs), DETAIL_HEADINGS, ""))
-    return [details("Slip, forces, errors around telegrams, indicators", content)] if content else []
-
-
-def _cell(value: float | None, first: Sequence[float | None] | None, index: int, is_first: bool) -> str:
-    return cell(value, None if is_first or first is None else first[index])
-
-
-def _differences(runs: Sequence[Run]) -> list[str]:
-    rows = differences(runs)
-    head = ["What", *(run.label for run in runs)]
-    rest = rows[DIFFERENCES_SHOWN:]
-    more = details(f"{len(rest)} more", simple_table(head, rest))
-    said = (
-        ""
-        if rows
-        else "Nothing the summaries tell of differs: settings, parameters, FMUs, telegrams and versions are the same."
-    )
-    return [paragraph(said), paragraph(layout_note(runs)), simple_table(head, rows[:DIFFERENCES_SHOWN]), more]
+    return grouped_table(["Observer and phase", "Run", *shown], groups)
 
 
 def _notes(runs: Sequence[Run]) -> list[str]:

@@ -1,15 +1,17 @@
-"""The long table of a report: every observer, phase by phase. Standard library only."""
+"""The tables of every observer, phase by phase: errors, and the long one with all the rest. Standard library only."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import groupby
 
+from cosim.evaluation.error_table import cells, columns
+from cosim.evaluation.metrics import PhaseMetrics
 from cosim.evaluation.numbers import DASH, error_number
 from cosim.evaluation.phase_details import PhaseDetails
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.page.parts import grouped_table, paragraph
+from cosim.report.page.table import Table, grouped_table
 
 COLUMNS: dict[str, tuple[str, float]] = {  # field: heading with unit, factor to that unit
     "slip": ("Slip error, rms [%]", 100.0),
@@ -22,26 +24,42 @@ COLUMNS: dict[str, tuple[str, float]] = {  # field: heading with unit, factor to
     "indicator_on": ("Slip indicated [% of the time]", 100.0),
     "telegrams": ("Telegrams used", 1.0),
 }
-TEXT = (
-    "Root mean squares of estimate minus true value. Before and after: in the last row before, and the first row "
-    "after, "
-    "each telegram that the observer used."
-)
 
 
-def phases_html(details: Sequence[PhaseDetails], spec: ReportSpec) -> list[str]:
-    """Text and table; nothing where no column holds a number.
+def errors_table(metrics: Sequence[PhaseMetrics], spec: ReportSpec) -> Table:
+    """Errors of speed and position of every observer in every phase, published numbers beside them.
 
     Args:
-        details: from `phase_details`. spec: labels.
+        metrics: from `phase_metrics`.
+        spec: labels.
+
+    Returns:
+        The table; without rows where there are no metrics.
+    """
+    chosen = columns(metrics)
+    groups = groupby(metrics, key=lambda m: m.observer)
+    rows = ((label(spec, name), [[m.phase, *cells(m, chosen)] for m in group]) for name, group in groups)
+    return grouped_table(["Observer", "Phase", *(c.text for c in chosen)], rows)
+
+
+def phases_table(details: Sequence[PhaseDetails], spec: ReportSpec) -> Table | None:
+    """Root mean squares and counts of every observer in every phase.
+
+    Args:
+        details: from `phase_details`.
+        spec: labels.
+
+    Returns:
+        The table with the columns that hold a number somewhere; None without any.
     """
     shown = [field for field in COLUMNS if any(getattr(d, field) is not None for d in details)]
     if not shown:
-        return []
-    headings = ["Observer", "Phase", *(COLUMNS[field][0] for field in shown)]
-    groups = [(label(spec, observer), list(group)) for observer, group in groupby(details, key=lambda d: d.observer)]
-    rows = [(name, [[d.phase, *(_cell(d, field) for field in shown)] for d in group]) for name, group in groups]
-    return [paragraph(TEXT), grouped_table(headings, rows)]
+        return None
+    groups = groupby(details, key=lambda d: d.observer)
+    rows = (
+        (label(spec, name), [[d.phase, *(_cell(d, field) for field in shown)] for d in group]) for name, group in groups
+    )
+    return grouped_table(["Observer", "Phase", *(COLUMNS[field][0] for field in shown)], rows)
 
 
 def _cell(entry: PhaseDetails, field: str) -> str:

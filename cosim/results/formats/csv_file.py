@@ -8,7 +8,8 @@ kept. FMPy splits lines at every comma, so names such as ``a[1,2]`` are read by 
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from importlib import import_module
 from itertools import chain
 from pathlib import Path
 
@@ -16,7 +17,9 @@ import numpy as np
 
 from cosim.results.table_layout import column_names, table_dtype
 
-CHUNK = 4096  # rows turned into Python floats at a time, so that memory stays flat
+CHUNK = 4096  # rows turned into text at a time, so that memory stays flat
+MANY = 50_000
+"""Numbers from which on a compiled function writes them; it has to be loaded, or even compiled first."""
 
 
 def write_csv(path: str | Path, table: np.ndarray, headings: Sequence[str] | None = None) -> None:
@@ -32,11 +35,25 @@ def write_csv(path: str | Path, table: np.ndarray, headings: Sequence[str] | Non
         OSError: the file cannot be written.
     """
     names = column_names(table)
+    rows = _rows_as_text(len(table) * len(names))
     with Path(path).open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, quoting=csv.QUOTE_ALL, lineterminator="\n").writerow(headings or names)
+    with Path(path).open("ab") as file:
         for start in range(0, len(table), CHUNK):
-            rows = table[start : start + CHUNK].tolist()
-            file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
+            part = np.ascontiguousarray(table[start : start + CHUNK], dtype=table_dtype(names))
+            file.write(rows(part.view(np.float64).reshape(len(part), len(names))))
+
+
+def _rows_as_text(count: int) -> Callable[[np.ndarray], bytes]:
+    """A function that writes rows, shape (rows, columns), as lines of text: compiled where `count` numbers are worth it
+    and there is a compiler, else in Python, with the same bytes.
+    """
+    native = import_module("cosim.results.formats.csv_numbers").native_rows() if count >= MANY else None
+    return native or _rows_in_python
+
+
+def _rows_in_python(rows: np.ndarray) -> bytes:
+    return "".join([",".join(map(repr, row)) + "\n" for row in rows.tolist()]).encode()
 
 
 def read_csv(path: str | Path) -> np.ndarray:

@@ -16,9 +16,7 @@ from fmus.check.bench import WARM_UP_STEPS, Bench
 from fmus.check.checks.life import listed, not_finite
 from fmus.check.context import Context
 from fmus.check.findings import Outcome, failed, limited, passed, skipped
-from fmus.check.instance import FmuInstance
-from fmus.check.slave import FmuSlave
-from fmus.fmi.types import FLOATING_TYPES
+from fmus.check.slave import FmuSlave, FmuSlave3
 
 PAYLOAD = "give what comes with an event a value that makes sense"
 NONE = "declares neither a triggered input clock nor a counted event"
@@ -28,26 +26,12 @@ def events(context: Context) -> Outcome:
     """Every declared event happens once, and the run goes on."""
     slave = context.bench.component
     assert isinstance(slave, FmuSlave)
-    counted = counted_events(slave)
-    if slave.clocks:
-        return _clocks(context, slave.clocks) if slave.has_event_mode else _no_event_mode(slave.clocks)
-    if counted:
-        return _counted(context, counted)
-    return skipped(NONE)
-
-
-def counted_events(instance: FmuInstance) -> list[str]:
-    """Names of the counted events."""
-    inputs = set(instance.names("input"))
-    names = [name.removesuffix("_count") for name in instance.names("input") if name.endswith("_count")]
-    variables = instance.variables
-    return [
-        name
-        for name in names
-        if f"{name}_time" in inputs
-        and variables[f"{name}_count"].type not in FLOATING_TYPES
-        and variables[f"{name}_time"].type in FLOATING_TYPES
-    ]
+    names = list(slave.events)
+    if not names:
+        return skipped(NONE)
+    if slave.fmi_version == 2:
+        return _counted(context, names)
+    return _clocks(context, names) if slave.has_event_mode else _no_event_mode(names)
 
 
 def _no_event_mode(clocks: Sequence[str]) -> Outcome:
@@ -61,7 +45,7 @@ def _clocks(context: Context, clocks: Sequence[str]) -> Outcome:
         bench.begin()
         for clock in clocks:
             bench.steps((bench.h,))
-            assert isinstance(bench.component, FmuSlave)
+            assert isinstance(bench.component, FmuSlave3)
             bench.component.activate(clock)
         rows = bench.steps((bench.h,) * WARM_UP_STEPS)
     finally:

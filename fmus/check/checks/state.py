@@ -42,7 +42,7 @@ def _through_bytes(context: Context, *, elsewhere: bool) -> Outcome:
     bench = context.bench
     slave = bench.component
     assert isinstance(slave, FmuSlave)
-    if not slave.can_save or not slave.declared.canSerializeFMUstate:
+    if not slave.can_save or not slave.capabilities.canSerializeFMUState:
         return skipped(NO_BYTES)
     path = continuation(bench)
     bench.begin()

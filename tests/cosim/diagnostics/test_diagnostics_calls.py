@@ -26,8 +26,8 @@ from cosim.diagnostics.call_log import HEADER, CallLog
 from cosim.diagnostics.call_statistics import EARLY, EVERY, CallStatistics
 from cosim.diagnostics.call_text import Described
 from cosim.errors import OutputError
+from cosim.evaluation.cost import cost_rows, cost_text
 from cosim.master.master import close
-from cosim.report.cost import cost_rows, cost_text
 from cosim.report.page.report import report_page
 
 LINE = re.compile(

@@ -176,7 +176,7 @@ def test_the_page_says_what_differs_before_all_else() -> None:
     )
     assert verdict < worst < table
     assert "nearest: train.slip_ratio" in text
-    assert "telegram &#x27;B7&#x27;" in text
+    assert "telegram &#39;B7&#39;" in text
     assert "Other versions of fmpy." in text
     assert text.count("reference &lt;1&gt;") == 2  # title and heading
     assert "<1>" not in text

@@ -19,15 +19,15 @@ from synthetic_run import OBSERVERS, ZONES, synthetic_result, synthetic_spec
 
 from cosim.drawing.style import new_figure, observer_line, png
 from cosim.errors import OutputError
+from cosim.evaluation.error_table import error_text
 from cosim.evaluation.metrics import phase_metrics
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.error_table import error_text
 from cosim.report.figures.drawing import thin
 from cosim.report.figures.gap_figure import certified_gaps, sampling_gaps
 from cosim.report.figures.main_picture import main_picture
 from cosim.report.figures.panels import PANELS, Panel, draw_all
 from cosim.report.figures.zooms import ZOOM_KEYS
-from cosim.report.page.parts import folded
+from cosim.report.page.render import first_sentence
 from cosim.report.page.report import report_page, write_report
 from cosim.results.folder import read_results, write_results
 from cosim.results.result import Result
@@ -338,7 +338,7 @@ def test_zones_are_shaded(result: Result) -> None:
 
 def test_a_long_text_folds_behind_its_first_part_and_loses_no_word() -> None:
     text = "unstable at a gap of 1 s: the error grows; " + "certified up to 0.5 s, and so on. " * 10
-    html = folded(text)
-    assert "<summary>unstable at a gap of 1 s: the error grows</summary>" in html
-    assert html.count("certified up to 0.5 s") == 10
-    assert "<summary>" not in folded("short; and seen whole")
+    shown, rest = first_sentence(text)
+    assert shown == "unstable at a gap of 1 s: the error grows"
+    assert rest.count("certified up to 0.5 s") == 10
+    assert first_sentence("short; and seen whole") == ("short; and seen whole", "")

@@ -13,7 +13,7 @@ from test_fmus.adaptive import adaptive_fmu
 from cosim import Scenario
 from cosim.components.loading import load_fmu
 from cosim.errors import CosimError, ScenarioError
-from fmus.check.slave import FmuSlave
+from fmus.check.slave import make_slave
 
 pytestmark = pytest.mark.compiler
 
@@ -82,7 +82,7 @@ def test_the_check_tells_the_declared_one(tmp_path: Path, version: Any) -> None:
 
     fmu = adaptive_fmu(tmp_path, version=version, declared=1e-5)
     folder = fmpy.extract(str(fmu), str(tmp_path / "unpacked"))
-    slave = FmuSlave(Path(folder), fmpy.read_model_description(str(fmu)))
+    slave = make_slave(Path(folder), fmpy.read_model_description(str(fmu)))
     slave.instantiate()
     slave.enter_initialization(0.0, 1.0)
     slave.exit_initialization()

@@ -1,6 +1,4 @@
-"""What the components were called for, what that took, and what they logged: as text and as HTML. Standard library
-only.
-"""
+"""What the components were called for, what that took, and how much they logged. Standard library only."""
 
 from __future__ import annotations
 
@@ -8,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cosim.evaluation.facts import list_entry, number_entry
-from cosim.evaluation.numbers import DASH, number
-from cosim.report.page.parts import paragraph, simple_table
+from cosim.evaluation.numbers import DASH
 from cosim.results.result import Result
 from fmus.text_table import text_table
 
@@ -23,47 +20,36 @@ KINDS = {
 """Columns, and the kinds of calls in each."""
 NOT_TIMED_IN_C = ("get", "set")
 """Columns that the compiled stepper counts and does not time."""
-MESSAGES_SHOWN = 100
 
 
 def cost_rows(result: Result) -> list[list[str]]:
-    """One row for each component: name, then calls and milliseconds of each column of `KINDS`, then messages logged."""
+    """One row for each component: name, then calls and milliseconds of each column of `KINDS`, then messages logged.
+
+    Args:
+        result: the run.
+    """
     entries = [entry for entry in list_entry(result, "components") if isinstance(entry, Mapping) and "cost" in entry]
-    return [_row(entry, _compiled(result)) for entry in entries]
+    return [_row(entry, was_compiled(result)) for entry in entries]
 
 
 def cost_text(result: Result) -> str:
-    """The same as a table for a terminal; empty where the result does not say; ends without a line break."""
+    """The same as a table for a terminal; empty where the result does not say; ends without a line break.
+
+    Args:
+        result: the run.
+    """
     rows = cost_rows(result)
     if not rows:
         return ""
     return "\n".join(text_table([["calls / ms", *KINDS, "messages"], *rows], heading=True))
 
 
-def cost_html(result: Result) -> list[str]:
-    """The same for the report."""
-    rows = cost_rows(result)
-    if not rows:
-        return []
-    timed = "in C none" if _compiled(result) else "one call in 64"
-    text = f"Calls and the milliseconds they took. Of reading (get) and writing (set) {timed} was timed."
-    return [paragraph(text), simple_table(["Component", *KINDS, "Messages"], rows, range(1, len(KINDS) + 2))]
+def was_compiled(result: Result) -> bool:
+    """Whether the compiled stepper took steps of a run.
 
-
-def messages_html(result: Result) -> list[str]:
-    """What the components logged: the first and last messages."""
-    messages = list(result.messages)
-    if not messages:
-        return []
-    half = MESSAGES_SHOWN // 2
-    shown = messages if len(messages) <= MESSAGES_SHOWN else [*messages[:half], *messages[-half:]]
-    cut = len(shown) < len(messages)
-    note = f"The first and last of {len(messages)} messages; messages.csv holds them." if cut else ""
-    rows = [[m.component, number(m.time), m.status, m.category or DASH, m.text] for m in shown]
-    return [paragraph(note), simple_table(["Component", "Time [s]", "Status", "Category", "Text"], rows, (1,))]
-
-
-def _compiled(result: Result) -> bool:
+    Args:
+        result: the run.
+    """
     master = result.summary.get("master")
     stepper = master.get("stepper") if isinstance(master, Mapping) else None
     return isinstance(stepper, Mapping) and bool(stepper.get("steps_compiled"))

@@ -1,16 +1,14 @@
-"""The table of errors, as plain text and as HTML. Standard library only."""
+"""The table of errors, as text. Standard library only."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import groupby
 
 from cosim.evaluation.metrics import PhaseMetrics
 from cosim.evaluation.numbers import error_number, number
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.page.parts import grouped_table
 from fmus.text_table import text_table
 
 
@@ -78,17 +76,3 @@ def error_text(metrics: Sequence[PhaseMetrics], spec: ReportSpec) -> str:
     rows = [["observer", "phase", *(f"{SHORT[c]} [{c.unit}]" for c in chosen)]]
     rows += [[label(spec, m.observer), m.phase, *cells(m, chosen)] for m in metrics]
     return "\n".join(text_table(rows, (0, 1), heading=True))
-
-
-def html_table(metrics: Sequence[PhaseMetrics], spec: ReportSpec) -> str:
-    """The errors as an HTML table, one group of rows for each observer.
-
-    Args:
-        metrics: from `phase_metrics`. spec: labels.
-    """
-    chosen = columns(metrics)
-    groups = [
-        (label(spec, observer), [[entry.phase, *cells(entry, chosen)] for entry in group])
-        for observer, group in groupby(metrics, key=lambda m: m.observer)
-    ]
-    return grouped_table(["Observer", "Phase", *(c.text for c in chosen)], groups)

@@ -10,23 +10,27 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
-from importlib import import_module
+from itertools import count
 from pathlib import Path
 from typing import Any
+
+from fmus.check.findings import Class, Verdict
+from fmus.check.report import as_data, table
+from fmus.check.run import CheckReport, check_count, check_fmu
+from fmus.cli.progress import ProgressBar
+from fmus.fmi.archive import open_archive
 
 CLEAN, PROBLEMS, UNCHECKED = 0, 1, 2
 TRUTH = {"true": 1.0, "false": 0.0}
 
 
-def add_parser(commands: Any) -> None:
-    """Add the subcommand to what `argparse.ArgumentParser.add_subparsers` returned.
+def register(commands: Any) -> None:
+    """Add the command to the parser.
 
     Args:
         commands: subparsers of the program.
     """
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "check", help="how far an FMU can be trusted: validity and behaviour"
-    )
+    parser: argparse.ArgumentParser = commands.add_parser("check")
     parser.add_argument("file", type=Path, metavar="FILE", help="an FMU, FMI 2.0 or 3.0")
     parser.add_argument("--step", type=float, metavar="H", help="communication step in s (default: the FMU's own)")
     parser.add_argument("--start", action="append", default=[], metavar="K=V", help="start value; may be repeated")
@@ -40,14 +44,14 @@ def add_parser(commands: Any) -> None:
     length.add_argument("--until", type=float, metavar="T", help="end of the longest run in s, in place of --steps")
     parser.add_argument("--strict", action="store_true", help="limits end with exit code 1 too")
     parser.add_argument("--json", metavar="FILE", help="write the report as JSON; '-' prints it in place of the table")
-    parser.set_defaults(run=run)
+    parser.set_defaults(execute=execute)
 
 
-def run(options: argparse.Namespace) -> int:
+def execute(options: argparse.Namespace) -> int:
     """Check a file and print the report.
 
     Args:
-        options: what the parser of `add_parser` understood.
+        options: what the parser of `register` understood.
 
     Returns:
         The exit code.
@@ -56,42 +60,33 @@ def run(options: argparse.Namespace) -> int:
         ValueError, OSError: the file cannot be checked, or a mistake of the user; the program ends with 2 then.
     """
     report = _checked(options)
-    reporting = import_module("fmus.check.report")
     if options.json:
-        _write_json(options.json, reporting.as_data(report))
+        _write_json(options.json, as_data(report))
     if options.json != "-":
-        print(reporting.table(report))
+        print(table(report))
     return _exit_code(report, options.strict)
 
 
-def _exit_code(report: Any, strict: bool) -> int:
-    findings = import_module("fmus.check.findings")
-    if report.verdict is findings.Class.DISTRUST:
+def _exit_code(report: CheckReport, strict: bool) -> int:
+    if report.verdict is Class.DISTRUST:
         return PROBLEMS
-    if any(finding.verdict is findings.Verdict.ERROR for finding in report.findings):
+    if any(finding.verdict is Verdict.ERROR for finding in report.findings):
         return UNCHECKED
     return PROBLEMS if strict and not report.clean else CLEAN
 
 
-def _checked(options: argparse.Namespace) -> Any:
-    running, archives = import_module("fmus.check.run"), import_module("fmus.fmi.archive")
+def _checked(options: argparse.Namespace) -> CheckReport:
     starts = _starts(options.start)
-    archive = archives.open_archive(options.file)
-    tqdm = import_module("tqdm").tqdm
-    with tqdm(total=running.check_count(archive), unit="check", leave=False, disable=None, file=sys.stderr) as bar:
-
-        def progress(name: str) -> None:
-            bar.set_description(name)
-            bar.update()
-
-        return running.check_fmu(
+    checks, number = check_count(open_archive(options.file)), count(1)
+    with ProgressBar("check") as bar:
+        return check_fmu(
             options.file,
             step=options.step,
             starts=starts,
             timeout=options.timeout,
             steps=options.steps,
             until=options.until,
-            progress=progress,
+            progress=lambda name: bar(next(number), checks, name),
         )
 
 

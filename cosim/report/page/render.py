@@ -1,0 +1,64 @@
+"""Pages from their templates: HTML that needs nothing else. Every text that a template inserts is escaped."""
+
+from __future__ import annotations
+
+import re
+from base64 import b64encode
+from functools import cache
+from typing import Any
+
+from jinja2 import Environment
+
+from cosim.evaluation.numbers import number
+from fmus.templates import environment
+
+SENTENCE_END = re.compile(r"(?<=[.]) (?=[A-Z])|(?<=;) ")
+LONGEST = 220  # characters; of a longer text the first sentence is shown and the rest unfolds
+
+
+def render(template: str, title: str, **values: Any) -> str:
+    """A page as text.
+
+    Args:
+        template: its file among the templates of this room.
+        title: of the page.
+        values: what the template inserts, by name.
+
+    Returns:
+        The page.
+    """
+    return _pages().get_template(template).render(title=title, filled=[], **values)
+
+
+def anchor(title: str) -> str:
+    """The id of a chapter in its page.
+
+    Args:
+        title: of the chapter.
+
+    Returns:
+        Small letters, digits and hyphens.
+    """
+    return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-") or "section"
+
+
+def first_sentence(text: object) -> tuple[str, str]:
+    """A long text cut behind its first sentence.
+
+    Args:
+        text: whatever has a text.
+
+    Returns:
+        What is shown, and what unfolds; the second is empty for a text that is seen whole.
+    """
+    whole = str(text)
+    first, *rest = SENTENCE_END.split(whole, 1) if len(whole) > LONGEST else [whole]
+    return (first.removesuffix(";"), rest[0]) if rest else (whole, "")
+
+
+@cache
+def _pages() -> Environment:
+    pages = environment("cosim.report.page")
+    filters: dict[str, Any] = {"anchor": anchor, "first_sentence": first_sentence, "number": number}
+    pages.filters |= filters | {"base64": lambda data: b64encode(data).decode("ascii")}
+    return pages

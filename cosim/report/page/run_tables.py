@@ -1,0 +1,152 @@
+"""The tables of a report that hold what the summary of a run says; every entry of it may be missing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from cosim.evaluation.cost import KINDS, cost_rows
+from cosim.evaluation.event_counts import outcome_columns
+from cosim.evaluation.facts import list_entry, mapping_entry
+from cosim.evaluation.indicators import indicator_statistics
+from cosim.evaluation.numbers import DASH, number
+from cosim.evaluation.roles import label
+from cosim.evaluation.spec import ReportSpec
+from cosim.expectations.judged import Judged
+from cosim.report.page.table import Table, simple_table
+from cosim.results.result import Result
+
+CERTIFICATE_COLUMNS = {
+    "aperiodic_limit": "Limit, varying gaps [s]",
+    "constant_limit": "Limit, constant gap [s]",
+    "max_gap": "Largest gap expected [s]",
+    "largest_gap_seen": "Largest gap seen [s]",
+}
+HOLDS = {"True": "holds", "False": "does not hold"}
+SEED_COLUMNS = ("lower quartile", "median", "upper quartile", "independent", "published")
+COMPONENT_COLUMNS = {"name": "Name", "kind": "Kind", "fmi_version": "FMI", "model": "Model", "source": "Source"}
+MESSAGES_SHOWN = 100
+
+
+def expectations_table(judged: list[Judged]) -> Table:
+    """All expectations with what was measured.
+
+    Args:
+        judged: in the order in which they are shown.
+    """
+    rows = [["met" if j.passed else "not met", j.name, j.text] for j in judged]
+    return simple_table(["Verdict", "Expected", "Measured"], rows)
+
+
+def seeds_table(result: Result) -> Table:
+    """Quartiles of the maximal speed errors over several balise seeds.
+
+    Args:
+        result: the run.
+    """
+    rows = [
+        [str(row.get("observer")), str(row.get("phase")), *(number(row.get(column)) for column in SEED_COLUMNS)]
+        for row in mapping_entry(result, "seed_study").get("rows", [])
+        if isinstance(row, Mapping)
+    ]
+    headings = ["Observer", "Phase", *(f"{column} [m/s]" for column in SEED_COLUMNS)]
+    return simple_table(headings, rows, range(2, len(headings)))
+
+
+def certificates(result: Result, spec: ReportSpec) -> tuple[Table, dict[str, str]]:
+    """Limits of the observers' certificates, those of the report first.
+
+    Args:
+        result: the run.
+        spec: labels and order of the observers.
+
+    Returns:
+        The table, and what was checked by label of the observer.
+    """
+    known = mapping_entry(result, "certificates")
+    order = dict.fromkeys([*(o for o in spec.observers if o in known), *known])
+    entries = {label(spec, o): entry for o in order if isinstance(entry := known[o], Mapping)}
+    rows = [
+        [name, *(number(entry.get(key)) for key in CERTIFICATE_COLUMNS), HOLDS.get(str(entry.get("holds")), DASH)]
+        for name, entry in entries.items()
+    ]
+    headings = ["Observer", *CERTIFICATE_COLUMNS.values(), "Certificate"]
+    explained = {name: str(entry.get("explanation") or "") for name, entry in entries.items()}
+    return simple_table(headings, rows, range(1, len(CERTIFICATE_COLUMNS) + 1)), explained
+
+
+def telegrams_table(
+    outcomes: Mapping[str, Mapping[str, int]], labels: Mapping[str, str], heading: str = "Receiver"
+) -> Table:
+    """What became of the telegrams in each receiver.
+
+    Args:
+        outcomes: number of telegrams by outcome, by name of the receiver.
+        labels: texts for names.
+        heading: what the receivers are called.
+    """
+    chosen = outcome_columns(outcomes.values())
+    rows = [[labels.get(name, name), *(str(count.get(o, 0)) for o in chosen)] for name, count in outcomes.items()]
+    return simple_table([heading, *chosen.values()], rows, range(1, len(chosen) + 1))
+
+
+def indicators_table(result: Result, spec: ReportSpec) -> Table:
+    """How long slip was indicated, and how late.
+
+    Args:
+        result: the run.
+        spec: roles and zones.
+    """
+    headings = ["Observer", "Time on [%]", "Time on outside zones [%]"]
+    headings += [f"Delay in zone {number(a)} to {number(b)} s [s]" for a, b in spec.zones]
+    rows = []
+    for s in indicator_statistics(result, spec):
+        delays = ["not indicated" if delay is None else number(delay) for delay in s.delays]
+        rows.append([label(spec, s.observer), number(100 * s.on), number(100 * s.on_outside), *delays])
+    return simple_table(headings, rows, range(1, len(headings)))
+
+
+def components_table(result: Result) -> Table:
+    """What was run.
+
+    Args:
+        result: the run.
+    """
+    entries = [entry for entry in list_entry(result, "components") if isinstance(entry, Mapping)]
+    rows = [[_shown(entry.get(key)) for key in COMPONENT_COLUMNS] for entry in entries]
+    return simple_table(list(COMPONENT_COLUMNS.values()), rows)
+
+
+def calls_table(result: Result) -> Table:
+    """Calls of the components and the milliseconds they took.
+
+    Args:
+        result: the run.
+    """
+    return simple_table(["Component", *KINDS, "Messages"], cost_rows(result), range(1, len(KINDS) + 2))
+
+
+def messages_table(result: Result) -> Table:
+    """What the components logged: the first and the last messages.
+
+    Args:
+        result: the run.
+    """
+    messages, half = list(result.messages), MESSAGES_SHOWN // 2
+    shown = messages if len(messages) <= MESSAGES_SHOWN else [*messages[:half], *messages[-half:]]
+    rows = [[m.component, number(m.time), m.status, m.category or DASH, m.text] for m in shown]
+    return simple_table(["Component", "Time [s]", "Status", "Category", "Text"], rows, (1,))
+
+
+def versions_table(result: Result) -> Table:
+    """Versions of the packages that were used.
+
+    Args:
+        result: the run.
+    """
+    versions = mapping_entry(result, "versions")
+    return simple_table(["Package", "Version"], [[str(name), str(version)] for name, version in versions.items()])
+
+
+def _shown(value: Any) -> str:
+    return DASH if value is None else str(value)

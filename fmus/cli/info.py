@@ -1,0 +1,41 @@
+"""Command line: ``fmus info FILE``."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from fmus.plain import plain
+from fmus.report import describe_file, problems_of
+
+OK, PROBLEMS = 0, 1
+
+
+def register(commands: Any) -> None:
+    """Add the command to the parser.
+
+    Args:
+        commands: subparsers of the program.
+    """
+    parser = commands.add_parser("info")
+    parser.add_argument("file", type=Path, metavar="FILE")
+    parser.set_defaults(execute=execute)
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Print what the file says, and its problems.
+
+    Args:
+        options: of the command line.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+    """
+    if not options.file.is_file():
+        raise FileNotFoundError(f"{options.file} does not exist; give the path of an FMU.")
+    print("\n".join(map(plain, describe_file(options.file))))
+    problems = problems_of(options.file)
+    for problem in problems:
+        print(f"problem: {plain(problem)}")
+    return PROBLEMS if problems else OK

@@ -1,0 +1,27 @@
+"""Versions of everything that can change a number. Loads none of it."""
+
+from __future__ import annotations
+
+import platform
+from importlib.metadata import PackageNotFoundError, version
+
+PACKAGES = ("fmu-observer", "fmpy", "numpy", "scipy", "casadi")
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and the packages, and the platform, by name."""
+    return {"python": platform.python_version(), "platform": platform.platform(), **{p: _version(p) for p in PACKAGES}}
+
+
+def version_text() -> str:
+    """The versions in one line, the package first."""
+    known = versions()
+    python, system = known.pop("python"), known.pop("platform")
+    return f"{', '.join(f'{name} {number}' for name, number in known.items())}, Python {python} on {system}"
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"

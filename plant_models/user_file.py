@@ -1,0 +1,195 @@
+"""A user's own classes, named ``path/to/file.py:Class`` or ``package.module:Class``. Runs that file or imports that
+module.
+"""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from hashlib import sha256
+from inspect import isabstract, signature
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from plant_models.registry import load
+
+
+class UserFileError(ValueError):
+    """A name that gives no class as expected; the message says what was found and what was expected."""
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What a name must stand for.
+
+    Args:
+        noun: for people, ``subclass of HybridSystem``. accepts: whether an object is one.
+    """
+
+    noun: str
+    accepts: Callable[[Any], bool]
+
+
+def names_a_file(name: str) -> bool:
+    """Whether a name is meant as ``file.py:Class``.
+
+    Args:
+        name: of a model.
+    """
+    return ".py:" in name or name.endswith(".py")
+
+
+def names_code(name: str) -> bool:
+    """Whether a name is meant as ``file.py:Class`` or ``package.module:Class``, and not as one of a registry.
+
+    Args:
+        name: of a model.
+    """
+    return ":" in name or names_a_file(name)
+
+
+def split_name(name: str) -> tuple[str, str]:
+    """The path in ``path/to/file.py:Class``, and the class, empty where it is left out.
+
+    Args:
+        name: of a model, for which `names_a_file` is true.
+    """
+    text, colon, wanted = name.rpartition(".py:")
+    return (f"{text}.py", wanted) if colon else (name, "")
+
+
+def load_class(name: str, expected: Expected, folder: Path | str = ".") -> Any:
+    """What ``path/to/file.py:Class`` or ``package.module:Class`` stands for.
+
+    ``:Class`` may be left out where a file has one such class only.
+
+    Args:
+        name: of the class. expected: what it must be. folder: that a relative path starts from.
+
+    Raises:
+        UserFileError: there is no such file, module or class, it fails while it is run, or the class is something else.
+    """
+    if not names_a_file(name):
+        found = _imported(name)
+        if not expected.accepts(found):
+            raise UserFileError(f"{name} is {_kind(found)}, no {expected.noun}.")
+        return found
+    text, wanted = split_name(name)
+    path = Path(folder, text)
+    if not path.is_file():
+        raise UserFileError(f"{path} does not exist; write path/to/file.py:Class.")
+    module = _run(path.resolve())
+    own = {k: v for k, v in vars(module).items() if isinstance(v, type) and v.__module__ == module.__name__}
+    fitting = [key for key, value in own.items() if expected.accepts(value)]
+    if not wanted and len(fitting) == 1:
+        return own[fitting[0]]
+    found = getattr(module, wanted or "-", None)
+    if expected.accepts(found):
+        return found
+    what = f" ({wanted} is {_kind(found)})" if found is not None else ""
+    raise UserFileError(
+        f"{path} has no {expected.noun} named {wanted!r}{what}; it has: {', '.join(fitting) or 'none'}. "
+        f"Write {path}:Class."
+    )
+
+
+def make(cls: type, options: Mapping[str, Any]) -> Any:
+    """An instance of a user's class.
+
+    Args:
+        cls: the class. options: arguments by name.
+
+    Raises:
+        UserFileError: the options do not fit, or its construction fails.
+    """
+    try:
+        signature(cls).bind(**options)
+    except TypeError as error:
+        known = ", ".join(signature(cls).parameters) or "none"
+        raise UserFileError(f"{cls.__name__}: {error}; its options are: {known}.") from error
+    try:
+        return cls(**options)
+    except Exception as error:
+        raise UserFileError(f"{cls.__name__} cannot be made: {explained(error)}") from error
+
+
+def explained(error: BaseException, path: Path | str | None = None) -> str:
+    """An error of a user's code in one line: its kind, its message, and the file and line that it comes from.
+
+    Args:
+        error: what was raised. path: of the user's file, whose last line on the way is named; None for the last of all.
+    """
+    text = f"{type(error).__name__}: {error}".removesuffix(": ")
+    if isinstance(error, SyntaxError) and error.filename:
+        return f"SyntaxError: {error.msg} ({error.filename}:{error.lineno})"
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if path is not None and frame.filename == str(path)] or frames
+    return f"{text} ({own[-1].filename}:{own[-1].lineno})" if own else text
+
+
+def name_of(model: Any) -> str:
+    """The name by which another process finds a class again: ``package.module:Class``, or ``path/to/file.py:Class``
+    where the module is a file alone.
+
+    Args:
+        model: the class, or an instance of it.
+
+    Raises:
+        UserFileError: it stands within a function, or in no file.
+    """
+    cls = model if isinstance(model, type) else type(model)
+    module = sys.modules.get(cls.__module__)
+    if module is None or getattr(module, cls.__qualname__, None) is not cls:
+        raise UserFileError(f"{cls.__qualname__} cannot be found again; define it at the top level of a file.")
+    if "." in module.__name__:
+        return f"{module.__name__}:{cls.__qualname__}"
+    file = getattr(module, "__file__", None)
+    if file is None:
+        raise UserFileError(f"{cls.__qualname__} stands in no file; write it into one.")
+    return f"{Path(file).resolve()}:{cls.__qualname__}"
+
+
+def _kind(found: Any) -> str:
+    if isinstance(found, type):
+        return f"{'an abstract' if isabstract(found) else 'a'} class"
+    return f"of type {type(found).__name__}"
+
+
+def _imported(name: str) -> Any:
+    try:
+        return load(name)
+    except ModuleNotFoundError as error:
+        raise UserFileError(f"{name}: no module named {error.name!r}; write package.module:Class.") from error
+    except AttributeError as error:
+        raise UserFileError(f"{name}: {error}") from error
+    except Exception as error:
+        raise UserFileError(f"{name} cannot be imported: {explained(error)}") from error
+
+
+def _run(path: Path) -> ModuleType:
+    """The module of a file; one that was run before with this very content is not run again."""
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise UserFileError(f"{path} cannot be read: {error.strerror or error}") from error
+    name = f"{path.stem}@{sha256(str(path).encode() + content).hexdigest()[:16]}"
+    if name in sys.modules:
+        return sys.modules[name]
+    module = sys.modules[name] = ModuleType(name)  # known before it runs, as dataclasses want
+    module.__file__ = str(path)
+    kept, flag = list(sys.path), sys.dont_write_bytecode
+    sys.path.insert(0, str(path.parent))  # as when Python runs it, so that it may import its neighbours
+    sys.dont_write_bytecode = True
+    try:
+        exec(compile(content, path, "exec"), vars(module))
+    except BaseException as error:
+        del sys.modules[name]
+        if isinstance(error, Exception | SystemExit):
+            raise UserFileError(f"{path} cannot be run: {explained(error, path)}") from error
+        raise
+    finally:
+        sys.path[:], sys.dont_write_bytecode = kept, flag
+    return module
