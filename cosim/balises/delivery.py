@@ -249,15 +249,15 @@ class Receiver:
     def _note_outcome(self) -> None:
         """What the receiver's own counters say of the telegrams it was told and has not answered for yet."""
         counts = self.planned.component.outcomes()
-        if counts is None:
+        if counts is None or counts == self.seen:
             return
-        changed = {name for name, value in counts.items() if value > self.seen.get(name, 0)}
-        self.seen = dict(counts)
-        outcome = next((name for name in OUTCOMES if name in changed), None)
-        if outcome is not None:
-            for delivery in self._open:
-                delivery.outcome = outcome
-            self._open.clear()
+        seen, self.seen = self.seen, dict(counts)
+        for name in OUTCOMES:
+            if counts.get(name, 0) > seen.get(name, 0):
+                for delivery in self._open:
+                    delivery.outcome = name
+                self._open.clear()
+                return
 
 
 def snapped(delivered_at: float, now: float, until: float) -> float:

@@ -202,7 +202,7 @@ def aperiodic(
         min_gap, max_gap: range of the regular gaps [s].
         dropout_after: drop-outs occur after this time [s].
         dropout_fraction: share of stretched gaps.
-        dropout_stretch: largest stretch.
+        dropout_stretch: largest factor of a stretched gap.
         start: the first gap begins here [s].
 
     Raises:
@@ -215,8 +215,8 @@ def aperiodic(
     t = start
     while True:
         gap = generator.uniform(min_gap, max_gap)
-        dropped, stretch = generator.uniform() < dropout_fraction, generator.uniform(1.2, max(dropout_stretch, 1.2))
-        t += gap * (stretch if dropped and t > dropout_after else 1.0)
+        dropped, factor = generator.uniform() < dropout_fraction, generator.uniform(1.2, max(dropout_stretch, 1.2))
+        t += gap * (factor if dropped and t > dropout_after else 1.0)
         if t > until:
             return InstantLayout(np.array(instants))
         instants.append(t)

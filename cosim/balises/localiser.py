@@ -65,9 +65,9 @@ class Localiser(ABC):
         """
         assert isinstance(self.layout, TrackLayout)
         found = []
-        for stretch in step.stretches():
-            for balise in self.layout.crossed(stretch.before, stretch.after):
-                s = step.crossing(balise.position, stretch)
+        for segment in step.segments():
+            for balise in self.layout.crossed(segment.before, segment.after):
+                s = step.crossing(balise.position, segment)
                 whole = bound + self.watch.error.time(t + s, balise.position, step.speed(s))
                 crossing = Crossing(
                     t + s, balise.position, balise.identity, balise.location_accuracy, self.method, whole

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.balises.hermite import HermiteStep, Stretch
+from cosim.balises.hermite import HermiteStep, Segment
 from cosim.balises.layout import Balise, InstantLayout, TrackLayout
 from cosim.balises.localiser import ACCELERATION_LIMIT, Localiser, Method
 from cosim.balises.telegram import Crossing
@@ -61,9 +61,9 @@ class RollbackLocaliser(Localiser):
     def _crossings(self, trial: _Trial) -> list[tuple[float, Balise | None]]:
         assert isinstance(self.layout, TrackLayout)
         return [
-            (trial.t + trial.search(balise.position, stretch), balise)
-            for stretch in trial.stretches()
-            for balise in self.layout.crossed(stretch.before, stretch.after)
+            (trial.t + trial.search(balise.position, segment), balise)
+            for segment in trial.segments()
+            for balise in self.layout.crossed(segment.before, segment.after)
         ]
 
     def crossing(self, stamp: float, balise: Balise | None, position: float, speed: float) -> Crossing:
@@ -120,11 +120,11 @@ class _Trial:
         """Free the saved state."""
         self.watch.release(self._state)
 
-    def stretches(self) -> list[Stretch]:
+    def segments(self) -> list[Segment]:
         """The step, divided where the plant itself turns."""
         hermite = self._hermite
         if not hermite.turns():
-            return hermite.stretches()
+            return hermite.segments()
         low, high = 0.0, hermite.h
         while high - low > TURN_TOLERANCE:
             middle = 0.5 * (low + high)
@@ -132,22 +132,22 @@ class _Trial:
             low, high = (middle, high) if self.watch.speed * hermite.v0 > 0.0 else (low, middle)
         self.go(self.t + high)
         place = self.watch.position
-        return [Stretch(0.0, high, hermite.p0, place), Stretch(high, hermite.h, place, hermite.p1)]
+        return [Segment(0.0, high, hermite.p0, place), Segment(high, hermite.h, place, hermite.p1)]
 
-    def search(self, target: float, stretch: Stretch) -> float:
+    def search(self, target: float, segment: Segment) -> float:
         """Time after the start of the step [s] at which the plant is at `target` [m].
 
         Safeguarded Newton iteration on the plant's own steps, started from the Hermite crossing.
         """
-        low, high = stretch.start, stretch.end
-        guess = min(max(self._guess(target, stretch), low), high)
+        low, high = segment.start, segment.end
+        guess = min(max(self._guess(target, segment), low), high)
         for _ in range(MAX_ROOT_STEPS):
             self.go(self.t + guess)
             miss, speed = self.watch.position - target, self.watch.speed
             # too short a step to take: `go` stayed at the start, and so does the linear rest
             if guess <= TIME_TOLERANCE:
                 return min(max(-miss / speed, 0.0), high) if speed else guess
-            if (miss < 0.0) == stretch.rising:
+            if (miss < 0.0) == segment.rising:
                 low = max(low, guess)
             else:
                 high = min(high, guess)
@@ -159,11 +159,11 @@ class _Trial:
             guess = following
         return guess
 
-    def _guess(self, target: float, stretch: Stretch) -> float:
-        for part in self._hermite.stretches():
-            if part.rising == stretch.rising:
+    def _guess(self, target: float, segment: Segment) -> float:
+        for part in self._hermite.segments():
+            if part.rising == segment.rising:
                 return self._hermite.crossing(target, part)
-        return 0.5 * (stretch.start + stretch.end)
+        return 0.5 * (segment.start + segment.end)
 
 
 def _is_near(position: float, speed: float, h: float, layout: TrackLayout) -> bool:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import inf, nan
+from operator import attrgetter
 from types import MappingProxyType
 
 from cosim.errors import ScenarioError
@@ -128,8 +129,9 @@ class Mailbox:
 
 
 PAYLOAD = ("position", "location_accuracy", "odometer_reading", "delivered_at")
+_of_telegram = attrgetter(*PAYLOAD)
 
 
 def payload(telegram: BaliseRecord) -> dict[str, float]:
     """The numeric fields of a telegram, by the names a receiver may declare as ``balise_<field>``."""
-    return {name: getattr(telegram, name) for name in PAYLOAD}
+    return dict(zip(PAYLOAD, _of_telegram(telegram), strict=True))

@@ -87,12 +87,12 @@ def kept_rows(result: Result, every: float | None) -> np.ndarray:
 
 
 def _spaced(time: np.ndarray, every: float | None) -> np.ndarray:
-    """The first row of each stretch of `every` seconds; of as many stretches as `ROWS` where no spacing is given."""
+    """The first row of each interval of `every` seconds; of as many intervals as `ROWS` where no spacing is given."""
     if every is None:
         rows = np.arange(len(time))
         return np.asarray(rows % -(-len(time) // ROWS) == 0)
-    stretch = np.floor((time - time[0]) / every + 1e-9)
-    return np.asarray(np.diff(stretch, prepend=-1.0) > 0.0)
+    interval = np.floor((time - time[0]) / every + 1e-9)
+    return np.asarray(np.diff(interval, prepend=-1.0) > 0.0)
 
 
 def _changes(result: Result) -> Iterable[np.ndarray]:

@@ -9,11 +9,13 @@ from cosim.comparison.points import Allowed, MatchedJumps, Points, outside_betwe
 from cosim.comparison.span import rounding
 from cosim.comparison.verdict import Finding, Kind
 
-MOST_RUNS = 20  # stretches outside the tube that are told one by one; more of them are joined over the gaps between
+MOST_RUNS = (
+    20  # runs of points outside the tube that are told one by one; more of them are joined over the gaps between
+)
 
 
 def value_findings(name: str, unit: str, points: Points, allowed: Allowed) -> list[Finding]:
-    """Stretches of points outside the tube, each with its worst point."""
+    """Runs of points outside the tube, each with its worst point."""
     rows = np.flatnonzero(points.judged)
     size = np.abs(points.error[rows])
     found = []
@@ -26,7 +28,7 @@ def value_findings(name: str, unit: str, points: Points, allowed: Allowed) -> li
 
 
 def number_findings(name: str, points: Points) -> list[Finding]:
-    """Stretches where one side holds a number and the other none."""
+    """Runs of points where one side holds a number and the other none."""
     found = []
     for a, b in _runs(points.no_number):
         begin, end = float(points.time[a]), float(points.time[b - 1])
@@ -119,7 +121,7 @@ def _lone_findings(name: str, unit: str, kind: Kind, jumps: Jumps, points: Point
 
 
 def _runs(marked: np.ndarray) -> list[tuple[int, int]]:
-    """Stretches [a, b) of marked entries; where there are many, joined over the smallest gaps."""
+    """Runs [a, b) of marked entries; where there are many, joined over the smallest gaps."""
     rows = np.flatnonzero(marked)
     if not len(rows):
         return []

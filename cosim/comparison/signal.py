@@ -126,7 +126,7 @@ def _rms(points: Points, judged: np.ndarray) -> float:
 
 
 def _worst(points: Points, findings: list[Finding], at: int | None) -> list[tuple[float, float, float, float]]:
-    """The worst point of each stretch outside, or the worst of all where none is."""
+    """The worst point of each run of points outside, or the worst of all where none is."""
     if at is None:
         return []
     rows = [at]

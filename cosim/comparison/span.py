@@ -32,7 +32,7 @@ def span_findings(name: str, reference: Curve, result: Curve, allowed: float) ->
 
 
 def gap_findings(name: str, reference: Curve, result: Curve, allowed: float, allowed_time: float) -> list[Finding]:
-    """Stretches in which one side has no rows where the other has many that are not on the straight line over the
+    """Intervals in which one side has no rows where the other has many that are not on the straight line over the
     gap.
     """
     found = []

@@ -4,8 +4,8 @@ does not.
 
 from __future__ import annotations
 
+from cosim.compiled.compiled_stepper import CompiledStepper
 from cosim.compiled.program import NotCompilable
-from cosim.compiled.stretch import CompiledStepper
 from cosim.errors import CouplingError
 from cosim.master.axis import TimeAxis
 from cosim.master.control.control import StepControl

@@ -1,7 +1,7 @@
 """Crossings: steps over a balise that the stepper does by itself, where everything about them is ordinary.
 
 The plant is localised by rollback and everybody is told at once: such a step ends with a record of the crossing, which
-Python makes into a telegram when the stretch is over. Knows no master.
+Python makes into a telegram when the chunk is over. Knows no master.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from cosim.coupling.plan import Plan
 from fmus.fmi.standard import NEVER
 
 AT_MOST = 256
-"""Crossings in one stretch."""
+"""Crossings in one chunk."""
 
 WORDS = (*OUTCOMES, "told")
 """By rank; the last one stands for an outcome that is not known."""
@@ -45,7 +45,7 @@ class Crossings:
         self._prepare(program, plan)
 
     def allow(self, wanted: bool) -> bool:
-        """Whether the coming stretch may hold such steps; to be asked before each."""
+        """Whether the coming chunk may hold such steps; to be asked before each."""
         idle = wanted and self._possible and self.service.has_nothing_found
         idle = idle and all(telling.component.next_event == NEVER for telling in self._tellings.values())
         self._head.on = idle
@@ -55,7 +55,7 @@ class Crossings:
         return idle
 
     def collect(self) -> None:
-        """Log what was passed in the stretch."""
+        """Log what was passed in the chunk."""
         count = int(self._head.passed_count)
         if not count:
             return

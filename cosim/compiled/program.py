@@ -43,7 +43,7 @@ SAME_AS = {"Real": "Float64", "Integer": "Int32"}
 
 
 class Stop(IntEnum):
-    """Why a stretch ended, as in ``stepper.h``."""
+    """Why a chunk ended, as in ``stepper.h``."""
 
     DONE = 0
     TIME = 1

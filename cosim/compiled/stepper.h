@@ -37,8 +37,8 @@ typedef struct {
     const int64_t *sources;            /* where they lie in the values of the plan, or in those at the start behind them */
     const double *factors, *offsets;   /* NULL: nothing is converted */
     double *inputs;                    /* gathered */
-    int64_t calls;                     /* of doStep in the present stretch */
-    int64_t all_calls;                 /* in all stretches before */
+    int64_t calls;                     /* of doStep in the present chunk */
+    int64_t all_calls;                 /* in all chunks before */
     double seconds;                    /* in the sampled ones, added up */
     /* in steps over balises, which are all timed */
     double now;                        /* where it stands [s] */
@@ -95,7 +95,7 @@ typedef struct {
 
 /* Steps over balises, which are found by rollback and told at once. */
 typedef struct {
-    int64_t on;             /* 0: they are not for the stepper in this stretch */
+    int64_t on;             /* 0: they are not for the stepper in this chunk */
     int64_t by_instant;     /* else by the places of the watch */
     const double *instants; /* [s], increasing */
     int64_t instant_count, next_instant;
@@ -139,7 +139,7 @@ typedef struct {
     int64_t used;
 } Journal;
 
-/* Why a stretch ended. */
+/* Why a chunk ended. */
 enum {
     STOP_DONE,       /* all steps are done */
     STOP_TIME,       /* its time is up; all steps so far are done */
@@ -163,13 +163,13 @@ typedef struct {
     PlantMonitor watch;
     Balises balises;
     Journal journal;
-    double seconds_at_most;     /* a stretch is to last [s] */
+    double seconds_at_most;     /* a chunk is to last [s] */
     int64_t *last_call;         /* where the call that is being made is noted, and the time [s], for whoever watches */
     double *last_time;
     int64_t *rows_told;         /* where the rows that are filled are counted, for the same */
-    int64_t rows_before;        /* those that are filled before the stretch */
-    int64_t rows_done;          /* in the stretch: one for each step, and those of events */
-    double seconds, sampled;    /* it lasted; steps of all stretches whose doStep calls were timed */
+    int64_t rows_before;        /* those that are filled before the chunk */
+    int64_t rows_done;          /* in the chunk: one for each step, and those of events */
+    double seconds, sampled;    /* it lasted; steps of all chunks whose doStep calls were timed */
     /* where and why it ended */
     int64_t stop, slave, port, status;
     int64_t event, terminate, early; /* results of doStep */

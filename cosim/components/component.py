@@ -29,7 +29,6 @@ from fmus.fmi.instance import shown
 from fmus.fmi.slave import Slave
 from fmus.fmi.values import element_reader, write_start
 
-NOT_PREPARED: Callable[[], None] | None = None
 WITHOUT_STATES = "without it: algorithm gauss-seidel or jacobi, control fixed, no balise method rollback"
 
 
@@ -81,7 +80,7 @@ class Component(Described, Slave):
         self.trespasses: dict[str, str] = {}
         self._numbers = LAST_CALL.numbers(name)
         self._call_note, self._step_number = LAST_CALL, self._numbers + STEP
-        self._outcomes, self._read_outcomes = np.zeros(len(OUTCOME_VARIABLES)), NOT_PREPARED
+        self._read_outcomes: Callable[[], Mapping[str, int] | None] | None = None
 
     # -- how it stands ----------------------------------------------------------------------------------------------
 
@@ -113,7 +112,7 @@ class Component(Described, Slave):
             if warning is None:
                 raise
             raise RunError(f"{error} Perhaps because: {warning}", self.name, error.time) from error
-        self._read_outcomes = NOT_PREPARED
+        self._read_outcomes = None
         self._switch_log()
 
     def set_start(self, name: str, value: StartValue) -> None:
@@ -189,19 +188,30 @@ class Component(Described, Slave):
 
         Of an FMU that cannot say any more those that were read last.
         """
-        counters = getattr(self.slave, "counters", None)
-        if counters is not None:
-            return dict(vars(counters))
+        read = self._read_outcomes or self._outcome_reader()
+        if self._alive:
+            self._read_outcomes = read
+        return read()
+
+    def _outcome_reader(self) -> Callable[[], Mapping[str, int] | None]:
+        """`outcomes` of the slave as it is instantiated, prepared."""
+        if getattr(self.slave, "counters", None) is not None:
+            return lambda: dict(vars(self.slave.counters))
         counted = [name for name in OUTCOME_VARIABLES if name in self.variables]  # an older export knows fewer
         if not counted:
-            return None
-        if self._alive and self._read_outcomes is None:
-            read = element_reader(self, counted, self._outcomes[: len(counted)])
-            self._read_outcomes = self.guarded("counts of events", read)
-        if self._alive and self._read_outcomes is not None:
-            with suppress(RunError):
-                self._read_outcomes()
-        return dict(zip(map(OUTCOME_VARIABLES.__getitem__, counted), map(int, self._outcomes), strict=False))
+            return lambda: None
+        names, values = [OUTCOME_VARIABLES[name] for name in counted], np.zeros(len(counted))
+        read = element_reader(self, counted, values) if self._alive else None
+
+        def outcomes() -> Mapping[str, int]:
+            try:
+                if self._alive and read is not None:
+                    read()
+            except Exception as error:
+                self.explained("counts of events", error)  # after a fatal error nothing is asked any more
+            return dict(zip(names, map(int, values), strict=True))
+
+        return outcomes
 
     def choose_log(self, choice: LogChoice | None) -> None:
         """What the slave shall log; before `instantiate`. None leaves that to the slave.
@@ -245,12 +255,13 @@ class Component(Described, Slave):
 
     def guard(self, what: str, call: Callable[[], Any]) -> Any:  # noqa: D102 - see Instance
         before = None if self._running else Surroundings()  # in a run its steps are looked at
+        LAST_CALL.begin(self.name, what, self.time)
         try:
-            with LAST_CALL.making(self.name, what, self.time):
-                return call()
+            return call()
         except Exception as error:
             raise self.explained(what, error) from error
         finally:
+            LAST_CALL.call[0] = 0
             for changed in () if before is None else before.put_back():
                 self.trespasses[changed] = what
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 from pathlib import Path
-from tempfile import mkdtemp
 from typing import Any, Literal
 
 import fmpy
@@ -17,18 +16,18 @@ from cosim.components.fmi2 import FMI2Component
 from cosim.components.fmi3 import FMI3Component
 from cosim.components.shared_libraries import refuse_foreign_libraries
 from cosim.components.surroundings import Surroundings
+from cosim.components.unpacking import read_archive, unpack
 from cosim.errors import FmuLoadError
 from cosim.process.last_call import LAST_CALL
 from cosim.process.sentinel import guard_exit
 from fmu_observer.block import make_block
-from fmus.fmi.archive import MAX_UNPACKED_BYTES, Archive, NotAnFmuError, open_archive
+from fmus.fmi.archive import Archive, NotAnFmuError
 from fmus.fmi.binaries import platform_folder
 from fmus.fmi.description import negated_aliases
 from fmus.fmi.library import load
 from fmus.fmi.standard import CO_SIMULATION, fmi_version
 from plant_models.hybrid import HybridSystem
 
-VERSIONS = ("1.0", "2.0", "3.0")
 COMPONENTS: dict[int, Any] = {1: FMI1Component, 2: FMI2Component, 3: FMI3Component}
 
 
@@ -54,19 +53,19 @@ def load_fmu(path: str | Path, name: str, tolerance: float | str | None = None) 
         archive.demand_this_platform(CO_SIMULATION)
     except NotAnFmuError as error:
         raise FmuLoadError(f"{name}: {error}") from error
-    folder = Path(mkdtemp(prefix="fmu_"))
     guard_exit()
     here, before = Path.cwd(), Surroundings()
+    folder: Path | None = None
     try:
-        fmpy.extract(str(path), unzipdir=str(folder))
+        folder = unpack(archive)
         refuse_foreign_libraries(_library(folder, description), path, name)
         with LAST_CALL.making(name, "loading its library"):
             slave = load(folder, description, CO_SIMULATION, name, complete=True)
-    except FmuLoadError:
-        shutil.rmtree(folder, ignore_errors=True)
-        raise
     except Exception as error:
-        shutil.rmtree(folder, ignore_errors=True)
+        if folder is not None:
+            shutil.rmtree(folder, ignore_errors=True)
+        if isinstance(error, FmuLoadError):
+            raise
         lacks = (
             "its library lacks a function that FMI demands of every FMU: " if isinstance(error, AttributeError) else ""
         )
@@ -125,7 +124,7 @@ def describe_fmu(path: str | Path, name: str) -> Component:
 
 def _open(path: Path, name: str) -> Archive:
     try:
-        return open_archive(path, MAX_UNPACKED_BYTES, VERSIONS)
+        return read_archive(path)
     except NotAnFmuError as error:
         raise FmuLoadError(f"{name}: {error}") from error
 

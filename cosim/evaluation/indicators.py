@@ -50,10 +50,10 @@ def on_intervals(time: np.ndarray, indicator: np.ndarray) -> list[tuple[float, f
 
 
 def on_share(time: np.ndarray, indicator: np.ndarray, start: float, end: float) -> float | None:
-    """Share of a stretch of time in which an indicator is on [1], or None where none of the stretch was recorded.
+    """Share of an interval of time in which an indicator is on [1], or None where none of it was recorded.
 
     Args:
-        time: [s], shape (rows,). indicator: 1 nominal, 2 degraded, shape (rows,). start, end: of the stretch [s].
+        time: [s], shape (rows,). indicator: 1 nominal, 2 degraded, shape (rows,). start, end: of the interval [s].
     """
     if not len(time) or not (start := max(start, float(time[0]))) < (end := min(end, float(time[-1]))):
         return None

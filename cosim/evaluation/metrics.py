@@ -12,12 +12,12 @@ from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.results.result import Result
 
 FEWEST_INSTANTS = 5
-"""Of a stretch that is judged; what a run shows at fewer instants says nothing of it."""
+"""Of an interval that is judged; what a run shows at fewer instants says nothing of it."""
 
 
 @dataclass(frozen=True, slots=True)
 class ErrorSize:
-    """Size of an error over a stretch of time, in the unit of the error; NaN with too few rows, infinite once diverged.
+    """Size of an error over a time interval, in the unit of the error; NaN with too few rows, infinite once diverged.
 
     Args:
         max_abs: largest absolute value. rms: time-weighted root mean square.

@@ -15,7 +15,7 @@ ROUNDING = 1e-9  # relative; times closer than this are the same
 
 @dataclass(frozen=True)
 class Window:
-    """A stretch of a run, both ends included.
+    """An interval of a run, both ends included.
 
     Args:
         result: the run. start, end: what the expectation speaks of [s]. reached: when the run ended [s].

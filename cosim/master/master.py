@@ -56,7 +56,7 @@ class Master:
         stepper: chooses who executes the plan, Python by default; `cosim.compiled.choice` knows the other one.
         events: of the components: ``propagate`` them to others at the same instant, or leave them ``local``.
 
-    `between_steps` is called between two steps, or stretches of the compiled stepper; it may raise KeyboardInterrupt.
+    `between_steps` is called between two steps, or chunks of the compiled stepper; it may raise KeyboardInterrupt.
 
     After `run`, `recorder`, `timing`, `exchange_rounds` and `balises.mailbox.log` hold what came out, also when it
     failed.
@@ -148,11 +148,11 @@ class Master:
                 self.between_steps()
             step: Callable[[], Sequence[Row]] | None = partial(self.control.step, axis[k], axis[k + 1])
             if compiled is not None:
-                stretch = compiled.run(k, self.recorder)
-                k, step = k + stretch.done, stretch.finish
-                if stretch.suspect:
+                chunk = compiled.run(k, self.recorder)
+                k, step = k + chunk.done, chunk.finish
+                if chunk.suspect:
                     self._check_finite(axis[k])
-                if self._progress is not None and stretch.done:
+                if self._progress is not None and chunk.done:
                     self._progress(axis[k])
             if step is None:
                 continue

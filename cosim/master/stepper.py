@@ -16,8 +16,8 @@ Finish = Callable[[], Sequence[Row]]
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """What a stretch did.
+class Chunk:
+    """What a chunk did.
 
     Args:
         done: steps done and recorded.
@@ -36,7 +36,7 @@ class Stepper(Protocol):
 
     steps: int
 
-    def run(self, k: int, recorder: Recorder) -> Stretch:
+    def run(self, k: int, recorder: Recorder) -> Chunk:
         """Do steps from number `k` on; their rows go to `recorder`."""
 
     def close(self) -> None:

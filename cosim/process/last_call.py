@@ -90,16 +90,22 @@ class LastCall:
             self._numbers[key] = self._four(component) or self._unknown
         return self._numbers[key]
 
-    @contextmanager
-    def making(self, component: str, what: str, time: float = nan) -> Iterator[None]:
-        """A call that is made now and then, at `time` [s]; within this context it is the present one.
-
-        What stands behind ``=`` in `what` is left out: a value is not part of the call.
+    def begin(self, component: str, what: str, time: float = nan) -> None:
+        """A call that is made now and then begins at `time` [s]; whoever makes it stores 0 in `call[0]` at its end.
 
         Args:
-            component: its name.
+            component: whose call it is. what: the call in words. What stands behind ``=`` in them is left out: a value
+                is not part of the call.
+            time: where the component stands [s].
         """
-        self.call[0], self.time[0] = self.number(component, what.partition(" = ")[0]), time
+        key = component, what
+        self.call[0] = self._numbers[key] if key in self._numbers else self.number(component, what.partition(" = ")[0])
+        self.time[0] = time
+
+    @contextmanager
+    def making(self, component: str, what: str, time: float = nan) -> Iterator[None]:
+        """Within this context a call is the present one; arguments as for `begin`."""
+        self.begin(component, what, time)
         try:
             yield
         finally:

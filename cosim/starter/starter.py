@@ -12,8 +12,9 @@ from cosim.simulation.scenario import Scenario
 from cosim.starter.alone import alone
 from cosim.starter.look import Look, look_into
 from cosim.starter.observer import observer_beside
+from cosim.starter.render import render
 from cosim.starter.roles import PlantRoles, is_observer, observer_roles, plant_roles
-from cosim.starter.toml_lines import LISTED, comment, listing, one_line
+from cosim.starter.toml_lines import LISTED, one_line
 from cosim.starter.train import DEFAULT_OBSERVER, train
 from fmu_observer import OBSERVERS
 
@@ -26,8 +27,9 @@ class Starter:
     """A starter scenario.
 
     Args:
-        text: of the file. kind: ``train``, ``observer`` or ``alone``. remarks: what the user should be told, a line
-            each.
+        text: of the file.
+        kind: ``train``, ``observer`` or ``alone``.
+        remarks: what the user should be told, a line each.
     """
 
     text: str
@@ -39,8 +41,12 @@ def starter(fmu: str | Path, target: str | Path, observer: str | None = None) ->
     """A starter scenario for an FMU; nothing is written and nothing of the FMU is executed.
 
     Args:
-        fmu: path of the FMU. target: the scenario file to be; paths in the text are relative to it.
+        fmu: path of the FMU.
+        target: the scenario file to be; paths in the text are relative to it.
         observer: name of a shipped observer to put beside a plant; by default the Takagi-Sugeno observer.
+
+    Returns:
+        The text of the file, and what the user should be told.
 
     Raises:
         FmuLoadError: the FMU cannot be read, or offers no co-simulation.
@@ -52,23 +58,32 @@ def starter(fmu: str | Path, target: str | Path, observer: str | None = None) ->
     place = relative(path, target.parent)
     roles = plant_roles(look)
     if is_observer(look):
-        kind, body = "observer", observer_beside(look, place, observer_roles(look))
+        kind, values = "observer", observer_beside(look, observer_roles(look))
     elif roles.is_train:
-        kind, body = "train", train(look, place, roles, observer or DEFAULT_OBSERVER)
+        kind, values = "train", train(look, roles, observer or DEFAULT_OBSERVER)
     else:
-        kind, body = "alone", alone(look, place, target.name)
-    text = "\n".join([*_head(look, target.name, kind), "", *body]) + "\n"
+        kind, values = "alone", alone(look)
+    known = {"look": look, "fmu": place, "target": target.name, "about": _about(look), "listed": LISTED}
+    text = render(kind, guesses=kind != "alone", **known, **values)
     return Starter(text, kind, list(_remarks(look, kind, roles, observer)))
 
 
 def write_starter(fmu: str | Path, target: str | Path, observer: str | None = None, *, force: bool = False) -> Starter:
-    """Write a starter scenario for an FMU; arguments as for `starter`.
+    """Write a starter scenario for an FMU; nothing of the FMU is executed.
 
     Args:
+        fmu: path of the FMU.
+        target: the scenario file; paths in it are relative to it.
+        observer: name of a shipped observer to put beside a plant; by default the Takagi-Sugeno observer.
         force: replace a file that exists.
+
+    Returns:
+        The text of the file, and what the user should be told.
 
     Raises:
         OutputError: the file exists, or cannot be written.
+        FmuLoadError: the FMU cannot be read, or offers no co-simulation.
+        ScenarioError: there is no such observer, or it does not listen to an effort and an odometer.
     """
     target = Path(target)
     if target.suffix != ".toml":
@@ -100,27 +115,11 @@ def _check_observer(observer: str | None) -> None:
         )
 
 
-def _head(look: Look, target: str, kind: str) -> list[str]:
+def _about(look: Look) -> str:
+    """What the FMU is, on one line."""
     description = look.description
     about = f"{one_line(look.path.name)}: {one_line(str(description.modelName))}, FMI {description.fmiVersion}"
-    about += f", made with {one_line(description.generationTool)}" if description.generationTool else ""
-    lines = comment(f"A starter scenario for {about}.")
-    if kind != "alone":
-        lines += comment(
-            "What stands here was guessed from the FMU's description; nothing of it was executed. "
-            "Behind each guess is said how sure it is: confirm it by editing. Then:"
-        )
-    lines += [
-        "#",
-        f"#   cosim show {target}    # how it hangs together",
-        f"#   cosim run {target}     # results, plots and a table",
-        "#",
-    ]
-    lines += listing("Inputs", look.inputs) + listing("Outputs", look.outputs)
-    if look.unread:
-        lines += ["# Not for numbers, or too long; a connection of a like variable reaches them:"]
-        lines += [f"#   {one_line(text)}" for text in look.unread[:LISTED]]
-    return lines
+    return about + (f", made with {one_line(description.generationTool)}" if description.generationTool else "")
 
 
 def _remarks(look: Look, kind: str, roles: PlantRoles, observer: str | None) -> Iterator[str]:

@@ -42,9 +42,9 @@ def one_line(text: str, length: int = 90) -> str:
     return clean if len(clean) <= length else clean[: length - 3] + "..."
 
 
-def comment(text: str) -> list[str]:
+def comment(text: str) -> str:
     """A paragraph as lines of comment."""
-    return [f"# {line}" for line in wrap(text, WIDTH)] if text else ["#"]
+    return "\n".join(f"# {line}" for line in wrap(text, WIDTH))
 
 
 def guessed(guess: Guess) -> str:
@@ -54,12 +54,12 @@ def guessed(guess: Guess) -> str:
     return f"  # {mark}{guess.sureness}: {one_line(guess.reason)}{others}"
 
 
-def listing(title: str, signals: Sequence[Signal]) -> list[str]:
+def listing(title: str, signals: Sequence[Signal]) -> str:
     """Variables with unit and description, as comment."""
     rows = [[one_line(s.name), f"[{one_line(s.unit or '-')}]  {one_line(s.description)}"] for s in signals[:LISTED]]
     lines = [f"# {title} ({len(signals)}):", *(f"#   {line}" for line in text_table(rows, left=(0, 1)))]
     more = len(signals) - LISTED
-    return lines + ([f"#   ... and {more} more, see: cosim info"] if more > 0 else [])
+    return "\n".join(lines + ([f"#   ... and {more} more, see: cosim info"] if more > 0 else []))
 
 
 @dataclass(frozen=True)
@@ -80,6 +80,6 @@ class Link:
         names = (self.source, *self.targets)
         if self.factor is None and all(PLAIN_NAME.fullmatch(name.partition(".")[2]) for name in names):
             text = f"{self.source} -> {', '.join(self.targets)}"
-            return [f"    {inline(text)},{self.remark}"]
+            return [f"{inline(text)},{self.remark}"]
         changed = {} if self.factor is None else {"factor": self.factor, "units": "ignore"}
-        return [f"    {inline({'from': self.source, 'to': to} | changed)},{self.remark}" for to in self.targets]
+        return [f"{inline({'from': self.source, 'to': to} | changed)},{self.remark}" for to in self.targets]

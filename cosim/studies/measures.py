@@ -22,7 +22,7 @@ def error_measures(outcome: Outcome) -> dict[str, float]:
 
     Returns:
         ``observer.speed_error_max``, ``observer.speed_error_rms`` [m/s] and the same of the position [m], where
-        recorded; NaN for a run that failed, whose errors are those of another stretch of time, and where too few rows
+        recorded; NaN for a run that failed, whose errors are those of another interval of time, and where too few rows
         are judged.
     """
     result, spec = outcome.result, outcome.spec

@@ -134,7 +134,7 @@ def observability(
 
 
 def observability_gramian(system: MeasuredSystem, pattern: SamplePattern) -> np.ndarray:
-    """W over a pattern in the units of the states, shape (n, n); from the last stretch back to the first.
+    """W over a pattern in the units of the states, shape (n, n); from the last interval back to the first.
 
     Args:
         system: A and C with scales.
@@ -146,13 +146,13 @@ def observability_gramian(system: MeasuredSystem, pattern: SamplePattern) -> np.
     gramian = np.zeros_like(system.A)
     for k, gap in enumerate(reversed(pattern.gaps)):
         if gap not in found:
-            found[gap] = _stretch(system.A, continuous, float(gap))
+            found[gap] = _over_gap(system.A, continuous, float(gap))
         transition, integral = found[gap]
         gramian = integral + transition.T @ (gramian + (sampled if k else 0.0)) @ transition
     return np.asarray(0.5 * (gramian + gramian.T))
 
 
-def _stretch(A: np.ndarray, weight: np.ndarray, gap: float) -> tuple[np.ndarray, np.ndarray]:
+def _over_gap(A: np.ndarray, weight: np.ndarray, gap: float) -> tuple[np.ndarray, np.ndarray]:
     """``exp(A gap)`` and ``int_0^gap exp(A't) weight exp(A t) dt`` by Van Loan's block, then doubling.
 
     The block exponential of Van Loan (1978) holds exp(-A' h) too, which leaves the range of numbers over a long gap
@@ -175,7 +175,7 @@ def _transition(A: np.ndarray, gap: float) -> np.ndarray:
 
 
 def _unseen(scaled: MeasuredSystem, pattern: SamplePattern, tolerance: float) -> np.ndarray:
-    """Basis of what neither the continuous measurement, over any stretch of time, nor a sample shows, shape (n, k)."""
+    """Basis of what neither the continuous measurement, over any interval, nor a sample shows, shape (n, k)."""
     assert isinstance(scaled.C_continuous, np.ndarray)
     assert isinstance(scaled.C_sampled, np.ndarray)
     lasting = pattern.duration > 0.0 and len(scaled.C_continuous)

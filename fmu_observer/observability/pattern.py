@@ -83,5 +83,5 @@ class SamplePattern:
 
     @property
     def gaps(self) -> np.ndarray:
-        """Lengths of the stretches from time zero over the instants to the end of the window [s], shape (N + 1,)."""
+        """Lengths of the intervals from time zero over the instants to the end of the window [s], shape (N + 1,)."""
         return np.diff(np.concatenate([[0.0], self.instants, [self.duration]]))

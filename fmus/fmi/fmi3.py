@@ -195,9 +195,10 @@ class FMI3Slave(FMI3Instance, Slave):
         self.terminated |= bool(terminate)
         if defined and math.isnan(next_time):
             raise self.failure("updateDiscreteStates says that the next event is at t = nan")
+        self.next_event = float(next_time) if defined else NEVER
         if self.clocks:
             self.guard("intervals of clocks", lambda: self.clocks.ask(self.time))
-        self.next_event = min(float(next_time) if defined else NEVER, self.clocks.next)
+            self.next_event = min(self.next_event, self.clocks.next)
         self.event_pending = False
         return bool(again)
 

@@ -30,7 +30,7 @@ def quicken(slave: Any) -> None:
 
 
 def _update(slave: Any) -> Callable[[], Discrete]:
-    flags = [ctypes.c_bool() for _ in range(5)]
+    flags = again, terminate, nominals, values, defined = tuple(ctypes.c_bool() for _ in range(5))
     time = ctypes.c_double()
     call = prepared_call(
         slave, "fmi3UpdateDiscreteStates", slave.component, *map(ctypes.byref, flags), ctypes.byref(time)
@@ -40,8 +40,7 @@ def _update(slave: Any) -> Callable[[], Discrete]:
         for flag in flags:  # a slave may leave out what it has nothing to say of
             flag.value = False
         call()
-        again, terminate, nominals, values, defined = (flag.value for flag in flags)
-        return again, terminate, nominals, values, defined, time.value
+        return again.value, terminate.value, nominals.value, values.value, defined.value, time.value
 
     return update
 

@@ -197,7 +197,7 @@ def test_ctrl_c_works_while_an_fmu_hangs(fmu: Path, tmp_path: Path, number: sign
 
 @pytest.mark.parametrize("stepper", ["python", "compiled"])
 def test_ctrl_c_within_a_step_loses_no_row(fmu: Path, stepper: str) -> None:
-    """The signal comes in the middle of a stretch of the compiled stepper, or in a call of the Python one."""
+    """The signal comes in the middle of a chunk of the compiled stepper, or in a call of the Python one."""
     outcome = hostile(fmu, "interrupts", stepper=stepper).run()
     assert outcome.failure is not None
     assert "interrupted" in outcome.failure

@@ -138,7 +138,7 @@ def test_one_step_finds_what_the_master_finds(
     step, layout = HermiteStep(h, p0, v0, p1, v1), by_spacing(spacing, -700.0, 700.0)
     expected = [
         (t, b_.position)
-        for s in step.stretches()
+        for s in step.segments()
         for b_ in layout.crossed(s.before, s.after)
         for t in (step.crossing(b_.position, s),)
     ]

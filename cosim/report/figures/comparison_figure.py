@@ -145,7 +145,7 @@ def worst_window(signal: SignalComparison) -> tuple[float, float] | None:
         return None
     begin, end = _span(curves)
     finding = worst_finding(signal)
-    centre, stretch = (signal.max_error_at, 0.0) if finding is None else _centre(finding)
+    centre, width = (signal.max_error_at, 0.0) if finding is None else _centre(finding)
     if not np.isfinite(centre) or not end > begin:
         return None
     steps = np.diff(np.unique(curves.reference_time))
@@ -153,7 +153,7 @@ def worst_window(signal: SignalComparison) -> tuple[float, float] | None:
     allowed = signal.allowed_time if np.isfinite(signal.allowed_time) else 0.0
     half = max(0.5 * SHARE * (end - begin), ROWS * step, SHIFTS * allowed)
     half = min(half, 0.5 * LARGEST_SHARE * (end - begin)) if len(steps) > 2 * ROWS else 0.5 * (end - begin)
-    return max(begin, centre - half), min(end, centre + min(stretch, half) + half)
+    return max(begin, centre - half), min(end, centre + min(width, half) + half)
 
 
 def _centre(finding: Finding) -> tuple[float, float]:
@@ -206,7 +206,7 @@ def _value_limits(curves: Curves, begin: float, end: float) -> tuple[float, floa
 
 
 def _pieces(curves: Curves, begin: float, end: float) -> Iterator[slice]:
-    """Stretches of the tube that touch a window; NaN rows separate them."""
+    """Segments of the tube that touch a window; NaN rows separate them."""
     bad = np.flatnonzero(np.isnan(curves.tube_time) | np.isnan(curves.lower) | np.isnan(curves.upper))
     for before, after in pairwise([-1, *bad.tolist(), len(curves.tube_time)]):
         rows = slice(before + 1, after)

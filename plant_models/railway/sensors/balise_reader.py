@@ -30,7 +30,7 @@ LayoutShape = Literal["spacing", "positions"]
 _EXAMPLE = (100.0, 350.0, 600.0, 1100.0)  # an example, so that the file in the FMU shows its form
 
 
-class _Stretch(NamedTuple):
+class _Segment(NamedTuple):
     """A part of a step in which the train does not turn: bracket of s, positions at its ends [m], direction, balises in
     it.
     """
@@ -136,9 +136,9 @@ class BaliseReader(HybridSystem):
         h = np.where(known, np.maximum(instant - t0, 0.0), 0.0)
         # A second sample at one instant replaces the first: the train did not move in no time.
         cubic = HermiteCubic.of(h, np.where(h > 0.0, p0, u.position), v0, u.position, u.speed)
-        stretches = self._stretches(cubic, u.position, p)
-        places, fractions = self._crossings(cubic, stretches, p)
-        found = stretches[0].count + stretches[1].count
+        segments = self._segments(cubic, u.position, p)
+        places, fractions = self._crossings(cubic, segments, p)
+        found = segments[0].count + segments[1].count
         stamps = [np.where(found > j, np.minimum(t0 + s * h, instant), 0.0) for j, s in enumerate(fractions)]
         places = [np.where(found > j, place, 0.0) for j, place in enumerate(places)]
         sample = (t, instant, u.position, u.speed, 1.0)
@@ -149,21 +149,21 @@ class BaliseReader(HybridSystem):
         count, time, position, lost = (x[len(_SAMPLE) + i] for i in range(4))
         return {"balise_count": count, "balise_time": time, "balise_position": position, "lost_count": lost}
 
-    def _stretches(self, cubic: HermiteCubic, after: Array, p: Any) -> tuple[_Stretch, _Stretch]:
-        """The step, divided where the train turns; the second stretch is empty where it does not."""
+    def _segments(self, cubic: HermiteCubic, after: Array, p: Any) -> tuple[_Segment, _Segment]:
+        """The step, divided where the train turns; the second segment is empty where it does not."""
         turn = cubic.turn()
         place = np.where(turn < 1.0, cubic.p0 + cubic.rise(turn), after)
         first, second = _direction(cubic.p0, place), _direction(place, after)
         return (
-            _Stretch(0.0, turn, cubic.p0, place, first, self._layout.count(cubic.p0, place, first, p)),
-            _Stretch(turn, 1.0, place, after, second, self._layout.count(place, after, second, p)),
+            _Segment(0.0, turn, cubic.p0, place, first, self._layout.count(cubic.p0, place, first, p)),
+            _Segment(turn, 1.0, place, after, second, self._layout.count(place, after, second, p)),
         )
 
     def _crossings(
-        self, cubic: HermiteCubic, stretches: tuple[_Stretch, _Stretch], p: Any
+        self, cubic: HermiteCubic, segments: tuple[_Segment, _Segment], p: Any
     ) -> tuple[list[Array], list[Array]]:
         """Places [m] and fractions of the step of the first crossings; what lies beyond their number means nothing."""
-        one, two = stretches
+        one, two = segments
         places: list[Array] = []
         fractions: list[Array] = []
         place = one.before

@@ -20,7 +20,7 @@ UNUSED = 1e30  # [m]; a balise that is not laid lies beyond the end of any track
 
 
 class BaliseLayout(Protocol):
-    """Balises along the track. A direction is 1 (increasing position) or -1; a stretch contains its end and not its
+    """Balises along the track. A direction is 1 (increasing position) or -1; a section contains its end and not its
     start, so that a train that stands on a balise has passed it once.
 
     Attributes:
@@ -94,7 +94,7 @@ class Positions:
     Args:
         size: number of entries.
         positions: start values [m], no more than `size`.
-        told_apart: number of crossings in a stretch up to which entries at one place are recognised; beyond it each one
+        told_apart: number of crossings in a section up to which entries at one place are recognised; beyond it each one
             counts.
 
     Raises:

@@ -25,9 +25,9 @@ def test_a_cubic_is_reproduced(coefficients: list[float], h: float) -> None:
 
 
 @given(speeds, speeds, st.floats(-2.0, 2.0))
-def test_stretches_cover_the_step_and_do_not_turn(v0: float, v1: float, p1: float) -> None:
+def test_segments_cover_the_step_and_do_not_turn(v0: float, v1: float, p1: float) -> None:
     step = HermiteStep(0.1, 0.0, v0, p1, v1)
-    parts = step.stretches()
+    parts = step.segments()
     assert [parts[0].start, parts[-1].end] == [0.0, 0.1]
     assert [parts[0].before, parts[-1].after] == [0.0, p1]
     assert len(parts) == (2 if v0 * v1 < 0.0 else 1)

@@ -12,7 +12,7 @@ from test_fmus.build import linear_fmu
 from test_fmus.events import awkward_fmu, periodic_fmu, timed_fmu, triggered_fmu
 
 from cosim import Scenario
-from cosim.compiled import library, stretch
+from cosim.compiled import compiled_stepper, library
 from cosim.errors import CouplingError
 from fmus.toolchain.compile import CompilerMissing
 
@@ -166,32 +166,32 @@ def test_progress_is_told_up_to_the_end(tmp_path: Path) -> None:
 
 
 def test_the_loop_of_the_master_may_stop_inside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Steps done in Python between stretches do not disturb them: every 13th step is taken away from the stepper."""
+    """Steps done in Python between chunks do not disturb them: every 13th step is taken away from the stepper."""
     rng = np.random.default_rng(5)
     scenario = chain(
         tmp_path, [random_linear(tmp_path, f"m{i}", rng, v) for i, v in enumerate((2, 3, 2))], stop=5.0, step=0.01
     )
     reference = scenario.run(overrides={"master.stepper": "python"}, warn=lambda _: None)
-    real = stretch.CompiledStepper._free_steps
-    monkeypatch.setattr(stretch.CompiledStepper, "_free_steps", lambda self, k: min(real(self, k), (-k) % 13))
+    real = compiled_stepper.CompiledStepper._free_steps
+    monkeypatch.setattr(compiled_stepper.CompiledStepper, "_free_steps", lambda self, k: min(real(self, k), (-k) % 13))
     outcome = scenario.run(overrides={"master.stepper": "compiled"}, warn=lambda _: None)
     assert 0 < steps_compiled(outcome) < 500
     assert outcome.result.table.tobytes() == reference.result.table.tobytes()
 
 
-def test_a_stretch_ends_when_its_time_is_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_chunk_ends_when_its_time_is_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With no time at all the routine comes back as soon as it looks at the clock, and does single steps from then
     on.
     """
     scenario = chain(tmp_path, [random_linear(tmp_path, "a", np.random.default_rng(1), 3)], stop=5.0, step=0.01)
-    real = stretch.CompiledStepper.__init__
+    real = compiled_stepper.CompiledStepper.__init__
 
     def hurried(self: Any, *arguments: Any) -> None:
         real(self, *arguments)
         self._longest = 400
 
-    monkeypatch.setattr(stretch, "SECONDS", 0.0)
-    monkeypatch.setattr(stretch.CompiledStepper, "__init__", hurried)
+    monkeypatch.setattr(compiled_stepper, "SECONDS", 0.0)
+    monkeypatch.setattr(compiled_stepper.CompiledStepper, "__init__", hurried)
     told: list[float] = []
     outcome = scenario.run(progress=lambda t, _: told.append(t), warn=lambda _: None)
     assert steps_compiled(outcome) == 500

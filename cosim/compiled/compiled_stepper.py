@@ -1,7 +1,7 @@
-"""Stretches: communication steps that the compiled stepper does in one call, and the way back to Python where one is
+"""Chunks: communication steps that the compiled stepper does in one call, and the way back to Python where one is
 odd.
 
-A stretch ends at a row of events that Python knows beforehand (a telegram, an instant, a time event), and at whatever
+A chunk ends at a row of events that Python knows beforehand (a telegram, an instant, a time event), and at whatever
 the stepper
 meets: then the Python stepper finishes the step from where it stands.
 """
@@ -28,7 +28,7 @@ from cosim.coupling.planned import PlannedComponent
 from cosim.master.axis import TimeAxis
 from cosim.master.control.control import StepControl
 from cosim.master.control.fixed import FixedStep
-from cosim.master.stepper import Stretch
+from cosim.master.stepper import Chunk
 from cosim.master.system import NO_ROWS, Row, System
 from cosim.results.recorder import Recorder
 from fmus.fmi.standard import NEVER, TIME_TOLERANCE
@@ -36,16 +36,16 @@ from fmus.toolchain.compile import CompilationError, CompilerMissing
 
 LONGEST = 4096
 SECONDS = 0.03
-"""A stretch is to last so long at most [s]: between two of them Ctrl-C is seen and progress told."""
+"""A chunk is to last so long at most [s]: between two of them Ctrl-C is seen and progress told."""
 
 GROWTH = 8
-"""A stretch is at most so many times as long as the one before it."""
+"""A chunk is at most so many times as long as the one before it."""
 
 ROWS_OF_EVENTS = 64
-"""Room for those in a stretch that may hold some; where it is not enough, the stretch is shorter."""
+"""Room for those in a chunk that may hold some; where it is not enough, the chunk is shorter."""
 
 WITHIN = frozenset({Stop.REFUSED, Stop.WRITE, Stop.STEP, Stop.READ, Stop.CROSSED})
-"""The stretch ended within a step, at one of the slaves."""
+"""The chunk ended within a step, at one of the slaves."""
 
 STEPPED = frozenset({Stop.STEP, Stop.READ, Stop.CROSSED})
 """That one has been called to do the step."""
@@ -80,9 +80,9 @@ class CompiledStepper:
         self._crossings = self._watch_balises()
         self._first: int | None = None
         for place, step in enumerate(self.plan.steps):
-            step.component.clock = partial(self._time_in_stretch, place, step.component)
+            step.component.clock = partial(self._time_in_chunk, place, step.component)
 
-    def run(self, k: int, recorder: Recorder) -> Stretch:
+    def run(self, k: int, recorder: Recorder) -> Chunk:
         """Do steps from number `k` on.
 
         Raises:
@@ -91,7 +91,7 @@ class CompiledStepper:
         own_crossings = self._crossings is not None and self._crossings.allow(recorder.every == 1)
         free = self._free_steps(k)
         if free < 1:
-            return Stretch(0, partial(self._whole_step, k))
+            return Chunk(0, partial(self._whole_step, k))
         wanted = min(free, self._longest)
         rows = recorder.block(wanted + ROWS_OF_EVENTS if own_crossings else wanted)
         head = self._program.head
@@ -110,18 +110,18 @@ class CompiledStepper:
             self._longest = max(1, min(fitting, GROWTH * self._longest, LONGEST))
         return self._ended(k, done, Stop(head.stop))
 
-    def _ended(self, k: int, done: int, stop: Stop) -> Stretch:
+    def _ended(self, k: int, done: int, stop: Stop) -> Chunk:
         if stop in (Stop.DONE, Stop.TIME):
-            return Stretch(done)
+            return Chunk(done)
         if stop is Stop.NOT_FINITE:
-            return Stretch(done, suspect=True)
+            return Chunk(done, suspect=True)
         if stop is Stop.NEAR:
-            return Stretch(done, partial(self._whole_step, k + done))
+            return Chunk(done, partial(self._whole_step, k + done))
         if stop is Stop.HANDED:
-            return Stretch(done, partial(self._step_again, k + done, self._program.journalled()))
-        return Stretch(done, partial(self._rest_of_step, k + done))
+            return Chunk(done, partial(self._step_again, k + done, self._program.journalled()))
+        return Chunk(done, partial(self._rest_of_step, k + done))
 
-    def _time_in_stretch(self, place: int, component: Component) -> float:
+    def _time_in_chunk(self, place: int, component: Component) -> float:
         """Where a component stands that logs something while C steps it: its calls so far tell the step it is in."""
         if self._first is None:
             return component.time
@@ -239,7 +239,7 @@ class CompiledStepper:
             self._answering = False
 
     def _set_times(self, k: int) -> None:
-        """Where the components stand after a stretch that ended in step number `k`; one call there is Python's to
+        """Where the components stand after a chunk that ended in step number `k`; one call there is Python's to
         count.
         """
         head, t = self._program.head, self.axis[k]
