@@ -11,7 +11,6 @@ import subprocess
 import sys
 import zipfile
 from collections.abc import Iterator
-from fcntl import LOCK_EX, flock
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +24,8 @@ from fmus import build_fmu, recipe
 from fmus.toolchain.compile import header_folder
 from fmus.toolchain.platforms import PLATFORMS, host_platform
 from plant_models.hybrid import HybridSystem, input_signal, output_signal
+
+fcntl = pytest.importorskip("fcntl")  # locks of files
 
 MACHINES = {
     "x86_64-linux": (lief.Binary.FORMATS.ELF, lief.ELF.ARCH.X86_64),
@@ -66,7 +67,7 @@ def everywhere(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPath
     folder = _shared(tmp_path_factory) / f"everywhere{request.param}"
     folder.mkdir(exist_ok=True)
     with (folder / "lock").open("w") as lock:
-        flock(lock, LOCK_EX)
+        fcntl.flock(lock, fcntl.LOCK_EX)
         for fmu in folder.glob("*.fmu"):
             return request.param, fmu
         return request.param, build_fmu(recipe("takagi_sugeno_cdo"), folder, request.param, platforms="all")
