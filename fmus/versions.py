@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
 PACKAGES = ("fmu-observer", "fmpy", "numpy", "scipy", "casadi")
@@ -20,6 +21,7 @@ def version_text() -> str:
     return f"{', '.join(f'{name} {number}' for name, number in known.items())}, Python {python} on {system}"
 
 
+@cache  # reading it takes a millisecond, and it stays
 def _version(package: str) -> str:
     try:
         return version(package)

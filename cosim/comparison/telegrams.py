@@ -8,7 +8,7 @@ from math import isfinite, isnan
 from typing import Literal
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 from cosim.comparison.span import rounding
 from cosim.comparison.tolerance import Tolerance
@@ -104,7 +104,7 @@ def _assign(
     rows = columns = np.arange(count)
     if len(one) != len(two) and count and max(len(one), len(two)) <= LARGEST_GROUP:
         stamps = [np.array([record.stamp for record in side]) for side in (one, two)]
-        rows, columns = linear_sum_assignment(np.abs(stamps[0][:, None] - stamps[1]))
+        rows, columns = scipy.optimize.linear_sum_assignment(np.abs(stamps[0][:, None] - stamps[1]))
     taken = set(rows.tolist()), set(columns.tolist())
     pairs = [(one[int(i)], two[int(j)]) for i, j in zip(rows, columns, strict=True)]
     left, right = (

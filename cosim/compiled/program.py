@@ -22,6 +22,7 @@ from cosim.errors import CosimError
 from cosim.master.axis import TimeAxis
 from cosim.process.last_call import LAST_CALL
 from fmus.fmi.elements import Element
+from fmus.fmi.ports import is_native
 from fmus.fmi.types import c_type, getter_type, size
 
 KINDS = (
@@ -343,7 +344,7 @@ def _first_values(elements: Sequence[Element]) -> tuple[dict[str, int], int]:
 
 def _check(component: Component) -> None:
     slave = component.slave
-    if component.kind != "FMU" or not hasattr(slave, "dll") or not hasattr(slave, "_functions"):
+    if component.kind != "FMU" or not is_native(slave) or not hasattr(slave, "_functions"):
         raise NotCompilable(f"{component.name} runs in Python ({component.kind})")
     if slave.fmiCallLogger is not None:
         raise NotCompilable(f"the calls of {component.name} are logged")

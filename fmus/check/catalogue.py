@@ -45,7 +45,12 @@ class Check:
         return Finding(self.name, verdict, outcome.detail, advice if verdict.rank >= Verdict.ERROR.rank else "")
 
     def lost(self, detail: str, *, crashed: bool) -> Finding:
-        """The finding where the process ended or fell silent in this check."""
+        """The finding where the process ended or fell silent in this check.
+
+        Args:
+            detail: how the process ended, in words.
+            crashed: whether it ended by itself, and not by the time limit.
+        """
         verdict = LIMIT if crashed and self.failing is NOTE else self.failing
         advice = f"{self.advice}; {NO_PROBE}" if crashed and self.advice else self.advice if crashed else SLOW
         return Finding(self.name, verdict, detail, advice)
@@ -115,5 +120,9 @@ CATALOGUE = {CO_SIMULATION: SLAVE_CHECKS, MODEL_EXCHANGE: MODEL_CHECKS}
 
 
 def check_of(interface: str, name: str) -> Check:
-    """A check by its name."""
+    """A check by its name.
+
+    Args:
+        interface: interface type.
+    """
     return next(check for check in CATALOGUE[interface] if check.name == name)

@@ -143,7 +143,11 @@ def check_fmu(
 
 
 def check_count(archive: Archive) -> int:
-    """How many checks `check_fmu` will begin at most, for a progress bar."""
+    """How many checks `check_fmu` will begin at most, for a progress bar.
+
+    Args:
+        archive: the FMU file.
+    """
     return len(STATIC) + sum(len(CATALOGUE.get(interface, ())) for interface in archive.interfaces)
 
 

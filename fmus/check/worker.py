@@ -89,6 +89,7 @@ def unrun(name: str, basis: str) -> Finding:
 
     Args:
         name: of the class.
+        basis: name of the check that failed.
     """
     return Finding(name, Verdict.SKIPPED, f"not run, because '{basis}' failed")
 

@@ -22,7 +22,7 @@ class FMI2Instance(Instance):
 
     fmi_version = 2
     event_needs_step = True
-    _state_calls = ("getFMUstate", "setFMUstate", "freeFMUstate")
+    _get_state, _set_state, _free_state = "getFMUstate", "setFMUstate", "freeFMUstate"
 
     def _instantiate(self) -> None:
         log = {"loggingOn": self.logging} if is_native(self.slave) else {}

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from cosim.drawing.style import ALARM_COLOUR, ZONE_COLOUR
+from cosim.drawing.style import ALARM, BLACK, MARK, TIME, ZONE
 from cosim.evaluation.event_counts import accepted_stamps
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.scales import curve_size
@@ -66,7 +66,7 @@ def is_noisy(values: np.ndarray) -> bool:
 def shade_zones(ax: Axes, spec: ReportSpec) -> None:
     """Shade the low-adhesion zones behind the curves."""
     for i, (start, end) in enumerate(spec.zones):
-        ax.axvspan(start, end, color=ZONE_COLOUR, linewidth=0, zorder=0, label="low adhesion" if i == 0 else None)
+        ax.axvspan(start, end, color=ZONE, linewidth=0, zorder=0, label="low adhesion" if i == 0 else None)
 
 
 def balise_ticks(ax: Axes, result: Result) -> None:
@@ -75,24 +75,24 @@ def balise_ticks(ax: Axes, result: Result) -> None:
     false = [event.stamp for event in result.events if event.kind == "false"]
     across = ax.get_xaxis_transform()
     if used:
-        ax.vlines(used, 0.0, 0.035, transform=across, color="#000000", linewidth=0.6)
-        ax.plot([], [], "|", color="#000000", label="balises")
+        ax.vlines(used, 0.0, 0.035, transform=across, color=BLACK, linewidth=0.6)
+        ax.plot([], [], "|", color=BLACK, label="balises")
     if false:
-        ax.vlines(false, 0.0, 0.09, transform=across, color=ALARM_COLOUR, linewidth=1.6)
-        ax.plot([], [], "|", color=ALARM_COLOUR, markersize=10, markeredgewidth=1.6, label="false telegrams")
+        ax.vlines(false, 0.0, 0.09, transform=across, color=ALARM, linewidth=1.6)
+        ax.plot([], [], "|", color=ALARM, markersize=10, markeredgewidth=1.6, label="false telegrams")
 
 
 def mark_evaluation(ax: Axes, result: Result, spec: ReportSpec) -> None:
     """Mark where the evaluation starts, if start-up is left out of it."""
     if len(result.time) and result.time[0] < spec.evaluate_after < result.time[-1]:
         ax.axvline(
-            spec.evaluate_after, color="#777777", linewidth=0.9, linestyle=(0, (1, 2)), label="evaluated from here on"
+            spec.evaluate_after, color=MARK, linewidth=0.9, linestyle=(0, (1, 2)), label="evaluated from here on"
         )
 
 
 def time_axis(ax: Axes, result: Result) -> None:
     """Label the time axis and give it the length of the run."""
-    ax.set_xlabel("Time [s]")
+    ax.set_xlabel(TIME)
     if len(result.time) and result.time[-1] > result.time[0]:
         ax.set_xlim(float(result.time[0]), float(result.time[-1]))
 

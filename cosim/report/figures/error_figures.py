@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, NullLocator
 
-from cosim.drawing.style import WILD_LINE, axes_or_new, observer_line, styled
+from cosim.drawing.style import MARK, WILD_LINE, axes_or_new, observer_line, styled
 from cosim.evaluation.metrics import error_size
 from cosim.evaluation.numbers import error_number, number
 from cosim.evaluation.roles import Quantity, estimation_error, label
@@ -127,7 +127,7 @@ def _absolute(ax: Axes, c: ErrorCurve, scale: ErrorScale, line: dict[str, Any], 
 def _apply(ax: Axes, scale: ErrorScale, quantity: Quantity, unit: str, window: float) -> None:
     """Set the scale and say what it shows."""
     if scale.floor is None:
-        ax.axhline(0.0, color="#888888", linewidth=0.7, zorder=1)
+        ax.axhline(0.0, color=MARK, linewidth=0.7, zorder=1)
         ax.set_ylim(-scale.limit, scale.limit)
         ax.set_ylabel(f"{quantity.capitalize()} error [{unit}]")
         return

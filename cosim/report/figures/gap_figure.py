@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.axes import Axes
 
-from cosim.drawing.style import axes_or_new, observer_line, styled
+from cosim.drawing.style import GAP, axes_or_new, observer_line, styled
 from cosim.evaluation.event_counts import accepted_stamps
 from cosim.evaluation.facts import mapping_entry, number_entry
 from cosim.evaluation.numbers import number
@@ -63,7 +63,7 @@ def gap_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes
     shade_zones(ax, spec)
     top = float(np.max(gaps)) if len(gaps) else max(limits.values(), default=1.0)
     if len(gaps):
-        ax.stairs(gaps, stamps, fill=True, color="#A9A9A9", label="gap between balises")
+        ax.stairs(gaps, stamps, fill=True, color=GAP, label="gap between balises")
     largest = top
     for limit in sorted(set(limits.values())):
         observers = [observer for observer in limits if limits[observer] == limit]

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cosim.drawing.style import TRUE_LINE, new_figure, png, run_line, styled
+from cosim.drawing.style import TIME, TRUE_LINE, new_figure, png, run_line, styled
 from cosim.evaluation.roles import Quantity, estimate, estimation_error, label, recorded
 from cosim.report.figures.drawing import curve, legend_above, mark_evaluation, shade_zones, thin
 from cosim.report.figures.error_figures import ErrorCurve, draw_errors
@@ -189,7 +189,7 @@ def _axes(runs: Sequence[Run], panels: Sequence[Panel]) -> list[Axes]:
             ax.text(0.995, 0.97, title, transform=ax.transAxes, ha="right", va="top", fontweight="bold", zorder=5)
     if end > start:
         axes[0].set_xlim(start, end)
-    axes[-1].set_xlabel("Time [s]")
+    axes[-1].set_xlabel(TIME)
     return axes
 
 

@@ -11,6 +11,7 @@ from matplotlib.patches import Rectangle
 from cosim.drawing.style import (
     NOISY_LINE,
     ODOMETER_LINE,
+    PALE,
     REFERENCE_LINE,
     TRUE_LINE,
     TRUE_LINE_ABOVE,
@@ -142,9 +143,7 @@ def _indicator_strips(ax: Axes, result: Result, spec: ReportSpec, limits: tuple[
     found = [(o, v) for o in spec.observers if (v := estimate(result, o, "slip_indicator")) is not None]
     share = STRIP * len(found)
     if found:
-        ax.add_patch(
-            Rectangle((0.0, 0.0), 1.0, share, transform=ax.transAxes, color="#F1F1F1", linewidth=0, zorder=3.0)
-        )
+        ax.add_patch(Rectangle((0.0, 0.0), 1.0, share, transform=ax.transAxes, color=PALE, linewidth=0, zorder=3.0))
     for i, (observer, values) in enumerate(found):
         bars = [(a, b - a) for a, b in on_intervals(result.time, values)]
         place = (share - (i + 0.9) * STRIP, 0.8 * STRIP)

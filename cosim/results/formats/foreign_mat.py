@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.io import loadmat
+import scipy
 
 from cosim.errors import OutputError
 from cosim.results.data import ResultData, SignalInfo
@@ -34,7 +34,7 @@ def read_foreign_mat(path: Path) -> ResultData:
     """
     try:
         with path.open("rb") as file:
-            content = loadmat(file, chars_as_strings=False)
+            content = scipy.io.loadmat(file, chars_as_strings=False)
     except Exception as error:  # whatever a broken file leads SciPy into: a dozen kinds were seen
         if isinstance(error, OSError) and error.errno is not None:
             raise
