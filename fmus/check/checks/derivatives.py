@@ -11,7 +11,6 @@ from fmus.check.checks.life import real_names
 from fmus.check.context import Context
 from fmus.check.derivatives import compare
 from fmus.check.findings import Outcome, skipped
-from fmus.check.slave import FmuSlave
 
 
 def slave_derivatives(context: Context) -> Outcome:
@@ -22,7 +21,6 @@ def slave_derivatives(context: Context) -> Outcome:
     bench.begin()
     bench.steps((bench.h,) * WARM_UP_STEPS)
     slave = bench.component
-    assert isinstance(slave, FmuSlave)
     inputs, outputs = real_names(slave, "input"), real_names(slave, "output")
     if not inputs or not outputs:
         return skipped("has no pair of a continuous input and a continuous output")

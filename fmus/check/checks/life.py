@@ -15,6 +15,7 @@ from fmus.check.bench import SLOW_STEPS, WARM_UP_STEPS
 from fmus.check.context import Context
 from fmus.check.findings import Outcome, Verdict, failed, limited, noted, passed, skipped
 from fmus.check.instance import FmuInstance, SlaveError
+from fmus.fmi.instance import Instance
 from fmus.fmi.library import functions_of_capabilities
 from fmus.fmi.types import FLOATING_TYPES
 
@@ -69,7 +70,6 @@ def values_at_start(context: Context) -> Outcome:
     try:
         bench.begin(excited=False)
         slave = bench.component
-        assert isinstance(slave, FmuInstance)
         outputs, locals_ = slave.names("output"), slave.names("local")
         bad_outputs = not_finite(outputs, slave.read(outputs))
         bad_locals = not_finite(locals_, slave.read(locals_))
@@ -88,7 +88,6 @@ def getters(context: Context) -> Outcome:
     try:
         bench.begin(excited=False)
         slave = bench.component
-        assert isinstance(slave, FmuInstance)
         own = [v for v in slave.description.modelVariables if v.alias is None]
         readable = [v for v in own if v.type != "Clock" and not v.clocks]
         problems = list(filter(None, (_unreadable(slave, variable) for variable in readable)))
@@ -101,7 +100,7 @@ def getters(context: Context) -> Outcome:
     return passed(f"{len(readable)} variables are read{note}")
 
 
-def _unreadable(slave: FmuInstance, variable: ModelVariable) -> str:
+def _unreadable(slave: Instance, variable: ModelVariable) -> str:
     try:
         slave.get(variable)
     except SlaveError as error:
@@ -231,7 +230,7 @@ def listed(names: Sequence[str]) -> str:
     return ", ".join(names[:NAMES_SHOWN]) + more
 
 
-def real_names(instance: FmuInstance, causality: str) -> list[str]:
+def real_names(instance: Instance, causality: str) -> list[str]:
     """Names of its scalar continuous real variables of one causality."""
     found = (instance.variables[n] for n in instance.names(causality))
     return [v.name for v in found if v.type in FLOATING_TYPES and v.variability in (None, "continuous")]

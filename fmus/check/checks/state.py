@@ -7,7 +7,7 @@ from fmus.check.bench import WARM_UP_STEPS
 from fmus.check.context import Context
 from fmus.check.findings import Outcome, failed, limited, passed, skipped
 from fmus.check.restoring import near, restoring
-from fmus.check.slave import FmuSlave
+from fmus.fmi.slave import Slave
 
 NO_STATE = "does not declare canGetAndSetFMUstate"
 WITHIN = "steps may be redone, and what is redone differs by as much; the master tells it in its bounds"
@@ -41,7 +41,6 @@ def other_instance(context: Context) -> Outcome:
 def _through_bytes(context: Context, *, elsewhere: bool) -> Outcome:
     bench = context.bench
     slave = bench.component
-    assert isinstance(slave, FmuSlave)
     if not slave.can_save or not slave.capabilities.canSerializeFMUState:
         return skipped(NO_BYTES)
     path = continuation(bench)
@@ -69,8 +68,7 @@ def _through_bytes(context: Context, *, elsewhere: bool) -> Outcome:
     )
 
 
-def _saved(slave: object) -> bytes:
-    assert isinstance(slave, FmuSlave)
+def _saved(slave: Slave) -> bytes:
     state = slave.save()
     try:
         return slave.serialize(state)
@@ -78,8 +76,7 @@ def _saved(slave: object) -> bytes:
         slave.release(state)
 
 
-def _restore(slave: object, content: bytes) -> None:
-    assert isinstance(slave, FmuSlave)
+def _restore(slave: Slave, content: bytes) -> None:
     state = slave.deserialize(content)
     try:
         slave.restore(state)
