@@ -73,9 +73,7 @@ def _write_all(result: ResultData, folder: Path, formats: Sequence[str]) -> list
     return [*(TABLES[name] for name in TABLES if name in formats), EVENTS, MESSAGES, SUMMARY]
 
 
-def write_results(
-    result: ResultData, directory: str | Path, formats: Sequence[str] = ("csv", "mat")
-) -> dict[str, Path]:
+def write_results(result: ResultData, directory: str | Path, formats: Sequence[str] = ("csv",)) -> dict[str, Path]:
     """Write a result to a folder, replacing what an earlier run left there.
 
     Args:

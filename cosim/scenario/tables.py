@@ -230,4 +230,4 @@ class ReportTable(Table):
     published: dict[str, dict[str, float]] = {}
     independent: dict[str, dict[str, float]] = {}
     notes: list[str] = []
-    tables: list[Literal["csv", "mat", "npy", "parquet", "hdf5", "modelica"]] = ["csv", "mat"]
+    tables: list[Literal["csv", "mat", "npy", "parquet", "hdf5", "modelica"]] = ["csv"]
