@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
 from fmu_observer.event_protocol import EventProtocol
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from fmus.build import Draft
 
 _known: WeakKeyDictionary[HybridSystem, dict[str, str]] = WeakKeyDictionary()
+_keys: WeakKeyDictionary[HybridSystem, dict[str, str | None]] = WeakKeyDictionary()
 
 
 def cached_fmu(
@@ -97,7 +98,7 @@ def cache_entry(
     """
     targets = choose_targets()
     request = fmi_version, preset, protocol, [f"{t.platform.name} {t.compiler.identity()}" for t in targets]
-    key = identity(system, request, code=("fmus",))
+    key = _key(system, request)
     known = _known_content(system, key, repr(request))
     if known is not None:
         path = _place(system, known)
@@ -111,6 +112,15 @@ def cache_entry(
     _keep_content(system, key, repr(request), content)
     path = _place(system, content)
     return CacheEntry(path, None if is_sealed(path) else Draft.of(plan, targets))
+
+
+def _key(system: HybridSystem, request: tuple[Any, ...]) -> str | None:
+    """Identity of a request; a system does not change once it is built, so it is described once in a process."""
+    keys = _keys.setdefault(system, {})
+    text = repr(request)
+    if text not in keys:
+        keys[text] = identity(system, request, code=("fmus",))
+    return keys[text]
 
 
 def _place(system: HybridSystem, content: str) -> Path:

@@ -38,7 +38,11 @@ class Identity:
 
 
 def identities(result: Result) -> list[Identity]:
-    """The models behind a result, by name of the component; none where it does not say (a plain table)."""
+    """The models behind a result, by name of the component; none where it does not say (a plain table).
+
+    Args:
+        result: the run.
+    """
     entries = result.summary.get("components", [])
     return sorted((_identity(entry) for entry in entries if isinstance(entry, Mapping)), key=lambda found: found.name)
 
@@ -68,12 +72,21 @@ def _vendor_file(entry: Mapping[str, Any]) -> Path | None:
 
 
 def file_digest(path: Path) -> str:
-    """SHA-256 of a file."""
+    """SHA-256 of a file.
+
+    Args:
+        path: the file.
+    """
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def same_models(before: Sequence[Identity], now: Sequence[Identity]) -> list[tuple[Identity, Identity]]:
-    """Components that both runs have, with what they were in each."""
+    """Components that both runs have, with what they were in each.
+
+    Args:
+        before: of the baseline.
+        now: of the new run.
+    """
     by_name = {identity.name: identity for identity in now}
     return [(identity, by_name[identity.name]) for identity in before if identity.name in by_name]

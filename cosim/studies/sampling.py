@@ -41,7 +41,11 @@ class Range:
             raise ScenarioError(f"A logarithmic range begins above zero (got {self.low!r}).")
 
     def at(self, share: float) -> float | int:
-        """The point at a share of the range, 0 <= share < 1."""
+        """The point at a share of the range, 0 <= share < 1.
+
+        Args:
+            share: from 0 to 1.
+        """
         if self.kind == "log":
             return exp(log(self.low) + share * (log(self.high) - log(self.low)))
         if self.kind == "whole":
@@ -68,6 +72,12 @@ def variations(
     values: Mapping[str, Iterable[Any] | Range] | Sequence[Mapping[str, Any]], mode: Mode, count: int | None, seed: int
 ) -> list[Variation]:
     """The variations of a sweep, in order; arguments as for `cosim.Scenario.vary`.
+
+    Args:
+        values: values or ranges by name of the setting.
+        mode: ``grid``, ``zip``, ``latin`` or ``random``, see `Scenario.vary`.
+        count: number of runs where they are drawn.
+        seed: of the drawing.
 
     Raises:
         ScenarioError: there are none, a list is missing, or lists of different length stand side by side.

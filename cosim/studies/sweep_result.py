@@ -85,7 +85,11 @@ class SweepResult:
         return list(dict.fromkeys(name for run in self.runs for name in run.measures))
 
     def unit(self, measure: str) -> str | None:
-        """Unit of a measure; None where nobody has said it."""
+        """Unit of a measure; None where nobody has said it.
+
+        Args:
+            measure: name of the measure.
+        """
         return self.units.get(measure) or measure_unit(measure)
 
     def table(self) -> list[dict[str, Any]]:
@@ -128,6 +132,7 @@ class SweepResult:
         Args:
             reference: number of the run to compare with.
             tolerance: and further options, as for `cosim.compare`.
+            options: further options of `cosim.compare`.
 
         Returns:
             A comparison for each other run that has results, by its number.
@@ -162,6 +167,9 @@ class SweepResult:
     def write(self, directory: str | Path) -> dict[str, Path]:
         """Write a results folder for each run (``run_000``, ...), the table as ``index.csv`` and ``index.json``, and a
         picture.
+
+        Args:
+            directory: the folder; created where it does not exist.
 
         Returns:
             Paths by kind.

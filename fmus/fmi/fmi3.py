@@ -235,6 +235,16 @@ class FMI3Slave(FMI3Instance, Slave):
         self.settle()
         return ticked
 
+    def activate(self, clock: str) -> None:
+        """Let a triggered input clock tick, with the values its clocked inputs have.
+
+        Args:
+            clock: its name.
+        """
+        self.enter_event_mode()
+        self.set_clocks([self.events[clock].trigger])
+        self.settle()
+
     def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Slave
         self.guard(f"event '{event.name}'", lambda: self._deliver(event, stamp, payload))
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
-from fmpy.model_description import ModelDescription
+from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmus.fmi.derivatives import directional_derivative
 from fmus.fmi.described import Described
@@ -22,6 +22,7 @@ from fmus.fmi.exact_ports import Values
 from fmus.fmi.native_log import forget
 from fmus.fmi.ports import is_native
 from fmus.fmi.standard import FATAL, MAX_EVENT_ITERATIONS
+from fmus.fmi.types import getter_type
 from fmus.fmi.values import element_reader, element_writer, exact_reader, exact_writer
 
 INSTANTIATING = "instantiate"
@@ -171,6 +172,29 @@ class Instance(Described):
         """
         write = exact_writer(self, self.variables[name])
         return lambda values: self.guard(f"writing {name}", lambda: write(values))
+
+    def read(self, names: Sequence[str]) -> np.ndarray:
+        """Values of numeric scalars and elements.
+
+        Args:
+            names: what is read.
+
+        Returns:
+            The values, shape (len(names),).
+        """
+        values = np.zeros(len(names))
+        self.reader(names, values)()
+        return values
+
+    def get(self, variable: ModelVariable) -> Values:
+        """The value of one variable of any type, by the getter of its type.
+
+        Args:
+            variable: a whole variable.
+        """
+        kind = getter_type(variable.type, self.fmi_version)
+        values: Values = self.guard(f"get{kind} of {variable.name}", exact_reader(self, variable))
+        return values
 
     def directional_derivative(
         self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]

@@ -21,12 +21,12 @@ from cosim.components.fmi3 import FMI3Component
 from cosim.components.loading import load_fmu
 from fmus.check.instance import FmuInstance
 from fmus.check.model import FmuModel, FmuModel2, FmuModel3
-from fmus.check.slave import FmuSlave, FmuSlave2, FmuSlave3, make_slave
+from fmus.check.slave import FmuSlave2, FmuSlave3, make_slave
 from fmus.fmi.description import read_description
 from fmus.fmi.library import MissingFunctionError, _Missing
 from fmus.fmi.native_calls import prepared_call
 
-CHECKED = (FmuInstance, FmuSlave, FmuSlave2, FmuSlave3, FmuModel, FmuModel2, FmuModel3)
+CHECKED = (FmuInstance, FmuSlave2, FmuSlave3, FmuModel, FmuModel2, FmuModel3)
 STEPPED = (Described, Component, FMI1Component, FMI2Component, FMI3Component)
 OWN_WORDS = {"failure", "note"}
 """How an error reads and where messages go is for each side to say."""

@@ -55,6 +55,9 @@ class Reference:
 def find_references(fmu: str | Path) -> list[Reference]:
     """All references in an FMU, in the order of the manifest: experiments first, then results that none of them names.
 
+    Args:
+        fmu: path of the FMU.
+
     Raises:
         FmuLoadError: it is not an FMU.
         BaselineError: a file of the standard in it cannot be read.

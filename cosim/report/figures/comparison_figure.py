@@ -75,7 +75,12 @@ def comparison_figure(
 
 @styled
 def comparison_error_figure(signal: SignalComparison, ax: Axes | None = None) -> Axes:
-    """Result minus reference with the band it may lie in, against time; arguments as for `comparison_figure`."""
+    """Result minus reference with the band it may lie in, against time; arguments as for `comparison_figure`.
+
+    Args:
+        signal: the comparison, with its curves.
+        ax: axes to draw on; None for a figure of its own.
+    """
     ax = axes_or_new(ax)
     curves = signal.curves
     if curves is None:
@@ -138,6 +143,9 @@ def comparison_picture(signal: SignalComparison) -> Figure:
 def worst_window(signal: SignalComparison) -> tuple[float, float] | None:
     """From when to when the worst point is worth a close look [s]; None without curves, or where nothing is the
     worst.
+
+    Args:
+        signal: the comparison, with its curves.
     """
     curves = signal.curves
     if curves is None or not len(curves.reference_time):
@@ -165,7 +173,11 @@ def _centre(finding: Finding) -> tuple[float, float]:
 
 
 def worst_finding(signal: SignalComparison) -> Finding | None:
-    """The first finding that has an instant."""
+    """The first finding that has an instant.
+
+    Args:
+        signal: the comparison of one signal.
+    """
     return next((f for f in signal.findings if np.isfinite(f.time)), None)
 
 

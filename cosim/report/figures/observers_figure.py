@@ -114,7 +114,11 @@ def cost_figure(scores: Sequence[ObserverScore], ax: Axes | None = None) -> Axes
 
 @styled
 def observers_picture(scores: Sequence[ObserverScore]) -> Figure:
-    """Both figures, one above the other."""
+    """Both figures, one above the other.
+
+    Args:
+        scores: the observers, each with its numbers.
+    """
     figure = new_figure((9.0, 5.4 + 0.45 * len(scores)))
     upper, lower = figure.subplots(2, 1, height_ratios=[1.0 + 0.45 * len(scores), 3.6])
     errors_figure(scores, upper)

@@ -66,7 +66,11 @@ def draw_overlays(runs: Sequence[Run], signals: Sequence[str] = ()) -> list[Over
 
 @styled
 def true_speed_figure(runs: Sequence[Run]) -> Figure | None:
-    """True speed of all runs in km/h, or None without any."""
+    """True speed of all runs in km/h, or None without any.
+
+    Args:
+        runs: from `make_runs`.
+    """
     found = [
         (i, run, speed)
         for i, run in enumerate(runs)
@@ -83,7 +87,12 @@ def true_speed_figure(runs: Sequence[Run]) -> Figure | None:
 
 @styled
 def error_overlay(runs: Sequence[Run], quantity: Literal["speed", "position"]) -> Figure | None:
-    """Errors of speed [m/s] or position [m], a panel for each observer, or None without any."""
+    """Errors of speed [m/s] or position [m], a panel for each observer, or None without any.
+
+    Args:
+        runs: from `make_runs`.
+        quantity: ``speed`` or ``position``.
+    """
     unit = "m/s" if quantity == "speed" else "m"
     panels = _panels(runs, lambda run, observer: estimation_error(run.result, run.spec, observer, quantity) is not None)
     if not panels:
@@ -99,7 +108,12 @@ def error_overlay(runs: Sequence[Run], quantity: Literal["speed", "position"]) -
 
 @styled
 def estimate_overlay(runs: Sequence[Run], signal: Literal["slip", "adhesion_force"]) -> Figure | None:
-    """Estimates of the slip [%] or the adhesion force [kN], a panel for each observer, or None without any."""
+    """Estimates of the slip [%] or the adhesion force [kN], a panel for each observer, or None without any.
+
+    Args:
+        runs: from `make_runs`.
+        signal: ``slip`` or ``adhesion_force``.
+    """
     factor, text = (100.0, "Slip [%]") if signal == "slip" else (1e-3, "Adhesion force [kN]")
     panels = _panels(runs, lambda run, observer: estimate(run.result, observer, signal) is not None)
     if not panels:
@@ -124,7 +138,12 @@ def estimate_overlay(runs: Sequence[Run], signal: Literal["slip", "adhesion_forc
 
 @styled
 def signal_figure(runs: Sequence[Run], name: str) -> Figure | None:
-    """One recorded signal of all runs in its SI unit, or None where no run has it."""
+    """One recorded signal of all runs in its SI unit, or None where no run has it.
+
+    Args:
+        runs: from `make_runs`.
+        name: name of the signal.
+    """
     found = [(i, run) for i, run in enumerate(runs) if recorded(run.result, name) is not None]
     if not found:
         return None

@@ -35,7 +35,11 @@ def differences(runs: Sequence[Run]) -> list[list[str]]:
 
 
 def layout_note(runs: Sequence[Run]) -> str:
-    """Whether the balises of all runs stand at the same places; empty where no run has any."""
+    """Whether the balises of all runs stand at the same places; empty where no run has any.
+
+    Args:
+        runs: from `make_runs`.
+    """
     passed = [{e.identity: e for e in run.result.events if e.kind != "false"} for run in runs]
     if not any(passed):
         return ""
