@@ -9,7 +9,8 @@ from pathlib import Path
 from cosim.errors import OutputError, nearest
 from cosim.results.data import ResultData
 from cosim.results.events_file import EVENTS_SUFFIX, read_events
-from cosim.results.folder import SUMMARY, TABLES, read_results
+from cosim.results.folder import SUMMARY, read_results
+from cosim.results.formats.catalogue import table_files
 from cosim.results.formats.columns import check_time
 from cosim.results.formats.foreign_csv import read_foreign_csv
 from cosim.results.formats.foreign_mat import read_foreign_mat
@@ -40,7 +41,7 @@ def load_result(path: str | Path) -> Result:
     if not source.exists():
         raise OutputError(f"There is no {source}; {_neighbours(source)}")
     folder = source.parent
-    if source.name in TABLES.values() and (folder / SUMMARY).is_file():
+    if source.name in table_files().values() and (folder / SUMMARY).is_file():
         return Result.of(read_results(folder, table=source.name))
     try:
         result = _reader(source)(source)
@@ -60,7 +61,7 @@ def load_result(path: str | Path) -> Result:
 def _folder(folder: Path) -> ResultData:
     if (folder / SUMMARY).is_file():
         return read_results(folder)
-    tables = [name for name in TABLES.values() if (folder / name).is_file()]
+    tables = [name for name in table_files().values() if (folder / name).is_file()]
     if tables:
         raise OutputError(
             f"{folder} is not a results folder: {SUMMARY} is missing. For the table alone: {folder / tables[0]}."

@@ -22,7 +22,8 @@ from cosim.errors import OutputError
 from cosim.results.block_file import BLOCK_FILE, BlockFile
 from cosim.results.data import BaliseRecord, SignalInfo
 from cosim.results.events_file import record_row, write_events
-from cosim.results.folder import EVENTS, LAYOUT, MESSAGES, SUMMARY, TABLES, check_writable
+from cosim.results.folder import EVENTS, LAYOUT, MESSAGES, SUMMARY, check_writable
+from cosim.results.formats.catalogue import table_files, usual_file
 from cosim.results.formats.growing_npy import growing_header
 from cosim.results.row_file import RowFile
 from cosim.results.si import UnitOf, convert, described, foreign_units
@@ -81,7 +82,7 @@ class Stream:
         Raises:
             OutputError: there is no space.
         """
-        self._file = _StreamFile(self.directory / TABLES["npy"], dtype, rows, self)
+        self._file = _StreamFile(self.directory / usual_file("npy"), dtype, rows, self)
         return self._file
 
     def block(self, rows: int) -> BlockFile:
@@ -137,7 +138,7 @@ class Stream:
         """
         folder = self.directory
         try:
-            for name in (SUMMARY, "report.html", BLOCK_FILE, *TABLES.values()):
+            for name in (SUMMARY, "report.html", BLOCK_FILE, *table_files().values()):
                 (folder / name).unlink(missing_ok=True)
             write_events(folder / EVENTS, ())
             write_messages(folder / MESSAGES, ())

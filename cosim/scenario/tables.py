@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, PlainValidator, Tag, model_validator
+from pydantic import AfterValidator, Discriminator, Field, PlainValidator, Tag, model_validator
 
+from cosim.errors import nearest
+from cosim.results.formats.catalogue import FORMATS
 from cosim.scenario.model_name import Model
 from cosim.table import Name, Table
 from fmu_observer.event_protocol import LatePolicy
@@ -206,6 +208,12 @@ ConnectionItem = Annotated[
 ]
 
 
+def _format(name: str) -> str:
+    if name not in FORMATS:
+        raise ValueError(f"unknown result format {name!r}; {nearest(name, FORMATS)}")
+    return name
+
+
 class PhaseTable(Table):
     """A part of the run to be judged on its own."""
 
@@ -230,4 +238,4 @@ class ReportTable(Table):
     published: dict[str, dict[str, float]] = {}
     independent: dict[str, dict[str, float]] = {}
     notes: list[str] = []
-    tables: list[Literal["csv", "mat", "npy", "parquet", "hdf5", "modelica"]] = ["csv", "mat"]
+    tables: list[Annotated[str, AfterValidator(_format)]] = ["csv"]

@@ -14,6 +14,7 @@ from cosim.evaluation.numbers import number
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.drawing import legend_above, shade_zones, time_axis
+from cosim.report.figures.panel import Panel
 from cosim.results.result import Result
 
 SHOWN = 3.0  # limits above this many largest gaps are named, not drawn
@@ -85,3 +86,23 @@ def gap_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes
     time_axis(ax, result)
     legend_above(ax)
     return ax
+
+
+class GapsPanel(Panel):
+    """Sampling gaps."""
+
+    name = "gaps"
+    title = "Sampling gaps"
+    caption = (
+        "Time between consecutive balises that were used, beside the largest varying gap each observer is "
+        "certified for."
+    )
+    place = 6
+
+    @staticmethod
+    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
+        return gap_figure(result, spec, ax)
+
+    @staticmethod
+    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: ARG004, D102 - see Panel
+        return len(sampling_gaps(result)[1]) > 0

@@ -17,8 +17,9 @@ from cosim.errors import OutputError
 from cosim.results.data import ResultData, SignalInfo
 from cosim.results.formats.about import with_about
 from cosim.results.formats.columns import result_of_columns
+from cosim.results.formats.format import Format
 from cosim.results.formats.mat_file import read_mat
-from cosim.results.formats.modelica_file import ABOUT, LARGEST, split_description
+from cosim.results.formats.modelica_file import ABOUT, LARGEST, split_description, write_modelica
 from cosim.results.table_layout import table_dtype
 
 TEXTS = 3  # in ``dataInfo``: a text over time, in the matrix ``stringData``
@@ -178,3 +179,19 @@ def _vectors(source: str, content: Mapping[str, Any]) -> ResultData:
     kept = {n: v for n, v in vectors.items() if len(v) == len(vectors[time])}
     names = ["time" if name == time else name for name in kept]
     return result_of_columns(source, names, [np.asarray(v, np.float64) for v in kept.values()], {})
+
+
+class ModelicaFormat(Format):
+    """MAT 4 as Dymola and OpenModelica write it."""
+
+    name = "modelica"
+    endings = (".modelica.mat",)
+    speed = -2
+
+    @staticmethod
+    def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format
+        write_modelica(path, result)
+
+    @staticmethod
+    def read(path: Path) -> ResultData:  # noqa: D102 - see Format
+        return read_modelica(path)

@@ -16,6 +16,7 @@ import scipy
 
 from cosim.results.data import BaliseRecord, ResultData, SignalInfo
 from cosim.results.events_file import COLUMNS, NUMBERS, record_from_row, record_row
+from cosim.results.formats.format import Format
 from cosim.results.formats.matlab_names import matlab_names
 from cosim.results.table_layout import column_names, table_dtype
 
@@ -114,3 +115,18 @@ def read_mat(path: str | Path) -> ResultData:
     for name, column in zip(names, columns, strict=True):
         table[name] = np.ravel(column)
     return ResultData(table, signals, events)
+
+
+class MatFormat(Format):
+    """MATLAB 5."""
+
+    name = "mat"
+    endings = (".mat",)
+
+    @staticmethod
+    def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format
+        write_mat(path, result)
+
+    @staticmethod
+    def read(path: Path) -> ResultData:  # noqa: D102 - see Format
+        return read_mat(path)
