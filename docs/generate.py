@@ -22,9 +22,10 @@ import fmu_observer
 from cosim import Outcome, Scenario
 from cosim.evaluation.error_table import error_text
 from cosim.evaluation.metrics import phase_metrics
+from cosim.expectations.registry import EXPECTATIONS
 from cosim.report.figures.main_picture import main_picture
-from cosim.scenario import expectation_tables as expectations
 from cosim.scenario import schema, tables
+from cosim.scenario.model_name import ModelName
 
 DOCS = Path(__file__).parent
 ROOT = DOCS.parent
@@ -150,9 +151,10 @@ def key_table(table: str) -> str:
     """
     model, words = (
         (schema_tables() | expectation_tables())[table],
-        tomllib.loads(WORDS.read_text(encoding="utf-8"))[table],
+        tomllib.loads(WORDS.read_text(encoding="utf-8")).get(table, {}),
     )
     fields: Mapping[str, FieldInfo] = {info.alias or name: info for name, info in model.model_fields.items()}
+    words = {name: ("", info.description) for name, info in fields.items() if info.description} | words
     if set(fields) != set(words):
         bare, extra = sorted(set(fields) - set(words)), sorted(set(words) - set(fields))
         raise ValueError(f"{WORDS.name}, [{table}]: keys without words {bare}, words without key {extra}")
@@ -180,16 +182,21 @@ def schema_tables() -> dict[str, Any]:
 
 def expectation_tables() -> dict[str, Any]:
     """The tables of expectations by the name they have on their page."""
-    return {
-        "expect_error": expectations.ErrorExpectation,
-        "expect_difference": expectations.DifferenceExpectation,
-        "expect_signal": expectations.SignalExpectation,
-        "expect_on": expectations.OnExpectation,
-        "expect_off": expectations.OffExpectation,
-        "expect_telegrams": expectations.TelegramsExpectation,
-        "expect_certificate": expectations.CertificateExpectation,
-        "expect_warnings": expectations.WarningsExpectation,
-    }
+    return {f"expect_{'error' if name.endswith('_error') else name}": table for name, table in EXPECTATIONS.items()}
+
+
+def on_page(table: str) -> bool:
+    """Whether the page of expectations has a place for this table; those of later kinds stand at its end."""
+    return f"<!-- generated: {table} -->" in (ROOT / "docs/expectations.md").read_text(encoding="utf-8")
+
+
+def all_expectations() -> str:
+    """All kinds with what they demand, and the keys of those that have no place of their own on the page."""
+    rows = ["| `check` | demands |", "|---|---|"]
+    for name, kind in sorted(EXPECTATIONS.items()):
+        rows.append(f"| `{name}` | {' '.join(str(kind.__doc__).split())} |")
+    others = [f"\nKeys of `{name}`:\n\n{key_table(name)}" for name in expectation_tables() if not on_page(name)]
+    return "\n".join([*rows, "", *others])
 
 
 def _default(info: FieldInfo) -> str:
@@ -216,7 +223,7 @@ def _limit(bound: Gt | Ge | Le) -> str:
     return f">= {bound.ge:g}" if isinstance(bound, Ge) else f"<= {bound.le:g}"  # type: ignore[str-format]
 
 
-SIMPLE = {float: "number", int: "whole number", str: "text", bool: "true or false"}
+SIMPLE = {float: "number", int: "whole number", str: "text", ModelName: "text", bool: "true or false"}
 
 
 def _kind(annotation: Any) -> str:
@@ -247,7 +254,8 @@ PARTS: dict[tuple[str, str], Callable[[], str]] = {
     ("README.md", "observers"): certificate_table,
     ("docs/certificates.md", "observers"): certificate_table,
     **{("docs/scenario_files.md", name): schema_page(name) for name in schema_tables()},
-    **{("docs/expectations.md", name): schema_page(name) for name in expectation_tables()},
+    **{("docs/expectations.md", name): schema_page(name) for name in expectation_tables() if on_page(name)},
+    ("docs/expectations.md", "expectations"): all_expectations,
 }
 
 if __name__ == "__main__":

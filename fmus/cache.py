@@ -8,30 +8,26 @@ need not be traced to find its FMU; code that changed without changing the equat
 
 from __future__ import annotations
 
-import hashlib
-import inspect
-import sys
-from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
-from importlib.resources import files
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
-import casadi as ca
-
-from fmu_observer.description import FmiVersion
 from fmu_observer.event_protocol import EventProtocol
-from fmus.build import Draft, Plan, plan_fmu, runtime_sources, standard_headers
 from fmus.toolchain.platforms import Platform
-from fmus.toolchain.targets import Target, choose_targets
+from fmus.toolchain.targets import choose_targets
 from plant_models.disk_cache.entries import keep, recall
 from plant_models.disk_cache.files import is_sealed, seal
 from plant_models.disk_cache.folder import cache_folder
 from plant_models.disk_cache.identity import identity
 from plant_models.hybrid import HybridSystem
 
+if TYPE_CHECKING:
+    from fmu_observer.description import FmiVersion
+    from fmus.build import Draft
+
 _known: WeakKeyDictionary[HybridSystem, dict[str, str]] = WeakKeyDictionary()
+_keys: WeakKeyDictionary[HybridSystem, dict[str, str | None]] = WeakKeyDictionary()
 
 
 def cached_fmu(
@@ -102,17 +98,29 @@ def cache_entry(
     """
     targets = choose_targets()
     request = fmi_version, preset, protocol, [f"{t.platform.name} {t.compiler.identity()}" for t in targets]
-    key = identity(system, request, code=("fmus",))
+    key = _key(system, request)
     known = _known_content(system, key, repr(request))
     if known is not None:
         path = _place(system, known)
         if is_sealed(path):
             return CacheEntry(path)
+    from fmus.build import Draft, plan_fmu  # noqa: PLC0415 - CasADi only for those who trace
+    from fmus.content_key import content_key  # noqa: PLC0415
+
     plan = plan_fmu(system, fmi_version, preset, protocol)
     content = content_key(plan, targets)
     _keep_content(system, key, repr(request), content)
     path = _place(system, content)
     return CacheEntry(path, None if is_sealed(path) else Draft.of(plan, targets))
+
+
+def _key(system: HybridSystem, request: tuple[Any, ...]) -> str | None:
+    """Identity of a request; a system does not change once it is built, so it is described once in a process."""
+    keys = _keys.setdefault(system, {})
+    text = repr(request)
+    if text not in keys:
+        keys[text] = identity(system, request, code=("fmus",))
+    return keys[text]
 
 
 def _place(system: HybridSystem, content: str) -> Path:
@@ -132,45 +140,3 @@ def _keep_content(system: HybridSystem, key: str | None, request: str, content: 
         _known.setdefault(system, {})[request] = content
     else:
         keep("fmu", key, content)
-
-
-def content_key(plan: Plan, targets: Sequence[Target]) -> str:
-    """Digest of all that decides the bytes of an FMU. The equations go in as CasADi's graph, of which the C follows.
-
-    Args:
-        plan: of the FMU, see `plan_fmu`. targets: platforms, each with its compiler.
-    """
-    digest = hashlib.sha256()
-    parts = [
-        plan.equations.digest(),
-        plan.description_xml(),
-        repr(plan.system.start_state(plan.preset).tolist()),
-        repr(plan.system.start_parameters(plan.preset).tolist()),
-        *(inspect.getdoc(cls) or "" for cls in type(plan.system).__mro__),  # the documentation repeats them
-        plan.system.source,
-        repr(plan.system.presets),
-        repr(plan.system.resources),
-        _tool_digest(),
-        *(f"{target.platform.name} {target.compiler.identity()}" for target in targets),
-    ]
-    for part in parts:
-        digest.update(part.encode() + b"\0")
-    return digest.hexdigest()[:32]
-
-
-@cache
-def _tool_digest() -> str:
-    """Of the runtime in C, the headers of FMI, this package's own code, and CasADi's version."""
-    digest = hashlib.sha256(f"{ca.CasadiMeta.version()} {sys.platform}".encode())
-    for name, text in sorted((_own_files() | runtime_sources() | standard_headers(2) | standard_headers(3)).items()):
-        digest.update(name.encode() + b"\0" + text + b"\0")
-    return digest.hexdigest()
-
-
-def _own_files() -> dict[str, bytes]:
-    """What writes the FMU, and what checks the gains that its documentation tells of."""
-    rooms = ("content", "toolchain", "documentation", "documentation/templates", "licenses")
-    kinds = (".py", ".txt", ".j2", ".css")
-    folders = (files("fmus"), *(files("fmus") / room for room in rooms), files("fmu_observer") / "certificates")
-    entries = [(folder, entry) for folder in folders for entry in folder.iterdir() if entry.name.endswith(kinds)]
-    return {f"{folder.name}/{entry.name}": entry.read_bytes() for folder, entry in entries}

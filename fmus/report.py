@@ -13,6 +13,7 @@ from fmpy.validation import validate_fmu
 
 from fmus.fmi.binaries import LIBRARY_SUFFIXES, why_not_here
 from fmus.fmi.description import read_description
+from fmus.fmi.types import enumeration_items
 from fmus.toolchain.machine_code import platforms_of_library
 from fmus.toolchain.platforms import host_platform
 
@@ -171,7 +172,7 @@ def _variables(variables: Iterable[ModelVariable]) -> list[str]:
 
 
 def _value(variable: ModelVariable) -> str:
-    items = {str(item.value): item.name for item in getattr(variable.declaredType, "items", None) or ()}
+    items = {str(number): item for item, number in enumeration_items(variable).items()}
     start = "" if variable.start is None else f" = {items.get(str(variable.start), variable.start)}"
     if items:
         return f"{variable.name}{start} [{', '.join(items.values())}]"

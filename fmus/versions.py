@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
 PACKAGES = ("fmu-observer", "fmpy", "numpy", "scipy", "casadi")
@@ -10,6 +11,11 @@ PACKAGES = ("fmu-observer", "fmpy", "numpy", "scipy", "casadi")
 
 def versions() -> dict[str, str]:
     """Versions of Python and the packages, and the platform, by name."""
+    return dict(_versions())
+
+
+@cache
+def _versions() -> dict[str, str]:
     return {"python": platform.python_version(), "platform": platform.platform(), **{p: _version(p) for p in PACKAGES}}
 
 
@@ -20,6 +26,7 @@ def version_text() -> str:
     return f"{', '.join(f'{name} {number}' for name, number in known.items())}, Python {python} on {system}"
 
 
+@cache  # reading it takes a millisecond, and it stays
 def _version(package: str) -> str:
     try:
         return version(package)

@@ -1,7 +1,8 @@
 """Registries: the members of one kind by name, found without importing them and loaded when they are asked for.
 
-A member is a class that states its own name, ``name = "locomotive"``, in a file of one of the registry's rooms: a new
-file is a new member. Installed packages bring members by entry points, and a program adds its own by assignment.
+A member is a class that states its own name, ``name = "locomotive"`` or ``check: Literal["signal"]``, in a file of one
+of the registry's rooms: a new file is a new member. Installed packages bring members by entry points, and a program
+adds its own by assignment.
 Standard library only.
 """
 
@@ -19,8 +20,10 @@ from typing import Any, Generic, TypeVar
 
 T = TypeVar("T")
 
-NAMED_CLASS = re.compile(r'^(?:class (\w+)|    name(?:: [^=\n]+)? = "(\w+)")', re.MULTILINE)
-"""A class at the top of a file, and the name that it states."""
+NAMED_CLASS = re.compile(
+    r'^(?:class (\w+)|    (?:name(?:: [^=\n]+)? = |check: Literal\[)((?:"[^"\n]+"(?:, )?)+))', re.M
+)
+"""A class at the top of a file, and the name that it states; a table states it, or several, in ``check``."""
 
 
 class RegistryError(ValueError):
@@ -118,10 +121,10 @@ class Registry(MutableMapping[str, T], Generic[T]):
         for room in self.rooms:
             for path in files_of(room):
                 cls = ""
-                for found, name in NAMED_CLASS.findall(path.read_text(encoding="utf-8")):
+                for found, names in NAMED_CLASS.findall(path.read_text(encoding="utf-8")):
                     cls = found or cls
-                    if name and cls:
-                        target = f"{room}.{path.stem}:{cls}"
+                    target = f"{room}.{path.stem}:{cls}"
+                    for name in re.findall('"(.+?)"', names) if cls else ():
                         yield Member(name, target, f"this package ({target})", room)
 
     def _announced(self) -> Iterator[Member]:

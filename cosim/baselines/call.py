@@ -50,8 +50,15 @@ class Call:
         """Run what a test names.
 
         Args:
-            what, folder: as for `make_subject`, as are the further arguments. path: of the baseline.
-            signals, every: as for `make_draft`. tolerance, tolerances, ignore: as for `tolerances_of`.
+            what: scenario, FMU, outcome or result, see `make_subject`.
+            folder: of the test, for relative paths.
+            path: of the baseline.
+            signals: names or patterns of what is kept; None for all.
+            every: least spacing of the rows [s]; None for at most about 2000 rows.
+            tolerance: what is allowed of signals that are not named otherwise.
+            tolerances: what is allowed, by name or pattern.
+            ignore: names or patterns of what is not compared.
+            arguments: further arguments of `make_subject`.
 
         Raises:
             CosimError: tolerances, names or the run itself are not as they should be.
@@ -87,7 +94,11 @@ class Call:
 
     @staticmethod
     def worst(found: Comparison) -> list[str]:
-        """What differs, the worst first, in lines."""
+        """What differs, the worst first, in lines.
+
+        Args:
+            found: what was found.
+        """
         lines = [_line(signal) for signal in found.failed]
         lines += [difference.text for difference in found.events.differences]
         return [*lines[:WORST], *found.notes]

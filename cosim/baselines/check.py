@@ -70,13 +70,24 @@ def check(
 def regression(
     comparison: Comparison, outcome: Outcome | None, actual: Result, baseline: Baseline | None
 ) -> Regression:
-    """A comparison with the run behind it."""
+    """A comparison with the run behind it.
+
+    Args:
+        comparison: what was found.
+        outcome: the run; None for a result of an earlier one.
+        actual: what was compared with the baseline.
+        baseline: what it was held against; None where it was made now.
+    """
     given: dict[str, Any] = {entry.name: getattr(comparison, entry.name) for entry in fields(Comparison)}
     return Regression(**given, outcome=outcome, actual=actual, baseline=baseline)
 
 
 def demand_same_models(result: Result, baseline: Baseline) -> None:
     """Refuse a result of another model; the same model with another GUID is a new delivery.
+
+    Args:
+        result: the run.
+        baseline: the baseline.
 
     Raises:
         BaselineError: a component is of another model; says both.

@@ -29,7 +29,11 @@ DEFAULTS: Mapping[str, Any] = {
 
 
 def header_data(header: Header, folder: Path) -> dict[str, Any]:
-    """Plain data of a header for a file in `folder`; no absolute paths, no time of day."""
+    """Plain data of a header for a file in `folder`; no absolute paths, no time of day.
+
+    Args:
+        header: what a baseline says of itself.
+    """
     return {
         "format": FORMAT,
         "version": header.version,
@@ -53,7 +57,11 @@ def _short(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def tolerances_data(tolerances: Tolerances) -> dict[str, Any]:
-    """Plain data of tolerances."""
+    """Plain data of tolerances.
+
+    Args:
+        tolerances: what is allowed, signal by signal.
+    """
     return {
         "default": asdict(tolerances.default),
         "signals": {name: asdict(given) for name, given in tolerances.by_signal.items()},
@@ -64,6 +72,9 @@ def tolerances_data(tolerances: Tolerances) -> dict[str, Any]:
 def tolerances_from(data: Mapping[str, Any]) -> Tolerances:
     """Tolerances from plain data.
 
+    Args:
+        data: plain data, as from a JSON file.
+
     Raises:
         ComparisonError: they cannot be.
     """
@@ -72,6 +83,10 @@ def tolerances_from(data: Mapping[str, Any]) -> Tolerances:
 
 def header_from(data: Any, folder: Path) -> Header:
     """The header that `header_data` made plain.
+
+    Args:
+        data: plain data, as from a JSON file.
+        folder: folder of the file; paths are relative to it.
 
     Raises:
         BaselineError: it is none, of another version, or something is missing; without the name of the file.
@@ -115,7 +130,11 @@ def _known(kind: Any, entry: Mapping[str, Any]) -> Any:
 
 
 def is_newer(version: str) -> bool:
-    """Whether a header was written by a newer version of the same layout."""
+    """Whether a header was written by a newer version of the same layout.
+
+    Args:
+        version: of the layout that the header names.
+    """
     return _numbers(version) > _numbers(VERSION)
 
 

@@ -94,7 +94,12 @@ def make_draft(
 
 
 def resolved(tolerances: Tolerances, names: Sequence[str]) -> Tolerances:
-    """Tolerances with the component put in front of names that stand without, where there is one component only."""
+    """Tolerances with the component put in front of names that stand without, where there is one component only.
+
+    Args:
+        tolerances: what is allowed, signal by signal.
+        names: of the signals.
+    """
     by_signal = {resolve(pattern, names): given for pattern, given in tolerances.by_signal.items()}
     return replace(
         tolerances, by_signal=by_signal, ignore=tuple(resolve(pattern, names) for pattern in tolerances.ignore)
@@ -115,7 +120,11 @@ def _span(result: Result) -> dict[str, float]:
 
 
 def versions_of(result: Result) -> dict[str, str]:
-    """Versions as the run tells them, without what differs between two machines of one kind."""
+    """Versions as the run tells them, without what differs between two machines of one kind.
+
+    Args:
+        result: the run.
+    """
     told: Mapping[str, Any] = result.summary.get("versions") or {}
     kept = {name: str(value) for name, value in told.items() if name != "platform"}
     return kept | {"platform": f"{sys.platform} {platform.machine()}"}
@@ -137,7 +146,11 @@ def _table_text(result: Result, rows: np.ndarray, tolerances: Tolerances) -> str
 
 
 def value_range(values: np.ndarray) -> float:
-    """Largest minus smallest finite value of a signal; its size where it is constant; 0 where nothing is finite."""
+    """Largest minus smallest finite value of a signal; its size where it is constant; 0 where nothing is finite.
+
+    Args:
+        values: in the unit of the signal, shape (rows,).
+    """
     finite = values[np.isfinite(values)]
     if not finite.size:
         return 0.0
@@ -146,7 +159,12 @@ def value_range(values: np.ndarray) -> float:
 
 
 def events_text(result: Result, tolerance: Tolerance) -> str:
-    """Telegrams as CSV, one a line."""
+    """Telegrams as CSV, one a line.
+
+    Args:
+        result: with the telegrams.
+        tolerance: what is allowed of telegrams; it decides how many digits are written.
+    """
     allowed = telegram_limits(result.events, tolerance, float(result.time[-1] - result.time[0]))
     room = {**dict.fromkeys(TIMES, allowed.time), **allowed.payload}
     lines = io.StringIO()
@@ -166,5 +184,10 @@ def _event_cell(value: float | str, allowed: float) -> str:
 
 
 def text_digest(table: str, events: str) -> str:
-    """Digest of the tables, the same whatever line endings they were given on the way."""
+    """Digest of the tables, the same whatever line endings they were given on the way.
+
+    Args:
+        table: the rows as CSV.
+        events: the telegrams as CSV.
+    """
     return hashlib.sha256((table + "\0" + events).replace("\r\n", "\n").encode()).hexdigest()

@@ -33,14 +33,22 @@ def parts(path: Path) -> dict[str, Path]:
 
 
 def baseline_path(path: str | Path) -> Path:
-    """The JSON file of a baseline, whichever of its files was named."""
+    """The JSON file of a baseline, whichever of its files was named.
+
+    Args:
+        path: the JSON file, its table or its telegrams.
+    """
     path = Path(path)
     name = path.name.removesuffix(".json").removesuffix(".csv").removesuffix(".events")
     return path.with_name(name + ".json")
 
 
 def is_baseline(path: str | Path) -> bool:
-    """Whether a path is that of a baseline: a JSON file that says so. Nothing is checked beyond that."""
+    """Whether a path is that of a baseline: a JSON file that says so. Nothing is checked beyond that.
+
+    Args:
+        path: the file.
+    """
     path = Path(path)
     if path.suffix != ".json" or not path.is_file():
         return False
@@ -74,7 +82,12 @@ def write_baseline(
 
 
 def write_draft(draft: Draft, path: str | Path) -> Change:
-    """Write a draft, see `write_baseline`."""
+    """Write a draft, see `write_baseline`.
+
+    Args:
+        draft: what the files are to hold.
+        path: the JSON file; the tables stand beside it.
+    """
     path = baseline_path(path)
     change = change_by(draft, path)
     if change != "unchanged":
@@ -83,7 +96,11 @@ def write_draft(draft: Draft, path: str | Path) -> Change:
 
 
 def draft_texts(draft: Draft, path: Path) -> dict[str, str]:
-    """What each file of a baseline at `path` is to hold."""
+    """What each file of a baseline at `path` is to hold.
+
+    Args:
+        draft: what the files are to hold.
+    """
     data = jsonable(header_data(draft.header, path.parent))
     text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     return {"header": text, "table": draft.table, "events": draft.events}
@@ -91,6 +108,10 @@ def draft_texts(draft: Draft, path: Path) -> dict[str, str]:
 
 def write_texts(texts: dict[str, str], path: Path) -> None:
     """Write the files of a baseline, the header last; an empty text removes its file.
+
+    Args:
+        texts: content by name of the file.
+        path: the JSON file.
 
     Raises:
         OutputError: a file cannot be written, or a table that belongs to no baseline is in the way.
@@ -116,6 +137,9 @@ def write_texts(texts: dict[str, str], path: Path) -> None:
 def demand_free(path: Path) -> None:
     """Refuse to write a table over one that belongs to no baseline: somebody's inputs, say.
 
+    Args:
+        path: of the table.
+
     Raises:
         OutputError: there is one.
     """
@@ -129,7 +153,12 @@ def demand_free(path: Path) -> None:
 
 
 def change_by(draft: Draft, path: Path) -> Change:
-    """What writing a draft would do. Other versions alone are no change: nothing else is to be seen in them."""
+    """What writing a draft would do. Other versions alone are no change: nothing else is to be seen in them.
+
+    Args:
+        draft: what the files are to hold.
+        path: the JSON file.
+    """
     if not path.exists():
         return "new"
     former = {kind: _text(file) for kind, file in parts(path).items()}
@@ -183,7 +212,11 @@ def read_baseline(path: str | Path) -> Baseline:
 
 
 def summary_of(header: Header) -> dict[str, Any]:
-    """What a run would say of itself, as far as the header tells."""
+    """What a run would say of itself, as far as the header tells.
+
+    Args:
+        header: what the baseline says of itself.
+    """
     components = [
         {key: getattr(entry, key) for key in entry.__dataclass_fields__} | {"source": entry.file}
         for entry in header.components

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.results.result import Result
+from plant_models.disk_cache.folder import cache_folder
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,11 @@ class Identity:
 
 
 def identities(result: Result) -> list[Identity]:
-    """The models behind a result, by name of the component; none where it does not say (a plain table)."""
+    """The models behind a result, by name of the component; none where it does not say (a plain table).
+
+    Args:
+        result: the run.
+    """
     entries = result.summary.get("components", [])
     return sorted((_identity(entry) for entry in entries if isinstance(entry, Mapping)), key=lambda found: found.name)
 
@@ -60,8 +65,6 @@ def _identity(entry: Mapping[str, Any]) -> Identity:
 
 def _vendor_file(entry: Mapping[str, Any]) -> Path | None:
     """The FMU that a user brought; None for blocks and for shipped models, which are built anew on every machine."""
-    from plant_models.disk_cache.folder import cache_folder  # noqa: PLC0415 - only where a result is at hand
-
     path = Path(str(entry.get("source") or ""))
     if entry.get("kind") != "FMU" or not path.is_file() or cache_folder() in path.parents:
         return None
@@ -69,12 +72,21 @@ def _vendor_file(entry: Mapping[str, Any]) -> Path | None:
 
 
 def file_digest(path: Path) -> str:
-    """SHA-256 of a file."""
+    """SHA-256 of a file.
+
+    Args:
+        path: the file.
+    """
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def same_models(before: Sequence[Identity], now: Sequence[Identity]) -> list[tuple[Identity, Identity]]:
-    """Components that both runs have, with what they were in each."""
+    """Components that both runs have, with what they were in each.
+
+    Args:
+        before: of the baseline.
+        now: of the new run.
+    """
     by_name = {identity.name: identity for identity in now}
     return [(identity, by_name[identity.name]) for identity in before if identity.name in by_name]

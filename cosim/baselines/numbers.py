@@ -48,7 +48,12 @@ def number_text(value: float, decimals: int | None) -> str:
 
 
 def column_text(values: Iterable[float], decimals: int | None) -> list[str]:
-    """A column of numbers as text, see `number_text`."""
+    """A column of numbers as text, see `number_text`.
+
+    Args:
+        values: the numbers.
+        decimals: digits behind the point; None for as many as they need.
+    """
     return [number_text(value, decimals) for value in values]
 
 

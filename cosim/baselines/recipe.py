@@ -56,6 +56,9 @@ class Recipe:
     def from_data(cls, data: Mapping[str, Any], folder: Path) -> Recipe:
         """The recipe that `to_data` wrote into a file in `folder`.
 
+        Args:
+            data: plain data, as from a JSON file.
+
         Raises:
             BaselineError: it is none.
         """
@@ -70,6 +73,9 @@ class Recipe:
 
     def of(self, fmu: str | Path) -> Recipe:
         """The same with another FMU.
+
+        Args:
+            fmu: its path.
 
         Raises:
             BaselineError: it is not an FMU alone.

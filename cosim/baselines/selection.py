@@ -20,6 +20,9 @@ def resolve(pattern: str, names: Sequence[str]) -> str:
     """A name or pattern as it fits the signals `names`: with the component in front where it stands without.
 
     ``speed`` means ``train.speed`` in a run of the component ``train`` alone.
+
+    Args:
+        pattern: name, or pattern such as ``train.*``.
     """
     if any(pattern == name or fnmatchcase(name, pattern) for name in names):
         return pattern

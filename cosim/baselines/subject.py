@@ -150,6 +150,10 @@ def make_subject(
 def scenario_source(what: str | Path, folder: Path) -> str:
     """A scenario file beside the user's own as an absolute path, or the name of a shipped scenario.
 
+    Args:
+        what: file or name.
+        folder: folder of the user's own file.
+
     Raises:
         ScenarioError: there is neither.
     """

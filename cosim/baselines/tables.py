@@ -66,6 +66,11 @@ def _numbers(row: list[str], count: int, file: Path, line: int) -> list[float]:
 def parse_events(text: str, header: Header, file: Path) -> list[BaliseRecord]:
     """The telegrams of a baseline.
 
+    Args:
+        text: content of the file.
+        header: what the baseline says of itself.
+        file: its path, for messages.
+
     Raises:
         BaselineError: it is cut off, a column is missing, or a cell cannot be read.
     """

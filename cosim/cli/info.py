@@ -9,6 +9,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+import fmpy
+
 from cosim.components.loading import read_description, runs_here
 from cosim.scenario.package_names import is_package
 from cosim.ssp.describe import describe_package, text_of_package
@@ -72,8 +74,6 @@ def describe_file(path: Path) -> dict[str, Any]:
     Raises:
         FmuLoadError: the file is missing or not an FMU.
     """
-    import fmpy  # noqa: PLC0415 - only here
-
     description = read_description(path, "info")
     interfaces = {
         "coSimulation": "co-simulation",

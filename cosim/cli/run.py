@@ -22,6 +22,7 @@ from cosim.results.summary_file import jsonable
 from cosim.results.unfinished import SPARE
 from cosim.scenario.outcome import Outcome
 from cosim.simulation.scenario import Scenario
+from cosim.studies.seed_file import SEEDS_CSV, seed_file
 from cosim.studies.seeds import seed_study
 from fmus.plain import plain
 
@@ -105,12 +106,14 @@ def execute(options: argparse.Namespace) -> int:
     outcome, paths = results.outcome, results.paths
     study = None
     if options.seeds and outcome.failure is None:
-        study = _study(scenario, options)
+        study = _study(scenario, options, directory / SEEDS_CSV)
         outcome = outcome.with_summary(seed_study=study.to_data())
-        paths = outcome.write(directory, report=not options.no_report)
+        paths = outcome.write(directory, report=not options.no_report) | {"seeds": directory / SEEDS_CSV}
     _tell(outcome, study, paths | ({"calls": call_log} if call_log is not None else {}), options)
     if outcome.failure is not None:
         return ERROR
+    if study is not None and study.failures:
+        return NOT_AS_ASKED
     return NOT_AS_ASKED if outcome.unmet or (options.strict and outcome.warnings) else DONE
 
 
@@ -169,12 +172,13 @@ def _warn(text: str) -> None:
     print(f"warning: {plain(text)}", file=sys.stderr, flush=True)
 
 
-def _study(scenario: Scenario, options: argparse.Namespace) -> Any:
+def _study(scenario: Scenario, options: argparse.Namespace, path: Path) -> Any:
     def tell(done: int, count: int) -> None:
         if not (options.quiet or options.json) and sys.stderr.isatty():
             print(f"\rseed {done} of {count}", end="" if done < count else "\n", file=sys.stderr)
 
-    return seed_study(scenario.copy().master(log_calls=False), range(options.seeds), tell)
+    with seed_file(path) as done:
+        return seed_study(scenario.copy().master(log_calls=False), range(options.seeds), tell, done)
 
 
 def _tell(outcome: Outcome, study: Any, paths: dict[str, Path], options: argparse.Namespace) -> None:

@@ -95,7 +95,12 @@ def compare(
 
 
 def label_of(given: Result | str | Path | Any, otherwise: str) -> str:
-    """What a result is called in messages."""
+    """What a result is called in messages.
+
+    Args:
+        given: what the user gave to be compared.
+        otherwise: what is said where that is no path.
+    """
     return str(given) if isinstance(given, str | Path) else otherwise
 
 

@@ -71,6 +71,9 @@ class Curve:
 def rows_to_keep(time: np.ndarray) -> np.ndarray:
     """Which rows count: of several with one time the first and the last, before and after all events of that
     instant.
+
+    Args:
+        time: [s], shape (rows,), never falling.
     """
     keep = np.ones(len(time), dtype=bool)
     if len(time) > 2:
@@ -80,6 +83,10 @@ def rows_to_keep(time: np.ndarray) -> np.ndarray:
 
 def check_time(time: np.ndarray, label: str) -> None:
     """That there are rows, and that time never falls.
+
+    Args:
+        time: [s], shape (rows,).
+        label: what the result is called in messages.
 
     Raises:
         ComparisonError: no rows, or the first row that is out of order.
@@ -96,7 +103,11 @@ def check_time(time: np.ndarray, label: str) -> None:
 
 
 def looks_held(values: np.ndarray) -> bool:
-    """Whether a signal that says it is continuous is an indicator: a few whole numbers, most steps without a change."""
+    """Whether a signal that says it is continuous is an indicator: a few whole numbers, most steps without a change.
+
+    Args:
+        values: of the signal, shape (rows,).
+    """
     if len(values) < 3 or not np.array_equal(values, np.rint(values)):
         return False
     changes = np.flatnonzero(np.diff(values))

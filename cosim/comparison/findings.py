@@ -15,7 +15,14 @@ MOST_RUNS = (
 
 
 def value_findings(name: str, unit: str, points: Points, allowed: Allowed) -> list[Finding]:
-    """Runs of points outside the tube, each with its worst point."""
+    """Runs of points outside the tube, each with its worst point.
+
+    Args:
+        name: name of the signal.
+        unit: its unit.
+        points: the points that were held against the tube.
+        allowed: error and shift that are allowed.
+    """
     rows = np.flatnonzero(points.judged)
     size = np.abs(points.error[rows])
     found = []
@@ -28,7 +35,12 @@ def value_findings(name: str, unit: str, points: Points, allowed: Allowed) -> li
 
 
 def number_findings(name: str, points: Points) -> list[Finding]:
-    """Runs of points where one side holds a number and the other none."""
+    """Runs of points where one side holds a number and the other none.
+
+    Args:
+        name: name of the signal.
+        points: the points that were held against the tube.
+    """
     found = []
     for a, b in _runs(points.no_number):
         begin, end = float(points.time[a]), float(points.time[b - 1])
@@ -40,7 +52,15 @@ def number_findings(name: str, points: Points) -> list[Finding]:
 
 
 def jump_findings(name: str, unit: str, points: Points, jumps: MatchedJumps, allowed: Allowed) -> list[Finding]:
-    """Jumps that are early or late, and jumps that one side has alone and that the values confirm."""
+    """Jumps that are early or late, and jumps that one side has alone and that the values confirm.
+
+    Args:
+        name: name of the signal.
+        unit: its unit.
+        points: the points that were held against the tube.
+        jumps: the jumps of both sides, paired.
+        allowed: error and shift that are allowed.
+    """
     found = _shift_findings(name, unit, jumps, allowed)
     found += _lone_findings(name, unit, "jump_missing", jumps.missing, points, allowed)
     found += _lone_findings(name, unit, "jump_extra", jumps.extra, points, allowed)
@@ -48,7 +68,12 @@ def jump_findings(name: str, unit: str, points: Points, jumps: MatchedJumps, all
 
 
 def with_unit(value: float, unit: str) -> str:
-    """A number as people read it; pure numbers without a unit."""
+    """A number as people read it; pure numbers without a unit.
+
+    Args:
+        value: in this unit.
+        unit: ``1`` for pure numbers.
+    """
     return f"{value:.4g}" if unit in ("", "1") else f"{value:.4g} {unit}"
 
 

@@ -69,6 +69,10 @@ def shifts(reference: Jumps, result: Jumps) -> np.ndarray:
     two intervals into the longer. On equal grids that is the distance of the samples; on others it is never overstated.
     One side that jumps at an event while the other is still unchanged in the row after that event is earlier, by that
     side's sample.
+
+    Args:
+        reference: jumps of the reference that have a partner.
+        result: their partners in the result.
     """
     first, last = result.begin - reference.begin, result.end - reference.end
     smaller = np.where(np.abs(first) < np.abs(last), first, last)
@@ -79,7 +83,12 @@ def shifts(reference: Jumps, result: Jumps) -> np.ndarray:
 
 
 def choose(jumps: Jumps, which: np.ndarray) -> Jumps:
-    """Some of the jumps."""
+    """Some of the jumps.
+
+    Args:
+        jumps: all of them.
+        which: indices of those to take, shape (n,).
+    """
     return Jumps(*(getattr(jumps, field.name)[which] for field in fields(Jumps)))
 
 

@@ -16,7 +16,14 @@ COMPONENT_KEYS = {"model": "is model", "guid": "has the GUID", "fmi_version": "h
 
 
 def notes(reference: Result, result: Result, tolerances: Tolerances, labels: tuple[str, str]) -> list[str]:
-    """Lines for people; empty where there is nothing to know."""
+    """Lines for people; empty where there is nothing to know.
+
+    Args:
+        reference: what was compared with.
+        result: what was compared.
+        tolerances: what is allowed, signal by signal.
+        labels: what result and reference are called.
+    """
     lines = [
         f"{label}: the run ended early: {side.failure}"
         for label, side in zip(labels, (reference, result), strict=True)
@@ -44,6 +51,9 @@ def notes(reference: Result, result: Result, tolerances: Tolerances, labels: tup
 def tells_no_units(side: Result) -> bool:
     """Whether it is a mere table without any unit, as most CSV files are: not a run, whose pure numbers are meant
     so.
+
+    Args:
+        side: result or reference.
     """
     return "components" not in side.summary and all(info.unit in ("", "1") for info in side.signals)
 

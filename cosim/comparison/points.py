@@ -71,6 +71,11 @@ def compare_points(reference: Curve, result: Curve, allowed: Allowed) -> tuple[P
     between the two is outside a tube that is not cut there. Else the two show one jump with different samples. Where
     many jumps would be moved in a way that no delay does, the value is wrong and not the time, and jumps are matched in
     place.
+
+    Args:
+        reference: curve of the reference.
+        result: curve of the result.
+        allowed: error and shift that are allowed.
     """
     view = _view(reference, result, allowed.time)
     one, two = (find_jumps(curve, allowed.value) for curve in view.sides)
@@ -92,6 +97,12 @@ def compare_points(reference: Curve, result: Curve, allowed: Allowed) -> tuple[P
 def outside_between(points: Points, allowed: Allowed, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
     """Whether a point between two instants, or the next one before or after them, is outside the tube; of their
     shape.
+
+    Args:
+        points: the points that were held against the tube.
+        allowed: error and shift that are allowed.
+        begin: [s], shape (n,).
+        end: [s], shape (n,).
     """
     outside = np.append(0, np.cumsum(points.judged & (np.abs(points.error) > allowed.value)))
     first = np.maximum(np.searchsorted(points.time, begin - allowed.time) - 1, 0)

@@ -37,7 +37,11 @@ class Task:
 
 
 def compare_signal(task: Task) -> SignalComparison:
-    """Compare one signal with its reference."""
+    """Compare one signal with its reference.
+
+    Args:
+        task: the signal with its reference and what is allowed.
+    """
     allowed = allowed_for(task)
     if _same(task.reference, task.result):
         return _equal(task, allowed)
@@ -65,7 +69,11 @@ def compare_signal(task: Task) -> SignalComparison:
 
 
 def allowed_for(task: Task) -> Allowed:
-    """What the tolerance means for this reference."""
+    """What the tolerance means for this reference.
+
+    Args:
+        task: the signal with its reference and what is allowed.
+    """
     scale = task.reference.scale
     time = task.tolerance.time_for(task.length)
     step = max(task.reference.step, task.result.step)

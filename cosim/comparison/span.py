@@ -12,7 +12,14 @@ GAP_STEPS = 10  # usual steps without a row make a gap, where the other has at l
 
 
 def span_findings(name: str, reference: Curve, result: Curve, allowed: float) -> list[Finding]:
-    """Starts and ends that are further apart than the allowed time [s]."""
+    """Starts and ends that are further apart than the allowed time [s].
+
+    Args:
+        name: name of the signal.
+        reference: curve of the reference.
+        result: curve of the result.
+        allowed: error and shift that are allowed.
+    """
     found = []
     ends: tuple[tuple[float, float, Kind, Kind, str], ...] = (
         (float(reference.time[0]), float(result.time[0]), "starts_early", "starts_late", "starts"),
@@ -34,6 +41,13 @@ def span_findings(name: str, reference: Curve, result: Curve, allowed: float) ->
 def gap_findings(name: str, reference: Curve, result: Curve, allowed: float, allowed_time: float) -> list[Finding]:
     """Intervals in which one side has no rows where the other has many that are not on the straight line over the
     gap.
+
+    Args:
+        name: name of the signal.
+        reference: curve of the reference.
+        result: curve of the result.
+        allowed: error that is allowed.
+        allowed_time: shift that is allowed [s].
     """
     found = []
     for lacking, full, who in ((reference, result, "reference"), (result, reference, "result")):
@@ -50,7 +64,11 @@ def gap_findings(name: str, reference: Curve, result: Curve, allowed: float, all
 
 
 def rounding(*times: float) -> float:
-    """How much two instants may differ by rounding alone [s]."""
+    """How much two instants may differ by rounding alone [s].
+
+    Args:
+        times: instants [s].
+    """
     return 8.0 * float(np.finfo(float).eps) * max(abs(time) for time in times)
 
 

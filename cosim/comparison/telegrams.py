@@ -8,7 +8,7 @@ from math import isfinite, isnan
 from typing import Literal
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 from cosim.comparison.span import rounding
 from cosim.comparison.tolerance import Tolerance
@@ -35,6 +35,9 @@ def keeps_telegrams(result: Result) -> bool:
     """Whether a result would have telegrams if there had been any: a run does, a plain table does not.
 
     The summary may say so itself: ``events_recorded``.
+
+    Args:
+        result: result or reference.
     """
     told = result.summary.get("events_recorded")
     return bool(result.events) or (bool(told) if told is not None else "components" in result.summary)
@@ -59,7 +62,13 @@ def compare_telegrams(reference: Result, result: Result, tolerance: Tolerance, l
 
 
 def telegram_limits(reference: Sequence[BaliseRecord], tolerance: Tolerance, length: float) -> Limits:
-    """What telegrams may differ by from those of a reference of `length` [s]."""
+    """What telegrams may differ by from those of a reference of `length` [s].
+
+    Args:
+        reference: its telegrams.
+        tolerance: what is allowed.
+        length: of the run [s].
+    """
     payload = {}
     for name in PAYLOAD:
         values = [v for record in reference if isfinite(v := getattr(record, name))]
@@ -104,7 +113,7 @@ def _assign(
     rows = columns = np.arange(count)
     if len(one) != len(two) and count and max(len(one), len(two)) <= LARGEST_GROUP:
         stamps = [np.array([record.stamp for record in side]) for side in (one, two)]
-        rows, columns = linear_sum_assignment(np.abs(stamps[0][:, None] - stamps[1]))
+        rows, columns = scipy.optimize.linear_sum_assignment(np.abs(stamps[0][:, None] - stamps[1]))
     taken = set(rows.tolist()), set(columns.tolist())
     pairs = [(one[int(i)], two[int(j)]) for i, j in zip(rows, columns, strict=True)]
     left, right = (

@@ -96,18 +96,32 @@ class Tolerances:
         by_signal: Mapping[str, Tolerance | Mapping[str, Any] | float] | None = None,
         ignore: Iterable[str] = (),
     ) -> Tolerances:
-        """Tolerances as users write them: see `tolerance`."""
+        """Tolerances as users write them: see `tolerance`.
+
+        Args:
+            default: for signals that have no tolerance of their own.
+            by_signal: by name or pattern.
+            ignore: names or patterns of what is not compared.
+        """
         base = Tolerance() if default is None else tolerance(default, Tolerance())
         return cls(base, {name: tolerance(given, base) for name, given in (by_signal or {}).items()}, tuple(ignore))
 
     def for_signal(self, name: str) -> Tolerance:
-        """The tolerance of a signal."""
+        """The tolerance of a signal.
+
+        Args:
+            name: name of the signal.
+        """
         if name in self.by_signal:
             return self.by_signal[name]
         return next((given for pattern, given in self.by_signal.items() if fnmatchcase(name, pattern)), self.default)
 
     def ignores(self, name: str) -> bool:
-        """Whether a signal is not compared."""
+        """Whether a signal is not compared.
+
+        Args:
+            name: name of the signal.
+        """
         return any(name == pattern or fnmatchcase(name, pattern) for pattern in self.ignore)
 
     def unused(self, names: Iterable[str]) -> list[str]:

@@ -60,7 +60,12 @@ def widen_at_ends(
     this a smooth signal that is late by less than allowed would be wrong in its first rows.
 
     Args:
-        band: of `curve` at the instants. The others as in `band_of`.
+        band: of the curve at the instants, from `band_of`.
+        curve: the finer curve.
+        at: instants [s], shape (m,).
+        tolerance: time that is allowed before and after each instant [s].
+        first: first row of the piece that belongs to each instant, shape (m,).
+        last: the row behind its last one, shape (m,).
     """
     low, high = band.low.copy(), band.high.copy()
     ends = [

@@ -25,6 +25,7 @@ from cosim.components.component import Component
 from cosim.coupling.chain import COMPILED_STAGE_TEXT, Mover, Position, Stage
 from cosim.coupling.plan import Plan
 from cosim.coupling.planned import PlannedComponent
+from cosim.diagnostics.sampled_times import typical_seconds
 from cosim.master.axis import TimeAxis
 from cosim.master.control.control import StepControl
 from cosim.master.control.fixed import FixedStep
@@ -262,8 +263,7 @@ class CompiledStepper:
                     0.0, calls + slave.more_calls
                 )  # so short in C that only doStep is timed
             component.seconds += slave.seconds_over
-            if self._program.head.sampled:
-                component.seconds += slave.seconds * max(calls - over, 0) / self._program.head.sampled
+            component.seconds += max(calls - over, 0) * typical_seconds(slave.sampled_calls, slave.sampled_seconds)
             slave.calls = slave.all_calls = slave.more_calls = 0
 
 

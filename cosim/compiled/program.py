@@ -18,10 +18,12 @@ from cosim.compiled.recorded_returns import Answer
 from cosim.components.component import Component
 from cosim.coupling.plan import Plan
 from cosim.coupling.planned import PlannedComponent
+from cosim.diagnostics.sampled_times import BINS
 from cosim.errors import CosimError
 from cosim.master.axis import TimeAxis
 from cosim.process.last_call import LAST_CALL
 from fmus.fmi.elements import Element
+from fmus.fmi.ports import is_native
 from fmus.fmi.types import c_type, getter_type, size
 
 KINDS = (
@@ -83,7 +85,8 @@ class CSlave(ctypes.Structure):
         *((name, ctypes.c_void_p) for name in ("sources", "factors", "offsets", "inputs")),
         ("calls", ctypes.c_int64),
         ("all_calls", ctypes.c_int64),
-        ("seconds", ctypes.c_double),
+        ("sampled_seconds", ctypes.c_double * BINS),
+        ("sampled_calls", ctypes.c_int64 * BINS),
         ("now", ctypes.c_double),
         ("calls_here", ctypes.c_int64),
         ("more_calls", ctypes.c_int64),
@@ -144,7 +147,7 @@ class CProgram(ctypes.Structure):
         *((name, ctypes.c_void_p) for name in ("last_call", "last_time", "rows_told")),
         ("rows_before", ctypes.c_int64),
         ("rows_done", ctypes.c_int64),
-        *((name, ctypes.c_double) for name in ("seconds", "sampled")),
+        ("seconds", ctypes.c_double),
         *((name, ctypes.c_int64) for name in ("stop", "slave", "port", "status", "event", "terminate", "early")),
         ("reached", ctypes.c_double),
     )
@@ -343,7 +346,7 @@ def _first_values(elements: Sequence[Element]) -> tuple[dict[str, int], int]:
 
 def _check(component: Component) -> None:
     slave = component.slave
-    if component.kind != "FMU" or not hasattr(slave, "dll") or not hasattr(slave, "_functions"):
+    if component.kind != "FMU" or not is_native(slave) or not hasattr(slave, "_functions"):
         raise NotCompilable(f"{component.name} runs in Python ({component.kind})")
     if slave.fmiCallLogger is not None:
         raise NotCompilable(f"the calls of {component.name} are logged")

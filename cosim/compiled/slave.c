@@ -254,6 +254,14 @@ static double now(void) {
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
+static void sample(Slave *slave, double seconds) {
+    int64_t bin = 0;
+    for (int64_t left = (int64_t)(seconds * 1e9); left > 1 && bin < BINS - 1; left /= 2)
+        bin++;
+    slave->sampled_seconds[bin] += seconds;
+    slave->sampled_calls[bin]++;
+}
+
 static bool move(Program *program, int64_t which, double t, double h, bool timed) {
     Slave *slave = &program->slaves[which];
     if (!send_inputs(program, which))
@@ -262,7 +270,7 @@ static bool move(Program *program, int64_t which, double t, double h, bool timed
     double begin = timed ? now() : 0.0;
     bool ordinary = do_step(program, which, t, h);
     if (timed)
-        slave->seconds += now() - begin;
+        sample(slave, now() - begin);
     if (!ordinary)
         return stopped(program, STOP_STEP, which, 0);
     return read_outputs(program, which);

@@ -59,7 +59,6 @@ EXPORTED int64_t stepper_run(Program *program, int64_t first, int64_t last, doub
         } else {
             if (!step_plan(program, t, until - t, timed))
                 break;
-            program->sampled += timed;
         }
         double *row = rows + used++ * width;
         row[0] = until;

@@ -6,6 +6,8 @@
 
 #include <stdint.h>
 
+#define BINS 40 /* of times of calls: 2 to 4 ns, 4 to 8 ns, ... as in sampled_times.py */
+
 /* Types of variables, by what the function of the library takes. */
 enum {
     KIND_FLOAT64, KIND_FLOAT32, KIND_INT8, KIND_UINT8, KIND_INT16, KIND_UINT16, KIND_INT32, KIND_UINT32, KIND_INT64, KIND_UINT64,
@@ -39,7 +41,8 @@ typedef struct {
     double *inputs;                    /* gathered */
     int64_t calls;                     /* of doStep in the present chunk */
     int64_t all_calls;                 /* in all chunks before */
-    double seconds;                    /* in the sampled ones, added up */
+    double sampled_seconds[BINS];      /* of sampled calls, by bins of their length, added up; see sampled_times.py */
+    int64_t sampled_calls[BINS];
     /* in steps over balises, which are all timed */
     double now;                        /* where it stands [s] */
     int64_t calls_here, more_calls;    /* of doStep in the present step; in all of them, beyond one for each step */
@@ -169,7 +172,7 @@ typedef struct {
     int64_t *rows_told;         /* where the rows that are filled are counted, for the same */
     int64_t rows_before;        /* those that are filled before the chunk */
     int64_t rows_done;          /* in the chunk: one for each step, and those of events */
-    double seconds, sampled;    /* it lasted; steps of all chunks whose doStep calls were timed */
+    double seconds;             /* it lasted */
     /* where and why it ended */
     int64_t stop, slave, port, status;
     int64_t event, terminate, early; /* results of doStep */

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from fmpy.model_description import ModelDescription
 
-from cosim.components.derivatives import directional_derivative, make_derivative_writer
+from cosim.components.derivatives import demand_derivatives, make_derivative_writer
 from cosim.components.described import Described
 from cosim.components.start_values import StartValue, refusal, typed_value, typed_values
 from cosim.components.surroundings import Surroundings
@@ -95,6 +95,9 @@ class Component(Described, Slave):
         """Take the structural parameters among start values: the shapes of arrays follow from them. Before
         `instantiate`.
 
+        Args:
+            starts: start values by name; other variables than structural parameters are left out.
+
         Raises:
             CouplingError: a value is no dimension.
         """
@@ -156,24 +159,21 @@ class Component(Described, Slave):
         write, buffer = make_derivative_writer(self, names)
         return self.guarded(f"derivatives of {shown(names)}", write), buffer
 
-    def directional_derivative(
+    def derivative_call(
         self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
-    ) -> np.ndarray:
-        """Derivatives of scalars and elements `unknowns` along a direction in `knowns`, where declared.
+    ) -> Callable[[], np.ndarray]:
+        """As for `Instance`.
 
         Args:
-            unknowns: outputs and the like. knowns: inputs and the like. seed: the direction, shape (len(knowns),).
-
-        Returns:
-            The derivatives, shape (len(unknowns),).
+            unknowns: outputs and the like.
+            knowns: inputs and the like.
+            seed: the direction, shape (len(knowns),).
 
         Raises:
             CouplingError: the slave does not declare providesDirectionalDerivatives, or a variable is not real.
-            RunError: the call failed.
         """
-        call = directional_derivative(self, unknowns, knowns, seed)
-        found: np.ndarray = self.guard("getDirectionalDerivative", call)
-        return found
+        demand_derivatives(self, *unknowns, *knowns)
+        return super().derivative_call(unknowns, knowns, seed)
 
     def free(self) -> None:
         """Free the instance, its library and its files."""
@@ -181,6 +181,11 @@ class Component(Described, Slave):
         if self._release_files is not None:
             self._release_files()
             self._release_files = None
+
+    def take_files(self) -> Callable[[], None] | None:
+        """What releases its files, which from now on is up to the caller; None where it has none."""
+        release, self._release_files = self._release_files, None
+        return release
 
     def outcomes(self) -> Mapping[str, int] | None:
         """Counts of what became of the events told, where the slave keeps them: blocks, and FMUs with
@@ -216,6 +221,9 @@ class Component(Described, Slave):
     def choose_log(self, choice: LogChoice | None) -> None:
         """What the slave shall log; before `instantiate`. None leaves that to the slave.
 
+        Args:
+            choice: ``none``, ``errors``, ``all`` or categories.
+
         Raises:
             CouplingError: a category that the slave does not declare.
         """
@@ -224,11 +232,20 @@ class Component(Described, Slave):
         self.messages.silent = choice == "none"
 
     def note(self, message: str | bytes | None, status: int | str = 0, category: str | bytes | None = None) -> None:
-        """Keep a message of the slave's own log; what it said of something wrong is part of a failure."""
+        """Keep a message of the slave's own log; what it said of something wrong is part of a failure.
+
+        Args:
+            status: of FMI, by number or name.
+            category: as the slave names it.
+        """
         self.messages.add(self.time if self.clock is None else self.clock(), message, status, category)
 
     def failure(self, reason: str, t: float | None = None) -> RunError:
-        """A RunError of this component at `t` [s], by default where it stands, with what the slave logged last."""
+        """A RunError of this component at `t` [s], by default where it stands, with what the slave logged last.
+
+        Args:
+            reason: what happened.
+        """
         if self.messages:
             reason = f"{reason.rstrip('.')}. The FMU says: {self.messages.reason}"
         when = self.time if t is None else t

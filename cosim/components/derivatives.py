@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cosim.errors import CouplingError
-from fmus.fmi.derivatives import directional_derivative as derivative_call
 from fmus.fmi.derivatives import input_derivative_writer
-from fmus.fmi.elements import Layout, described, layout
+from fmus.fmi.elements import described
 from fmus.fmi.types import FLOATING_TYPES
 from fmus.fmi.values import signs
 
@@ -55,30 +54,20 @@ def make_derivative_writer(component: Component, names: Sequence[str]) -> tuple[
     return turn_and_write, buffer
 
 
-def directional_derivative(
-    component: Component, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
-) -> Callable[[], np.ndarray]:
-    """A call of getDirectionalDerivative.
+def demand_derivatives(component: Component, *names: str) -> None:
+    """Refuse a component without directional derivatives, and variables that have none.
 
     Args:
-        component: an instantiated slave.
-        unknowns: outputs and the like.
-        knowns: inputs and the like.
-        seed: the direction, shape (len(knowns),).
+        component: whose they are.
+        names: of unknowns and knowns.
 
     Raises:
-        CouplingError: the slave does not declare it, or a variable is not real.
+        CouplingError: the slave does not declare them, or a variable is not real.
     """
     if component.fmi_version == 1 or not component.capabilities.providesDirectionalDerivatives:
         raise CouplingError(f"{component.name} gives no directional derivatives: it does not declare them.")
-    return derivative_call(component.slave, _real(component, unknowns), _real(component, knowns), seed)
-
-
-def _real(component: Component, names: Sequence[str]) -> Layout:
-    elements = [element for name in names for element in component.elements(name)]
-    for element in elements:
+    for element in (element for name in names for element in component.elements(name)):
         if element.variable.type not in FLOATING_TYPES:
             raise CouplingError(
                 f"{component.name}.{element.name} has no derivative: it is a {described(element.variable)}."
             )
-    return layout(elements)

@@ -20,7 +20,6 @@ from cosim.components.unpacking import read_archive, unpack
 from cosim.errors import FmuLoadError
 from cosim.process.last_call import LAST_CALL
 from cosim.process.sentinel import guard_exit
-from fmu_observer.block import make_block
 from fmus.fmi.archive import Archive, NotAnFmuError
 from fmus.fmi.binaries import platform_folder
 from fmus.fmi.description import negated_aliases
@@ -131,6 +130,8 @@ def _open(path: Path, name: str) -> Archive:
 
 def load_block(system: HybridSystem, name: str, fmi_version: Literal[2, 3] = 3, **arguments: Any) -> Component:
     """A Python block as a component; further arguments as for `fmu_observer.block.FMIInterface`."""
+    from fmu_observer.block import make_block  # noqa: PLC0415 - CasADi only for those who run in Python
+
     block = make_block(system, fmi_version, instance_name=name, **arguments)
     source = system.source or type(system).__qualname__
     face = COMPONENTS[fmi_version]

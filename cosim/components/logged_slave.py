@@ -8,6 +8,7 @@ from typing import Any
 from cosim.components.component import Component
 from cosim.diagnostics.call_log import CallLog
 from cosim.diagnostics.call_text import Names, describe_native, describe_prepared, describe_python
+from fmus.fmi.ports import is_native
 from fmus.fmi.types import REAL_TYPE
 
 
@@ -18,7 +19,7 @@ def log_calls(component: Component, log: CallLog) -> None:
         component: made and not instantiated yet. log: where to.
     """
     names = Names(component.description)
-    if hasattr(component.slave, "dll"):
+    if is_native(component.slave):
         component.slave._call = _logged_native(component, log, names)
         component.slave.fmiCallLogger = _unheard  # prepared calls and the compiled stepper make way for a logger
         component.slave._log_fmi_args = _unheard

@@ -45,7 +45,12 @@ class RecordingSlave:
         """Nothing to do."""
 
     def enterInitializationMode(self, startTime: float = 0.0, stopTime: float | None = None, **_: Any) -> None:
-        """Go to the start [s]; of an event there the row after it."""
+        """Go to the start [s]; of an event there the row after it.
+
+        Args:
+            startTime: [s].
+            stopTime: [s], without effect.
+        """
         self._go(startTime, before=False)
 
     def exitInitializationMode(self) -> None:
@@ -84,11 +89,19 @@ class RecordingSlave:
         return self._time, self._before
 
     def setFMUState(self, state: tuple[float, bool]) -> None:
-        """Go there."""
+        """Go there.
+
+        Args:
+            state: from `getFMUState`.
+        """
         self._go(state[0], before=state[1])
 
     def freeFMUState(self, state: tuple[float, bool]) -> None:
-        """Nothing to do."""
+        """Nothing to do.
+
+        Args:
+            state: from `getFMUState`.
+        """
 
     def _go(self, t: float, *, before: bool) -> None:
         self._values[:] = self.recording.at(t, before=before)
@@ -97,15 +110,29 @@ class RecordingSlave:
     # -- values -----------------------------------------------------------------------------------------------------
 
     def getFloat64(self, vr: Sequence[int], nValues: int | None = None) -> list[float]:
-        """Values of columns."""
+        """Values of columns.
+
+        Args:
+            vr: value references.
+            nValues: without effect: columns are scalars.
+        """
         return [float(self._values[reference - 1]) for reference in vr]
 
     def getInt32(self, vr: Sequence[int], nValues: int | None = None) -> list[int]:
-        """Values of columns of whole numbers."""
+        """Values of columns of whole numbers.
+
+        Args:
+            vr: value references.
+            nValues: without effect: columns are scalars.
+        """
         return [int(self._values[reference - 1]) for reference in vr]
 
     def prepared_get(self, references: Sequence[int], values: np.ndarray) -> Callable[[], None]:
-        """A call that reads columns into `values`."""
+        """A call that reads columns into `values`.
+
+        Args:
+            references: value references.
+        """
         places, held = np.array(references, dtype=np.intp) - 1, self._values
 
         def read() -> None:
@@ -128,7 +155,12 @@ class RecordingComponent(FMI3Component):
         self.held_outputs = recording.held_over_steps
 
     def variable(self, name: str, *causalities: str) -> ModelVariable:
-        """As for `Described`; a column that was left out is refused with the reason."""
+        """As for `Described`; a column that was left out is refused with the reason.
+
+        Args:
+            name: of a column.
+            causalities: those that it may have; none for any.
+        """
         if name in self.recording.left_out:
             raise CouplingError(f"{self.name}.{name} cannot be played back: {self.recording.left_out[name]}.")
         return super().variable(name, *causalities)

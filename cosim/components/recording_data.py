@@ -217,6 +217,9 @@ def _without_gaps(values: np.ndarray, time: np.ndarray, interpolation: Interpola
 def whole_number_columns(recording: Recording) -> Sequence[bool]:
     """For each column whether it is a discrete pure number that was whole throughout: a mode, a count, a truth
     value.
+
+    Args:
+        recording: what is played back.
     """
     largest = 2.0**31 - 1.0
     return [

@@ -12,13 +12,17 @@ from fmpy.model_description import ModelVariable
 
 from cosim.errors import nearest
 from fmus.fmi.elements import described
-from fmus.fmi.types import CTYPES, FLOATING_TYPES, size
+from fmus.fmi.types import CTYPES, FLOATING_TYPES, enumeration_items, size
 
 StartValue = float | int | bool | str | bytes | Sequence[Any]
 
 
 def refusal(what: str, error: ValueError) -> str:
-    """The sentence that a value does not fit, from what was to be set and why not."""
+    """The sentence that a value does not fit, from what was to be set and why not.
+
+    Args:
+        error: why not.
+    """
     return f"{what}: {error}" + ("" if str(error).endswith("?") else ".")
 
 
@@ -120,7 +124,7 @@ def _bytes(kind: str, value: Any) -> bytes:
 
 
 def _item(variable: ModelVariable, value: Any) -> int:
-    items = {item.name: int(item.value) for item in getattr(variable.declaredType, "items", None) or []}
+    items = enumeration_items(variable)
     if not isinstance(value, str):
         return _whole("Enumeration", value)
     if value not in items:

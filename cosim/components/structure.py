@@ -17,6 +17,10 @@ STRUCTURAL = "structuralParameter"
 def structural_value(component: str, variable: ModelVariable, value: Any) -> int:
     """The value of a structural parameter.
 
+    Args:
+        component: its name, for messages.
+        variable: in the model description.
+
     Raises:
         CouplingError: it is no whole number, or outside of what the FMU declares.
     """
@@ -35,6 +39,10 @@ def structural_value(component: str, variable: ModelVariable, value: Any) -> int
 
 def resize(description: ModelDescription, structure: Mapping[str, int]) -> None:
     """Shapes of all arrays for these values of the structural parameters; the others have their start values.
+
+    Args:
+        description: whose arrays get their shapes.
+        structure: values of structural parameters by name.
 
     Raises:
         CouplingError: an array would become too large.

@@ -4,13 +4,9 @@ components.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from heapq import heapify, heappop, heappush
 from typing import TypeVar
-
-import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 Node = TypeVar("Node", bound=Hashable)
 Edges = Iterable[tuple[Node, Node]]
@@ -22,8 +18,8 @@ def strong_groups(nodes: Sequence[Node], edges: Edges[Node]) -> list[list[Node]]
     Args:
         nodes: what is grouped. edges: pairs (first, second) of these nodes.
 
-    Source: D. Pearce, An improved algorithm for finding the strongly connected components of a directed graph, 2005
-    (SciPy).
+    Source: Kosaraju's algorithm, after M. Sharir, A strong-connectivity algorithm and its applications in data flow
+    analysis, 1981.
     """
     edges = list(edges)
     place = {node: i for i, node in enumerate(nodes)}
@@ -86,6 +82,37 @@ def _search(start: Node, successors: Mapping[Node, Sequence[Node]]) -> dict[Node
 
 
 def _labels(place: Mapping[Node, int], edges: Sequence[tuple[Node, Node]]) -> list[int]:
-    pairs = np.array([(place[a], place[b]) for a, b in edges], dtype=int).reshape(-1, 2)
-    matrix = coo_array((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(len(place), len(place)))
-    return [int(label) for label in connected_components(matrix.tocsr(), connection="strong")[1]]
+    """For each node the number of its group: those that a search against the edges reaches, begun at the node that a
+    search along them left last.
+    """
+    along: list[list[int]] = [[] for _ in place]
+    against: list[list[int]] = [[] for _ in place]
+    for a, b in edges:
+        along[place[a]].append(place[b])
+        against[place[b]].append(place[a])
+    labels = [-1] * len(place)
+    left = [i for search in _searches(range(len(place)), along) for i in search]
+    for label, group in enumerate(_searches(reversed(left), against)):
+        for i in group:
+            labels[i] = label
+    return labels
+
+
+def _searches(starts: Iterable[int], successors: Sequence[Sequence[int]]) -> Iterator[list[int]]:
+    """Depth first from each start that is not met yet: what each search meets, in the order in which it leaves it."""
+    met: set[int] = set()
+    for start in starts:
+        if start in met:
+            continue
+        met.add(start)
+        left: list[int] = []
+        path = [(start, iter(successors[start]))]
+        while path:
+            rest = path[-1][1]
+            following = next((i for i in rest if i not in met), None)
+            if following is None:
+                left.append(path.pop()[0])
+            else:
+                met.add(following)
+                path.append((following, iter(successors[following])))
+        yield left

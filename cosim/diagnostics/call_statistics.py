@@ -11,6 +11,8 @@ from functools import wraps
 from time import perf_counter
 from typing import Any
 
+from cosim.diagnostics.sampled_times import BINS, bin_of, typical_seconds
+
 EARLY, EVERY = 3, 64  # the third call is timed, the first ones are not like the others; then every 64th
 KINDS = ("get", "set", "event", "save", "restore", "release")
 OF_METHOD = {
@@ -27,10 +29,11 @@ OF_METHOD = {
 class CallStatistics:
     """Count and time of one kind of call."""
 
-    __slots__ = ("_counted", "_pending", "_seconds", "_timed", "depth")
+    __slots__ = ("_counted", "_pending", "_sampled_calls", "_sampled_seconds", "_seconds", "_timed", "depth")
 
     def __init__(self) -> None:
         self._counted, self._timed, self._seconds, self.depth = 0, 0, 0.0, 0
+        self._sampled_calls, self._sampled_seconds = [0] * BINS, [0.0] * BINS
         self._pending: list[Callable[[], int]] = []
 
     @property
@@ -40,8 +43,8 @@ class CallStatistics:
 
     @property
     def seconds(self) -> float:
-        """Seconds of all calls, estimated from those that were timed [s]."""
-        return self._seconds * self.count / self._timed if self._timed else 0.0
+        """Seconds of all calls [s]: those that were timed one by one, and an estimate of the others by samples."""
+        return self._seconds + (self.count - self._timed) * typical_seconds(self._sampled_calls, self._sampled_seconds)
 
     def add(self, seconds: float, count: int = 1) -> None:
         """Take calls that were timed elsewhere, e.g. by a stepper in C.
@@ -71,8 +74,10 @@ class CallStatistics:
             cycle = left = EVERY
             begin = perf_counter()
             call()
-            self._seconds += perf_counter() - begin
-            self._timed += 1
+            seconds = perf_counter() - begin
+            place = bin_of(seconds)
+            self._sampled_calls[place] += 1
+            self._sampled_seconds[place] += seconds
 
         def counted() -> None:
             nonlocal left

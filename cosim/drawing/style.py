@@ -15,30 +15,38 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure, SubFigure
+from matplotlib.rcsetup import cycler
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
+BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
+SLATE, VIOLET, AMBER = "#33475B", "#7A4FA3", "#F0C36D"
+BLACK, INK, QUIET, MARK = "#000000", "#1B1B1B", "#5F5F5F", "#777777"  # lines; texts; what explains; what is no curve
+EDGE, GAP, BAND, GRID = "#9A9A9A", "#A9A9A9", "#B4B4B4", "#E3E3E3"  # frames; areas; the true values; the grid
+PALE, PALE_BLUE, PALE_YELLOW, PALE_RED, WHITE = "#F4F4F4", "#E8EFF6", "#F7F2E4", "#FBECEE", "#FFFFFF"  # areas
+ALARM, ZONE = "#B00020", "#DCE9F2"  # what went wrong; zones of low adhesion
+
 OBSERVER_LINES: tuple[dict[str, Any], ...] = (
-    {"color": "#0072B2", "linestyle": "-", "linewidth": 1.5},
-    {"color": "#D55E00", "linestyle": (0, (6, 1.5)), "linewidth": 1.5},
-    {"color": "#009E73", "linestyle": (0, (1.2, 1.0)), "linewidth": 1.9},
-    {"color": "#CC79A7", "linestyle": (0, (5, 1.2, 1.2, 1.2)), "linewidth": 1.5},
-    {"color": "#E69F00", "linestyle": (0, (9, 3)), "linewidth": 1.5},
-    {"color": "#56B4E9", "linestyle": (0, (4, 1.2, 1.2, 1.2, 1.2, 1.2)), "linewidth": 1.5},
+    {"color": BLUE, "linestyle": "-", "linewidth": 1.5},
+    {"color": VERMILION, "linestyle": (0, (6, 1.5)), "linewidth": 1.5},
+    {"color": GREEN, "linestyle": (0, (1.2, 1.0)), "linewidth": 1.9},
+    {"color": PURPLE, "linestyle": (0, (5, 1.2, 1.2, 1.2)), "linewidth": 1.5},
+    {"color": ORANGE, "linestyle": (0, (9, 3)), "linewidth": 1.5},
+    {"color": SKY, "linestyle": (0, (4, 1.2, 1.2, 1.2, 1.2, 1.2)), "linewidth": 1.5},
 )
 # a band, on which the estimates lie
-TRUE_LINE: dict[str, Any] = {"color": "#B4B4B4", "linestyle": "-", "linewidth": 5.0}
-ODOMETER_LINE: dict[str, Any] = {"color": "#000000", "linestyle": "-", "linewidth": 0.8}
-REFERENCE_LINE: dict[str, Any] = {"color": "#000000", "linestyle": (0, (1, 3)), "linewidth": 1.2}
-TRUE_LINE_ABOVE: dict[str, Any] = {"color": "#000000", "linestyle": "-", "linewidth": 1.3, "zorder": 2.5}  # over noise
+TRUE_LINE: dict[str, Any] = {"color": BAND, "linestyle": "-", "linewidth": 5.0}
+ODOMETER_LINE: dict[str, Any] = {"color": BLACK, "linestyle": "-", "linewidth": 0.8}
+REFERENCE_LINE: dict[str, Any] = {"color": BLACK, "linestyle": (0, (1, 3)), "linewidth": 1.2}
+TRUE_LINE_ABOVE: dict[str, Any] = {"color": BLACK, "linestyle": "-", "linewidth": 1.3, "zorder": 2.5}  # over noise
 NOISY_LINE: dict[str, Any] = {"linestyle": "-", "linewidth": 0.5, "alpha": 0.55, "zorder": 1.6}
 WILD_LINE: dict[str, Any] = {"linewidth": 0.6, "alpha": 0.6, "zorder": 1.2}  # a diverged curve stays behind the others
-ZONE_COLOUR = "#DCE9F2"
-ALARM_COLOUR = "#B00020"
 
 PANEL_SIZE = (8.2, 3.4)  # inches
+HEADLINE = 11.5  # font size [pt]
 DPI = 130  # dots per inch
+TIME = "Time [s]"  # on the axis of every curve against time
 
 RC: dict[str, Any] = {
     "font.family": "DejaVu Sans",  # the font that comes with matplotlib, so that pictures look the same everywhere
@@ -47,11 +55,12 @@ RC: dict[str, Any] = {
     "xtick.labelsize": 8.5,
     "ytick.labelsize": 8.5,
     "legend.fontsize": 8.5,
+    "axes.prop_cycle": cycler(color=[line["color"] for line in OBSERVER_LINES]),
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
     "axes.axisbelow": True,
-    "grid.color": "#E3E3E3",
+    "grid.color": GRID,
     "grid.linewidth": 0.6,
     "axes.unicode_minus": True,
     "text.usetex": False,
@@ -60,7 +69,14 @@ RC: dict[str, Any] = {
 
 
 def styled(function: Callable[P, T]) -> Callable[P, T]:
-    """Run a drawing function under our style and leave the caller's as it was."""
+    """Run a drawing function under our style and leave the caller's as it was.
+
+    Args:
+        function: draws something with matplotlib.
+
+    Returns:
+        A function with the same arguments.
+    """
 
     @wraps(function)
     def run(*args: P.args, **kwargs: P.kwargs) -> T:
@@ -71,12 +87,27 @@ def styled(function: Callable[P, T]) -> Callable[P, T]:
 
 
 def observer_line(observers: Sequence[str], observer: str) -> dict[str, Any]:
-    """Colour, dashes and width of an observer: by its place among all observers, the same in every figure."""
+    """Colour, dashes and width of an observer: by its place among all observers, the same in every figure.
+
+    Args:
+        observers: names of all observers of a run.
+        observer: name of the one to draw.
+
+    Returns:
+        Arguments of ``Axes.plot``.
+    """
     return dict(OBSERVER_LINES[list(observers).index(observer) % len(OBSERVER_LINES)])
 
 
 def run_line(index: int) -> dict[str, Any]:
-    """Colour, dashes and width of a run among others: the first lies broad below, later ones are told apart by both."""
+    """Colour, dashes and width of a run among others: the first lies broad below, later ones are told apart by both.
+
+    Args:
+        index: place of the run, from 0.
+
+    Returns:
+        Arguments of ``Axes.plot``.
+    """
     if index == 0:
         return dict(OBSERVER_LINES[0]) | {"linewidth": 2.6, "alpha": 0.75, "zorder": 1.9}
     count = len(OBSERVER_LINES)
@@ -90,14 +121,32 @@ def new_figure(size: tuple[float, float] = PANEL_SIZE) -> Figure:
 
     Args:
         size: width and height [inch].
+
+    Returns:
+        The figure.
     """
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
 
+def headline(figure: Figure, text: str) -> None:
+    """A title over a figure of several panels.
+
+    Args:
+        figure: the figure.
+        text: the title.
+    """
+    figure.suptitle(text, fontsize=HEADLINE, fontweight="bold", x=0.01, ha="left")
+
+
 def axes_or_new(ax: Axes | None, size: tuple[float, float] = PANEL_SIZE) -> Axes:
-    """The axes given, or those of a new figure."""
+    """The axes given, or those of a new figure.
+
+    Args:
+        ax: axes, or None.
+        size: width and height of a new figure [inch].
+    """
     return ax if ax is not None else new_figure(size).add_subplot()
 
 

@@ -47,7 +47,12 @@ def event_rows(time: np.ndarray, instant: float) -> tuple[int, int] | None:
 
 
 def used_by(event: BaliseRecord, observer: str) -> bool:
-    """Whether an observer took a telegram into its estimate."""
+    """Whether an observer took a telegram into its estimate.
+
+    Args:
+        event: the telegram.
+        observer: name of its component.
+    """
     return event.kind != "missed" and (not event.outcomes or event.outcomes.get(observer) in USED)
 
 

@@ -41,7 +41,7 @@ def cost_text(result: Result) -> str:
     rows = cost_rows(result)
     if not rows:
         return ""
-    return "\n".join(text_table([["calls / ms", *KINDS, "messages"], *rows], heading=True))
+    return "\n".join(text_table([["calls / estimated ms", *KINDS, "messages"], *rows], heading=True))
 
 
 def was_compiled(result: Result) -> bool:

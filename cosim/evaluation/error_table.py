@@ -44,7 +44,11 @@ SHORT = {
 
 
 def columns(metrics: Sequence[PhaseMetrics]) -> list[Column]:
-    """Columns that hold a number somewhere; the measured ones always stand."""
+    """Columns that hold a number somewhere; the measured ones always stand.
+
+    Args:
+        metrics: from `phase_metrics`.
+    """
     chosen = [*MEASURED]
     chosen += [PUBLISHED] if any(m.published is not None for m in metrics) else []
     chosen += [INDEPENDENT] if any(m.independent is not None for m in metrics) else []
@@ -52,7 +56,12 @@ def columns(metrics: Sequence[PhaseMetrics]) -> list[Column]:
 
 
 def cells(entry: PhaseMetrics, chosen: Sequence[Column]) -> list[str]:
-    """The numbers of a row as text."""
+    """The numbers of a row as text.
+
+    Args:
+        entry: errors of an observer in a phase.
+        chosen: from `columns`.
+    """
     sizes = [
         size
         for error in (entry.speed, entry.position)

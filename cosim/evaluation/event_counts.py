@@ -33,7 +33,11 @@ class EventCounts:
 
 
 def count_events(events: Sequence[BaliseRecord]) -> EventCounts:
-    """Count telegrams by kind, and by receiver and outcome."""
+    """Count telegrams by kind, and by receiver and outcome.
+
+    Args:
+        events: the telegrams.
+    """
     kinds = Counter(event.kind for event in events)
     waiting = sum(bool(event.outcomes) and set(event.outcomes.values()) == {UNDELIVERED} for event in events)
     outcomes: dict[str, Counter[str]] = {}
@@ -44,7 +48,11 @@ def count_events(events: Sequence[BaliseRecord]) -> EventCounts:
 
 
 def outcome_columns(outcomes: Iterable[Mapping[str, int]]) -> dict[str, str]:
-    """The outcomes that occurred at some receiver, known ones first, each with its heading."""
+    """The outcomes that occurred at some receiver, known ones first, each with its heading.
+
+    Args:
+        outcomes: number of telegrams by outcome, for each receiver.
+    """
     seen = dict.fromkeys(outcome for counts in outcomes for outcome, count in counts.items() if count)
     ordered = [*(o for o in KNOWN_OUTCOMES if o in seen), *(o for o in seen if o not in KNOWN_OUTCOMES)]
     return {outcome: IN_WORDS.get(outcome, outcome) for outcome in ordered}

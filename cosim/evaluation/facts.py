@@ -18,13 +18,23 @@ from cosim.results.result import Result
 
 
 def mapping_entry(result: Result, key: str) -> Mapping[str, Any]:
-    """An entry that is a mapping; empty where it is missing or something else."""
+    """An entry that is a mapping; empty where it is missing or something else.
+
+    Args:
+        result: the run.
+        key: of the summary.
+    """
     value = result.summary.get(key)
     return value if isinstance(value, Mapping) else {}
 
 
 def list_entry(result: Result, key: str) -> list[Any]:
-    """An entry that is a list; a single text counts as one item, a missing entry as none."""
+    """An entry that is a list; a single text counts as one item, a missing entry as none.
+
+    Args:
+        result: the run.
+        key: of the summary.
+    """
     value = result.summary.get(key)
     if isinstance(value, str):
         return [value]
@@ -32,7 +42,12 @@ def list_entry(result: Result, key: str) -> list[Any]:
 
 
 def number_entry(entries: Mapping[str, Any], key: str) -> float | None:
-    """A finite number, or None."""
+    """A finite number, or None.
+
+    Args:
+        entries: the summary, or a part of it.
+        key: of the entry.
+    """
     value = entries.get(key)
     return float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) and isfinite(value) else None
 
@@ -40,6 +55,9 @@ def number_entry(entries: Mapping[str, Any], key: str) -> float | None:
 def localisation(result: Result) -> str:
     """How the crossings were found and why so: from the summary, or else from the telegrams; empty where neither
     says.
+
+    Args:
+        result: the run.
     """
     stated = mapping_entry(result, "localisation")
     if not stated:
@@ -57,7 +75,11 @@ def _duration(result: Result) -> float:
 
 
 def statement(result: Result) -> str:
-    """A few sentences: what was run, for how long, at which step, how fast, and how balises were found."""
+    """A few sentences: what was run, for how long, at which step, how fast, and how balises were found.
+
+    Args:
+        result: the run.
+    """
     duration, step = _duration(result), number_entry(result.summary, "step")
     wall, factor = number_entry(result.summary, "wall_seconds"), number_entry(result.summary, "real_time_factor")
     if factor is None and wall:

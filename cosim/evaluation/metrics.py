@@ -75,17 +75,32 @@ def error_size(time: np.ndarray, error: np.ndarray) -> ErrorSize:
 
 
 def instants(time: np.ndarray) -> int:
-    """How many different times there are among times that do not decrease [s], shape (rows,)."""
+    """How many different times there are among times that do not decrease [s], shape (rows,).
+
+    Args:
+        time: instants [s], shape (rows,), never falling.
+    """
     return int(np.count_nonzero(np.diff(time) > 0.0)) + 1 if len(time) else 0
 
 
 def judged_size(time: np.ndarray, error: np.ndarray) -> ErrorSize:
-    """As `error_size`; NaN where there are fewer than `FEWEST_INSTANTS` instants."""
+    """As `error_size`; NaN where there are fewer than `FEWEST_INSTANTS` instants.
+
+    Args:
+        time: instants [s], shape (rows,), never falling.
+        error: estimate minus true value, shape (rows,).
+    """
     return error_size(time, error) if instants(time) >= FEWEST_INSTANTS else ErrorSize(nan, nan)
 
 
 def within(time: np.ndarray, phase: Phase, evaluate_after: float) -> np.ndarray:
-    """Rows of a phase that are evaluated, shape (rows,): ``start <= t <= end`` and ``t >= evaluate_after``."""
+    """Rows of a phase that are evaluated, shape (rows,): ``start <= t <= end`` and ``t >= evaluate_after``.
+
+    Args:
+        time: instants [s], shape (rows,), never falling.
+        phase: its begin and end [s].
+        evaluate_after: from when on errors count [s].
+    """
     return np.asarray((time >= max(phase.start, evaluate_after)) & (time <= phase.end))
 
 

@@ -36,12 +36,21 @@ def _finite(value: float, digits: int) -> str:
 
 
 def error_number(value: float | None, digits: int = 3) -> str:
-    """A size of an error: as `number`, but an infinite one reads ``diverged``."""
+    """A size of an error: as `number`, but an infinite one reads ``diverged``.
+
+    Args:
+        value: the size; None and NaN give a dash.
+        digits: significant digits.
+    """
     return "diverged" if value is not None and math.isinf(value) else number(value, digits)
 
 
 def cell(value: Any) -> str:
-    """A cell of a table as text."""
+    """A cell of a table as text.
+
+    Args:
+        value: number, text or None.
+    """
     if isinstance(value, str | int):
         return str(value)
     return DASH if value is None else error_number(value)

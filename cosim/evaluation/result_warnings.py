@@ -39,7 +39,12 @@ def result_warnings(result: Result, spec: ReportSpec) -> list[str]:
 
 
 def all_warnings(result: Result, spec: ReportSpec) -> list[str]:
-    """The warnings of the summary, and what may be added to those of an older run."""
+    """The warnings of the summary, and what may be added to those of an older run.
+
+    Args:
+        result: the run.
+        spec: roles of the signals, labels, phases and zones.
+    """
     return list(dict.fromkeys([*map(str, list_entry(result, "warnings")), *result_warnings(result, spec)]))
 
 

@@ -13,18 +13,34 @@ Quantity = Literal["speed", "position"]
 
 
 def recorded(result: Result, name: str | None) -> np.ndarray | None:
-    """Values of a signal, shape (rows,), or None where `name` is None or was not recorded."""
+    """Values of a signal, shape (rows,), or None where `name` is None or was not recorded.
+
+    Args:
+        result: the run.
+    """
     return result[name] if name is not None and name in (result.table.dtype.names or ()) else None
 
 
 def estimate(result: Result, observer: str, signal: str) -> np.ndarray | None:
-    """What an observer said of a quantity, shape (rows,), or None where it was not recorded."""
+    """What an observer said of a quantity, shape (rows,), or None where it was not recorded.
+
+    Args:
+        result: the run.
+        observer: name of its component.
+        signal: the quantity, as the outputs of observers are called.
+    """
     return recorded(result, f"{observer}.{signal}")
 
 
 def estimation_error(result: Result, spec: ReportSpec, observer: str, quantity: Quantity) -> np.ndarray | None:
     """Estimate minus true value: speed [m/s] or position [m], shape (rows,), or None where one of them was not
     recorded.
+
+    Args:
+        result: the run.
+        spec: roles of the signals, labels, phases and zones.
+        observer: name of its component.
+        quantity: ``speed`` or ``position``.
     """
     true = recorded(result, spec.true_speed if quantity == "speed" else spec.true_position)
     believed = estimate(result, observer, quantity)
@@ -47,12 +63,22 @@ def coupler_force(result: Result, signal: str | None) -> np.ndarray | None:
 
 
 def label(spec: ReportSpec, observer: str) -> str:
-    """Text to show for an observer."""
+    """Text to show for an observer.
+
+    Args:
+        spec: labels.
+        observer: name of its component.
+    """
     return spec.labels.get(observer, observer)
 
 
 def phases(result: Result, spec: ReportSpec) -> list[Phase]:
-    """The phases to be judged; the whole run where the specification names none."""
+    """The phases to be judged; the whole run where the specification names none.
+
+    Args:
+        result: the run.
+        spec: roles of the signals, labels, phases and zones.
+    """
     if spec.phases or not len(result.time):
         return list(spec.phases)
     return [Phase("whole run", float(result.time[0]), float(result.time[-1]))]

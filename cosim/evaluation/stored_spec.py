@@ -42,7 +42,11 @@ def spec_of(result: Result, fallback_title: str = "Co-simulation") -> ReportSpec
 
 
 def is_guessed(result: Result) -> bool:
-    """Whether the summary is silent about the roles."""
+    """Whether the summary is silent about the roles.
+
+    Args:
+        result: with its summary.
+    """
     return not mapping_entry(result, SPEC_ENTRY)
 
 

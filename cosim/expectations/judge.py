@@ -2,31 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from cosim.expectations.indicators import judge_off, judge_on
 from cosim.expectations.judged import Judged
 from cosim.expectations.run import NotRecordedError, Run
-from cosim.expectations.telegrams import judge_telegrams
-from cosim.expectations.values import ERRORS, judge_difference, judge_error, judge_signal
-from cosim.expectations.whole_run import judge_certificate, judge_warnings
 
 if TYPE_CHECKING:
     from cosim.scenario.outcome import Outcome
     from cosim.scenario.schema import ScenarioTable
-
-JUDGES: dict[str, Callable[[Any, Run], list[Judged]]] = {
-    **dict.fromkeys(ERRORS, judge_error),
-    "difference": judge_difference,
-    "signal": judge_signal,
-    "on": judge_on,
-    "off": judge_off,
-    "telegrams": judge_telegrams,
-    "certificate": judge_certificate,
-    "warnings": judge_warnings,
-}
 
 
 def judge(table: ScenarioTable, outcome: Outcome) -> list[Judged]:
@@ -44,7 +28,7 @@ def judge(table: ScenarioTable, outcome: Outcome) -> list[Judged]:
 
 def _judge(place: int, item: Any, run: Run) -> list[Judged]:
     try:
-        parts = JUDGES[item.check](item, run)
+        parts = item.judge(run)
     except NotRecordedError as error:
         parts = [Judged(item.check, item.check, passed=False, text=str(error))]
     if item.name is not None:

@@ -154,6 +154,12 @@ def error_at_balises(result: Result, spec: ReportSpec, name: str, quantity: Quan
 
     A row pair of the same time stands at each delivery, before and after; of an observer that could not be stopped
     there the last row before it counts.
+
+    Args:
+        result: the run.
+        spec: roles of the signals, labels, phases and zones.
+        name: of the observer's component.
+        quantity: ``speed`` or ``position``.
     """
     error = estimation_error(result, spec, name, quantity)
     times = [
@@ -173,7 +179,11 @@ def error_at_balises(result: Result, spec: ReportSpec, name: str, quantity: Quan
 
 
 def divergence(whole: PhaseMetrics | None) -> str | None:
-    """Why the numbers of an observer mean nothing although it ran to the end, in words, or None."""
+    """Why the numbers of an observer mean nothing although it ran to the end, in words, or None.
+
+    Args:
+        whole: errors over the whole run; None without any.
+    """
     speed = None if whole is None else whole.speed
     if speed is None or not speed.max_abs > DIVERGED:
         return None
@@ -181,7 +191,13 @@ def divergence(whole: PhaseMetrics | None) -> str | None:
 
 
 def false_alarms(result: Result, spec: ReportSpec, name: str) -> int | None:
-    """How often the slip indicator came on outside the low-adhesion zones; None where no zones are known."""
+    """How often the slip indicator came on outside the low-adhesion zones; None where no zones are known.
+
+    Args:
+        result: the run.
+        spec: roles of the signals, labels, phases and zones.
+        name: of the observer's component.
+    """
     values = estimate(result, name, "slip_indicator")
     if values is None or not spec.zones:
         return None
@@ -190,7 +206,12 @@ def false_alarms(result: Result, spec: ReportSpec, name: str) -> int | None:
 
 
 def telegram_outcomes(events: Sequence[BaliseRecord], name: str) -> dict[str, int]:
-    """What became of the telegrams at one receiver, by outcome."""
+    """What became of the telegrams at one receiver, by outcome.
+
+    Args:
+        events: the telegrams.
+        name: of the receiver.
+    """
     counts: dict[str, int] = {}
     for event in events:
         outcome = event.outcomes.get(name)
@@ -200,6 +221,11 @@ def telegram_outcomes(events: Sequence[BaliseRecord], name: str) -> dict[str, in
 
 
 def longest_gap(events: Sequence[BaliseRecord], start: float) -> float | None:
-    """Longest time between two balises that were told, or from the start to the first one [s]; None without any."""
+    """Longest time between two balises that were told, or from the start to the first one [s]; None without any.
+
+    Args:
+        events: the telegrams.
+        start: begin of the run [s].
+    """
     stamps = sorted(e.stamp for e in events if e.kind == "true")
     return float(np.diff([start, *stamps]).max()) if stamps else None

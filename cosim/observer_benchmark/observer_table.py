@@ -14,7 +14,11 @@ from fmus.text_table import text_table
 
 
 def main_row(score: ObserverScore) -> dict[str, Any]:
-    """One row of the main table; headings with units."""
+    """One row of the main table; headings with units.
+
+    Args:
+        score: an observer with its numbers.
+    """
     whole: PhaseMetrics | None = score.whole
     speed, position = (whole.speed, whole.position) if whole is not None else (None, None)
     at_v, at_p = score.speed_at_balises, score.position_at_balises
@@ -36,7 +40,11 @@ def main_row(score: ObserverScore) -> dict[str, Any]:
 
 
 def certified(certificate: CertifiedGap | None) -> str | None:
-    """Whether a certificate holds for the gaps expected and seen, in words."""
+    """Whether a certificate holds for the gaps expected and seen, in words.
+
+    Args:
+        certificate: with the gaps it was held against; None where there is none.
+    """
     if certificate is None:
         return None
     words = {True: "yes", False: "NO", None: "?"}
@@ -44,5 +52,9 @@ def certified(certificate: CertifiedGap | None) -> str | None:
 
 
 def aligned(rows: Sequence[Mapping[str, str]]) -> str:
-    """Rows as lines of equal width; the first column to the left, the others to the right."""
+    """Rows as lines of equal width; the first column to the left, the others to the right.
+
+    Args:
+        rows: texts by heading.
+    """
     return "\n".join(text_table([list(rows[0]), *(list(row.values()) for row in rows)], heading=True)) if rows else ""

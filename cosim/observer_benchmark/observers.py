@@ -126,6 +126,9 @@ class ObserverBenchmark:
     def write(self, directory: str | Path) -> dict[str, Path]:
         """Write page, picture and data to a folder.
 
+        Args:
+            directory: the folder; created where it does not exist.
+
         Returns:
             Paths by kind: ``page``, ``picture``, ``data``.
 

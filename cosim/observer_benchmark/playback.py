@@ -51,7 +51,11 @@ class Sides:
         return tuple(name for name in self.observers if name in self.plant)
 
     def sources(self, name: str) -> dict[str, Link]:
-        """Where the inputs of a component come from."""
+        """Where the inputs of a component come from.
+
+        Args:
+            name: of the component.
+        """
         return {target.partition(".")[2]: link for link in self.links if (target := link[1]).partition(".")[0] == name}
 
     def template(self) -> dict[str, Link]:
@@ -71,6 +75,9 @@ class Sides:
 
 def find_sides(scenario: Scenario) -> Sides:
     """Tell the plant side of a scenario from its observers.
+
+    Args:
+        scenario: the scenario.
 
     Raises:
         CosimError: a component cannot be made, or a connection cannot be read.
@@ -115,7 +122,12 @@ def _ancestors(roots: Iterable[str], links: Iterable[Link], components: Iterable
 
 
 def recording_scenario(scenario: Scenario, sides: Sides) -> Scenario:
-    """The plant side alone, everything recorded that an observer listens to."""
+    """The plant side alone, everything recorded that an observer listens to.
+
+    Args:
+        scenario: the scenario.
+        sides: the plant side and the observers, from `find_sides`.
+    """
     data = _table(sides.table)
     heard = _heard(sides)
     data["components"] = {name: _recorded(data["components"][name], heard.get(name, set())) for name in sides.plant}
@@ -173,7 +185,12 @@ def playback_scenario(
 
 
 def connection(link: Link, target: str) -> str | dict[str, Any]:
-    """A connection as it stands in a scenario, to this target."""
+    """A connection as it stands in a scenario, to this target.
+
+    Args:
+        link: where the value comes from, and how it is converted.
+        target: as ``component.signal``.
+    """
     if len(link) == 2:
         return f"{link[0]} -> {target}"
     given = link[2]
@@ -240,6 +257,9 @@ def known_facts(sides: Sides) -> dict[str, tuple[float, str]]:
     """What the scenario says of the train that an observer should know too: value, and who says so.
 
     What its own observers were told in agreement comes first; then parameters and preset of the plant.
+
+    Args:
+        sides: the plant side and the observers, from `find_sides`.
     """
     found: dict[str, tuple[float, str]] = {}
     for fact in FACTS:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from cosim.errors import CosimError
 from cosim.pytest_plugin import options
 from cosim.pytest_plugin.records import Record, Records
 
@@ -45,7 +46,6 @@ def write_baselines(session: pytest.Session, exitstatus: int) -> None:
     if config.stash[REFUSED] or not staged:
         return
     from cosim.baselines.files import write_texts  # noqa: PLC0415 - only where something is written
-    from cosim.errors import CosimError  # noqa: PLC0415
 
     faults = config.stash.setdefault(WRITTEN, [])
     for record in staged:

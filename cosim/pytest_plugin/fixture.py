@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from cosim.errors import CosimError
 from cosim.pytest_plugin import options
 from cosim.pytest_plugin.names import baseline_name
 from cosim.pytest_plugin.records import Record, Records, Status
@@ -75,7 +76,6 @@ class FmuRegression:
             The comparison, with `outcome` and `actual`: what ran.
         """
         from cosim.baselines.call import Call  # noqa: PLC0415 - pytest must start fast
-        from cosim.errors import CosimError  # noqa: PLC0415
 
         path, reason = self._path(name), ""
         try:

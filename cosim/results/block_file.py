@@ -77,6 +77,9 @@ class ReadBlock:
     def after(self, known: int, dtype: np.dtype[np.void]) -> np.ndarray:
         """The rows that are not among the first `known` of the table, in SI and of the table's type, shape (rows,).
 
+        Args:
+            dtype: type of a row of the table.
+
         Raises:
             ValueError: it is the block of another table.
         """
@@ -91,6 +94,9 @@ class ReadBlock:
 
 def read_block(path: Path) -> ReadBlock:
     """The block that a process left or is filling.
+
+    Args:
+        path: of the block.
 
     Raises:
         OSError: the file cannot be read. ValueError: it is no block.

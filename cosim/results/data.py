@@ -103,5 +103,9 @@ class ResultData:
         return np.asarray(self.table[name])
 
     def info(self, name: str) -> SignalInfo:
-        """What a column is."""
+        """What a column is.
+
+        Args:
+            name: name of the column.
+        """
         return next(s for s in self.signals if s.name == name)

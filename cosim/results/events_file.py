@@ -20,7 +20,11 @@ _ESCAPES = {ord("%"): "%25", ord(";"): "%3B", ord("="): "%3D"}
 
 
 def outcomes_text(outcomes: Mapping[str, str]) -> str:
-    """Outcomes as ``name=outcome;name=outcome``; ``%``, ``;`` and ``=`` inside a name are written as in a URL."""
+    """Outcomes as ``name=outcome;name=outcome``; ``%``, ``;`` and ``=`` inside a name are written as in a URL.
+
+    Args:
+        outcomes: by name of the receiver.
+    """
     return ";".join(f"{name.translate(_ESCAPES)}={what.translate(_ESCAPES)}" for name, what in outcomes.items())
 
 
@@ -40,7 +44,11 @@ def parse_outcomes(text: str) -> dict[str, str]:
 
 
 def record_row(record: BaliseRecord) -> dict[str, float | str]:
-    """One telegram by column: numbers as they are, the outcomes as text."""
+    """One telegram by column: numbers as they are, the outcomes as text.
+
+    Args:
+        record: the telegram.
+    """
     row: dict[str, Any] = {name: getattr(record, name) for name in COLUMNS}
     row["outcomes"] = outcomes_text(record.outcomes)
     return {name: float(value) if name in NUMBERS else str(value) for name, value in row.items()}
@@ -48,6 +56,9 @@ def record_row(record: BaliseRecord) -> dict[str, float | str]:
 
 def record_from_row(row: Mapping[str, Any]) -> BaliseRecord:
     """The telegram of a row; numbers may still be text.
+
+    Args:
+        row: cells by column.
 
     Raises:
         KeyError: a column is missing. ValueError: a number or an outcome cannot be read.
@@ -76,6 +87,9 @@ def write_events(path: str | Path, events: Iterable[BaliseRecord]) -> None:
 
 def read_events(path: str | Path) -> list[BaliseRecord]:
     """Read the telegrams written by `write_events`.
+
+    Args:
+        path: the file.
 
     Raises:
         ValueError: the file is not such a table; the message names the line.

@@ -18,12 +18,11 @@ from cosim.diagnostics.messages import read_messages, write_messages
 from cosim.errors import OutputError
 from cosim.results.data import ResultData, SignalInfo
 from cosim.results.events_file import read_events, write_events
-from cosim.results.formats.catalogue import FASTEST_FIRST, FORMATS, check_formats
+from cosim.results.formats.catalogue import FORMATS, check_formats, fastest_first, table_files, usual_file
 from cosim.results.optional import is_installed
 from cosim.results.summary_file import read_summary, write_summary
 from cosim.results.unfinished import read_unfinished
 
-TABLES = {name: f"table{item.endings[0]}" for name, item in FORMATS.items()}
 EVENTS, MESSAGES, SUMMARY = "events.csv", "messages.csv", "summary.json"
 LAYOUT = 1  # version of the layout of summary.json
 
@@ -51,7 +50,7 @@ def check_writable(directory: str | Path, formats: Sequence[str] = ()) -> Path:
         raise OutputError(
             f"Results cannot be written to {folder}: {_reason(error)}. Choose another output folder."
         ) from error
-    for name in (*TABLES.values(), EVENTS, MESSAGES, SUMMARY):
+    for name in (*table_files().values(), EVENTS, MESSAGES, SUMMARY):
         if (folder / name).is_dir():
             raise OutputError(
                 f"Results cannot be written to {folder}: {name} is a folder there. Choose another output folder."
@@ -65,17 +64,15 @@ def _reason(error: OSError) -> str:
 
 def _write_all(result: ResultData, folder: Path, formats: Sequence[str]) -> list[str]:
     for name in formats:
-        FORMATS[name].write(folder / TABLES[name], result)
+        FORMATS[name].write(folder / usual_file(name), result)
     write_events(folder / EVENTS, result.events)
     write_messages(folder / MESSAGES, result.messages)
     content = {"layout": LAYOUT, "failure": result.failure, "signals": list(result.signals), "summary": result.summary}
     write_summary(folder / SUMMARY, content)
-    return [*(TABLES[name] for name in TABLES if name in formats), EVENTS, MESSAGES, SUMMARY]
+    return [*(usual_file(name) for name in dict.fromkeys(formats)), EVENTS, MESSAGES, SUMMARY]
 
 
-def write_results(
-    result: ResultData, directory: str | Path, formats: Sequence[str] = ("csv", "mat")
-) -> dict[str, Path]:
+def write_results(result: ResultData, directory: str | Path, formats: Sequence[str] = ("csv",)) -> dict[str, Path]:
     """Write a result to a folder, replacing what an earlier run left there.
 
     Args:
@@ -97,12 +94,12 @@ def write_results(
         with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as scratch:
             for name in _write_all(result, Path(scratch), formats):
                 (Path(scratch) / name).replace(folder / name)
-        for stale in set(TABLES) - set(formats):
-            (folder / TABLES[stale]).unlink(missing_ok=True)
+        for stale in set(table_files()) - set(formats):
+            (folder / usual_file(stale)).unlink(missing_ok=True)
     except OSError as error:
         hint = "Free the disk, or close the program that has the file open."
         raise OutputError(f"Results could not be written to {folder}: {_reason(error)}. {hint}") from error
-    return {name: folder / TABLES[name] for name in TABLES if name in formats} | {
+    return {name: folder / usual_file(name) for name in dict.fromkeys(formats)} | {
         "events": folder / EVENTS,
         "messages": folder / MESSAGES,
         "summary": folder / SUMMARY,
@@ -111,11 +108,11 @@ def write_results(
 
 def _table(folder: Path, name: str | None) -> np.ndarray:
     """The table of a folder, from the file with that name or from the one that is read fastest."""
-    present = [item for item in FASTEST_FIRST if (folder / TABLES[item.name]).exists()]
-    named = [item for item in FASTEST_FIRST if TABLES[item.name] == name]
+    present = [item for item in fastest_first() if (folder / usual_file(item.name)).exists()]
+    named = [item for item in fastest_first() if usual_file(item.name) == name]
     readable = [item for item in present if item.package is None or is_installed(item.package)]
     chosen = next(iter([*named, *readable, *present]), FORMATS["csv"])
-    return chosen.read(folder / TABLES[chosen.name]).table
+    return chosen.read(folder / usual_file(chosen.name)).table
 
 
 def _read(folder: Path, table_name: str | None = None) -> tuple[ResultData, Mapping[str, Any]]:
@@ -124,7 +121,7 @@ def _read(folder: Path, table_name: str | None = None) -> tuple[ResultData, Mapp
         raise ValueError(f"{SUMMARY} has layout {content.get('layout')!r}, this version reads layout {LAYOUT}.")
     signals = [SignalInfo(**signal) for signal in content["signals"]]
     if not content.get("ended", True):  # it was streamed here, and its program died
-        return read_unfinished(folder / TABLES["npy"], folder / EVENTS, folder / MESSAGES, content), content
+        return read_unfinished(folder / usual_file("npy"), folder / EVENTS, folder / MESSAGES, content), content
     table = _table(folder, table_name)
     messages = read_messages(folder / MESSAGES) if (folder / MESSAGES).exists() else []  # older results have none
     return ResultData(table, signals, read_events(folder / EVENTS), messages=messages), content

@@ -9,8 +9,12 @@ from pathlib import Path
 from cosim.errors import OutputError, nearest
 from cosim.results.data import ResultData
 from cosim.results.events_file import EVENTS_SUFFIX, read_events
-from cosim.results.folder import SUMMARY, TABLES, read_results
+from cosim.results.folder import SUMMARY, read_results
+from cosim.results.formats.catalogue import table_files
 from cosim.results.formats.columns import check_time
+from cosim.results.formats.foreign_csv import read_foreign_csv
+from cosim.results.formats.foreign_mat import read_foreign_mat
+from cosim.results.formats.foreign_npy import read_foreign_npy
 from cosim.results.result import Result
 
 
@@ -37,7 +41,7 @@ def load_result(path: str | Path) -> Result:
     if not source.exists():
         raise OutputError(f"There is no {source}; {_neighbours(source)}")
     folder = source.parent
-    if source.name in TABLES.values() and (folder / SUMMARY).is_file():
+    if source.name in table_files().values() and (folder / SUMMARY).is_file():
         return Result.of(read_results(folder, table=source.name))
     try:
         result = _reader(source)(source)
@@ -57,7 +61,7 @@ def load_result(path: str | Path) -> Result:
 def _folder(folder: Path) -> ResultData:
     if (folder / SUMMARY).is_file():
         return read_results(folder)
-    tables = [name for name in TABLES.values() if (folder / name).is_file()]
+    tables = [name for name in table_files().values() if (folder / name).is_file()]
     if tables:
         raise OutputError(
             f"{folder} is not a results folder: {SUMMARY} is missing. For the table alone: {folder / tables[0]}."
@@ -86,20 +90,22 @@ def _reader(path: Path) -> Callable[[Path], ResultData]:
     if not start:
         raise OutputError(f"{path} is empty: expected a table with a column 'time'.")
     if start.startswith(b"\x93NUMPY"):
-        from cosim.results.formats.foreign_npy import read_foreign_npy as read  # noqa: PLC0415 - only what is needed
-    elif start.startswith(b"PAR1"):
-        from cosim.results.formats.parquet_file import read_parquet as read  # noqa: PLC0415
-    elif start.startswith((b"\x89HDF", b"MATLAB 7.3")):
-        from cosim.results.formats.hdf5_file import read_hdf5 as read  # noqa: PLC0415
-    elif start.startswith(b"MATLAB") or path.suffix.lower() == ".mat":
-        from cosim.results.formats.foreign_mat import read_foreign_mat as read  # noqa: PLC0415
-    elif start.startswith((b"PK\x03\x04", b"\x1f\x8b")):
+        return read_foreign_npy
+    if start.startswith(b"PAR1"):
+        from cosim.results.formats.parquet_file import read_parquet  # noqa: PLC0415 - an optional package
+
+        return read_parquet
+    if start.startswith((b"\x89HDF", b"MATLAB 7.3")):
+        from cosim.results.formats.hdf5_file import read_hdf5  # noqa: PLC0415 - an optional package
+
+        return read_hdf5
+    if start.startswith(b"MATLAB") or path.suffix.lower() == ".mat":
+        return read_foreign_mat
+    if start.startswith((b"PK\x03\x04", b"\x1f\x8b")):
         raise OutputError(
             f"{path} is an archive (FMU, spreadsheet, zip or gzip), not a table. Unpack it, or export it as CSV."
         )
-    else:
-        from cosim.results.formats.foreign_csv import read_foreign_csv as read  # noqa: PLC0415
-    return read
+    return read_foreign_csv
 
 
 def _with_events(result: ResultData, source: Path) -> ResultData:

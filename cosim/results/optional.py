@@ -29,5 +29,9 @@ def optional_module(name: str, extra: str, purpose: str) -> Any:
 
 
 def is_installed(name: str) -> bool:
-    """Whether a package can be imported; it is not imported for that."""
+    """Whether a package can be imported; it is not imported for that.
+
+    Args:
+        name: of the package.
+    """
     return find_spec(name) is not None

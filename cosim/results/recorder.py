@@ -33,11 +33,20 @@ class Stream(Protocol):
     seconds: float
 
     def open(self, dtype: np.dtype[np.void], rows: int) -> RowFile:
-        """The file for rows of this type, with space for so many."""
+        """The file for rows of this type, with space for so many.
+
+        Args:
+            dtype: type of a row: its columns.
+            rows: number of rows.
+        """
         ...
 
     def block(self, rows: int) -> BlockFile:
-        """The block of so many rows that are not in the file yet."""
+        """The block of so many rows that are not in the file yet.
+
+        Args:
+            rows: number of rows.
+        """
         ...
 
 
@@ -110,6 +119,10 @@ class Recorder:
     def add(self, t: float, values: np.ndarray) -> None:
         """Copy the row of a communication point: time [s] and values, shape (n,).
 
+        Args:
+            t: time [s].
+            values: of the plan, shape (n,).
+
         Raises:
             OutputError: the file cannot take more rows; everything recorded so far is kept.
         """
@@ -124,6 +137,10 @@ class Recorder:
     def add_event(self, t: float, values: np.ndarray) -> None:
         """Copy the row of an event within a step or at its end; it is kept whatever `every` says. Otherwise as
         `add`.
+
+        Args:
+            t: time [s].
+            values: shape (n,).
         """
         self._append(t, values)
         self._after_event, self._skipping = True, False

@@ -52,6 +52,9 @@ class RowFile:
     def reserve(self, rows: int) -> None:
         """Make sure that the file can hold so many rows.
 
+        Args:
+            rows: number of rows.
+
         Raises:
             OutputError: there is no space for them.
         """
@@ -64,6 +67,9 @@ class RowFile:
 
     def write(self, first: int, rows: np.ndarray) -> None:
         """Write rows from number `first` on; a C-contiguous array.
+
+        Args:
+            rows: structured rows, shape (n,).
 
         Raises:
             OutputError: the disk refuses.
@@ -78,11 +84,19 @@ class RowFile:
         self.count = first + len(rows)
 
     def converted(self, rows: np.ndarray) -> np.ndarray:
-        """Structured rows as they would stand in the file."""
+        """Structured rows as they would stand in the file.
+
+        Args:
+            rows: structured rows, shape (n,).
+        """
         return rows
 
     def table(self, dtype: np.dtype[np.void]) -> np.ndarray:
-        """All rows as a structured array that is a map of the file, shape (count,)."""
+        """All rows as a structured array that is a map of the file, shape (count,).
+
+        Args:
+            dtype: type of a row.
+        """
         if not self.count:
             return np.empty(0, dtype)
         return np.memmap(self._file, dtype=dtype, mode="r+", shape=(self.count,))
@@ -114,7 +128,13 @@ def _folder_for_large_files() -> str:
 
 
 def allocate(descriptor: int, start: int, size: int) -> None:
-    """Have the file system set space aside; where it cannot, zeros are written."""
+    """Have the file system set space aside; where it cannot, zeros are written.
+
+    Args:
+        descriptor: of the file.
+        start: first byte.
+        size: number of bytes.
+    """
     if size <= 0:
         return
     if hasattr(os, "posix_fallocate"):

@@ -9,7 +9,8 @@ from typing import Any
 
 from cosim.errors import CosimError
 from cosim.results.block_file import BLOCK_FILE, read_block
-from cosim.results.folder import SUMMARY, TABLES, read_results, write_results
+from cosim.results.folder import SUMMARY, read_results, write_results
+from cosim.results.formats.catalogue import usual_file
 from cosim.results.formats.growing_npy import growing_header, read_grown
 from cosim.results.summary_file import read_summary, write_summary
 from cosim.results.unfinished import DID_NOT_END
@@ -27,7 +28,7 @@ def salvage(note: Mapping[str, Any], reason: str) -> str:
     """
     spare, out = Path(note["spare"]), Path(note["out"])
     try:
-        if not (spare / SUMMARY).exists() or not (spare / TABLES["npy"]).exists():
+        if not (spare / SUMMARY).exists() or not (spare / usual_file("npy")).exists():
             return "Nothing had been computed yet."
         close_unfinished(spare, reason)
         result = read_results(spare)
@@ -48,10 +49,14 @@ def salvage(note: Mapping[str, Any], reason: str) -> str:
 def close_unfinished(folder: Path, reason: str) -> None:
     """Bring the rows of the block into the table of a folder that was streamed to, and say why the run ended.
 
+    Args:
+        folder: the results folder.
+        reason: why the run ended, in words.
+
     Raises:
         OSError, ValueError: a file cannot be read or written, or is none of a stream.
     """
-    table, block = folder / TABLES["npy"], folder / BLOCK_FILE
+    table, block = folder / usual_file("npy"), folder / BLOCK_FILE
     if block.exists():
         rows = read_grown(table)
         new = read_block(block).after(len(rows), rows.dtype)

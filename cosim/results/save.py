@@ -7,8 +7,9 @@ from pathlib import Path
 from cosim.errors import OutputError
 from cosim.results.data import ResultData
 from cosim.results.events_file import EVENTS_SUFFIX, write_events
-from cosim.results.formats.catalogue import Format, check_formats, format_of
+from cosim.results.formats.catalogue import check_formats, format_of
 from cosim.results.formats.csv_file import write_csv
+from cosim.results.formats.format import Format
 from cosim.results.formats.headings import with_unit
 
 
@@ -48,7 +49,7 @@ def save_result(result: ResultData, path: str | Path, *, units: bool = True) -> 
         raise OutputError(f"{target} cannot be written: {error.strerror or error}. Choose another place.") from error
 
 
-def _write(result: ResultData, path: Path, wanted: Format, units: bool) -> None:
+def _write(result: ResultData, path: Path, wanted: type[Format], units: bool) -> None:
     if wanted.name != "csv" or not units:
         wanted.write(path, result)
         return
@@ -57,7 +58,7 @@ def _write(result: ResultData, path: Path, wanted: Format, units: bool) -> None:
     write_csv(path, result.table, ["time", *headings])
 
 
-def _events_beside(result: ResultData, target: Path, wanted: Format) -> list[Path]:
+def _events_beside(result: ResultData, target: Path, wanted: type[Format]) -> list[Path]:
     """Telegrams of a format without room for them; a file that is there already would otherwise be taken for theirs."""
     beside = target.with_name(target.with_suffix("").name + EVENTS_SUFFIX)
     if wanted.keeps or not (result.events or beside.exists()):

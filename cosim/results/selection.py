@@ -17,6 +17,10 @@ from cosim.results.table_layout import column_names, table_dtype
 def selected(result: Result, patterns: Iterable[str]) -> Result:
     """The result with those signals only that are named or match a pattern such as ``train.*``; their order stays.
 
+    Args:
+        result: the run.
+        patterns: names or patterns.
+
     Raises:
         OutputError: a pattern matches nothing; the message lists the nearest names.
     """

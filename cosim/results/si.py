@@ -60,18 +60,31 @@ def in_si(table: np.ndarray, signals: Sequence[SignalInfo], unit_of: UnitOf) -> 
 
 
 def foreign_units(signals: Sequence[SignalInfo], unit_of: UnitOf) -> dict[str, Unit]:
-    """The units of the columns that are not in SI, by name; arguments as for `in_si`."""
+    """The units of the columns that are not in SI, by name; arguments as for `in_si`.
+
+    Args:
+        signals: what the columns are.
+        unit_of: gives the unit of a column by its name; None where it is not known.
+    """
     return {signal.name: unit for signal in signals if (unit := _to_convert(signal, unit_of)) is not None}
 
 
 def convert(rows: np.ndarray, units: Mapping[str, Unit]) -> None:
-    """Bring rows, shape (rows,), to SI in place; `units` as from `foreign_units`."""
+    """Bring rows, shape (rows,), to SI in place; `units` as from `foreign_units`.
+
+    Args:
+        rows: structured rows; changed in place.
+    """
     for name, unit in units.items():
         rows[name] = unit.factor * rows[name] + unit.offset
 
 
 def described(signals: Sequence[SignalInfo], units: Mapping[str, Unit]) -> list[SignalInfo]:
-    """What the columns are once they are in SI; `units` as from `foreign_units`."""
+    """What the columns are once they are in SI; `units` as from `foreign_units`.
+
+    Args:
+        signals: what the columns are.
+    """
     return [_described(signal, units.get(signal.name)) for signal in signals]
 
 
@@ -97,7 +110,11 @@ class InFormerUnits:
 
 
 def si_name(unit: Unit) -> str:
-    """A name for the SI unit of the same dimension, e.g. ``m/s`` for ``km/h``."""
+    """A name for the SI unit of the same dimension, e.g. ``m/s`` for ``km/h``.
+
+    Args:
+        unit: of a column.
+    """
     if unit.exponents in NAMED:
         return NAMED[unit.exponents]
     return ".".join(f"{s}{'' if e == 1 else e}" for s, e in zip(BASE_SYMBOLS, unit.exponents, strict=True) if e)

@@ -22,7 +22,8 @@ from cosim.errors import OutputError
 from cosim.results.block_file import BLOCK_FILE, BlockFile
 from cosim.results.data import BaliseRecord, SignalInfo
 from cosim.results.events_file import record_row, write_events
-from cosim.results.folder import EVENTS, LAYOUT, MESSAGES, SUMMARY, TABLES, check_writable
+from cosim.results.folder import EVENTS, LAYOUT, MESSAGES, SUMMARY, check_writable
+from cosim.results.formats.catalogue import table_files, usual_file
 from cosim.results.formats.growing_npy import growing_header
 from cosim.results.row_file import RowFile
 from cosim.results.si import UnitOf, convert, described, foreign_units
@@ -74,14 +75,21 @@ class Stream:
     def open(self, dtype: np.dtype[np.void], rows: int) -> RowFile:
         """The file of the table, with space for so many rows.
 
+        Args:
+            dtype: type of a row: its columns.
+            rows: number of rows.
+
         Raises:
             OutputError: there is no space.
         """
-        self._file = _StreamFile(self.directory / TABLES["npy"], dtype, rows, self)
+        self._file = _StreamFile(self.directory / usual_file("npy"), dtype, rows, self)
         return self._file
 
     def block(self, rows: int) -> BlockFile:
         """The block of rows that are not in the table yet.
+
+        Args:
+            rows: number of rows.
 
         Raises:
             OutputError: there is no space.
@@ -130,7 +138,7 @@ class Stream:
         """
         folder = self.directory
         try:
-            for name in (SUMMARY, "report.html", BLOCK_FILE, *TABLES.values()):
+            for name in (SUMMARY, "report.html", BLOCK_FILE, *table_files().values()):
                 (folder / name).unlink(missing_ok=True)
             write_events(folder / EVENTS, ())
             write_messages(folder / MESSAGES, ())

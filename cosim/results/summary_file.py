@@ -55,7 +55,11 @@ def _container(value: Any) -> Any:
 
 
 def restored(value: Any) -> Any:
-    """A value of `jsonable` with its infinities; NaN stays None."""
+    """A value of `jsonable` with its infinities; NaN stays None.
+
+    Args:
+        value: as read from JSON.
+    """
     if isinstance(value, dict):
         return {key: restored(item) for key, item in value.items()}
     if isinstance(value, list):
@@ -79,6 +83,9 @@ def write_summary(path: str | Path, summary: Mapping[str, Any]) -> None:
 
 def read_summary(path: str | Path) -> dict[str, Any]:
     """Read a summary written by `write_summary`; ``null`` is read as None.
+
+    Args:
+        path: the file.
 
     Raises:
         ValueError: the file holds no JSON object.

@@ -11,15 +11,17 @@ from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cosim.errors import FmuLoadError
 from cosim.scenario.tables import Backend, ComponentTable
-from fmus.build import Draft
 from fmus.cache import CacheEntry, cache_entry
 from fmus.toolchain.compile import CompilerMissing, find_compiler
 from fmus.toolchain.platforms import Platform
 from plant_models.hybrid import HybridSystem
+
+if TYPE_CHECKING:
+    from fmus.build import Draft
 
 NATIVE: Backend = "fmu3"
 IN_PYTHON: Backend = "block3"

@@ -11,6 +11,7 @@ import fmu_observer
 import fmus
 import plant_models
 from cosim.components.component import Component
+from cosim.components.kept_libraries import load_shipped
 from cosim.components.loading import load_block, load_fmu
 from cosim.components.python import PythonComponent
 from cosim.components.python_model import PythonModel
@@ -122,14 +123,15 @@ def component_factories(
             made.notes += left_out_note(name, recording)
         elif name not in systems and table.fmu is None:
             factories[name] = partial(python_component, name, table, places[name])
-        elif name in systems and name not in made.files:
+        elif name in made.files:
+            factories[name] = partial(load_shipped, made.files[name], name)
+        elif name in systems:
             factories[name] = partial(
                 load_block, systems[name], name, _version(made.kinds[name]), **_block_arguments(table)
             )
         else:
-            path = made.files[name] if name in systems else (folder / str(table.fmu)).resolve()
-            told = None if name in systems else tolerance if table.tolerance is None else table.tolerance
-            factories[name] = partial(load_fmu, path, name, told)
+            told = tolerance if table.tolerance is None else table.tolerance
+            factories[name] = partial(load_fmu, (folder / str(table.fmu)).resolve(), name, told)
     return factories, made.notes
 
 

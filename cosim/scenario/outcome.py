@@ -35,7 +35,7 @@ class Outcome:
 
     result: Result
     spec: ReportSpec
-    tables: tuple[str, ...] = ("csv", "mat")
+    tables: tuple[str, ...] = ("csv",)
     origin: Origin | None = field(default=None, repr=False, compare=False)
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -102,14 +102,14 @@ class Outcome:
         Raises:
             OutputError: the folder cannot be written.
         """
-        from cosim.report.page.report import write_report  # noqa: PLC0415 - matplotlib is loaded only for a report
-
         with renewed(directory, self.origin, files_up_to) as seal:
             paths = dict(write_results(self.result, directory, self.tables))
             seal(paths, self.result.summary)
         if self.origin is not None:
             paths["made_from"] = Path(directory) / "made_from" / "manifest.json"
         if report:
+            from cosim.report.page.report import write_report  # noqa: PLC0415 - matplotlib is loaded only for a report
+
             paths["report"] = write_report(self.result, self.spec, directory)
         else:
             # of an earlier run: it would not speak of these results

@@ -37,6 +37,7 @@ from cosim.process.sentinel import limited_calls
 from cosim.results.recorder import Recorder
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 from cosim.results.si import InFormerUnits, in_si
+from cosim.results.stream import Stream
 from cosim.scenario.after_run import warnings_after
 from cosim.scenario.balise_service import Choice, choose_method, find_receivers, make_service, watched_plant
 from cosim.scenario.certificates import check_certificates, expected_gap
@@ -326,8 +327,6 @@ class _Setup:
         """From here on what is recorded, told and logged is in the folder as well."""
         if self.streaming is None:
             return
-        from cosim.results.stream import Stream  # noqa: PLC0415 - the formats of results only for those who stream
-
         summary = first_summary(self.name, self.table, master.plan) | {"report": asdict(self._report_spec())}
         summary |= {"certificates": self.certificates, "warnings": self.warnings, "notes": self.notes}
         events = [] if self.service is None else self.service.mailbox.log

@@ -6,14 +6,16 @@ Unknown keys, wrong types and values out of range are refused with the place and
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from math import ulp
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
 from pydantic import Field, ValidationError, model_validator
 
 from cosim.errors import ScenarioError, nearest
-from cosim.scenario.expectation_tables import EXPECTATIONS, ExpectationItem
+from cosim.expectations.expectation import Expectation
+from cosim.expectations.registry import EXPECTATIONS
 from cosim.scenario.tables import (
     LINE,
     TABLE,
@@ -23,12 +25,29 @@ from cosim.scenario.tables import (
     ConnectionTable,
     IterationTable,
     MasterTable,
-    Name,
     ReportTable,
-    Table,
     Tolerance,
 )
+from cosim.table import Name, Table
 from fmus.fmi.standard import TIME_TOLERANCE
+from plant_models.registry import RegistryError
+
+
+def _kinds() -> Any:
+    """One of all expectations; what an installed package announces and cannot be loaded is told where it is asked
+    for.
+    """
+    found = []
+    for name in EXPECTATIONS:
+        with suppress(RegistryError):
+            found.append(EXPECTATIONS[name])
+    return Union[tuple(dict.fromkeys(found))]  # noqa: UP007 - as many as there are
+
+
+if TYPE_CHECKING:
+    ExpectationItem = Expectation
+else:
+    ExpectationItem = Annotated[_kinds(), Field(discriminator="check")]
 
 
 class ScenarioTable(Table):
@@ -170,6 +189,10 @@ def _wrong_check(given: Any) -> str:
     """What to say of an expectation whose kind is not known."""
     if not isinstance(given, dict) or "check" not in given:
         return f"expected a table with the key 'check', which is one of: {', '.join(EXPECTATIONS)}"
+    try:
+        EXPECTATIONS.get(str(given["check"]))
+    except RegistryError as error:
+        return str(error)
     return f"unknown check {given['check']!r}; {nearest(str(given['check']), EXPECTATIONS)}"
 
 

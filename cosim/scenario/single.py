@@ -11,6 +11,7 @@ from fmpy.model_description import DefaultExperiment, ModelDescription
 from cosim.components.component import Component
 from cosim.components.loading import describe_fmu
 from cosim.errors import ScenarioError, nearest
+from cosim.results.load import load_result
 from cosim.scenario.schema import step_count
 
 STEPS = 1000
@@ -110,8 +111,6 @@ def _matches(source: Path, component: Component, where: str) -> tuple[list[str],
     Raises:
         ScenarioError: no column is.
     """
-    from cosim.results.load import load_result  # noqa: PLC0415 - only for those who play back
-
     columns = [signal.name for signal in load_result(source).signals]
     inputs = set(component.names("input"))
     used = [name for name in columns if name in inputs]

@@ -12,7 +12,7 @@ from cosim.components.start_values import StartValue, refusal, typed_value, type
 from cosim.components.structure import STRUCTURAL
 from cosim.errors import CouplingError
 from cosim.scenario.schema import ScenarioTable
-from fmus.fmi.types import NUMERIC_TYPES
+from fmus.fmi.types import NUMERIC_TYPES, enumeration_items
 
 
 def given_values(table: ScenarioTable) -> dict[str, list[str]]:
@@ -71,9 +71,9 @@ def _checked(component: Component, name: str, value: Any) -> StartValue:
 
 def _check_range(component: Component, name: str, variable: ModelVariable, value: float) -> None:
     declared = variable.declaredType
-    numbers = [int(item.value) for item in getattr(declared, "items", None) or []]
-    if variable.type == "Enumeration" and numbers and value not in numbers:
-        names = ", ".join(f"{item.name} ({item.value})" for item in declared.items)
+    items = enumeration_items(variable)
+    if variable.type == "Enumeration" and items and value not in items.values():
+        names = ", ".join(f"{item} ({number})" for item, number in items.items())
         raise CouplingError(f"{component.name}.{name} = {value:g} is no item of the enumeration: {names}.")
     lowest = variable.min if variable.min is not None else getattr(declared, "min", None)
     highest = variable.max if variable.max is not None else getattr(declared, "max", None)

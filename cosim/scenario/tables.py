@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, PlainValidator, Tag, model_validator
+from pydantic import AfterValidator, Discriminator, Field, PlainValidator, Tag, model_validator
 
+from cosim.errors import nearest
+from cosim.results.formats.catalogue import FORMATS
 from cosim.scenario.model_name import Model
-from fmu_observer.block import LatePolicy
-
-Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
+from cosim.table import Name, Table
+from fmu_observer.event_protocol import LatePolicy
 
 
 def _start(value: Any) -> Any:
@@ -38,12 +39,6 @@ def _tolerance(value: Any) -> float | str:
 Tolerance = Annotated[float | Literal["none"], PlainValidator(_tolerance)]
 """Relative tolerance of the solvers in FMUs."""
 Backend = Literal["fmu3", "fmu2", "block3", "block2"]
-
-
-class Table(BaseModel):
-    """A table of a scenario file."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True, allow_inf_nan=False)
 
 
 class ComponentTable(Table):
@@ -213,6 +208,12 @@ ConnectionItem = Annotated[
 ]
 
 
+def _format(name: str) -> str:
+    if name not in FORMATS:
+        raise ValueError(f"unknown result format {name!r}; {nearest(name, FORMATS)}")
+    return name
+
+
 class PhaseTable(Table):
     """A part of the run to be judged on its own."""
 
@@ -237,4 +238,4 @@ class ReportTable(Table):
     published: dict[str, dict[str, float]] = {}
     independent: dict[str, dict[str, float]] = {}
     notes: list[str] = []
-    tables: list[Literal["csv", "mat", "npy", "parquet", "hdf5", "modelica"]] = ["csv", "mat"]
+    tables: list[Annotated[str, AfterValidator(_format)]] = ["csv"]

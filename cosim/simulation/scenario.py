@@ -24,6 +24,7 @@ from cosim.scenario.save import plain, save_scenario, scenario_text
 from cosim.scenario.schema import ScenarioTable, parse_scenario
 from cosim.scenario.single import single_tables
 from cosim.scenario.streaming import finish_stream, streaming_to
+from cosim.scenario.structure import scenario_structure
 from cosim.structure.structure import Structure
 from cosim.studies.sweep import Sweep, make_sweep
 
@@ -383,8 +384,6 @@ class Scenario:
         Raises:
             CosimError: the scenario cannot be set up.
         """
-        from cosim.scenario.structure import scenario_structure  # noqa: PLC0415 - scipy's graphs only for those who ask
-
         with self._places_named():
             return scenario_structure(self.table(), self.name, self.folder, self.where)
 

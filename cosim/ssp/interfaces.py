@@ -1,11 +1,8 @@
-"""Faces: what the FMU of a component says of its variables, as far as connections and parameters need it. Loads no
+"""Interfaces: what the FMU of a component says of its variables, as far as connections and parameters need it. Loads no
 library.
 """
 
 from __future__ import annotations
-
-from dataclasses import replace
-from typing import Any
 
 from fmpy.model_description import ModelDescription, ModelVariable
 
@@ -16,7 +13,9 @@ from cosim.ssp.document import Node, fail
 from cosim.ssp.lapses import Lapses
 from cosim.ssp.model import ComponentElement, Connector
 from fmus.fmi.sense import doubled_names
-from plant_models.hybrid.units import BASE_SYMBOLS, Unit, UnitError, parse_unit
+from fmus.fmi.types import enumeration_items
+from fmus.fmi.units import Units
+from plant_models.hybrid.units import UnitError
 
 
 class Interface:
@@ -29,7 +28,7 @@ class Interface:
     def __init__(self, description: ModelDescription, what: str) -> None:
         self.description, self.what = description, what
         self.variables: dict[str, ModelVariable] = {v.name: v for v in description.modelVariables}
-        self._units = {u.name: u for u in description.unitDefinitions}
+        self._units = Units(description)
 
     def variable(self, name: str, node: Node) -> ModelVariable:
         """The variable of this name, or of the array it is an element of.
@@ -47,21 +46,16 @@ class Interface:
     def unit(self, name: str) -> NamedUnit | None:
         """The unit of a variable, or None where it has none or one that cannot be understood."""
         variable = self.variables[name]
-        declared = variable.declaredType
-        unit_name = variable.unit or getattr(declared, "unit", None)
-        if not unit_name:
-            return None
+        unit_name = self._units.name(variable)
         try:
-            unit = self._defined(unit_name) or parse_unit(unit_name)
+            unit = self._units.of(variable) if unit_name else None
         except UnitError:
             return None
-        own = variable.relativeQuantity
-        relative = getattr(declared, "relativeQuantity", False) if own is None else own
-        return NamedUnit(unit_name, replace(unit, offset=0.0) if relative else unit)
+        return NamedUnit(unit_name, unit) if unit_name and unit else None
 
     def items(self, name: str) -> dict[str, int]:
         """Items of an enumeration by name; empty for another type."""
-        return {i.name: int(i.value) for i in getattr(self.variables[name].declaredType, "items", None) or []}
+        return enumeration_items(self.variables[name])
 
     def check(self, connector: Connector) -> None:
         """A connector of the component must be a variable of the FMU, of its kind and type.
@@ -85,13 +79,6 @@ class Interface:
                 f"connector {connector.name!r} is of type {connector.type.name}, the variable of {self.what} of type "
                 f"{variable.type}.",
             )
-
-    def _defined(self, unit_name: str) -> Unit | None:
-        base: Any = getattr(self._units.get(unit_name), "baseUnit", None)
-        if base is None:
-            return None
-        powers = tuple(int(getattr(base, symbol) or 0) for symbol in BASE_SYMBOLS)
-        return Unit(powers, 1.0 if base.factor is None else float(base.factor), float(base.offset or 0.0))
 
 
 def interface_of(element: ComponentElement, lapses: Lapses) -> Interface:

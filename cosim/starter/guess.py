@@ -99,7 +99,12 @@ def guess(quantity: Quantity, signals: Sequence[Signal], taken: Sequence[str] = 
 
 
 def fits(signal: Signal, unit: str) -> bool:
-    """Whether the unit of a signal can be converted to this one; rad counts, unlike in SI."""
+    """Whether the unit of a signal can be converted to this one; rad counts, unlike in SI.
+
+    Args:
+        signal: a signal of the FMU.
+        unit: the unit it should have.
+    """
     if signal.meaning is None:
         return False
     wanted = parse_unit(unit)

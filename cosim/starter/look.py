@@ -54,6 +54,9 @@ class Look:
 def look_into(path: Path) -> Look:
     """Look into an FMU.
 
+    Args:
+        path: of the FMU.
+
     Raises:
         FmuLoadError: it is missing, broken, or not made for co-simulation.
     """
@@ -103,7 +106,11 @@ def _signals(component: Component, variable: ModelVariable) -> list[Signal]:
 
 
 def number(text: Any) -> float | None:
-    """A start value as a number, where it is one."""
+    """A start value as a number, where it is one.
+
+    Args:
+        text: as the description gives it.
+    """
     try:
         return float(text)
     except (TypeError, ValueError):

@@ -44,7 +44,11 @@ class ObserverRoles:
 
 
 def plant_roles(look: Look) -> PlantRoles:
-    """Guesses for an FMU as a plant."""
+    """Guesses for an FMU as a plant.
+
+    Args:
+        look: what the FMU says of itself.
+    """
     wheel = _seen("wheel_speed", look)
     taken = [] if wheel is None else [wheel.signal.name]
     effort = guess("effort", look.inputs)
@@ -74,10 +78,18 @@ def _seen(quantity: Quantity, look: Look, taken: Sequence[str] = (), part: str =
 
 
 def is_observer(look: Look) -> bool:
-    """Whether the FMU is told of balises, as observers are."""
+    """Whether the FMU is told of balises, as observers are.
+
+    Args:
+        look: what the FMU says of itself.
+    """
     return BALISE_EVENT in look.component.events
 
 
 def observer_roles(look: Look) -> ObserverRoles:
-    """Guesses for an FMU as an observer: its odometer may be called that, or just speed."""
+    """Guesses for an FMU as an observer: its odometer may be called that, or just speed.
+
+    Args:
+        look: what the FMU says of itself.
+    """
     return ObserverRoles(guess("effort", look.inputs), guess("wheel_speed", look.inputs) or guess("speed", look.inputs))

@@ -22,13 +22,22 @@ LISTED = 40
 
 
 def entry(key: str, value: Any) -> str:
-    """``key = value`` as TOML on one line."""
+    """``key = value`` as TOML on one line.
+
+    Args:
+        key: its name.
+        value: number, text, list or table.
+    """
     name, _, _ = tomli_w.dumps({key: 0}).rpartition(" = ")
     return f"{name} = {inline(value)}"
 
 
 def inline(value: Any) -> str:
-    """A value as TOML on one line."""
+    """A value as TOML on one line.
+
+    Args:
+        value: number, text, list or table.
+    """
     if isinstance(value, dict):
         return "{ " + ", ".join(entry(str(k), v) for k, v in value.items()) + " }"
     if isinstance(value, list):
@@ -37,25 +46,43 @@ def inline(value: Any) -> str:
 
 
 def one_line(text: str, length: int = 90) -> str:
-    """A vendor's text fit for a comment: on one line, without control characters, not too long."""
+    """A vendor's text fit for a comment: on one line, without control characters, not too long.
+
+    Args:
+        text: the text.
+        length: of the text at most.
+    """
     clean = " ".join("".join(c if c.isprintable() else " " for c in text).split())
     return clean if len(clean) <= length else clean[: length - 3] + "..."
 
 
 def comment(text: str) -> str:
-    """A paragraph as lines of comment."""
+    """A paragraph as lines of comment.
+
+    Args:
+        text: the text.
+    """
     return "\n".join(f"# {line}" for line in wrap(text, WIDTH))
 
 
 def guessed(guess: Guess) -> str:
-    """What is to be said behind a line that was guessed."""
+    """What is to be said behind a line that was guessed.
+
+    Args:
+        guess: a signal with why it was chosen.
+    """
     others = f"; else {', '.join(map(one_line, guess.others))}" if guess.others else ""
     mark = "" if guess.sureness == "sure" else "PLEASE CHECK, "
     return f"  # {mark}{guess.sureness}: {one_line(guess.reason)}{others}"
 
 
 def listing(title: str, signals: Sequence[Signal]) -> str:
-    """Variables with unit and description, as comment."""
+    """Variables with unit and description, as comment.
+
+    Args:
+        title: what they are.
+        signals: the variables.
+    """
     rows = [[one_line(s.name), f"[{one_line(s.unit or '-')}]  {one_line(s.description)}"] for s in signals[:LISTED]]
     lines = [f"# {title} ({len(signals)}):", *(f"#   {line}" for line in text_table(rows, left=(0, 1)))]
     more = len(signals) - LISTED

@@ -77,10 +77,18 @@ PARTS = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+")
 
 
 def plain_letters(text: str) -> str:
-    """The text without accents: ``Ä`` becomes ``A``, ``ß`` becomes ``ss``."""
+    """The text without accents: ``Ä`` becomes ``A``, ``ß`` becomes ``ss``.
+
+    Args:
+        text: the text.
+    """
     return "".join(c for c in unicodedata.normalize("NFKD", text.replace("ß", "ss")) if not unicodedata.combining(c))
 
 
 def words_of(text: str) -> list[str]:
-    """The words in a name or a sentence, in small letters: ``vTrain`` and ``v_train`` alike are ``v`` and ``train``."""
+    """The words in a name or a sentence, in small letters: ``vTrain`` and ``v_train`` alike are ``v`` and ``train``.
+
+    Args:
+        text: the text.
+    """
     return [part.lower() for part in PARTS.findall(plain_letters(text))]

@@ -20,7 +20,25 @@ from matplotlib.patches import Circle, FancyBboxPatch, PathPatch, Polygon
 from matplotlib.path import Path as Curve
 from matplotlib.textpath import TextPath
 
-from cosim.drawing.style import RC, new_figure, styled
+from cosim.drawing.style import (
+    ALARM,
+    EDGE,
+    GREEN,
+    HEADLINE,
+    INK,
+    MARK,
+    PALE,
+    PALE_BLUE,
+    PALE_RED,
+    PALE_YELLOW,
+    QUIET,
+    RC,
+    SLATE,
+    VERMILION,
+    VIOLET,
+    new_figure,
+    styled,
+)
 from cosim.errors import OutputError
 from cosim.structure.layout import EVENT_PORT, lay_out
 from cosim.structure.shapes import FOOT, PAD, Box, Edge, Frame, Layout, Size, Wire
@@ -28,7 +46,7 @@ from cosim.structure.shapes import FOOT, PAD, Box, Edge, Frame, Layout, Size, Wi
 if TYPE_CHECKING:
     from cosim.structure.structure import Link, Part, Structure
 
-COLOURS = {"fresh": "#33475B", "held": "#D55E00", "iterated": "#7A4FA3", "loop": "#B00020", "event": "#009E73"}
+COLOURS = {"fresh": SLATE, "held": VERMILION, "iterated": VIOLET, "loop": ALARM, "event": GREEN}
 MEANINGS = {
     "fresh": "fresh, value of the end of the step",
     "held": "held, value of the start of the step",
@@ -37,10 +55,8 @@ MEANINGS = {
     "event": "balise telegrams and clocks, at their own instants",
 }
 ALGORITHMS = {"gauss-seidel": "Gauss-Seidel", "jacobi": "Jacobi", "iterate": "Gauss-Seidel with iterated loops"}
-FILLS = {"FMU": "#E8EFF6", "block": "#F7F2E4"}
-FRAME_FILL, FRAME_EDGE, QUIET, INK = "#F4F4F4", "#9A9A9A", "#5F5F5F", "#1B1B1B"
-LOOP_FRAME_FILL, LOOP_FRAME_EDGE = "#FBECEE", "#B00020"
-NAME, SMALL, PORT, HEADLINE = 9.5, 7.3, 8.0, 11.5  # font sizes [pt]
+FILLS = {"FMU": PALE_BLUE, "block": PALE_YELLOW}
+NAME, SMALL, PORT = 9.5, 7.3, 8.0  # font sizes [pt]
 MARGIN, HEAD, KEY_ROW, KEY_LINE = 0.22, 0.62, 0.22, 0.42  # [inch]
 SIDE, MIDDLE, BADGE, ARROW = 0.12, 0.34, 0.105, 0.075  # within a box [inch]
 CORNER = 0.07
@@ -188,7 +204,7 @@ def _draw_layout(ax: Axes, structure: Structure, layout: Layout) -> None:
 
 
 def _draw_frame(ax: Axes, frame: Frame, loop: bool) -> None:
-    fill, edge = (LOOP_FRAME_FILL, LOOP_FRAME_EDGE) if loop else (FRAME_FILL, FRAME_EDGE)
+    fill, edge = (PALE_RED, ALARM) if loop else (PALE, EDGE)
     shape = FancyBboxPatch(
         (frame.x + CORNER, frame.y + CORNER),
         frame.width - 2 * CORNER,
@@ -268,7 +284,7 @@ def _draw_feedthrough(ax: Axes, structure: Structure, part: Part, box: Box) -> N
             if port.name in box.size.outputs:
                 looped = ((part.name, name), (part.name, port.name)) in knots
                 ends = [box.row(box.size.inputs, name), box.row(box.size.outputs, port.name)]
-                colour, width = (COLOURS["loop"], 1.5) if looped else ("#8A8A8A", 0.7)
+                colour, width = (COLOURS["loop"], 1.5) if looped else (MARK, 0.7)
                 ax.plot([left, right], ends, color=colour, linewidth=width, linestyle=(0, (1, 1)), zorder=2.5)
 
 

@@ -20,6 +20,9 @@ ERROR_UNITS: Mapping[Quantity, str] = {"speed": "m/s", "position": "m"}
 def error_measures(outcome: Outcome) -> dict[str, float]:
     """Largest and root-mean-square errors of every observer over the evaluated part of the run.
 
+    Args:
+        outcome: the run.
+
     Returns:
         ``observer.speed_error_max``, ``observer.speed_error_rms`` [m/s] and the same of the position [m], where
         recorded; NaN for a run that failed, whose errors are those of another interval of time, and where too few rows
@@ -44,7 +47,12 @@ def error_measures(outcome: Outcome) -> dict[str, float]:
 
 
 def own_measures(outcome: Outcome, measure: Mapping[str, Measure]) -> tuple[dict[str, float], list[str]]:
-    """The user's measures, and what went wrong in computing them: one that fails is NaN, and the sweep goes on."""
+    """The user's measures, and what went wrong in computing them: one that fails is NaN, and the sweep goes on.
+
+    Args:
+        outcome: the run.
+        measure: functions of the outcome that give a number, by name.
+    """
     measures: dict[str, float] = {}
     faults: list[str] = []
     for name, function in measure.items():
@@ -57,17 +65,30 @@ def own_measures(outcome: Outcome, measure: Mapping[str, Measure]) -> tuple[dict
 
 
 def setting_text(value: Any) -> str:
-    """A value that was varied, as people write it."""
+    """A value that was varied, as people write it.
+
+    Args:
+        value: of a setting.
+    """
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def with_unit(name: str, unit: str | None) -> str:
-    """The name with its unit, where it has one."""
+    """The name with its unit, where it has one.
+
+    Args:
+        name: of a measure or a setting.
+        unit: None where nobody has said it.
+    """
     return name if unit is None else f"{name} [{unit}]"
 
 
 def measure_unit(name: str) -> str | None:
-    """SI unit of a measure of `error_measures`; None for the user's own."""
+    """SI unit of a measure of `error_measures`; None for the user's own.
+
+    Args:
+        name: of the measure.
+    """
     for quantity, unit in ERROR_UNITS.items():
         if name.endswith((f".{quantity}_error_max", f".{quantity}_error_rms")):
             return unit

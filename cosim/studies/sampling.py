@@ -9,6 +9,7 @@ from math import exp, floor, isfinite, log, prod
 from typing import Any, Literal
 
 import numpy as np
+import scipy
 
 from cosim.errors import ScenarioError
 from cosim.scenario.save import plain
@@ -40,7 +41,11 @@ class Range:
             raise ScenarioError(f"A logarithmic range begins above zero (got {self.low!r}).")
 
     def at(self, share: float) -> float | int:
-        """The point at a share of the range, 0 <= share < 1."""
+        """The point at a share of the range, 0 <= share < 1.
+
+        Args:
+            share: from 0 to 1.
+        """
         if self.kind == "log":
             return exp(log(self.low) + share * (log(self.high) - log(self.low)))
         if self.kind == "whole":
@@ -67,6 +72,12 @@ def variations(
     values: Mapping[str, Iterable[Any] | Range] | Sequence[Mapping[str, Any]], mode: Mode, count: int | None, seed: int
 ) -> list[Variation]:
     """The variations of a sweep, in order; arguments as for `cosim.Scenario.vary`.
+
+    Args:
+        values: values or ranges by name of the setting.
+        mode: ``grid``, ``zip``, ``latin`` or ``random``, see `Scenario.vary`.
+        count: number of runs where they are drawn.
+        seed: of the drawing.
 
     Raises:
         ScenarioError: there are none, a list is missing, or lists of different length stand side by side.
@@ -128,13 +139,11 @@ def _choices(name: str, given: Any, ranges: bool) -> Any:
 
 def _sampled(choices: Mapping[str, Any], mode: Mode, count: int | None, seed: int) -> list[Variation]:
     """Points of a Latin hypercube, or independent ones; a list takes the place of a range by its entries."""
-    from scipy.stats import qmc  # noqa: PLC0415 - only for those who sample
-
     if count is None or count < 1:
         raise ScenarioError(f"vary: mode {mode!r} needs count=..., the number of points, at least 1 (got {count!r}).")
     _check_count(count)
     if mode == "latin":
-        points = qmc.LatinHypercube(d=len(choices), seed=seed).random(count)
+        points = scipy.stats.qmc.LatinHypercube(d=len(choices), seed=seed).random(count)
     else:
         points = np.random.default_rng(seed).random((count, len(choices)))
     return [

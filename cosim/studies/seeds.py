@@ -1,9 +1,12 @@
-"""Studies: one scenario over several balise seeds, medians and quartiles of the errors, beside published numbers."""
+"""Studies: one scenario over several balise seeds, medians and quartiles of the errors, beside published numbers.
+
+Of each seed only its row is kept, so memory does not grow with the number of runs.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from math import isnan
 from typing import TYPE_CHECKING, Any
 
@@ -15,9 +18,29 @@ from cosim.evaluation.spec import ReportSpec
 from fmus.text_table import text_table
 
 if TYPE_CHECKING:
+    from cosim.scenario.outcome import Outcome
     from cosim.simulation.scenario import Scenario
 
 QUARTILES = (25.0, 50.0, 75.0)
+
+
+@dataclass(frozen=True)
+class SeedRow:
+    """What one seed gave.
+
+    Args:
+        seed: of the balises. errors: (observer, phase) -> maximal speed error [m/s]; not of phases that the run did not
+            reach. failure: why it did not reach its end, or None.
+    """
+
+    seed: int
+    errors: Mapping[tuple[str, str], float]
+    failure: str | None = None
+
+    def to_data(self) -> dict[str, Any]:
+        """Plain data, one entry for each observer and phase: ``observer, phase``."""
+        errors = {f"{observer}, {phase}": error for (observer, phase), error in self.errors.items()}
+        return {"seed": self.seed, "failure": self.failure} | errors
 
 
 @dataclass
@@ -26,16 +49,37 @@ class SeedStudy:
 
     Args:
         spec: roles, phases and reference numbers of the scenario.
-        seeds: seeds that were run.
-        errors: (observer, phase) -> maximal speed errors [m/s], one for each seed.
+        each: one row for each seed that was run, in their order.
     """
 
     spec: ReportSpec
-    seeds: list[int]
-    errors: dict[tuple[str, str], list[float]] = field(default_factory=dict)
+    each: list[SeedRow]
+
+    @property
+    def seeds(self) -> list[int]:
+        """Seeds that were run to the end."""
+        return [row.seed for row in self.each if row.failure is None]
+
+    @property
+    def failures(self) -> dict[int, str]:
+        """Why seeds failed, by seed."""
+        return {row.seed: row.failure for row in self.each if row.failure is not None}
+
+    @property
+    def errors(self) -> dict[tuple[str, str], list[float]]:
+        """(observer, phase) -> maximal speed errors [m/s] of the seeds that were run to the end."""
+        gathered: dict[tuple[str, str], list[float]] = {}
+        for row in self.each:
+            for key, error in row.errors.items() if row.failure is None else ():
+                gathered.setdefault(key, []).append(error)
+        return gathered
 
     def quartiles(self, observer: str, phase: str) -> tuple[float, float, float]:
-        """Lower quartile, median and upper quartile of the maximal speed error [m/s]."""
+        """Lower quartile, median and upper quartile of the maximal speed error [m/s].
+
+        Args:
+            observer: name of the component. phase: name of the phase.
+        """
         low, middle, high = np.percentile(self.errors[observer, phase], QUARTILES)
         return float(low), float(middle), float(high)
 
@@ -58,39 +102,57 @@ class SeedStudy:
         return rows
 
     def text(self) -> str:
-        """A plain-text table."""
+        """A plain-text table, failed seeds in words below it."""
         rows = [["observer", "phase", "quartile", "median", "quartile", "independent", "published"]]
         for observer, phase, *sizes in (row.values() for row in self.rows()):
             rows.append([observer, phase, *("-" if size is None else f"{size:.4f}" for size in sizes)])
         head = f"Maximal speed error over {len(self.seeds)} balise seeds [m/s]"
-        return "\n".join([head, *text_table(rows, left=(0, 1))])
+        failed = [f"seed {seed} failed: {why}" for seed, why in self.failures.items()]
+        return "\n".join([head, *text_table(rows, left=(0, 1)), *failed])
 
     def to_data(self) -> dict[str, Any]:
-        """Plain data."""
-        return {"seeds": self.seeds, "rows": self.rows()}
+        """Plain data: the seeds that ended, the quartiles, and a row for each seed."""
+        return {"seeds": self.seeds, "rows": self.rows(), "each": [row.to_data() for row in self.each]}
 
 
-def seed_study(scenario: Scenario, seeds: Iterable[int], tell: Callable[[int, int], None] | None = None) -> SeedStudy:
-    """Run a scenario once for each balise seed.
+def seed_study(
+    scenario: Scenario,
+    seeds: Iterable[int],
+    tell: Callable[[int, int], None] | None = None,
+    done: Callable[[SeedRow], None] | None = None,
+) -> SeedStudy:
+    """Run a scenario once for each balise seed. One that fails is kept as a failure and does not stop the others.
 
     Args:
         scenario: with a balise layout that depends on `balises.seed`.
         seeds: seeds to run.
         tell: called with the number done and the number in all.
+        done: called with the row of each seed as soon as it is there.
+
+    Returns:
+        The study.
 
     Raises:
-        ScenarioError: there are no seeds, or no balises. RunError: a run failed.
+        ScenarioError: there are no seeds, or no balises. RunError: every seed failed.
     """
     chosen = list(seeds)
-    study: SeedStudy | None = None
+    spec: ReportSpec | None = None
+    rows: list[SeedRow] = []
     sweep = scenario.copy().set("certificates", "ignore").vary({"balises.seed": chosen})
     # what is doubtful is said once, by the scenario's own run, and not for every seed
     for run in sweep.each(progress=tell):
-        if run.outcome is None or run.failure is not None:
-            raise RunError(f"Seed {chosen[run.number]}: {run.failure}")
-        study = study or SeedStudy(run.outcome.spec, chosen)
-        for row in phase_metrics(run.outcome.result, run.outcome.spec):
-            if row.speed is not None and not isnan(row.speed.max_abs):  # NaN: the run ended before this phase
-                study.errors.setdefault((row.observer, row.phase), []).append(row.speed.max_abs)
-    assert study is not None
-    return study
+        spec = spec or (None if run.outcome is None else run.outcome.spec)
+        rows.append(SeedRow(chosen[run.number], _errors(run.outcome), run.failure))
+        if done is not None:
+            done(rows[-1])
+    if spec is None or all(row.failure is not None for row in rows):
+        raise RunError(f"No seed could be run to its end. Seed {rows[0].seed}: {rows[0].failure}")
+    return SeedStudy(spec, rows)
+
+
+def _errors(outcome: Outcome | None) -> dict[tuple[str, str], float]:
+    if outcome is None:
+        return {}
+    sizes = ((row.observer, row.phase, row.speed) for row in phase_metrics(outcome.result, outcome.spec))
+    # NaN: the run ended before this phase
+    return {(o, phase): size.max_abs for o, phase, size in sizes if size is not None and not isnan(size.max_abs)}

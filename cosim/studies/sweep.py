@@ -129,6 +129,13 @@ def make_sweep(
 ) -> Sweep:
     """A sweep whose every variation is a valid scenario; arguments as for `Scenario.vary`.
 
+    Args:
+        scenario: the scenario.
+        values: values or ranges by name of the setting.
+        mode: ``grid``, ``zip``, ``latin`` or ``random``, see `Scenario.vary`.
+        count: number of runs where they are drawn.
+        seed: of the drawing.
+
     Raises:
         CosimError: a name or a value cannot be.
     """
@@ -146,7 +153,11 @@ def make_sweep(
 
 
 def settings_text(settings: Mapping[str, Any]) -> str:
-    """Settings in one line."""
+    """Settings in one line.
+
+    Args:
+        settings: values by name.
+    """
     return ", ".join(f"{name} = {value!r}" for name, value in settings.items())
 
 

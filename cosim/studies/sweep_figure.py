@@ -43,6 +43,12 @@ LINES_NAMED = 8
 def sweep_figure(result: SweepResult, measure: str | None, against: str | None, ax: Axes | None) -> Axes:
     """A measure over a varied value, units on the axes; arguments as for `SweepResult.plot`.
 
+    Args:
+        result: the runs.
+        measure: its name; None for the first.
+        against: what was varied; None for the first that takes several values.
+        ax: axes to draw on; None for a figure of its own.
+
     Raises:
         OutputError: there is no such measure, or this was not varied.
     """
@@ -71,7 +77,12 @@ def sweep_figure(result: SweepResult, measure: str | None, against: str | None, 
 
 
 def setting_unit(result: SweepResult, name: str) -> str | None:
-    """Unit of what is varied: of the parameter as its component declares it, or of a key; None where there is none."""
+    """Unit of what is varied: of the parameter as its component declares it, or of a key; None where there is none.
+
+    Args:
+        result: the runs.
+        name: what was varied.
+    """
     component, _, variable = name.partition(".")
     table = result.scenario.table().components.get(component)
     if table is None:

@@ -18,12 +18,20 @@ INDEX_CSV, INDEX_JSON, PICTURE = "index.csv", "index.json", "sweep.png"
 
 
 def run_folder(number: int) -> str:
-    """Name of a run's folder."""
+    """Name of a run's folder.
+
+    Args:
+        number: of the run.
+    """
     return f"run_{number:03d}"
 
 
 def write_run(run: SweepRun, folder: Path) -> Path | None:
     """Write the results of a run; None where it has none.
+
+    Args:
+        run: one run of a sweep.
+        folder: of this run.
 
     Raises:
         OutputError: the folder cannot be written.
@@ -37,6 +45,10 @@ def write_run(run: SweepRun, folder: Path) -> Path | None:
 def write_sweep(result: SweepResult, directory: Path) -> dict[str, Path]:
     """Write all runs that are in memory, the index and a picture; paths by kind.
 
+    Args:
+        result: the runs.
+        directory: the folder; created where it does not exist.
+
     Raises:
         OutputError: the folder cannot be written.
     """
@@ -49,6 +61,10 @@ def write_sweep(result: SweepResult, directory: Path) -> dict[str, Path]:
 
 def write_index(result: SweepResult, directory: Path) -> dict[str, Path]:
     """Write the table as CSV and JSON, and a picture where there is something to draw; paths by kind.
+
+    Args:
+        result: the runs.
+        directory: the folder; created where it does not exist.
 
     Raises:
         OutputError: the folder cannot be written.

@@ -9,12 +9,14 @@ from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cosim.comparison.compare import compare
 from cosim.errors import ComparisonError, OutputError
 from cosim.evaluation.numbers import number as number_text
 from cosim.results.load import load_result
 from cosim.results.result import Result
 from cosim.scenario.outcome import Outcome
 from cosim.studies.measures import measure_unit, setting_text, with_unit
+from cosim.studies.sweep_files import write_sweep
 from fmus.text_table import text_table
 
 if TYPE_CHECKING:
@@ -83,7 +85,11 @@ class SweepResult:
         return list(dict.fromkeys(name for run in self.runs for name in run.measures))
 
     def unit(self, measure: str) -> str | None:
-        """Unit of a measure; None where nobody has said it."""
+        """Unit of a measure; None where nobody has said it.
+
+        Args:
+            measure: name of the measure.
+        """
         return self.units.get(measure) or measure_unit(measure)
 
     def table(self) -> list[dict[str, Any]]:
@@ -126,6 +132,7 @@ class SweepResult:
         Args:
             reference: number of the run to compare with.
             tolerance: and further options, as for `cosim.compare`.
+            options: further options of `cosim.compare`.
 
         Returns:
             A comparison for each other run that has results, by its number.
@@ -133,8 +140,6 @@ class SweepResult:
         Raises:
             ComparisonError: the reference has no results.
         """
-        from cosim.comparison.compare import compare  # noqa: PLC0415 - only for those who compare
-
         results = {run.number: result for run in self.runs if (result := run.result) is not None}
         if reference not in results:
             known = ", ".join(map(str, results)) or "none"
@@ -163,12 +168,13 @@ class SweepResult:
         """Write a results folder for each run (``run_000``, ...), the table as ``index.csv`` and ``index.json``, and a
         picture.
 
+        Args:
+            directory: the folder; created where it does not exist.
+
         Returns:
             Paths by kind.
 
         Raises:
             OutputError: the folder cannot be written.
         """
-        from cosim.studies.sweep_files import write_sweep  # noqa: PLC0415 - which knows this class
-
         return write_sweep(self, Path(directory))

@@ -35,7 +35,12 @@ class Raised(NamedTuple):
 
 
 def attempt(task: Callable[[Any], Any], argument: Any) -> Any:
-    """The answer of a task, or what it raised: one that fails must not stop the others."""
+    """The answer of a task, or what it raised: one that fails must not stop the others.
+
+    Args:
+        task: a function.
+        argument: what it is called with.
+    """
     try:
         return task(argument)
     except Exception as error:  # whatever it is, it is told

@@ -17,9 +17,11 @@ from typing import Any
 import matplotlib as mpl
 from PIL import Image
 
+from cosim.drawing.style import RC
 from fmus.text_table import text_table
 
 mpl.use("Agg")
+mpl.rcParams.update(RC)
 
 SAME = 1e-2
 COLOURS = 256

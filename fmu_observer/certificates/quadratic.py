@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
+import scipy
 
 from plant_models.hybrid.system import Array
 
@@ -114,7 +115,6 @@ def common_quadratic_form(condition: Condition) -> QuadraticForm | None:
 
 def _solve(matrix: np.ndarray, n: int, inequalities: int) -> np.ndarray:
     import clarabel  # noqa: PLC0415 - only who certifies pays for the solver's import
-    from scipy.sparse import csc_matrix  # noqa: PLC0415
 
     variables = matrix.shape[1]
     right = np.zeros(len(matrix))
@@ -124,8 +124,10 @@ def _solve(matrix: np.ndarray, n: int, inequalities: int) -> np.ndarray:
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     cones = [clarabel.ZeroConeT(1), *(clarabel.PSDTriangleConeT(n) for _ in range(inequalities + 1))]
-    empty = csc_matrix((variables, variables))
-    return np.asarray(clarabel.DefaultSolver(empty, cost, csc_matrix(matrix), right, cones, settings).solve().x)
+    empty = scipy.sparse.csc_matrix((variables, variables))
+    return np.asarray(
+        clarabel.DefaultSolver(empty, cost, scipy.sparse.csc_matrix(matrix), right, cones, settings).solve().x
+    )
 
 
 def _inequality_rows(condition: Condition) -> np.ndarray:

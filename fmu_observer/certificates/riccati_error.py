@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from scipy.linalg import solve_continuous_are
+import scipy
 
 from fmu_observer.certificates.exponential import small_exponential
 from fmu_observer.certificates.gap_error import GapError, matrix_powers
@@ -62,7 +62,7 @@ class RiccatiError(GapError):
     def continuous_limit(self) -> np.ndarray:
         """``drift - P C' inv(R) C`` with P of the continuous Riccati equation, shape (n, n)."""
         F, C, Q, R = (np.asarray(rows) for rows in (self.believed, self.C, self.Q, self.R))
-        P = solve_continuous_are(F.T, C.T, Q, R)
+        P = scipy.linalg.solve_continuous_are(F.T, C.T, Q, R)
         return np.asarray(np.asarray(self.drift) - P @ C.T @ np.linalg.solve(R, C))
 
     def units(self, rate: float) -> np.ndarray:

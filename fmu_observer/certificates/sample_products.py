@@ -11,7 +11,7 @@ from functools import lru_cache
 from math import ceil, inf
 
 import numpy as np
-from scipy.linalg import solve_discrete_lyapunov
+import scipy
 
 from fmu_observer.certificates.aperiodic import MARGIN
 from fmu_observer.certificates.certificate import Certificate
@@ -167,4 +167,4 @@ def _scaling(error: TwoRateError, samples: int) -> np.ndarray:
     middle = error.products((samples + 1) // 2, 1)[-1, 0]
     if np.abs(np.linalg.eigvals(middle)).max() >= 1.0:
         return np.ones(len(error.A))
-    return np.asarray(1.0 / np.sqrt(np.diag(solve_discrete_lyapunov(middle.T, np.eye(len(error.A))))))
+    return np.asarray(1.0 / np.sqrt(np.diag(scipy.linalg.solve_discrete_lyapunov(middle.T, np.eye(len(error.A))))))

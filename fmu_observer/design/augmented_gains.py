@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import inf, isfinite, sqrt
 
 import numpy as np
-from scipy.linalg import solve_discrete_lyapunov
+import scipy
 
 from fmu_observer.certificates import Certificate, SampledError, certify_sampled_error
 from fmu_observer.certificates.aperiodic import aperiodic_limit
@@ -126,7 +126,7 @@ def noise_to_speed(error: SampledError, gap: float) -> float:
     transition = error.transition(gap)
     free = _free_transition(error, gap)
     from_noise = (transition - free)[:, 0]  # the innovation enters as C e does
-    covariance = solve_discrete_lyapunov(transition, np.outer(from_noise, from_noise))
+    covariance = scipy.linalg.solve_discrete_lyapunov(transition, np.outer(from_noise, from_noise))
     return sqrt(max(float(covariance[1, 1]), 0.0))
 
 

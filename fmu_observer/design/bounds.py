@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
-from scipy.linalg import solve_continuous_lyapunov
+import scipy
 
 from fmu_observer.certificates import SampledError, certify_sampled_error
 from fmu_observer.design.high_gain_bounds import HighGainBounds, high_gain_bounds
@@ -64,7 +64,7 @@ def gain_matrix(n: int = 2) -> np.ndarray:
     """
     measured = np.zeros((n, n))
     measured[0, 0] = 1.0
-    return np.asarray(solve_continuous_lyapunov((shift_matrix(n) + 0.5 * np.eye(n)).T, measured))
+    return np.asarray(scipy.linalg.solve_continuous_lyapunov((shift_matrix(n) + 0.5 * np.eye(n)).T, measured))
 
 
 def smallest_theta_1_51(lipschitz: float, K: Sequence[float] = SHAPE, mu: float = 1.0) -> float:

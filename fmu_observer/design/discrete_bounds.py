@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import pi, sin
 
 import numpy as np
-from scipy.linalg import expm
+import scipy
 
 from fmu_observer.design.scaled_slopes import scaled, scaled_lipschitz
 from fmu_observer.models import ObserverModel
@@ -82,7 +82,7 @@ def discrete_bound(model: ObserverModel, gain: np.ndarray, period: float) -> Dis
     Args:
         model: the plant as the observer knows it.
     """
-    closed = expm(centre_of(model) * period) - gain @ model.C
+    closed = scipy.linalg.expm(centre_of(model) * period) - gain @ model.C
     radius = float(np.abs(np.linalg.eigvals(closed)).max())
     if radius >= 1.0:
         return DiscreteBound(radius, 0.0, transition_lipschitz(model, period, 1.0), 1.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import expm
+import scipy
 
 
 def process_covariance(A: np.ndarray, density: np.ndarray, period: float) -> np.ndarray:
@@ -18,6 +18,6 @@ def process_covariance(A: np.ndarray, density: np.ndarray, period: float) -> np.
     n = len(A)
     block = np.zeros((2 * n, 2 * n))
     block[:n, :n], block[:n, n:], block[n:, n:] = -A, density, A.T
-    exponential = expm(block * period)
+    exponential = scipy.linalg.expm(block * period)
     covariance = exponential[n:, n:].T @ exponential[:n, n:]
     return np.asarray(0.5 * (covariance + covariance.T))

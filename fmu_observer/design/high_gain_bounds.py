@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_continuous_lyapunov
+import scipy
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ def high_gain_bounds(
     closed = A - K @ C
     if np.linalg.eigvals(closed).real.max() >= 0.0:
         return HighGainBounds(mu, np.nan, np.nan, np.inf, 0.0)
-    P = solve_continuous_lyapunov(closed.T, -2.0 * mu * np.eye(len(A)))
+    P = scipy.linalg.solve_continuous_lyapunov(closed.T, -2.0 * mu * np.eye(len(A)))
     eigenvalues = np.linalg.eigvalsh(P)
     smallest, largest = float(eigenvalues[0]), float(eigenvalues[-1])
     slope = (lipschitz + theta) * float(np.linalg.norm(K, 2))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf, sqrt
 
 import numpy as np
-from scipy.linalg import solve_continuous_lyapunov
+import scipy
 
 from fmu_observer.models import ObserverModel
 from fmu_observer.models.model import shift_matrix
@@ -29,7 +29,7 @@ def lyapunov_size(K: np.ndarray) -> float:
     closed = chain_error(K)
     if np.linalg.eigvals(closed).real.max() >= 0.0:
         return inf
-    return float(np.linalg.eigvalsh(solve_continuous_lyapunov(closed.T, -np.eye(len(closed))))[-1])
+    return float(np.linalg.eigvalsh(scipy.linalg.solve_continuous_lyapunov(closed.T, -np.eye(len(closed))))[-1])
 
 
 def chain_error(K: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import expm, solve_discrete_lyapunov
+import scipy
 
 from fmu_observer.certificates import SampledError
 
@@ -62,10 +62,10 @@ def _at(error: SampledError, gap: float, odometer_gain: np.ndarray) -> tuple[flo
     generator[:n, n + 1] = odometer_gain
     if error.spectral_radius(gap) >= 1.0:
         raise ValueError(f"Noise amplification: the error grows at a constant gap of {gap:.4g} s.")
-    moved = [expm(generator * t)[:n] for t in np.linspace(0.0, gap, POINTS)]
+    moved = [scipy.linalg.expm(generator * t)[:n] for t in np.linspace(0.0, gap, POINTS)]
     # the innovation starts as the first error component
     closed = [m[:, :n] + np.outer(m[:, n], np.eye(n)[0]) for m in moved]
-    at_balises = solve_discrete_lyapunov(closed[-1], np.outer(moved[-1][:, n], moved[-1][:, n]))
+    at_balises = scipy.linalg.solve_discrete_lyapunov(closed[-1], np.outer(moved[-1][:, n], moved[-1][:, n]))
     offset = np.linalg.solve(np.eye(n) - closed[-1], moved[-1][:, n + 1])
     variances = [np.diag(c @ at_balises @ c.T) + m[:, n] ** 2 for c, m in zip(closed, moved, strict=True)]
     slip = max(abs(float((c @ offset + m[:, n + 1])[1])) for c, m in zip(closed, moved, strict=True))

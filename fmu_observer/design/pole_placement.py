@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.signal import place_poles
+import scipy
 
 from fmu_observer.observability import MeasuredSystem, require_observable
 
@@ -42,7 +42,7 @@ def observer_gain(
         )
     require_observable(MeasuredSystem(A, C, states=states, name=name))
     if len(C) > 1:
-        return np.asarray(place_poles(A.T, C.T, wanted).gain_matrix.T)
+        return np.asarray(scipy.signal.place_poles(A.T, C.T, wanted).gain_matrix.T)
     n = len(A)
     matrix = observability_matrix(A, C)
     polynomial = np.real(np.poly(wanted))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
+import scipy
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ def steady_filter(A: np.ndarray, C: np.ndarray, QN: np.ndarray, RN: np.ndarray) 
         not see, or a mode on the circle that the process noise does not drive).
     """
     try:
-        P = solve_discrete_are(A.T, C.T, QN, RN)
+        P = scipy.linalg.solve_discrete_are(A.T, C.T, QN, RN)
     except (np.linalg.LinAlgError, ValueError):
         return None
     gain = np.linalg.solve(C @ P @ C.T + RN, C @ P).T

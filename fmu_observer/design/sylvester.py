@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_sylvester
+import scipy
 
 from fmu_observer.design.pole_placement import observer_gain
 
@@ -53,7 +53,7 @@ def sylvester_transformation(F: np.ndarray, A: np.ndarray, B: np.ndarray) -> np.
         raise ValueError(
             "Sylvester equation: A shares an eigenvalue with the plant, there is no unique T; move the poles of A."
         )
-    return np.asarray(solve_sylvester(-A, F, np.hstack([np.zeros((r, r)), B])))
+    return np.asarray(scipy.linalg.solve_sylvester(-A, F, np.hstack([np.zeros((r, r)), B])))
 
 
 def sylvester_residual(F: np.ndarray, A: np.ndarray, B: np.ndarray, T: np.ndarray) -> float:

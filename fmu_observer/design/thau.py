@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_continuous_lyapunov
+import scipy
 
 from fmu_observer.design.scaled_slopes import scaled, scaled_lipschitz
 from fmu_observer.models import ObserverModel
@@ -48,7 +48,7 @@ def thau_bound(closed: np.ndarray) -> tuple[float, float]:
     """
     if np.linalg.eigvals(closed).real.max() >= 0.0:
         return 0.0, 0.0
-    sizes = np.linalg.eigvalsh(solve_continuous_lyapunov(closed.T, -np.eye(len(closed))))
+    sizes = np.linalg.eigvalsh(scipy.linalg.solve_continuous_lyapunov(closed.T, -np.eye(len(closed))))
     return float(0.5 / sizes[-1]), float(1.0 / sizes[0])
 
 

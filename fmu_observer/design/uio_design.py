@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import expm, solve_discrete_are
+import scipy
 
 from fmu_observer.design.discretisation import process_covariance
 
@@ -65,7 +65,7 @@ def discretise(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.ndarray,
     n = len(B)
     block = np.zeros((n + 1, n + 1))
     block[:n, :n], block[:n, n] = A, B
-    exponential = expm(block * period)
+    exponential = scipy.linalg.expm(block * period)
     return exponential[:n, :n], exponential[:n, n]
 
 
@@ -98,6 +98,6 @@ def _channel_gain(A: np.ndarray, density: float, variance: float, interval: floa
     measured.
     """
     C = np.array([[1.0, 0.0, 0.0]])
-    transition, process = expm(A * interval), process_covariance(A, np.diag([0.0, 0.0, density]), interval)
-    P = solve_discrete_are(transition.T, C.T, process, np.array([[variance]]))
+    transition, process = scipy.linalg.expm(A * interval), process_covariance(A, np.diag([0.0, 0.0, density]), interval)
+    P = scipy.linalg.solve_discrete_are(transition.T, C.T, process, np.array([[variance]]))
     return np.asarray((P @ C.T)[:, 0] / (C @ P @ C.T + variance)[0, 0])

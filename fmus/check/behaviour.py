@@ -69,7 +69,11 @@ def divided_steps(bench: Bench, scale: float = 1.0) -> str:
 
 
 def ends_of_divided_steps(bench: Bench, h: float) -> list[np.ndarray]:
-    """Outputs before a step of `h` [s], after it, and after it in the parts of `DIVISIONS`, each of shape (q,)."""
+    """Outputs before a step of `h` [s], after it, and after it in the parts of `DIVISIONS`, each of shape (q,).
+
+    Args:
+        bench: the instance under test.
+    """
     warm_up = (bench.h,) * WARM_UP_STEPS
     bench.begin()
     rows = bench.steps((*warm_up, h))[-2:]
@@ -80,7 +84,11 @@ def ends_of_divided_steps(bench: Bench, h: float) -> list[np.ndarray]:
 
 
 def short_step(bench: Bench) -> str:
-    """The first change after a short step: a tiny step must move the outputs, by about its share of a whole one."""
+    """The first change after a short step: a tiny step must move the outputs, by about its share of a whole one.
+
+    Args:
+        bench: the instance under test.
+    """
     h, warm_up = bench.h, (bench.h,) * WARM_UP_STEPS
     bench.begin()
     start, whole = bench.steps((*warm_up, h))[-2:]
@@ -103,13 +111,21 @@ def honest_step(bench: Bench) -> str:
 
 
 def continuation(bench: Bench) -> tuple[float, ...]:
-    """The steps [s] by which continuations are compared."""
+    """The steps [s] by which continuations are compared.
+
+    Args:
+        bench: the instance under test.
+    """
     h = bench.h
     return (h, UNEVEN * h, h, h) if bench.component.can_vary_step else (h, h, h)
 
 
 def go_elsewhere(bench: Bench, distance: float = 1.0) -> None:
-    """Some steps under other inputs, `distance` times as large, so that a restored state has something to undo."""
+    """Some steps under other inputs, `distance` times as large, so that a restored state has something to undo.
+
+    Args:
+        bench: the instance under test.
+    """
     bench.set_inputs(distance * elsewhere(bench.amplitude))
     bench.steps((bench.h,) * WARM_UP_STEPS)
 
@@ -118,6 +134,7 @@ def again(bench: Bench, saved_at: float, path: Sequence[float]) -> list[np.ndarr
     """Steps from a restored state of time `saved_at` [s] under the inputs of before.
 
     Args:
+        bench: the instance under test.
         path: of the FMU.
     """
     bench.now = saved_at
@@ -126,7 +143,13 @@ def again(bench: Bench, saved_at: float, path: Sequence[float]) -> list[np.ndarr
 
 
 def difference(bench: Bench, first: Sequence[np.ndarray], second: Sequence[np.ndarray]) -> str:
-    """Where two runs that must be identical part, in words; nothing where they do not."""
+    """Where two runs that must be identical part, in words; nothing where they do not.
+
+    Args:
+        bench: the instance under test.
+        first: outputs after each step, each of shape (q,).
+        second: the same of the other run.
+    """
     for number, (a, b) in enumerate(zip(first, second, strict=True), start=1):
         if not np.array_equal(a, b, equal_nan=True):
             return f"the outputs differ: in step {number} of {len(first)}, {worst(bench, a, b)}"
@@ -134,7 +157,13 @@ def difference(bench: Bench, first: Sequence[np.ndarray], second: Sequence[np.nd
 
 
 def worst(bench: Bench, a: np.ndarray, b: np.ndarray) -> str:
-    """The output that differs most between two rows, in words."""
+    """The output that differs most between two rows, in words.
+
+    Args:
+        bench: the instance under test.
+        a: outputs, shape (q,).
+        b: outputs, shape (q,).
+    """
     apart = np.abs(a - b) / np.maximum(np.maximum(np.abs(a), np.abs(b)), np.finfo(float).tiny)
     place = int(np.argmax(np.where(np.isnan(apart), np.inf, apart)))
     return f"{bench.output_names[place]} {float(a[place])!r} and {float(b[place])!r}"

@@ -59,7 +59,11 @@ class Bench:
         return self._make()
 
     def twin(self, make: Callable[[], Slave] | None = None) -> Bench:
-        """A second bench with an instance of its own and the same inputs."""
+        """A second bench with an instance of its own and the same inputs.
+
+        Args:
+            make: makes its component; by default the same way as here.
+        """
         other = Bench(make or self._make, self.starts, self.t0, self.h, until=self.end)
         other.amplitude, other.spread, other.excited = self.amplitude, self.spread, self.excited
         return other
@@ -155,6 +159,9 @@ class Bench:
         """All continuous inputs to this much above their start values, more from one to the next where a spread is set.
 
         Nothing goes beyond a declared range.
+
+        Args:
+            amplitude: how far above the start values.
         """
         aim = self._own + amplitude * (1.0 + self.spread * np.arange(len(self._inputs)))
         self._inputs[:] = np.clip(aim, self._lowest, self._highest)

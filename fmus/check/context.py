@@ -46,7 +46,11 @@ class Context:
         self._made = 0
 
     def slave(self, *, logging: bool = False) -> FmuSlave:
-        """A fresh co-simulation instance, not yet instantiated, with a name of its own."""
+        """A fresh co-simulation instance, not yet instantiated, with a name of its own.
+
+        Args:
+            logging: whether the FMU is asked to log.
+        """
         self._made += 1
         return make_slave(self.folder, self.description, f"checked_{self._made}", logging=logging)
 

@@ -20,6 +20,9 @@ def drift(bench: Bench) -> np.ndarray:
 
     The first half of the steps is left out, where a difference that does not grow would count for much.
 
+    Args:
+        bench: the instance under test.
+
     Raises:
         FAILURES: the FMU refuses the finer tolerance, or cannot be stepped for so long.
     """

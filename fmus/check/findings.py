@@ -71,12 +71,20 @@ class Finding:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Finding:
-        """The finding that `to_dict` described."""
+        """The finding that `to_dict` described.
+
+        Args:
+            data: from `to_dict`.
+        """
         return cls(str(data["check"]), Verdict(data["verdict"]), str(data["detail"]), str(data["advice"]))
 
 
 def class_of(findings: Iterable[Finding]) -> Class:
-    """The class of an FMU: that of its worst finding. What an error of the check left unseen is a limit."""
+    """The class of an FMU: that of its worst finding. What an error of the check left unseen is a limit.
+
+    Args:
+        findings: of all checks that ran.
+    """
     worst = max((finding.verdict for finding in findings), key=lambda verdict: verdict.rank, default=Verdict.PASS)
     if worst in (Verdict.LIMIT, Verdict.ERROR):
         return Class.LIMITS
@@ -84,25 +92,45 @@ def class_of(findings: Iterable[Finding]) -> Class:
 
 
 def passed(detail: str = "") -> Outcome:
-    """All is as it should be."""
+    """All is as it should be.
+
+    Args:
+        detail: what was seen, in words.
+    """
     return Outcome(Verdict.PASS, detail)
 
 
 def noted(detail: str) -> Outcome:
-    """For information: it changes nothing in a run of this package's master."""
+    """For information: it changes nothing in a run of this package's master.
+
+    Args:
+        detail: what was seen, in words.
+    """
     return Outcome(Verdict.NOTE, detail)
 
 
 def limited(detail: str, advice: str = "") -> Outcome:
-    """A run is right as long as the advice, or that of the catalogue, is followed."""
+    """A run is right as long as the advice, or that of the catalogue, is followed.
+
+    Args:
+        detail: what was seen, in words.
+    """
     return Outcome(Verdict.LIMIT, detail, advice)
 
 
 def failed(detail: str) -> Outcome:
-    """The FMU breaks the standard or its own word; what that means stands in the catalogue."""
+    """The FMU breaks the standard or its own word; what that means stands in the catalogue.
+
+    Args:
+        detail: what was seen, in words.
+    """
     return Outcome(None, detail)
 
 
 def skipped(reason: str) -> Outcome:
-    """Not checked, and why."""
+    """Not checked, and why.
+
+    Args:
+        reason: why, in words.
+    """
     return Outcome(Verdict.SKIPPED, reason)

@@ -8,18 +8,14 @@ from __future__ import annotations
 
 import ctypes
 from collections import deque
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from fmpy.model_description import ModelDescription, ModelVariable
+from fmpy.model_description import ModelDescription
 
 from fmus.fmi.elements import elements_of
-from fmus.fmi.exact_ports import make_exact_reader
 from fmus.fmi.instance import Instance
 from fmus.fmi.library import load
-from fmus.fmi.types import NUMERIC_TYPES, getter_type
+from fmus.fmi.types import NUMERIC_TYPES
 from fmus.plain import one_line
 
 LOADING = "loading the library"
@@ -84,34 +80,6 @@ class FmuInstance(Instance):
         call = getattr(self.slave, f"fmi{self.fmi_version}FreeInstance")
         self.guard("freeInstance", lambda: call(self.slave.component))
         self.slave.component = None
-
-    def read(self, names: Sequence[str]) -> np.ndarray:
-        """Values of numeric scalars and elements.
-
-        Args:
-            names: what is read.
-
-        Returns:
-            The values, shape (len(names),).
-        """
-        values = np.zeros(len(names))
-        self.reader(names, values)()
-        return values
-
-    def get(self, variable: ModelVariable) -> tuple[Any, ...]:
-        """The value of one variable of any type, by the getter of its type.
-
-        Args:
-            variable: a whole variable.
-
-        Raises:
-            SlaveError: it cannot be read.
-        """
-        kind = getter_type(variable.type, self.fmi_version)
-        values: tuple[Any, ...] = self.guard(
-            f"get{kind} of {variable.name}", make_exact_reader(self.slave, self.fmi_version, variable)
-        )
-        return values
 
     def failure(self, reason: str, t: float | None = None) -> SlaveError:  # noqa: D102 - see Instance
         place = "" if t is None else f" at t = {t:g} s"

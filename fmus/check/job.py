@@ -38,6 +38,10 @@ class Job:
 
     @classmethod
     def from_json(cls, text: str) -> Job:
-        """The job that `to_json` wrote."""
+        """The job that `to_json` wrote.
+
+        Args:
+            text: from `to_json`.
+        """
         data = json.loads(text)
         return cls(**data | {"checks": tuple(data["checks"])})

@@ -61,6 +61,9 @@ def restoring(bench: Bench) -> Restoring:
     Several steps are compared, because a part of the state that was not restored may take time to show, and one of them
     is short where the FMU takes such steps. Where they differ, the instance is sent further away once more: what was
     not restored then differs by more, what a solver makes of its restart does not.
+
+    Args:
+        bench: the instance under test.
     """
     path = continuation(bench)
     bench.begin()
@@ -89,7 +92,11 @@ def _trip(bench: Bench, state: Any, saved_at: float, path: Sequence[float], dist
 
 
 def solver_tolerance(bench: Bench) -> float:
-    """Relative tolerance that the solver in the FMU may be thought to have."""
+    """Relative tolerance that the solver in the FMU may be thought to have.
+
+    Args:
+        bench: the instance under test.
+    """
     return max(bench.component.tolerance or 0.0, USUAL_TOLERANCE)
 
 
@@ -114,7 +121,13 @@ def _judged(first: np.ndarray, trips: Sequence[Trip], tolerance: float, problem:
 
 
 def near(bench: Bench, first: Sequence[np.ndarray], redone: Sequence[np.ndarray]) -> bool:
-    """Whether two runs differ by no more than the solver in the FMU may make of it."""
+    """Whether two runs differ by no more than the solver in the FMU may make of it.
+
+    Args:
+        bench: the instance under test.
+        first: outputs after each step, each of shape (q,).
+        redone: the same of the other run.
+    """
     rows = np.array(first)
     size = np.max(np.abs(rows), axis=0)
     slack = SOLVER_FACTOR * solver_tolerance(bench) * size + ROUNDING * np.maximum(size, 1.0)
@@ -124,6 +137,10 @@ def near(bench: Bench, first: Sequence[np.ndarray], redone: Sequence[np.ndarray]
 def largest(first: np.ndarray | Sequence[np.ndarray], redone: np.ndarray) -> np.ndarray:
     """Largest differences of each output, shape (q,), between rows that should agree; infinite where only one is a
     number.
+
+    Args:
+        first: rows, shape (k, q).
+        redone: the same of one or more other runs, shape (..., k, q).
     """
     a, b = np.broadcast_arrays(np.asarray(first), redone)
     with np.errstate(invalid="ignore"):  # infinite values of one sign do not differ

@@ -11,7 +11,11 @@ OWN_PACKAGES = {"plant_models", "fmu_observer", "fmus", "cosim"}
 
 
 def is_ours(system: HybridSystem) -> bool:
-    """Whether a system ships with this package; any other is its author's."""
+    """Whether a system ships with this package; any other is its author's.
+
+    Args:
+        system: the hybrid system.
+    """
     return type(system).__module__.partition(".")[0] in OWN_PACKAGES
 
 

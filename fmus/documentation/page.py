@@ -19,6 +19,8 @@ from plant_models.hybrid import HybridSystem
 
 INTERFACES = (("coSimulation", "co-simulation"), ("modelExchange", "model exchange"))
 CAUSALITIES = ("input", "output", "parameter")
+PAGES = environment("fmus.documentation")
+PAGES.filters["pieces"] = pieces
 
 
 def page(system: HybridSystem, description: ModelDescription, preset: str | None, targets: Sequence[Target]) -> str:
@@ -65,11 +67,8 @@ def render(template: str, description: ModelDescription, **values: Any) -> str:
     Returns:
         The page.
     """
-    pages = environment("fmus.documentation")
-    filters: dict[str, Any] = {"pieces": pieces}
-    pages.filters |= filters
     rows = {f"{causality}s": variable_rows(description, causality) for causality in CAUSALITIES}
-    return pages.get_template(template).render(description=description, **rows, **values)
+    return PAGES.get_template(template).render(description=description, **rows, **values)
 
 
 def _equations(system: HybridSystem) -> list[Any]:

@@ -72,6 +72,9 @@ class Archive:
     def demand_this_platform(self, *interfaces: str) -> None:
         """Refuse an FMU without a library for this platform; arguments as for `why_not_here`.
 
+        Args:
+            interfaces: interface types, in the words of fmpy.
+
         Raises:
             NotAnFmuError: there is none; the message says what there is and what was needed.
         """
@@ -127,6 +130,7 @@ def demand_harmless(path: Path, entries: list[zipfile.ZipInfo], max_bytes: int =
 
     Args:
         path: of the FMU.
+        max_bytes: what the archive may unpack to [bytes].
 
     Raises:
         NotAnFmuError: it is refused.

@@ -24,7 +24,11 @@ def platform_folder(description: ModelDescription) -> str:
 
 
 def platforms_with(identifiers: Collection[str], names: Iterable[str]) -> tuple[str, ...]:
-    """Folders in ``binaries/`` that hold a library with a model identifier's name, of the names of all files."""
+    """Folders in ``binaries/`` that hold a library with a model identifier's name, of the names of all files.
+
+    Args:
+        identifiers: model identifiers, one of which a library must be named after.
+    """
     libraries = [_folder_and_file(name) for name in names]
     return tuple(sorted({folder for folder, file in libraries if posixpath.splitext(file)[0] in identifiers}))
 

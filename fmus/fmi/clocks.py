@@ -170,7 +170,11 @@ class ClockSchedule:
         return [(clock.rhythm, clock.number, clock.ticked) for clock in self.clocks]
 
     def restore(self, state: list[tuple[Rhythm | None, int, bool]]) -> None:
-        """Return to what was saved."""
+        """Return to what was saved.
+
+        Args:
+            state: from `save`.
+        """
         for clock, (rhythm, number, ticked) in zip(self.clocks, state, strict=True):
             clock.rhythm, clock.number, clock.ticked = rhythm, number, ticked
 
@@ -226,6 +230,16 @@ def is_time_based(variable: ModelVariable) -> bool:
         and variable.causality == "input"
         and variable.intervalVariability in PERIODIC + APERIODIC
     )
+
+
+def clock_references(variable: ModelVariable) -> frozenset[int]:
+    """Value references of the clocks of a variable; fmpy holds the clocks themselves, descriptions made in Python
+    references.
+
+    Args:
+        variable: in the model description.
+    """
+    return frozenset(int(getattr(entry, "valueReference", entry)) for entry in variable.clocks or ())
 
 
 def _may_change(clock: TimeClock) -> bool:

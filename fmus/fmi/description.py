@@ -74,6 +74,7 @@ def why_unreadable(source: Path, error: Exception) -> str:
 
     Args:
         source: the user's file.
+        error: what the parser threw.
     """
     try:
         read_model_description(str(source), validate=True)

@@ -61,6 +61,9 @@ class Variables(dict[str, ModelVariable]):
     def expanded(self, name: str) -> list[Element]:
         """The elements of a variable in row-major order; a scalar or a single element is alone.
 
+        Args:
+            name: variable, or element of an array.
+
         Raises:
             KeyError: there is no such variable or element.
         """

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from fmpy.model_description import ModelVariable
 
-from fmus.fmi.ports import is_native
+from fmus.fmi.ports import is_native, native_call
 from fmus.fmi.types import c_type, getter_type, size
 
 Values = tuple[Any, ...]
@@ -26,6 +26,7 @@ def make_exact_reader(slave: Any, fmi_version: int, variable: ModelVariable) -> 
     """A call that returns the values of a variable, one for a scalar.
 
     Args:
+        slave: instantiated, with fmpy's call surface.
         fmi_version: 2 or 3.
     """
     kind, total = getter_type(variable.type, fmi_version), size(variable)
@@ -44,6 +45,7 @@ def make_exact_writer(slave: Any, fmi_version: int, variable: ModelVariable) -> 
     The call raises ValueError, OverflowError, TypeError or struct.error for a value that the type cannot hold.
 
     Args:
+        slave: instantiated, with fmpy's call surface.
         fmi_version: 2 or 3.
     """
     kind, total = getter_type(variable.type, fmi_version), size(variable)
@@ -66,23 +68,13 @@ def _list_reader(slave: Any, kind: str, variable: ModelVariable, total: int) -> 
     return read
 
 
-def _native_call(
-    slave: Any, fmi_version: int, verb: str, kind: str, variable: ModelVariable, *buffers: Any
-) -> Callable[[], Any]:
-    """The function of the library on one variable; buffers last to first as in its signature."""
-    call = getattr(slave, f"fmi{fmi_version}{verb}{kind}")
-    references = (ctypes.c_uint32 * 1)(variable.valueReference)
-    arguments = (slave.component, references, 1, *buffers, *((size(variable),) if fmi_version == 3 else ()))
-    return lambda: call(*arguments)
-
-
 def _number_reader(
     slave: Any, fmi_version: int, kind: str, variable: ModelVariable, total: int
 ) -> Callable[[], Values]:
     ctype, _, dtype = c_type(kind, fmi_version)
     raw = (ctype * total)()
     seen: np.ndarray = np.frombuffer(raw, dtype=dtype)
-    call = _native_call(slave, fmi_version, "Get", kind, variable, raw)
+    call = native_call(slave, fmi_version, "Get", kind, [variable.valueReference], raw, total)
 
     def read() -> Values:
         call()
@@ -97,7 +89,7 @@ def _number_writer(
     ctype, letter, _ = c_type(kind, fmi_version)
     raw = (ctype * total)()
     pack = struct.Struct(f"={total}{letter}").pack_into
-    call = _native_call(slave, fmi_version, "Set", kind, variable, raw)
+    call = native_call(slave, fmi_version, "Set", kind, [variable.valueReference], raw, total)
 
     def write(values: Sequence[Any]) -> None:
         pack(raw, 0, *map(bool, values) if kind == "Boolean" else values)
@@ -108,7 +100,7 @@ def _number_writer(
 
 def _string_reader(slave: Any, fmi_version: int, variable: ModelVariable, total: int) -> Callable[[], Values]:
     raw = (ctypes.c_char_p * total)()
-    call = _native_call(slave, fmi_version, "Get", "String", variable, raw)
+    call = native_call(slave, fmi_version, "Get", "String", [variable.valueReference], raw, total)
 
     def read() -> Values:
         call()
@@ -121,7 +113,7 @@ def _string_writer(
     slave: Any, fmi_version: int, variable: ModelVariable, total: int
 ) -> Callable[[Sequence[Any]], None]:
     raw = (ctypes.c_char_p * total)()
-    call = _native_call(slave, fmi_version, "Set", "String", variable, raw)
+    call = native_call(slave, fmi_version, "Set", "String", [variable.valueReference], raw, total)
 
     def write(values: Sequence[Any]) -> None:
         raw[:] = [_encoded(value) for value in values]
@@ -132,7 +124,7 @@ def _string_writer(
 
 def _binary_reader(slave: Any, variable: ModelVariable, total: int) -> Callable[[], Values]:
     sizes, pointers = (ctypes.c_size_t * total)(), (ctypes.POINTER(ctypes.c_uint8) * total)()
-    call = _native_call(slave, 3, "Get", "Binary", variable, sizes, pointers)
+    call = native_call(slave, 3, "Get", "Binary", [variable.valueReference], sizes, pointers, total)
 
     def read() -> Values:
         call()
@@ -143,7 +135,7 @@ def _binary_reader(slave: Any, variable: ModelVariable, total: int) -> Callable[
 
 def _binary_writer(slave: Any, variable: ModelVariable, total: int) -> Callable[[Sequence[Any]], None]:
     sizes, pointers = (ctypes.c_size_t * total)(), (ctypes.POINTER(ctypes.c_uint8) * total)()
-    call = _native_call(slave, 3, "Set", "Binary", variable, sizes, pointers)
+    call = native_call(slave, 3, "Set", "Binary", [variable.valueReference], sizes, pointers, total)
 
     def write(values: Sequence[Any]) -> None:
         # never a null pointer

@@ -18,8 +18,7 @@ from fmus.fmi.described import EventPort
 from fmus.fmi.exact_ports import Values
 from fmus.fmi.native_log import fmi1_callbacks
 from fmus.fmi.ports import is_native
-from fmus.fmi.prepared_step import make_step
-from fmus.fmi.slave import Slave, answer
+from fmus.fmi.slave import Slave, answer, make_step
 from fmus.fmi.values import negative
 
 TRUE = b"\x01"

@@ -37,9 +37,17 @@ class FMU1SlaveRepaired(FMU1Slave):
     # fmpy takes the types of the arguments from the signature
     @wraps(FMU1Slave.fmi1SetRealInputDerivatives, assigned=())
     def fmi1SetRealInputDerivatives(self, *arguments: Any) -> Any:
-        """The call that this name says."""
+        """The call that this name says.
+
+        Args:
+            arguments: as for the function of FMI.
+        """
         return self._call("fmi1SetRealInputDerivatives", *arguments)
 
     def getRealStatus(self, kind: int) -> float:
-        """The value itself, as the slaves of the other versions give it."""
+        """The value itself, as the slaves of the other versions give it.
+
+        Args:
+            kind: of status, in the numbers of FMI.
+        """
         return float(super().getRealStatus(kind).value)

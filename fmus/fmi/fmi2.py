@@ -12,8 +12,7 @@ from fmus.fmi.described import EventPort
 from fmus.fmi.instance import Instance
 from fmus.fmi.native_log import fmi2_callbacks
 from fmus.fmi.ports import is_native
-from fmus.fmi.prepared_step import make_step
-from fmus.fmi.slave import Slave, answer
+from fmus.fmi.slave import Slave, answer, make_step
 from fmus.fmi.standard import TIME_TOLERANCE
 
 
@@ -22,7 +21,7 @@ class FMI2Instance(Instance):
 
     fmi_version = 2
     event_needs_step = True
-    _state_calls = ("getFMUstate", "setFMUstate", "freeFMUstate")
+    _get_state, _set_state, _free_state = "getFMUstate", "setFMUstate", "freeFMUstate"
 
     def _instantiate(self) -> None:
         log = {"loggingOn": self.logging} if is_native(self.slave) else {}

@@ -8,9 +8,9 @@ from collections.abc import Callable, Mapping, Sequence
 from time import perf_counter
 from typing import Any
 
-from fmpy.model_description import ModelDescription, ModelVariable
+from fmpy.model_description import ModelDescription
 
-from fmus.fmi.clocks import ClockSchedule
+from fmus.fmi.clocks import ClockSchedule, clock_references
 from fmus.fmi.described import EventPort
 from fmus.fmi.instance import Instance
 from fmus.fmi.intermediate import IntermediateUpdate
@@ -27,7 +27,7 @@ class FMI3Instance(Instance):
 
     fmi_version = 3
     event_needs_step = False
-    _state_calls = ("getFMUState", "setFMUState", "freeFMUState")
+    _get_state, _set_state, _free_state = "getFMUState", "setFMUState", "freeFMUState"
 
     def _instantiate(self) -> None:
         log = {"loggingOn": self.logging} if is_native(self.slave) else {}
@@ -46,7 +46,7 @@ class FMI3Instance(Instance):
         events = {}
         for clock in variables:
             if clock.type == "Clock" and clock.causality == "input" and clock.intervalVariability == "triggered":
-                clocked = {v.name: v.valueReference for v in variables if _is_clocked_by(v, clock)}
+                clocked = {v.name: v.valueReference for v in variables if clock.valueReference in clock_references(v)}
                 stamp = clocked.get(f"{clock.name}_time")
                 events[clock.name] = EventPort(
                     clock.name, clock.valueReference, stamp, self._payload_of(clock.name, clocked)
@@ -149,6 +149,9 @@ class FMI3Slave(FMI3Instance, Slave):
     def step_towards(self, t: float, until: float) -> float:
         """One doStep to `until` or to the next time event before it, with the event handled; returns the time reached
         [s].
+
+        Args:
+            t: where it stands [s].
         """
         reached, event = self.step(t, self.next_stop(t, until))
         if self.has_event_mode and not self.terminated and self.is_event(reached, event):
@@ -183,11 +186,19 @@ class FMI3Slave(FMI3Instance, Slave):
         return [clock.variable.valueReference for clock in due]
 
     def set_clocks(self, references: Sequence[int]) -> None:
-        """In Event Mode: set input clocks active."""
+        """In Event Mode: set input clocks active.
+
+        Args:
+            references: value references of the clocks.
+        """
         self.guard("setClock", lambda: self.slave.setClock(list(references), [True] * len(references)))
 
     def ticking(self, references: Sequence[int]) -> list[bool]:
-        """In Event Mode: which of these output clocks are active."""
+        """In Event Mode: which of these output clocks are active.
+
+        Args:
+            references: value references of the clocks.
+        """
         return [bool(x) for x in self.guard("getClock", lambda: self.slave.getClock(list(references)))]
 
     def update_discrete_states(self) -> bool:  # noqa: D102 - see Instance
@@ -224,6 +235,16 @@ class FMI3Slave(FMI3Instance, Slave):
         self.settle()
         return ticked
 
+    def activate(self, clock: str) -> None:
+        """Let a triggered input clock tick, with the values its clocked inputs have.
+
+        Args:
+            clock: its name.
+        """
+        self.enter_event_mode()
+        self.set_clocks([self.events[clock].trigger])
+        self.settle()
+
     def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:  # noqa: D102 - see Slave
         self.guard(f"event '{event.name}'", lambda: self._deliver(event, stamp, payload))
 
@@ -250,13 +271,6 @@ class FMI3Slave(FMI3Instance, Slave):
     def _step_arguments(self) -> dict[str, Any]:
         early = self.capabilities.mightReturnEarlyFromDoStep
         return {"eventModeUsed": self.has_event_mode, "earlyReturnAllowed": early} | self._intermediate.arguments
-
-
-def _is_clocked_by(variable: ModelVariable, clock: ModelVariable) -> bool:
-    """fmpy puts the clocks themselves where it read a file, and value references where a description was made in
-    Python.
-    """
-    return any(entry is clock or entry == clock.valueReference for entry in variable.clocks or ())
 
 
 def _native_step(slave: Any) -> Callable[[float, float], tuple[bool, bool, bool, float]]:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
-from fmpy.model_description import ModelDescription
+from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmus.fmi.derivatives import directional_derivative
 from fmus.fmi.described import Described
@@ -22,6 +22,7 @@ from fmus.fmi.exact_ports import Values
 from fmus.fmi.native_log import forget
 from fmus.fmi.ports import is_native
 from fmus.fmi.standard import FATAL, MAX_EVENT_ITERATIONS
+from fmus.fmi.types import getter_type
 from fmus.fmi.values import element_reader, element_writer, exact_reader, exact_writer
 
 INSTANTIATING = "instantiate"
@@ -172,6 +173,29 @@ class Instance(Described):
         write = exact_writer(self, self.variables[name])
         return lambda values: self.guard(f"writing {name}", lambda: write(values))
 
+    def read(self, names: Sequence[str]) -> np.ndarray:
+        """Values of numeric scalars and elements.
+
+        Args:
+            names: what is read.
+
+        Returns:
+            The values, shape (len(names),).
+        """
+        values = np.zeros(len(names))
+        self.reader(names, values)()
+        return values
+
+    def get(self, variable: ModelVariable) -> Values:
+        """The value of one variable of any type, by the getter of its type.
+
+        Args:
+            variable: a whole variable.
+        """
+        kind = getter_type(variable.type, self.fmi_version)
+        values: Values = self.guard(f"get{kind} of {variable.name}", exact_reader(self, variable))
+        return values
+
     def directional_derivative(
         self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
     ) -> np.ndarray:
@@ -185,11 +209,27 @@ class Instance(Described):
         Returns:
             The derivatives, shape (len(unknowns),).
         """
-        spreads = [layout([e for name in names for e in self.variables.expanded(name)]) for names in (unknowns, knowns)]
-        found: np.ndarray = self.guard(
-            "getDirectionalDerivative", directional_derivative(self.slave, spreads[0], spreads[1], seed)
-        )
+        found: np.ndarray = self.guard("getDirectionalDerivative", self.derivative_call(unknowns, knowns, seed))
         return found
+
+    def derivative_call(
+        self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
+    ) -> Callable[[], np.ndarray]:
+        """The unguarded call of `directional_derivative`.
+
+        Args:
+            unknowns: outputs and the like. An array stands for all its elements.
+            knowns: inputs and the like.
+            seed: the direction, shape (len(knowns),).
+
+        Returns:
+            The call; it gives the derivatives, shape (len(unknowns),).
+        """
+        targets, sources = (
+            layout([element for name in names for element in self.variables.expanded(name)])
+            for names in (unknowns, knowns)
+        )
+        return directional_derivative(self.slave, targets, sources, seed)
 
     # -- state ------------------------------------------------------------------------------------------------------
 
@@ -203,8 +243,9 @@ class Instance(Described):
         Args:
             state: of this instance, from `save` or `deserialize`.
         """
-        self.guard(self._state_calls[1], lambda: getattr(self.slave, self._state_calls[1])(state[0]))
-        self._recall(state[1])
+        held, remembered = state
+        self.guard(self._set_state, lambda: getattr(self.slave, self._set_state)(held))
+        self._recall(remembered)
 
     def release(self, state: Any) -> None:
         """Free a saved state.
@@ -213,7 +254,7 @@ class Instance(Described):
             state: of this instance.
         """
         if self._alive:
-            self.guard(self._state_calls[2], lambda: getattr(self.slave, self._state_calls[2])(state[0]))
+            self.guard(self._free_state, lambda: getattr(self.slave, self._free_state)(state[0]))
 
     def serialize(self, state: Any) -> bytes:
         """A saved state as bytes.
@@ -302,8 +343,10 @@ class Instance(Described):
 
     # -- what versions and interface types add ----------------------------------------------------------------------
 
-    _state_calls: tuple[str, str, str]
-    """The slave's functions that save, restore and free a state."""
+    _get_state: str
+    _set_state: str
+    _free_state: str
+    """Names of the slave's functions that save, restore and free a state."""
 
     @abstractmethod
     def _instantiate(self) -> None: ...
@@ -324,15 +367,14 @@ class Instance(Described):
 
     def _slave_state(self) -> Any:
         """A state from the slave; a null pointer is none, and to restore it would end the process."""
-        name = self._state_calls[0]
         try:
-            state = getattr(self.slave, name)()
+            state = getattr(self.slave, self._get_state)()
             if getattr(state, "value", state) is None:
                 raise RuntimeError("the slave gave no state")
         except self.mistakes:
             raise
         except Exception as error:
-            raise self.explained(f"{name}{self.without_states}", error) from error
+            raise self.explained(f"{self._get_state}{self.without_states}", error) from error
         return state
 
     def _unguarded_reader(self, names: Sequence[str], values: np.ndarray) -> Callable[[], None]:

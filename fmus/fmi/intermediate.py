@@ -24,7 +24,11 @@ class IntermediateUpdate:
         self._error: Exception | None = None
 
     def request(self, variables: Sequence[ModelVariable]) -> None:
-        """Ask for calls for those of the inputs that may be set within a step."""
+        """Ask for calls for those of the inputs that may be set within a step.
+
+        Args:
+            variables: the inputs that are asked for.
+        """
         self.requested = {v.name: v.valueReference for v in variables if v.intermediateUpdate}
 
     @property

@@ -40,7 +40,11 @@ CAPABILITY_FUNCTIONS = {
 
 
 def functions_of(version: int, interface: str) -> list[str]:
-    """Names of the C functions that an interface type has in the standard."""
+    """Names of the C functions that an interface type has in the standard.
+
+    Args:
+        version: of FMI.
+    """
     return [name for name, _ in inspect.getmembers(FACES[version, interface]) if name.startswith(f"fmi{version}")]
 
 
@@ -49,6 +53,7 @@ def functions_of_capabilities(description: ModelDescription, interface: str) -> 
 
     Args:
         description: model description of the FMU.
+        interface: ``coSimulation`` or ``modelExchange``.
     """
     declared = getattr(description, interface)
     for capability, functions in CAPABILITY_FUNCTIONS.items():

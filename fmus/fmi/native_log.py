@@ -24,7 +24,12 @@ class Listener(Protocol):
     name: str
 
     def note(self, message: bytes | None, status: int = 0, category: bytes | None = None) -> None:
-        """Take a message."""
+        """Take a message.
+
+        Args:
+            status: of FMI, by number.
+            category: as the slave names it.
+        """
 
 
 _numbers = count(1)
@@ -52,7 +57,11 @@ def fmi2_callbacks(listener: Listener) -> Any:
 
 
 def forget(listener: Listener) -> None:
-    """Messages of this one are of no interest any more."""
+    """Messages of this one are of no interest any more.
+
+    Args:
+        listener: who was told until now.
+    """
     for number in [n for n, known in _listeners.items() if known is listener]:
         del _listeners[number]
 

@@ -32,6 +32,7 @@ def make_reader(
     """A call that reads `variables` into `values`, shape (number of values of all,).
 
     Args:
+        slave: instantiated, with fmpy's call surface.
         fmi_version: 2 or 3.
     """
     return _make_port(slave, fmi_version, variables, values, "Get")
@@ -43,6 +44,7 @@ def make_writer(
     """A call that writes `variables` from `buffer`, shape (number of values of all,).
 
     Args:
+        slave: instantiated, with fmpy's call surface.
         fmi_version: 2 or 3.
     """
     return _make_port(slave, fmi_version, variables, buffer, "Set")
@@ -105,14 +107,23 @@ def _group(kind: str, members: Sequence[tuple[ModelVariable, range]]) -> _Group:
     return _Group(kind, [variable.valueReference for variable, _ in members], len(places), index, has_arrays)
 
 
-def _native_call(slave: Any, fmi_version: int, verb: str, group: _Group, buffer: Any) -> Callable[[], None]:
-    """The function of the library with all its arguments."""
-    count = len(group.references)
-    references = (ctypes.c_uint32 * count)(*group.references)
-    total = (group.total,) if fmi_version == 3 else ()
-    return prepared_call(
-        slave, f"fmi{fmi_version}{verb}{group.kind}", slave.component, references, count, buffer, *total
-    )
+def native_call(
+    slave: Any, fmi_version: int, verb: Literal["Get", "Set"], kind: str, references: Sequence[int], *rest: Any
+) -> Callable[[], None]:
+    """A getter or setter of the library with all its arguments.
+
+    Args:
+        slave: native, instantiated.
+        fmi_version: 1, 2 or 3.
+        verb: which of both.
+        kind: type in the name of the function.
+        references: value references of the variables.
+        rest: buffers as in the signature, and the number of values, which FMI 3 alone is told.
+    """
+    count, (*buffers, total) = len(references), rest
+    numbers = (total,) if fmi_version == 3 else ()
+    held = (ctypes.c_uint32 * count)(*references)
+    return prepared_call(slave, f"fmi{fmi_version}{verb}{kind}", slave.component, held, count, *buffers, *numbers)
 
 
 def _straight(values: np.ndarray, group: _Group) -> Any:
@@ -127,11 +138,15 @@ def _straight(values: np.ndarray, group: _Group) -> Any:
 def _native_reader(slave: Any, fmi_version: int, group: _Group, values: np.ndarray) -> Callable[[], None]:
     pointer = _straight(values, group)
     if pointer is not None:
-        return _native_call(slave, fmi_version, "Get", group, pointer)
+        return native_call(slave, fmi_version, "Get", group.kind, group.references, pointer, group.total)
     kind, _, dtype = c_type(group.kind, fmi_version)
     raw = (kind * group.total)()
     seen: np.ndarray = np.frombuffer(raw, dtype=dtype)
-    call, index, truth = _native_call(slave, fmi_version, "Get", group, raw), group.index, group.kind == "Boolean"
+    call, index, truth = (
+        native_call(slave, fmi_version, "Get", group.kind, group.references, raw, group.total),
+        group.index,
+        group.kind == "Boolean",
+    )
 
     def read() -> None:
         call()
@@ -143,11 +158,15 @@ def _native_reader(slave: Any, fmi_version: int, group: _Group, values: np.ndarr
 def _native_writer(slave: Any, fmi_version: int, group: _Group, buffer: np.ndarray) -> Callable[[], None]:
     pointer = _straight(buffer, group)
     if pointer is not None:
-        return _native_call(slave, fmi_version, "Set", group, pointer)
+        return native_call(slave, fmi_version, "Set", group.kind, group.references, pointer, group.total)
     kind, letter, _ = c_type(group.kind, fmi_version)
     raw = (kind * group.total)()
     pack = struct.Struct(f"={group.total}{letter}").pack_into  # refuses what the type cannot hold; ctypes would wrap it
-    call, index, cast = _native_call(slave, fmi_version, "Set", group, raw), group.index, _cast(group.kind)
+    call, index, cast = (
+        native_call(slave, fmi_version, "Set", group.kind, group.references, raw, group.total),
+        group.index,
+        _cast(group.kind),
+    )
 
     def write() -> None:
         pack(raw, 0, *map(cast, buffer[index].tolist()))

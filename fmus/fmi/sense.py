@@ -60,7 +60,11 @@ def nonsense(description: ModelDescription) -> str | None:
 
 
 def shape_fault(variable: ModelVariable) -> str | None:
-    """What is wrong with the shape of an array, as a sentence, or None."""
+    """What is wrong with the shape of an array, as a sentence, or None.
+
+    Args:
+        variable: in the model description.
+    """
     shape = tuple(variable.shape or ())
     if any(extent < 0 for extent in shape):
         return f"array '{variable.name}' has the shape {shape}; no dimension may be negative."

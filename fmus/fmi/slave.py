@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from time import perf_counter
 from typing import Any, Protocol
 
@@ -13,7 +15,9 @@ from fmpy.model_description import ModelDescription
 
 from fmus.fmi.described import EventPort
 from fmus.fmi.instance import Instance
-from fmus.fmi.standard import DISCARD, NEVER, PENDING
+from fmus.fmi.native_calls import prepared_call
+from fmus.fmi.ports import is_native
+from fmus.fmi.standard import DISCARD, NEVER, OK, PENDING, STATUS, WARNING
 
 Refused = Callable[[FMICallException, float, float], None]
 
@@ -30,6 +34,28 @@ class Unnoted:
 
     def __init__(self) -> None:
         self.call, self.time = [0], [math.nan]
+
+
+@dataclass(frozen=True)
+class RawStep:
+    """What one call of doStep said.
+
+    Args:
+        status: FMI status by name.
+        event: event handling is needed.
+        terminate: the FMU asks for the end.
+        reached: where it says it stands [s], NaN where it did the whole step.
+    """
+
+    status: str
+    event: bool = False
+    terminate: bool = False
+    reached: float = math.nan
+
+    @property
+    def refused(self) -> bool:
+        """Whether the step was not done."""
+        return self.status not in {STATUS[OK], STATUS[WARNING]}
 
 
 class Slave(Instance):
@@ -98,6 +124,27 @@ class Slave(Instance):
         Where `event_needs_step` says so, only the last event before a step happens, and it happens in that step.
         """
 
+    def raw_step(self, t: float, h: float) -> RawStep:
+        """One doStep and nothing else; a refusal is returned, not raised. Raises where the call could not be made.
+
+        Args:
+            t: from when [s].
+            h: length [s].
+        """
+        try:
+            said = self._do_step(t, h)
+        except FMICallException as error:
+            self.explained("doStep", error)
+            return RawStep(STATUS[error.status] if error.status in range(len(STATUS)) else f"status {error.status}")
+        except self.mistakes:
+            raise
+        except Exception as error:
+            raise self.explained("doStep", error, t) from error
+        if said is None:
+            return RawStep(STATUS[OK])
+        event, terminate, early, reached = said
+        return RawStep(STATUS[OK], bool(event), bool(terminate), float(reached) if early or terminate else math.nan)
+
     def pending(self, t: float) -> Exception:
         """The error of a slave that returned from doStep before it was done.
 
@@ -162,3 +209,23 @@ def answer(ask: Callable[[int], Any], kind: int) -> Any:
         return ask(kind)
     except Exception:
         return None
+
+
+def make_step(slave: Any, name: str, last: Any) -> Callable[[float, float], None]:
+    """The doStep of FMI 1 and 2 from a time by a length, both in [s], its arguments allocated once.
+
+    Args:
+        slave: instantiated, with fmpy's call surface.
+        name: of the function in fmpy's words.
+        last: the last argument, always the same.
+    """
+    if not is_native(slave):
+        return lambda t, h: slave.doStep(t, h, last)
+    start, length = ctypes.c_double(), ctypes.c_double()
+    call = prepared_call(slave, name, slave.component, start, length, last)
+
+    def do_step(t: float, h: float) -> None:
+        start.value, length.value = t, h
+        call()
+
+    return do_step

@@ -51,6 +51,7 @@ def getter_type(kind: str, fmi_version: int) -> str:
     """The type in the name of the functions that read and write a variable type.
 
     Args:
+        kind: type of the variable.
         fmi_version: 2 or 3.
     """
     if kind == "Enumeration":
@@ -62,6 +63,16 @@ def c_type(kind: str, fmi_version: int) -> tuple[Any, str, Any]:
     """C type, letter in `struct` and dtype of a getter's numeric type.
 
     Args:
+        kind: type in the name of the getter.
         fmi_version: 2 or 3.
     """
     return BOOLEANS[fmi_version] if kind == "Boolean" else CTYPES[kind]
+
+
+def enumeration_items(variable: ModelVariable) -> dict[str, int]:
+    """Items of an enumeration by name; empty for a variable of another type.
+
+    Args:
+        variable: in the model description.
+    """
+    return {item.name: int(item.value) for item in getattr(variable.declaredType, "items", None) or ()}

@@ -23,7 +23,11 @@ Turn = Callable[[np.ndarray, np.ndarray], None]
 
 
 def element_reader(instance: Instance, names: Sequence[str], values: np.ndarray) -> Callable[[], None]:
-    """A call that reads scalars and elements into `values`, shape (len(names),)."""
+    """A call that reads scalars and elements into `values`, shape (len(names),).
+
+    Args:
+        instance: instantiated.
+    """
     spread, turn = layout([instance.variables.element(n) for n in names]), signs(instance, names)
     whole = values if spread.is_whole else np.zeros(spread.total)
     read = make_reader(instance.slave, instance.fmi_version, spread.variables, whole)
@@ -41,7 +45,11 @@ def element_reader(instance: Instance, names: Sequence[str], values: np.ndarray)
 
 
 def element_writer(instance: Instance, names: Sequence[str]) -> tuple[Callable[[], None], np.ndarray]:
-    """A call that writes scalars and elements, and the array of shape (len(names),) it writes from."""
+    """A call that writes scalars and elements, and the array of shape (len(names),) it writes from.
+
+    Args:
+        instance: instantiated.
+    """
     spread, turn = layout([instance.variables.element(n) for n in names]), signs(instance, names)
     slave, version, buffer = instance.slave, instance.fmi_version, np.zeros(len(names))
     if spread.is_whole and turn is None:
@@ -62,7 +70,11 @@ def element_writer(instance: Instance, names: Sequence[str]) -> tuple[Callable[[
 
 
 def exact_reader(instance: Instance, variable: ModelVariable) -> Callable[[], Values]:
-    """A call that returns the values of a whole variable as they are."""
+    """A call that returns the values of a whole variable as they are.
+
+    Args:
+        instance: instantiated.
+    """
     read = make_exact_reader(instance.slave, instance.fmi_version, variable)
     if variable.name not in instance.negated:
         return read
@@ -70,7 +82,11 @@ def exact_reader(instance: Instance, variable: ModelVariable) -> Callable[[], Va
 
 
 def exact_writer(instance: Instance, variable: ModelVariable) -> Callable[[Sequence[Any]], None]:
-    """A call that writes the values of a whole variable as they are."""
+    """A call that writes the values of a whole variable as they are.
+
+    Args:
+        instance: instantiated.
+    """
     write = make_exact_writer(instance.slave, instance.fmi_version, variable)
     if variable.name not in instance.negated:
         return write
@@ -97,6 +113,9 @@ def signs(instance: Instance, names: Sequence[str]) -> Turn | None:
     """What turns values as the slave holds them into those of the variables and back, or None where nothing is negated.
 
     The call takes source and target, both of shape (len(names),), which may be the same array.
+
+    Args:
+        instance: whose variables they are.
     """
     if not any(name in instance.negated for name in names):
         return None
@@ -112,5 +131,9 @@ def signs(instance: Instance, names: Sequence[str]) -> Turn | None:
 
 
 def negative(variable: ModelVariable, value: Any) -> Any:
-    """A value with the other sign; of a truth value the opposite."""
+    """A value with the other sign; of a truth value the opposite.
+
+    Args:
+        variable: in the model description.
+    """
     return not value if variable.type == "Boolean" else -value

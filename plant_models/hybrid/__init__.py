@@ -1,9 +1,15 @@
-"""The hybrid system: signals, events, flow and jumps; traced, integrated and run through time."""
+"""The hybrid system: signals, events, flow and jumps; traced, integrated and run through time.
+
+What traces and runs systems loads CasADi, so it is loaded when it is first used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from plant_models.hybrid.event import CommunicationEvent, Event, PeriodicEvent, TriggeredEvent
-from plant_models.hybrid.kernel import NumpyKernel, TracedKernel, make_kernel
 from plant_models.hybrid.resource import Resource
-from plant_models.hybrid.runtime import Runtime, Snapshot
 from plant_models.hybrid.signal import (
     Signal,
     input_signal,
@@ -15,7 +21,11 @@ from plant_models.hybrid.signal import (
     width,
 )
 from plant_models.hybrid.system import HybridSystem, vector
-from plant_models.hybrid.tracing import TracedSystem, TracingError
+
+if TYPE_CHECKING:
+    from plant_models.hybrid.kernel import NumpyKernel, TracedKernel, make_kernel
+    from plant_models.hybrid.runtime import Runtime, Snapshot
+    from plant_models.hybrid.tracing import TracedSystem, TracingError
 
 __all__ = [
     "CommunicationEvent",
@@ -41,3 +51,20 @@ __all__ = [
     "vector",
     "width",
 ]
+
+_HOMES = {
+    "NumpyKernel": "kernel",
+    "Runtime": "runtime",
+    "Snapshot": "runtime",
+    "TracedKernel": "kernel",
+    "TracedSystem": "tracing",
+    "TracingError": "tracing",
+    "make_kernel": "kernel",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    return value

@@ -8,12 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import casadi as ca
 import numpy as np
 
 from plant_models.hybrid.system import Array
-
-SYMBOLIC = ca.ArrayInterface.SX
 
 
 def exact_jacobian(
@@ -29,15 +26,18 @@ def exact_jacobian(
     Returns:
         A function of x and u that returns shape (rows, states), for numbers and for traced symbols.
     """
+    import casadi as ca  # noqa: PLC0415 - for those who differentiate; every observer model imports this file
+
+    symbolic = ca.ArrayInterface.SX
     x, u = ca.SX.sym("x", states), ca.SX.sym("u", inputs)
-    value = function(SYMBOLIC(x, shape=(states,)), SYMBOLIC(u, shape=(inputs,)))
+    value = function(symbolic(x, shape=(states,)), symbolic(u, shape=(inputs,)))
     columns = ca.SX(value) if getattr(value, "size", 1) else ca.SX(0, 1)
     traced = ca.Function("jacobian", [x, u], [ca.densify(ca.jacobian(columns, x))])
     shape = (columns.numel(), states)
 
     def jacobian(at: Array, known: Array) -> Array:
         if isinstance(at, ca.ArrayInterface) or isinstance(known, ca.ArrayInterface):
-            return SYMBOLIC(traced(ca.SX(at), ca.SX(known)), shape=shape)
+            return symbolic(traced(ca.SX(at), ca.SX(known)), shape=shape)
         return np.asarray(traced(at, known), dtype=float).reshape(shape)
 
     return jacobian

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import root
+import scipy
 
 from plant_models.hybrid import HybridSystem
 from plant_models.interop.continuous_part import ContinuousPart, Values, filled, known
@@ -80,9 +80,9 @@ def operating_point(
         targets=np.array(list(wanted.values()), dtype=float),
     )
     _check_count(problem)
-    found = (
-        root(problem.residual, problem.guess, jac=problem.slope, tol=1e-13).x if problem.guess.size else problem.guess
-    )
+    found = problem.guess
+    if found.size:
+        found = scipy.optimize.root(problem.residual, found, jac=problem.slope, tol=1e-13).x
     _check_found(problem, found)
     return _point(part, *problem.place(found), t)
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from pages import PACKAGES, ROOT
 
-HIDDEN_AT_MOST = 122
+HIDDEN_AT_MOST = 40
 """In functions stands only what is large and seldom used: an optional package, the drawing of a page."""
 
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)

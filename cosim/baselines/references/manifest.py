@@ -70,6 +70,10 @@ class Experiment:
 def parse(text: bytes, file: str) -> Any:
     """The root element of a file.
 
+    Args:
+        text: content of the file.
+        file: its name, for messages.
+
     Raises:
         BaselineError: it is not XML, or declares a document type.
     """
@@ -87,6 +91,10 @@ def parse(text: bytes, file: str) -> Any:
 
 def read_manifest(text: bytes, file: str) -> list[Related]:
     """The files a manifest names.
+
+    Args:
+        text: content of the file.
+        file: its name, for messages.
 
     Raises:
         BaselineError: it is not a manifest of FMI-LS-REF.
@@ -108,6 +116,10 @@ def read_manifest(text: bytes, file: str) -> list[Related]:
 
 def read_experiments(text: bytes, member: str) -> list[Experiment]:
     """The experiments in a file of the archive.
+
+    Args:
+        text: content of the file.
+        member: its name in the archive; the files it names stand beside it.
 
     Raises:
         BaselineError: it is not a file of experiments.
@@ -165,7 +177,11 @@ def manifest_text(related: list[Related], former: bytes | None) -> bytes:
 
 
 def experiments_text(experiment: Experiment) -> bytes:
-    """A file with one experiment, whose files stand beside it."""
+    """A file with one experiment, whose files stand beside it.
+
+    Args:
+        experiment: with the names of its files.
+    """
     root = etree.Element("Experiments", name=experiment.name, description=experiment.description)
     times = (experiment.start, experiment.stop, experiment.step)
     given = {key: repr(value) for key, value in zip(TIMES, times, strict=True) if value is not None}

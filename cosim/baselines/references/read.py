@@ -23,8 +23,12 @@ from cosim.comparison.tolerance import Tolerances
 from cosim.components.component import Component
 from cosim.components.loading import describe_fmu, read_description
 from cosim.errors import BaselineError, CosimError, nearest
+from cosim.results.load import load_result
 from cosim.results.result import Result
 from cosim.scenario.single import run_times
+from cosim.ssp.document import parse
+from cosim.ssp.lapses import Lapses
+from cosim.ssp.values import read_parameter_set
 
 COMPONENT = "fmu"
 """What the component of an FMU alone is called, see `Scenario.fmu`."""
@@ -50,6 +54,9 @@ class Reference:
 
 def find_references(fmu: str | Path) -> list[Reference]:
     """All references in an FMU, in the order of the manifest: experiments first, then results that none of them names.
+
+    Args:
+        fmu: path of the FMU.
 
     Raises:
         FmuLoadError: it is not an FMU.
@@ -135,8 +142,6 @@ def _baseline(reference: Reference) -> Baseline:
 
 
 def _load(text: bytes, where: str) -> Result:
-    from cosim.results.load import load_result  # noqa: PLC0415 - knows the tables of other tools
-
     with tempfile.TemporaryDirectory(prefix="fmu-reference-") as folder:
         file = Path(folder) / "reference.csv"
         file.write_bytes(text)
@@ -185,10 +190,6 @@ def _header(reference: Reference, component: Component, table: Result, texts: Ma
 
 def _parameters(text: bytes, member: str) -> dict[str, Any]:
     """The values of a parameter set (SSV); in the units of the FMU, in which nearly all sets are."""
-    from cosim.ssp.document import parse  # noqa: PLC0415 - the schemas of SSP only for those who need them
-    from cosim.ssp.lapses import Lapses  # noqa: PLC0415
-    from cosim.ssp.values import read_parameter_set  # noqa: PLC0415
-
     values: dict[str, Any] = {}
     for parameter in read_parameter_set(parse(text, member, "ssv"), "", Lapses()):
         items = [_value(item, parameter.type.family) for item in parameter.values]

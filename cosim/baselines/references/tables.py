@@ -16,13 +16,21 @@ REALS = ("Real", "Float64", "Float32")
 
 
 def prefix(component: str) -> str:
-    """What stands before the name of a variable in a table of a run."""
+    """What stands before the name of a variable in a table of a run.
+
+    Args:
+        component: name of the component.
+    """
     return f"{component}."
 
 
 def as_of_a_run(result: Result, component: Component) -> Result:
     """A table of the FMU's variables as a run would give it: named by component, in SI, with what the FMU says of
     them.
+
+    Args:
+        result: the table, in the units of the FMU.
+        component: the component of the FMU.
     """
     names = [info.name for info in result.signals]
     table = np.empty(len(result.table), table_dtype(["time", *(prefix(component.name) + name for name in names)]))
@@ -36,7 +44,12 @@ def as_of_a_run(result: Result, component: Component) -> Result:
 
 
 def in_units_of(result: Result, component: Component) -> Result:
-    """A table of a run in the units of the FMU's variables; names stay."""
+    """A table of a run in the units of the FMU's variables; names stay.
+
+    Args:
+        result: the table of a run, in SI.
+        component: the component of the FMU.
+    """
     table = np.array(result.table)
     for info in result.signals:
         unit = _unit(info.name, component)

@@ -37,6 +37,7 @@ from cosim.components.component import Component
 from cosim.components.loading import describe_fmu
 from cosim.errors import BaselineError, OutputError
 from cosim.results.summary_file import jsonable
+from cosim.ssp.write import add_parameter, child, root_of, text_of
 
 STAMP = (1980, 1, 1, 0, 0, 0)
 """Of the files added: the earliest a zip file can hold, so that the same content gives the same bytes."""
@@ -152,8 +153,6 @@ def _csv(names: list[str], columns: list[np.ndarray]) -> bytes:
 
 
 def _parameter_set(name: str, parameters: Mapping[str, Any], component: Component) -> bytes:
-    from cosim.ssp.write import add_parameter, child, root_of, text_of  # noqa: PLC0415 - lxml only for those who embed
-
     root = root_of("ssv", "ParameterSet", "2.0" if component.fmi_version == 3 else "1.0", name=name)
     holder = child(root, "ssv", "Parameters")
     for key, value in parameters.items():

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.components.component import Component
-from cosim.components.derivatives import directional_derivative
 from cosim.coupling.feedthrough import declared_feedthrough
 from cosim.coupling.plan import Plan
 from cosim.master.algorithms.links import Link
@@ -36,7 +35,7 @@ class Passage:
 
     def gains(self) -> Callable[[], np.ndarray]:
         """A call that gives the directional derivatives of the outputs along each input, shape (q, m)."""
-        calls = [directional_derivative(self.component, self.outputs, [name], [1.0]) for name in self.inputs]
+        calls = [self.component.derivative_call(self.outputs, [name], [1.0]) for name in self.inputs]
         return lambda: np.array([call() for call in calls]).T
 
 

@@ -14,8 +14,9 @@ from cosim.components.fmi3 import FMI3Component
 from cosim.coupling.clocks import ClockConnection
 from cosim.coupling.connection import Connection
 from cosim.master.events.coordinator import EventCoordinator
-from cosim.master.events.gates import Gate, clock_references
+from cosim.master.events.gates import Gate
 from cosim.master.events.participant import Participant
+from fmus.fmi.clocks import clock_references
 from fmus.fmi.standard import OWN_TOOL
 
 if TYPE_CHECKING:

@@ -13,6 +13,7 @@ from fmpy.model_description import ModelVariable
 
 from cosim.components.component import Component
 from cosim.coupling.inputs import Inputs
+from fmus.fmi.clocks import clock_references
 from fmus.fmi.types import FLOATING_TYPES
 
 Send = Callable[[], None]
@@ -133,13 +134,6 @@ class Gate:
             write()
 
         return send
-
-
-def clock_references(variable: ModelVariable) -> frozenset[int]:
-    """Value references of the clocks of a variable; fmpy holds the clocks themselves, descriptions made in Python
-    references.
-    """
-    return frozenset(int(getattr(entry, "valueReference", entry)) for entry in variable.clocks or ())
 
 
 def _flows(variable: ModelVariable) -> bool:

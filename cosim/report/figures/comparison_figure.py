@@ -15,15 +15,14 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from cosim.comparison.verdict import Curves, Finding, SignalComparison
-from cosim.drawing.style import ALARM_COLOUR, axes_or_new, new_figure, styled
+from cosim.drawing.style import ALARM, AMBER, BLACK, BLUE, GRID, MARK, TIME, axes_or_new, headline, new_figure, styled
 from cosim.evaluation.numbers import number
 from cosim.report.figures.drawing import curve, legend_above, thin
 from cosim.report.figures.scales import bounded, value_limits
 
 WIDTH, HEIGHT = 7.2, 6.6  # inches, of the whole picture
-TUBE_COLOUR, RESULT_COLOUR = "#F0C36D", "#0072B2"
-REFERENCE = {"color": "#000000", "linestyle": "-", "linewidth": 1.0}
-RESULT = {"color": RESULT_COLOUR, "linestyle": (0, (6, 1.5)), "linewidth": 1.3}
+REFERENCE = {"color": BLACK, "linestyle": "-", "linewidth": 1.0}
+RESULT = {"color": BLUE, "linestyle": (0, (6, 1.5)), "linewidth": 1.3}
 DOTTED = 60  # rows at most that are drawn as dots as well
 ROOM = 1.25  # of an axis above what it must show
 SPIKE = 50.0  # an error so many times as large as the band hides the band; the axis then is that of the error
@@ -76,7 +75,12 @@ def comparison_figure(
 
 @styled
 def comparison_error_figure(signal: SignalComparison, ax: Axes | None = None) -> Axes:
-    """Result minus reference with the band it may lie in, against time; arguments as for `comparison_figure`."""
+    """Result minus reference with the band it may lie in, against time; arguments as for `comparison_figure`.
+
+    Args:
+        signal: the comparison, with its curves.
+        ax: axes to draw on; None for a figure of its own.
+    """
     ax = axes_or_new(ax)
     curves = signal.curves
     if curves is None:
@@ -88,24 +92,24 @@ def comparison_error_figure(signal: SignalComparison, ax: Axes | None = None) ->
         ax.axhspan(
             -allowed,
             allowed,
-            color=TUBE_COLOUR,
+            color=AMBER,
             alpha=0.55,
             linewidth=0,
             zorder=0.5,
             label=f"allowed: {number(allowed)}",
         )
-    ax.axhline(0.0, color="#888888", linewidth=0.7, zorder=1)
+    ax.axhline(0.0, color=MARK, linewidth=0.7, zorder=1)
     curve(
         ax,
         curves.error_time,
         error,
         (-limit, limit),
-        color=RESULT_COLOUR,
+        color=BLUE,
         linewidth=1.1,
         label="result minus reference",
     )
     if np.isfinite(signal.max_error_at) and not signal.passed:
-        ax.axvline(signal.max_error_at, color=ALARM_COLOUR, linewidth=0.8, linestyle=(0, (2, 2)), label="largest")
+        ax.axvline(signal.max_error_at, color=ALARM, linewidth=0.8, linestyle=(0, (2, 2)), label="largest")
     ax.set_ylim(-limit, limit)
     return _finish(ax, *_span(curves), _axis_name("error", signal))
 
@@ -121,7 +125,7 @@ def comparison_picture(signal: SignalComparison) -> Figure:
         The figure; save it with ``figure.savefig(path)``.
     """
     figure = new_figure((WIDTH, HEIGHT))
-    figure.suptitle(f"{signal.name}: {signal.status}", fontsize=11.5, fontweight="bold", x=0.01, ha="left")
+    headline(figure, f"{signal.name}: {signal.status}")
     whole, error, zoom = figure.subplots(3, 1, height_ratios=(1.15, 0.8, 1.15))
     comparison_figure(signal, whole)
     comparison_error_figure(signal, error)
@@ -130,7 +134,7 @@ def comparison_picture(signal: SignalComparison) -> Figure:
     for ax in (whole, error):
         ax.set_xlabel("")
     if window is not None:
-        whole.axvspan(*window, color="#E3E3E3", linewidth=0, zorder=0.2, label="enlarged below")
+        whole.axvspan(*window, color=GRID, linewidth=0, zorder=0.2, label="enlarged below")
         legend_above(whole)
         legend_above(zoom, ["reference", "result", "tolerance tube"])
     return figure
@@ -139,6 +143,9 @@ def comparison_picture(signal: SignalComparison) -> Figure:
 def worst_window(signal: SignalComparison) -> tuple[float, float] | None:
     """From when to when the worst point is worth a close look [s]; None without curves, or where nothing is the
     worst.
+
+    Args:
+        signal: the comparison, with its curves.
     """
     curves = signal.curves
     if curves is None or not len(curves.reference_time):
@@ -166,7 +173,11 @@ def _centre(finding: Finding) -> tuple[float, float]:
 
 
 def worst_finding(signal: SignalComparison) -> Finding | None:
-    """The first finding that has an instant."""
+    """The first finding that has an instant.
+
+    Args:
+        signal: the comparison of one signal.
+    """
     return next((f for f in signal.findings if np.isfinite(f.time)), None)
 
 
@@ -233,8 +244,8 @@ def _draw_tube(
         shapes.append(np.column_stack([np.append(low_time, high_time[::-1]), np.append(low, high[::-1])]))
     if shapes:
         look: dict[str, Any] = {
-            "facecolor": TUBE_COLOUR,
-            "edgecolor": TUBE_COLOUR,
+            "facecolor": AMBER,
+            "edgecolor": AMBER,
             "linewidth": edge,
             "alpha": 0.55,
             "zorder": 0.5,
@@ -248,13 +259,13 @@ def _mark_findings(ax: Axes, signal: SignalComparison, begin: float, end: float)
     if found:
         across = ax.get_xaxis_transform()
         times = [(max(a, begin), min(b, end) if np.isfinite(b) else a) for a, b in found]
-        ax.vlines([a for a, _ in times], 0.0, 0.07, transform=across, color=ALARM_COLOUR, linewidth=1.4)
-        ax.hlines([0.012] * len(times), *np.transpose(times), transform=across, color=ALARM_COLOUR, linewidth=3.0)
-        ax.plot([], [], color=ALARM_COLOUR, linewidth=3.0, label="outside")
+        ax.vlines([a for a, _ in times], 0.0, 0.07, transform=across, color=ALARM, linewidth=1.4)
+        ax.hlines([0.012] * len(times), *np.transpose(times), transform=across, color=ALARM, linewidth=3.0)
+        ax.plot([], [], color=ALARM, linewidth=3.0, label="outside")
 
 
 def _finish(ax: Axes, begin: float, end: float, name: str) -> Axes:
-    ax.set_xlabel("Time [s]")
+    ax.set_xlabel(TIME)
     ax.set_ylabel(name)
     for axis in (ax.xaxis, ax.yaxis):  # every number in full: an offset above the axis would stand in the legend
         axis.set_major_formatter(lambda value, _: f"{value:.10g}")
@@ -266,6 +277,6 @@ def _finish(ax: Axes, begin: float, end: float, name: str) -> Axes:
 
 def _empty(ax: Axes, signal: SignalComparison) -> Axes:
     """Axes that say that there is nothing to draw."""
-    ax.set(xlabel="Time [s]", ylabel=_axis_name("value", signal), yticks=[])
+    ax.set(xlabel=TIME, ylabel=_axis_name("value", signal), yticks=[])
     ax.text(0.5, 0.5, f"{signal.name}: {signal.status}, no curves", transform=ax.transAxes, ha="center", va="center")
     return ax

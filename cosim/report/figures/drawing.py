@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from cosim.drawing.style import ALARM_COLOUR, ZONE_COLOUR
+from cosim.drawing.style import ALARM, BLACK, MARK, TIME, ZONE
 from cosim.evaluation.event_counts import accepted_stamps
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.scales import curve_size
@@ -42,7 +42,14 @@ def thin(time: np.ndarray, values: np.ndarray, buckets: int = BUCKETS) -> tuple[
 
 
 def curve(ax: Axes, time: np.ndarray, values: np.ndarray, limits: tuple[float, float] | None, **line: Any) -> None:
-    """Draw a curve; values that are not finite leave a gap, values far outside `limits` are cut."""
+    """Draw a curve; values that are not finite leave a gap, values far outside `limits` are cut.
+
+    Args:
+        ax: the axes.
+        time: [s], shape (rows,).
+        values: in the unit of the axes, shape (rows,).
+        line: colour, dashes and width, as for ``Axes.plot``.
+    """
     shown = np.where(np.isfinite(values), values, np.nan)
     if limits is not None:
         reach = FAR * (limits[1] - limits[0])
@@ -51,12 +58,21 @@ def curve(ax: Axes, time: np.ndarray, values: np.ndarray, limits: tuple[float, f
 
 
 def is_wild(values: np.ndarray, limits: tuple[float, float] | None) -> bool:
-    """Whether a curve has left the axis by more than its height, for more than a spike."""
+    """Whether a curve has left the axis by more than its height, for more than a spike.
+
+    Args:
+        values: values, shape (rows,).
+        limits: lowest and highest value of the axis, or None.
+    """
     return limits is not None and curve_size(values - sum(limits) / 2) > 1.5 * (limits[1] - limits[0])
 
 
 def is_noisy(values: np.ndarray) -> bool:
-    """Whether a curve turns round at more than a quarter of its rows: drawn in full width it would hide all others."""
+    """Whether a curve turns round at more than a quarter of its rows: drawn in full width it would hide all others.
+
+    Args:
+        values: values, shape (rows,).
+    """
     with np.errstate(invalid="ignore", over="ignore"):
         steps = np.diff(values)
         turns = steps[1:] * steps[:-1] < 0
@@ -64,35 +80,56 @@ def is_noisy(values: np.ndarray) -> bool:
 
 
 def shade_zones(ax: Axes, spec: ReportSpec) -> None:
-    """Shade the low-adhesion zones behind the curves."""
+    """Shade the low-adhesion zones behind the curves.
+
+    Args:
+        ax: the axes.
+        spec: with the zones.
+    """
     for i, (start, end) in enumerate(spec.zones):
-        ax.axvspan(start, end, color=ZONE_COLOUR, linewidth=0, zorder=0, label="low adhesion" if i == 0 else None)
+        ax.axvspan(start, end, color=ZONE, linewidth=0, zorder=0, label="low adhesion" if i == 0 else None)
 
 
 def balise_ticks(ax: Axes, result: Result) -> None:
-    """Ticks along the bottom where balises were passed and used; false telegrams stand taller."""
+    """Ticks along the bottom where balises were passed and used; false telegrams stand taller.
+
+    Args:
+        ax: the axes.
+        result: with the telegrams.
+    """
     used = accepted_stamps(result.events)
     false = [event.stamp for event in result.events if event.kind == "false"]
     across = ax.get_xaxis_transform()
     if used:
-        ax.vlines(used, 0.0, 0.035, transform=across, color="#000000", linewidth=0.6)
-        ax.plot([], [], "|", color="#000000", label="balises")
+        ax.vlines(used, 0.0, 0.035, transform=across, color=BLACK, linewidth=0.6)
+        ax.plot([], [], "|", color=BLACK, label="balises")
     if false:
-        ax.vlines(false, 0.0, 0.09, transform=across, color=ALARM_COLOUR, linewidth=1.6)
-        ax.plot([], [], "|", color=ALARM_COLOUR, markersize=10, markeredgewidth=1.6, label="false telegrams")
+        ax.vlines(false, 0.0, 0.09, transform=across, color=ALARM, linewidth=1.6)
+        ax.plot([], [], "|", color=ALARM, markersize=10, markeredgewidth=1.6, label="false telegrams")
 
 
 def mark_evaluation(ax: Axes, result: Result, spec: ReportSpec) -> None:
-    """Mark where the evaluation starts, if start-up is left out of it."""
+    """Mark where the evaluation starts, if start-up is left out of it.
+
+    Args:
+        ax: the axes.
+        result: the run.
+        spec: says from when on errors count.
+    """
     if len(result.time) and result.time[0] < spec.evaluate_after < result.time[-1]:
         ax.axvline(
-            spec.evaluate_after, color="#777777", linewidth=0.9, linestyle=(0, (1, 2)), label="evaluated from here on"
+            spec.evaluate_after, color=MARK, linewidth=0.9, linestyle=(0, (1, 2)), label="evaluated from here on"
         )
 
 
 def time_axis(ax: Axes, result: Result) -> None:
-    """Label the time axis and give it the length of the run."""
-    ax.set_xlabel("Time [s]")
+    """Label the time axis and give it the length of the run.
+
+    Args:
+        ax: the axes.
+        result: the run.
+    """
+    ax.set_xlabel(TIME)
     if len(result.time) and result.time[-1] > result.time[0]:
         ax.set_xlim(float(result.time[0]), float(result.time[-1]))
 

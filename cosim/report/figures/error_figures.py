@@ -10,12 +10,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, NullLocator
 
-from cosim.drawing.style import WILD_LINE, axes_or_new, observer_line, styled
+from cosim.drawing.style import MARK, WILD_LINE, axes_or_new, observer_line, styled
 from cosim.evaluation.metrics import error_size
 from cosim.evaluation.numbers import error_number, number
 from cosim.evaluation.roles import Quantity, estimation_error, label
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.drawing import balise_ticks, curve, legend_above, mark_evaluation, shade_zones, time_axis
+from cosim.report.figures.panel import Panel
 from cosim.report.figures.scales import ErrorScale, error_scale, running_maximum
 from cosim.results.result import Result
 
@@ -127,7 +128,7 @@ def _absolute(ax: Axes, c: ErrorCurve, scale: ErrorScale, line: dict[str, Any], 
 def _apply(ax: Axes, scale: ErrorScale, quantity: Quantity, unit: str, window: float) -> None:
     """Set the scale and say what it shows."""
     if scale.floor is None:
-        ax.axhline(0.0, color="#888888", linewidth=0.7, zorder=1)
+        ax.axhline(0.0, color=MARK, linewidth=0.7, zorder=1)
         ax.set_ylim(-scale.limit, scale.limit)
         ax.set_ylabel(f"{quantity.capitalize()} error [{unit}]")
         return
@@ -136,3 +137,40 @@ def _apply(ax: Axes, scale: ErrorScale, quantity: Quantity, unit: str, window: f
     ax.yaxis.set_minor_locator(NullLocator())
     ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 1)))
     ax.set_ylabel(f"|{quantity} error| [{unit}]\nlargest in {number(window, 1)} s")
+
+
+class SpeedErrorPanel(Panel):
+    """Speed error."""
+
+    name = "speed_error"
+    title = "Speed error"
+    caption = (
+        "Estimated minus true speed. The scale follows the observers that work; one that leaves it "
+        "is named in the legend."
+    )
+    place = 2
+
+    @staticmethod
+    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
+        return speed_error_figure(result, spec, ax)
+
+    @staticmethod
+    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
+        return any(estimation_error(result, spec, observer, "speed") is not None for observer in spec.observers)
+
+
+class PositionErrorPanel(Panel):
+    """Position error."""
+
+    name = "position_error"
+    title = "Position error"
+    caption = "Estimated minus true position, on a scale chosen in the same way."
+    place = 3
+
+    @staticmethod
+    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
+        return position_error_figure(result, spec, ax)
+
+    @staticmethod
+    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
+        return any(estimation_error(result, spec, observer, "position") is not None for observer in spec.observers)

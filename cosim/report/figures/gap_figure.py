@@ -7,13 +7,14 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.axes import Axes
 
-from cosim.drawing.style import axes_or_new, observer_line, styled
+from cosim.drawing.style import GAP, axes_or_new, observer_line, styled
 from cosim.evaluation.event_counts import accepted_stamps
 from cosim.evaluation.facts import mapping_entry, number_entry
 from cosim.evaluation.numbers import number
 from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.drawing import legend_above, shade_zones, time_axis
+from cosim.report.figures.panel import Panel
 from cosim.results.result import Result
 
 SHOWN = 3.0  # limits above this many largest gaps are named, not drawn
@@ -36,6 +37,10 @@ def sampling_gaps(result: Result) -> tuple[np.ndarray, np.ndarray]:
 def certified_gaps(result: Result, spec: ReportSpec) -> dict[str, float]:
     """Largest gap each observer is certified for when the gaps vary [s]; observers without a finite limit are left
     out.
+
+    Args:
+        result: with the certificates in its summary.
+        spec: roles of the signals, labels, phases and zones.
     """
     certificates = mapping_entry(result, "certificates")
     limits = {}
@@ -63,7 +68,7 @@ def gap_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes
     shade_zones(ax, spec)
     top = float(np.max(gaps)) if len(gaps) else max(limits.values(), default=1.0)
     if len(gaps):
-        ax.stairs(gaps, stamps, fill=True, color="#A9A9A9", label="gap between balises")
+        ax.stairs(gaps, stamps, fill=True, color=GAP, label="gap between balises")
     largest = top
     for limit in sorted(set(limits.values())):
         observers = [observer for observer in limits if limits[observer] == limit]
@@ -81,3 +86,23 @@ def gap_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes
     time_axis(ax, result)
     legend_above(ax)
     return ax
+
+
+class GapsPanel(Panel):
+    """Sampling gaps."""
+
+    name = "gaps"
+    title = "Sampling gaps"
+    caption = (
+        "Time between consecutive balises that were used, beside the largest varying gap each observer is "
+        "certified for."
+    )
+    place = 6
+
+    @staticmethod
+    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
+        return gap_figure(result, spec, ax)
+
+    @staticmethod
+    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: ARG004, D102 - see Panel
+        return len(sampling_gaps(result)[1]) > 0

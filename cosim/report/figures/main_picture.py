@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
-from cosim.drawing.style import new_figure, styled
+from cosim.drawing.style import headline, new_figure, styled
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.drawing import legend_above
-from cosim.report.figures.panels import PANELS, Panel
+from cosim.report.figures.panels import panels as all_panels
 from cosim.results.result import Result
 
 MAIN_PANELS = ("speed", "speed_error", "slip", "gaps")
@@ -24,9 +24,9 @@ def main_picture(result: Result, spec: ReportSpec) -> Figure:
     Returns:
         The figure; save it with ``figure.savefig(path)``.
     """
-    panels: list[Panel] = [p for p in PANELS if p.key in MAIN_PANELS and p.available(result, spec)]
+    panels = [p for p in all_panels() if p.name in MAIN_PANELS and p.available(result, spec)]
     figure = new_figure((WIDTH, HEIGHT * max(len(panels), 1)))
-    figure.suptitle(spec.title, fontsize=11.5, fontweight="bold", x=0.01, ha="left")
+    headline(figure, spec.title)
     if not panels:
         return figure
     rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]

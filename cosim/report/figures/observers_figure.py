@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cosim.drawing.style import axes_or_new, new_figure, observer_line, styled
+from cosim.drawing.style import MARK, axes_or_new, new_figure, observer_line, styled
 
 if TYPE_CHECKING:
     from cosim.observer_benchmark.observer_scores import ObserverScore
@@ -54,7 +54,7 @@ def errors_figure(scores: Sequence[ObserverScore], ax: Axes | None = None) -> Ax
             ax.hlines(place, min(ends), max(ends), color=colour, linewidth=1.0, zorder=1)
         if not points:
             word = "no numbers" if score.failure else "no speed"
-            ax.annotate(word, (0.02, place), xycoords=("axes fraction", "data"), va="center", color="#777777")
+            ax.annotate(word, (0.02, place), xycoords=("axes fraction", "data"), va="center", color=MARK)
     if any(_points(score) for score in scores):
         ax.set_xscale("log")
     ax.set_yticks(range(len(scores)), [score.label for score in scores])
@@ -114,7 +114,11 @@ def cost_figure(scores: Sequence[ObserverScore], ax: Axes | None = None) -> Axes
 
 @styled
 def observers_picture(scores: Sequence[ObserverScore]) -> Figure:
-    """Both figures, one above the other."""
+    """Both figures, one above the other.
+
+    Args:
+        scores: the observers, each with its numbers.
+    """
     figure = new_figure((9.0, 5.4 + 0.45 * len(scores)))
     upper, lower = figure.subplots(2, 1, height_ratios=[1.0 + 0.45 * len(scores), 3.6])
     errors_figure(scores, upper)

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cosim.drawing.style import TRUE_LINE, new_figure, png, run_line, styled
+from cosim.drawing.style import TIME, TRUE_LINE, new_figure, png, run_line, styled
 from cosim.evaluation.roles import Quantity, estimate, estimation_error, label, recorded
 from cosim.report.figures.drawing import curve, legend_above, mark_evaluation, shade_zones, thin
 from cosim.report.figures.error_figures import ErrorCurve, draw_errors
@@ -66,7 +66,11 @@ def draw_overlays(runs: Sequence[Run], signals: Sequence[str] = ()) -> list[Over
 
 @styled
 def true_speed_figure(runs: Sequence[Run]) -> Figure | None:
-    """True speed of all runs in km/h, or None without any."""
+    """True speed of all runs in km/h, or None without any.
+
+    Args:
+        runs: from `make_runs`.
+    """
     found = [
         (i, run, speed)
         for i, run in enumerate(runs)
@@ -83,7 +87,12 @@ def true_speed_figure(runs: Sequence[Run]) -> Figure | None:
 
 @styled
 def error_overlay(runs: Sequence[Run], quantity: Literal["speed", "position"]) -> Figure | None:
-    """Errors of speed [m/s] or position [m], a panel for each observer, or None without any."""
+    """Errors of speed [m/s] or position [m], a panel for each observer, or None without any.
+
+    Args:
+        runs: from `make_runs`.
+        quantity: ``speed`` or ``position``.
+    """
     unit = "m/s" if quantity == "speed" else "m"
     panels = _panels(runs, lambda run, observer: estimation_error(run.result, run.spec, observer, quantity) is not None)
     if not panels:
@@ -99,7 +108,12 @@ def error_overlay(runs: Sequence[Run], quantity: Literal["speed", "position"]) -
 
 @styled
 def estimate_overlay(runs: Sequence[Run], signal: Literal["slip", "adhesion_force"]) -> Figure | None:
-    """Estimates of the slip [%] or the adhesion force [kN], a panel for each observer, or None without any."""
+    """Estimates of the slip [%] or the adhesion force [kN], a panel for each observer, or None without any.
+
+    Args:
+        runs: from `make_runs`.
+        signal: ``slip`` or ``adhesion_force``.
+    """
     factor, text = (100.0, "Slip [%]") if signal == "slip" else (1e-3, "Adhesion force [kN]")
     panels = _panels(runs, lambda run, observer: estimate(run.result, observer, signal) is not None)
     if not panels:
@@ -124,7 +138,12 @@ def estimate_overlay(runs: Sequence[Run], signal: Literal["slip", "adhesion_forc
 
 @styled
 def signal_figure(runs: Sequence[Run], name: str) -> Figure | None:
-    """One recorded signal of all runs in its SI unit, or None where no run has it."""
+    """One recorded signal of all runs in its SI unit, or None where no run has it.
+
+    Args:
+        runs: from `make_runs`.
+        name: name of the signal.
+    """
     found = [(i, run) for i, run in enumerate(runs) if recorded(run.result, name) is not None]
     if not found:
         return None
@@ -189,7 +208,7 @@ def _axes(runs: Sequence[Run], panels: Sequence[Panel]) -> list[Axes]:
             ax.text(0.995, 0.97, title, transform=ax.transAxes, ha="right", va="top", fontweight="bold", zorder=5)
     if end > start:
         axes[0].set_xlim(start, end)
-    axes[-1].set_xlabel("Time [s]")
+    axes[-1].set_xlabel(TIME)
     return axes
 
 

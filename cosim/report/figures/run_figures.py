@@ -11,6 +11,7 @@ from matplotlib.patches import Rectangle
 from cosim.drawing.style import (
     NOISY_LINE,
     ODOMETER_LINE,
+    PALE,
     REFERENCE_LINE,
     TRUE_LINE,
     TRUE_LINE_ABOVE,
@@ -23,6 +24,7 @@ from cosim.evaluation.indicators import on_intervals
 from cosim.evaluation.roles import estimate, label, recorded
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.drawing import curve, is_noisy, is_wild, legend_above, shade_zones, time_axis
+from cosim.report.figures.panel import Panel, any_estimate
 from cosim.report.figures.scales import bounded, value_limits
 from cosim.results.result import Result
 
@@ -142,9 +144,7 @@ def _indicator_strips(ax: Axes, result: Result, spec: ReportSpec, limits: tuple[
     found = [(o, v) for o in spec.observers if (v := estimate(result, o, "slip_indicator")) is not None]
     share = STRIP * len(found)
     if found:
-        ax.add_patch(
-            Rectangle((0.0, 0.0), 1.0, share, transform=ax.transAxes, color="#F1F1F1", linewidth=0, zorder=3.0)
-        )
+        ax.add_patch(Rectangle((0.0, 0.0), 1.0, share, transform=ax.transAxes, color=PALE, linewidth=0, zorder=3.0))
     for i, (observer, values) in enumerate(found):
         bars = [(a, b - a) for a, b in on_intervals(result.time, values)]
         place = (share - (i + 0.9) * STRIP, 0.8 * STRIP)
@@ -153,3 +153,55 @@ def _indicator_strips(ax: Axes, result: Result, spec: ReportSpec, limits: tuple[
         ax.broken_barh(bars, place, transform=ax.get_xaxis_transform(), facecolor=colour, label=text, zorder=3.1)
     ax.set_ylim(low - (high - low) * share / (1 - share), high)
     ax.set_yticks([tick for tick in ax.get_yticks() if low <= tick <= high])
+
+
+class SpeedPanel(Panel):
+    """Speed."""
+
+    name = "speed"
+    title = "Speed"
+    caption = "True speed, odometer, reference and estimates."
+    place = 1
+
+    @staticmethod
+    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
+        return speed_figure(result, spec, ax)
+
+    @staticmethod
+    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
+        roles = (spec.true_speed, spec.odometer, spec.speed_reference)
+        return any(recorded(result, name) is not None for name in roles) or any_estimate(result, spec, "speed")
+
+
+class SlipPanel(Panel):
+    """Slip."""
+
+    name = "slip"
+    title = "Slip"
+    caption = "True and estimated slip; bars where a slip indicator is on, in the legend's order."
+    place = 4
+
+    @staticmethod
+    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
+        return slip_figure(result, spec, ax)
+
+    @staticmethod
+    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
+        return recorded(result, spec.true_slip) is not None or any_estimate(result, spec, "slip", "slip_indicator")
+
+
+class AdhesionPanel(Panel):
+    """Adhesion force."""
+
+    name = "adhesion"
+    title = "Adhesion force"
+    caption = "True and estimated adhesion force; short spikes may be cut."
+    place = 5
+
+    @staticmethod
+    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
+        return adhesion_figure(result, spec, ax)
+
+    @staticmethod
+    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
+        return recorded(result, spec.true_adhesion_force) is not None or any_estimate(result, spec, "adhesion_force")

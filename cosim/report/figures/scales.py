@@ -29,13 +29,20 @@ class ErrorScale:
 
 
 def bounded(values: np.ndarray) -> np.ndarray:
-    """Values with those beyond all bounds cut; NaN stays."""
+    """Values with those beyond all bounds cut; NaN stays.
+
+    Args:
+        values: values, shape (rows,).
+    """
     return np.asarray(np.clip(values, -BOUND, BOUND))
 
 
 def curve_size(values: np.ndarray) -> float:
     """Size that represents a curve: the 99th percentile of its finite absolute values; infinite where most are not
     finite.
+
+    Args:
+        values: values, shape (rows,).
     """
     finite = np.abs(bounded(values[np.isfinite(values)]))
     if not len(finite) or len(finite) * 2 < len(values):

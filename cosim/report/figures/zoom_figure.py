@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cosim.drawing.style import ALARM_COLOUR, ZONE_COLOUR, new_figure, observer_line, styled
+from cosim.drawing.style import ALARM, BAND, BLACK, MARK, TIME, WHITE, ZONE, new_figure, observer_line, styled
 from cosim.evaluation.roles import estimate, estimation_error, label, recorded
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.drawing import FAR, legend_above
@@ -19,10 +19,10 @@ from cosim.report.zoom_windows import ZoomWindow
 from cosim.results.result import BaliseRecord, Result
 
 SIZE, ONE_PANEL = (5.6, 4.3), (5.6, 2.8)  # inches
-TRUE: dict[str, Any] = {"color": "#B4B4B4", "linewidth": 4.0, "zorder": 1.5}  # a band, on which the estimates lie
-STAMP: dict[str, Any] = {"color": "#000000", "linewidth": 0.9, "zorder": 1.4}
-DELIVERY: dict[str, Any] = {"color": "#000000", "linewidth": 0.9, "linestyle": (0, (2, 2)), "zorder": 1.4}
-MISSED: dict[str, Any] = {"color": "#6E6E6E", "linewidth": 0.9, "linestyle": (0, (1, 2)), "zorder": 1.4}
+TRUE: dict[str, Any] = {"color": BAND, "linewidth": 4.0, "zorder": 1.5}  # a band, on which the estimates lie
+STAMP: dict[str, Any] = {"color": BLACK, "linewidth": 0.9, "zorder": 1.4}
+DELIVERY: dict[str, Any] = {"color": BLACK, "linewidth": 0.9, "linestyle": (0, (2, 2)), "zorder": 1.4}
+MISSED: dict[str, Any] = {"color": MARK, "linewidth": 0.9, "linestyle": (0, (1, 2)), "zorder": 1.4}
 MOST_TELEGRAMS = 60  # in a window; more would be a hatching
 
 
@@ -57,7 +57,7 @@ def zoom_figure(result: Result, spec: ReportSpec, moment: ZoomWindow) -> Figure:
         others = [] if true is None else [true[rows]]
         _limits(ax, [*shown.values(), *others], _reach([*shown.values(), *others], own), zero=true is None)
         ax.set_ylabel(text)
-    axes[-1].set_xlabel("Time [s]")
+    axes[-1].set_xlabel(TIME)
     axes[-1].set_xlim(moment.start, moment.end)
     axes[-1].ticklabel_format(axis="x", useOffset=False)
     legend_above(axes[0])
@@ -105,7 +105,7 @@ def _draw(ax: Axes, time: np.ndarray, curves: Curves, spec: ReportSpec, reach: f
             "color": line["color"],
             "zorder": 3.0,
         }
-        ax.plot(time[moved], shown[moved], markerfacecolor="#FFFFFF", **mark)
+        ax.plot(time[moved], shown[moved], markerfacecolor=WHITE, **mark)
         ax.plot(time[moved], shown[moved + 1], **mark)
 
 
@@ -119,7 +119,7 @@ def _limits(ax: Axes, curves: list[np.ndarray], reach: float, *, zero: bool) -> 
     finite = [c[np.isfinite(c) & (np.abs(c) <= reach)] for c in curves]
     ends = [(float(np.min(c)), float(np.max(c))) for c in finite if len(c)]
     if zero:
-        ax.axhline(0.0, color="#888888", linewidth=0.7, zorder=1)
+        ax.axhline(0.0, color=MARK, linewidth=0.7, zorder=1)
         ends.append((0.0, 0.0))
     low, high = min((e[0] for e in ends), default=0.0), max((e[1] for e in ends), default=0.0)
     room = 0.08 * (high - low) or 0.1 * max(abs(low), 1e-9)
@@ -131,7 +131,7 @@ def _background(ax: Axes, result: Result, spec: ReportSpec, moment: ZoomWindow) 
     inside = [z for z in spec.zones if z[1] > moment.start and z[0] < moment.end]
     for start, end in inside:
         text = "low adhesion" if (start, end) == inside[0] else "_"
-        ax.axvspan(start, end, color=ZONE_COLOUR, linewidth=0, zorder=0, label=text)
+        ax.axvspan(start, end, color=ZONE, linewidth=0, zorder=0, label=text)
     seen: set[str] = set()
     for event in _in_window(result, moment):
         for instant, text, line in _instants(event):
@@ -148,7 +148,7 @@ def _instants(event: BaliseRecord) -> list[tuple[float, str, dict[str, Any]]]:
     """Instants of a telegram: time [s], text for the legend, line."""
     if event.kind == "missed":
         return [(event.stamp, "missed balise", MISSED)]
-    false = {"color": ALARM_COLOUR, "linewidth": 1.4} if event.kind == "false" else {}
+    false = {"color": ALARM, "linewidth": 1.4} if event.kind == "false" else {}
     kind = "false telegram" if false else "balise"
     if not event.delivered_at > event.stamp:
         return [(event.stamp, kind, STAMP | false)]

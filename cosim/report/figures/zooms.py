@@ -31,7 +31,12 @@ class Zoom:
 
 
 def draw_zooms(result: Result, spec: ReportSpec) -> list[Zoom]:
-    """All zoom figures of a run in order of time; none where it has no errors."""
+    """All zoom figures of a run in order of time; none where it has no errors.
+
+    Args:
+        result: the run.
+        spec: roles of the signals, labels, phases and zones.
+    """
     windows = notable_windows(result, spec)
     pictures = [png(zoom_figure(result, spec, moment)) for moment in windows]
     return [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from hashlib import sha256
 from typing import Any
 
 from cosim.evaluation.event_counts import count_events
@@ -34,7 +35,11 @@ def differences(runs: Sequence[Run]) -> list[list[str]]:
 
 
 def layout_note(runs: Sequence[Run]) -> str:
-    """Whether the balises of all runs stand at the same places; empty where no run has any."""
+    """Whether the balises of all runs stand at the same places; empty where no run has any.
+
+    Args:
+        runs: from `make_runs`.
+    """
     passed = [{e.identity: e for e in run.result.events if e.kind != "false"} for run in runs]
     if not any(passed):
         return ""
@@ -110,8 +115,6 @@ def _phases(run: Run) -> str:
 
 
 def _digest(lines: Sequence[Any]) -> str:
-    from hashlib import sha256  # noqa: PLC0415 - only here
-
     return sha256("\n".join(sorted(map(str, lines))).encode()).hexdigest()[:8]
 
 

@@ -31,12 +31,20 @@ class Measured:
 
 
 def measured(runs: Sequence[Run]) -> list[Measured]:
-    """Maximal and rms errors of speed and position, in the columns of `table.MEASURED`."""
+    """Maximal and rms errors of speed and position, in the columns of `table.MEASURED`.
+
+    Args:
+        runs: from `make_runs`.
+    """
     return _by_phase(runs, lambda run: {(m.observer, m.phase): _sizes(m) for m in phase_metrics(run.result, run.spec)})
 
 
 def detailed(runs: Sequence[Run]) -> list[Measured]:
-    """The numbers of `phase_details`, in the columns of `phases.COLUMNS` and their units."""
+    """The numbers of `phase_details`, in the columns of `phases.COLUMNS` and their units.
+
+    Args:
+        runs: from `make_runs`.
+    """
 
     def of(run: Run) -> dict[tuple[str, str], Values]:
         return {
@@ -48,7 +56,12 @@ def detailed(runs: Sequence[Run]) -> list[Measured]:
 
 
 def headings(rows: Sequence[Measured], names: Sequence[str]) -> tuple[list[str], list[int]]:
-    """Headings of the columns that hold a number somewhere, and their indices."""
+    """Headings of the columns that hold a number somewhere, and their indices.
+
+    Args:
+        rows: from `measured` or `detailed`.
+        names: headings of all columns.
+    """
     kept = [i for i in range(len(names)) if any(v[i] is not None for row in rows for v in row.values.values())]
     return [names[i] for i in kept], kept
 
@@ -58,7 +71,12 @@ DETAIL_HEADINGS = tuple(heading for heading, _ in COLUMNS.values())
 
 
 def cell(value: float | None, first: float | None) -> str:
-    """A number, and below it the difference to the first run, absolute and in percent."""
+    """A number, and below it the difference to the first run, absolute and in percent.
+
+    Args:
+        value: of a run; None without one.
+        first: of the first run; None where nothing is to be compared.
+    """
     if value is None:
         return DASH
     text = str(value) if isinstance(value, int) else error_number(value)  # counts and sizes
@@ -66,7 +84,12 @@ def cell(value: float | None, first: float | None) -> str:
 
 
 def difference(value: float, first: float) -> str:
-    """How far a number is from that of the first run."""
+    """How far a number is from that of the first run.
+
+    Args:
+        value: of a run.
+        first: of the first run.
+    """
     if value == first:
         return "same"
     if not (isfinite(value) and isfinite(first)):

@@ -77,10 +77,18 @@ def _like(first: ReportSpec, spec: ReportSpec) -> ReportSpec:
 
 
 def observers_of(runs: Sequence[Run]) -> list[str]:
-    """All observers, in the order in which the runs name them."""
+    """All observers, in the order in which the runs name them.
+
+    Args:
+        runs: from `make_runs`.
+    """
     return list(dict.fromkeys(observer for run in runs for observer in run.spec.observers))
 
 
 def one_each(runs: Sequence[Run]) -> bool:
-    """Whether every run has a single observer: then these are compared, whatever their names."""
+    """Whether every run has a single observer: then these are compared, whatever their names.
+
+    Args:
+        runs: from `make_runs`.
+    """
     return all(len(run.spec.observers) == 1 for run in runs)

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from cosim.observer_benchmark.observers import ObserverBenchmark
 
 PAGE, PICTURE, DATA = "observers.html", "observers.png", "observers.json"
-DPI = 120
 
 
 def write_benchmark(benchmark: ObserverBenchmark, directory: str | Path) -> dict[str, Path]:
@@ -43,7 +42,7 @@ def write_benchmark(benchmark: ObserverBenchmark, directory: str | Path) -> dict
         OutputError: the folder cannot be written; former files are then still whole.
     """
     folder = Path(directory)
-    picture = png(observers_picture(benchmark.scores), DPI)
+    picture = png(observers_picture(benchmark.scores))
     data = json.dumps(jsonable(benchmark.to_data()), indent=2) + "\n"
     contents = {PAGE: benchmark_page(benchmark, picture).encode("utf-8"), PICTURE: picture, DATA: data.encode("utf-8")}
     try:
@@ -112,7 +111,7 @@ def _over_time(benchmark: ObserverBenchmark) -> bytes | None:
     names = {signal.name.partition(".")[0] for signal in result.signals}
     spec = benchmark.labelled_spec()
     shown = replace(spec, observers=[name for name in spec.observers if name in names])
-    return png(speed_error_figure(result, shown).figure, DPI)
+    return png(speed_error_figure(result, shown).figure)
 
 
 def merged_result(benchmark: ObserverBenchmark) -> Result | None:

@@ -16,7 +16,8 @@ from cosim.evaluation.phase_details import phase_details
 from cosim.evaluation.result_warnings import all_warnings
 from cosim.evaluation.spec import ReportSpec
 from cosim.expectations.judged import Judged
-from cosim.report.figures.panels import PANELS, Panel, draw_all
+from cosim.report.figures.panel import Panel
+from cosim.report.figures.panels import draw_all, panels
 from cosim.report.figures.zooms import ZOOM_KEYS, Zoom, draw_zooms
 from cosim.report.page import run_tables
 from cosim.report.page.files import write_file, write_page
@@ -45,8 +46,8 @@ def write_report(result: Result, spec: ReportSpec, directory: str | Path) -> Pat
     folder = Path(directory)
     figures, zooms = draw_all(result, spec), draw_zooms(result, spec)
     text = report_page(result, spec, figures, zooms)
-    files = {panel.key: data for panel, data in figures.items()} | {zoom.key: zoom.png for zoom in zooms}
-    stale = ({panel.key for panel in PANELS} | set(ZOOM_KEYS)) - set(files)  # of an earlier run
+    files = {panel.name: data for panel, data in figures.items()} | {zoom.key: zoom.png for zoom in zooms}
+    stale = ({panel.name for panel in panels()} | set(ZOOM_KEYS)) - set(files)  # of an earlier run
     try:
         (folder / FIGURES).mkdir(parents=True, exist_ok=True)
         for key, data in files.items():
@@ -79,7 +80,9 @@ def write_report_page(result: Result, spec: ReportSpec, path: str | Path) -> Pat
     return write_page(path, report_page(result, spec, draw_all(result, spec), draw_zooms(result, spec)))
 
 
-def report_page(result: Result, spec: ReportSpec, figures: Mapping[Panel, bytes], zooms: Sequence[Zoom] = ()) -> str:
+def report_page(
+    result: Result, spec: ReportSpec, figures: Mapping[type[Panel], bytes], zooms: Sequence[Zoom] = ()
+) -> str:
     """The page as text.
 
     Args:

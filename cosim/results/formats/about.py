@@ -21,6 +21,9 @@ _FROM_JSON = {None: math.nan, "inf": math.inf, "-inf": -math.inf}
 def signals_of(result: ResultData) -> list[SignalInfo]:
     """What each column but ``time`` is, in the order of the table.
 
+    Args:
+        result: the table and what its columns are.
+
     Raises:
         ValueError: the table is not a result table.
     """
@@ -29,20 +32,34 @@ def signals_of(result: ResultData) -> list[SignalInfo]:
 
 
 def blocks(table: np.ndarray, size: int = BLOCK) -> Iterator[tuple[int, np.ndarray]]:
-    """Number of the first row and rows of a table, piece by piece; at least one piece, which may be empty."""
+    """Number of the first row and rows of a table, piece by piece; at least one piece, which may be empty.
+
+    Args:
+        table: rows, a structured array, shape (rows,).
+        size: rows of a piece.
+    """
     rows = max(size // table.dtype.itemsize, 1)
     for start in range(0, max(len(table), 1), rows):
         yield start, np.asarray(table[start : start + rows])
 
 
 def about_text(result: ResultData) -> str:
-    """Telegrams, summary and failure as JSON."""
+    """Telegrams, summary and failure as JSON.
+
+    Args:
+        result: with telegrams, summary and failure.
+    """
     content = {"events": [record_row(e) for e in result.events], "summary": result.summary, "failure": result.failure}
     return json.dumps(jsonable(content), ensure_ascii=False, allow_nan=False)
 
 
 def with_about(table: np.ndarray, signals: list[SignalInfo], text: str) -> ResultData:
     """The result of a table and what `about_text` told; NaN in the summary has become None.
+
+    Args:
+        table: rows, a structured array, shape (rows,).
+        signals: what each column but ``time`` is.
+        text: from `about_text`.
 
     Raises:
         KeyError, TypeError, ValueError: the text is none of ours.

@@ -48,12 +48,19 @@ class Dialect:
                     yield number, line if self.separator == "," else line.replace(",", ".")
 
     def cells(self, line: str) -> list[str]:
-        """The cells of a line without spaces around them."""
+        """The cells of a line without spaces around them.
+
+        Args:
+            line: of the file.
+        """
         return [cell.strip() for cell in next(csv.reader([line], delimiter=self.separator, skipinitialspace=True), [])]
 
 
 def csv_dialect(path: Path) -> Dialect:
     """Look at the beginning of a file.
+
+    Args:
+        path: the file.
 
     Raises:
         OutputError: it is empty, or it is not text.

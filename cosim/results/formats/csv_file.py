@@ -15,6 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
+from cosim.results.data import ResultData
+from cosim.results.formats.format import Format, bare
 from cosim.results.table_layout import column_names, table_dtype
 
 CHUNK = 4096  # rows turned into text at a time, so that memory stays flat
@@ -83,3 +85,20 @@ def read_csv(path: str | Path) -> np.ndarray:
     if values.shape[1] != len(names):
         raise ValueError(f"{path} is not a result table: {len(names)} names but {values.shape[1]} numbers in a row.")
     return values.view(table_dtype(names))[:, 0]
+
+
+class CsvFormat(Format):
+    """Text, for every program."""
+
+    name = "csv"
+    endings = (".csv",)
+    keeps = False
+    speed = 0
+
+    @staticmethod
+    def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format
+        write_csv(path, result.table)
+
+    @staticmethod
+    def read(path: Path) -> ResultData:  # noqa: D102 - see Format
+        return bare(read_csv, path)

@@ -27,6 +27,9 @@ def read_foreign_csv(path: Path) -> ResultData:
     """Read a table with a column ``time`` and columns of numbers; the separator, decimal comma, encoding and units are
     found out.
 
+    Args:
+        path: the file.
+
     Raises:
         OutputError: the file is no such table; the message names the line and the column.
         OSError: the file cannot be read.

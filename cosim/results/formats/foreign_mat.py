@@ -11,14 +11,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.io import loadmat
+import scipy
 
 from cosim.errors import OutputError
 from cosim.results.data import ResultData, SignalInfo
 from cosim.results.formats.about import with_about
 from cosim.results.formats.columns import result_of_columns
+from cosim.results.formats.format import Format
 from cosim.results.formats.mat_file import read_mat
-from cosim.results.formats.modelica_file import ABOUT, LARGEST, split_description
+from cosim.results.formats.modelica_file import ABOUT, LARGEST, split_description, write_modelica
 from cosim.results.table_layout import table_dtype
 
 TEXTS = 3  # in ``dataInfo``: a text over time, in the matrix ``stringData``
@@ -28,13 +29,16 @@ def read_foreign_mat(path: Path) -> ResultData:
     """Read a MAT file of version 4 to 7: ours, a Modelica trajectory (``binTrans`` or ``binNormal``), or vectors with
     ``time``.
 
+    Args:
+        path: the file.
+
     Raises:
         OutputError: it is none of these; the message says what it holds.
         ValueError: the file is broken. OSError: it cannot be read.
     """
     try:
         with path.open("rb") as file:
-            content = loadmat(file, chars_as_strings=False)
+            content = scipy.io.loadmat(file, chars_as_strings=False)
     except Exception as error:  # whatever a broken file leads SciPy into: a dozen kinds were seen
         if isinstance(error, OSError) and error.errno is not None:
             raise
@@ -49,7 +53,11 @@ def read_foreign_mat(path: Path) -> ResultData:
 
 
 def read_modelica(path: str | Path) -> ResultData:
-    """Read a Modelica trajectory; see `read_foreign_mat`."""
+    """Read a Modelica trajectory; see `read_foreign_mat`.
+
+    Args:
+        path: the file.
+    """
     return read_foreign_mat(Path(path))
 
 
@@ -171,3 +179,19 @@ def _vectors(source: str, content: Mapping[str, Any]) -> ResultData:
     kept = {n: v for n, v in vectors.items() if len(v) == len(vectors[time])}
     names = ["time" if name == time else name for name in kept]
     return result_of_columns(source, names, [np.asarray(v, np.float64) for v in kept.values()], {})
+
+
+class ModelicaFormat(Format):
+    """MAT 4 as Dymola and OpenModelica write it."""
+
+    name = "modelica"
+    endings = (".modelica.mat",)
+    speed = -2
+
+    @staticmethod
+    def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format
+        write_modelica(path, result)
+
+    @staticmethod
+    def read(path: Path) -> ResultData:  # noqa: D102 - see Format
+        return read_modelica(path)

@@ -17,6 +17,9 @@ def read_foreign_npy(path: Path) -> ResultData:
     """Read a structured array with a field ``time``; one of ours stays in the file, whose pages are read when looked
     at.
 
+    Args:
+        path: the file.
+
     Raises:
         OutputError: it is another kind of array. ValueError: the file is broken. OSError: it cannot be read.
     """

@@ -37,6 +37,9 @@ def read_grown(path: str | Path) -> np.ndarray:
 
     Where the power failed the header may promise rows that never reached the disk: they are left out.
 
+    Args:
+        path: the file.
+
     Raises:
         ValueError: the file is not such a table. OSError: it cannot be read.
     """

@@ -27,7 +27,11 @@ class GuardedFile:
         self.refusal: OSError | None = None
 
     def write(self, data: Any) -> int:
-        """Write all of it, or remember why that failed."""
+        """Write all of it, or remember why that failed.
+
+        Args:
+            data: bytes.
+        """
         view = memoryview(data).cast("B")
         done = 0
         try:
@@ -39,7 +43,11 @@ class GuardedFile:
         return len(view)
 
     def readinto(self, buffer: Any) -> int:
-        """Fill the buffer; what the disk did not take reads as zeros."""
+        """Fill the buffer; what the disk did not take reads as zeros.
+
+        Args:
+            buffer: to be filled.
+        """
         view = memoryview(buffer).cast("B")
         done = self._file.readinto(view) or 0
         while done < len(view) and (more := self._file.readinto(view[done:])):
@@ -48,11 +56,20 @@ class GuardedFile:
         return len(view)
 
     def read(self, size: int = -1) -> bytes:
-        """As of any file; by this h5py knows that it is one."""
+        """As of any file; by this h5py knows that it is one.
+
+        Args:
+            size: bytes at most; -1 for all.
+        """
         return self._file.read(size) or b""
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        """As of any file."""
+        """As of any file.
+
+        Args:
+            offset: [bytes].
+            whence: from where on, as in `io`.
+        """
         return self._file.seek(offset, whence)
 
     def tell(self) -> int:
@@ -60,7 +77,11 @@ class GuardedFile:
         return self._file.tell()
 
     def truncate(self, size: int | None = None) -> int:
-        """As of any file."""
+        """As of any file.
+
+        Args:
+            size: [bytes]; None for the present place.
+        """
         try:
             return self._file.truncate(size)
         except OSError as error:

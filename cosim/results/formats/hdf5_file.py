@@ -21,6 +21,7 @@ from cosim.results.data import BaliseRecord, ResultData, SignalInfo
 from cosim.results.events_file import COLUMNS, NUMBERS, record_from_row, record_row
 from cosim.results.formats.about import BLOCK, blocks, signals_of
 from cosim.results.formats.columns import result_of_columns
+from cosim.results.formats.format import Format
 from cosim.results.formats.guarded_file import GuardedFile
 from cosim.results.optional import optional_module
 from cosim.results.summary_file import jsonable, restored
@@ -113,6 +114,9 @@ def read_hdf5(path: str | Path) -> ResultData:
     """Read a file of `write_hdf5`, bit by bit, or of another tool: vectors of numbers, one of them ``time``; groups
     become names.
 
+    Args:
+        path: the file.
+
     Raises:
         OutputError: there is nothing of that kind in it, or h5py is not installed.
         ValueError: the file is broken. OSError: it cannot be read.
@@ -182,3 +186,20 @@ def _foreign(source: str, file: Any) -> ResultData:
 
 def _unit(attributes: Any) -> str | None:
     return next((_text(attributes[key]) for key in ("units", "unit", "UNIT") if key in attributes), None)
+
+
+class Hdf5Format(Format):
+    """HDF5, as SDF reads it."""
+
+    name = "hdf5"
+    endings = (".h5", ".hdf5")
+    speed = 1
+    package, extra = "h5py", "hdf5"
+
+    @staticmethod
+    def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format
+        write_hdf5(path, result)
+
+    @staticmethod
+    def read(path: Path) -> ResultData:  # noqa: D102 - see Format
+        return read_hdf5(path)

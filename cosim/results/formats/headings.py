@@ -18,6 +18,9 @@ def split_unit(heading: str) -> tuple[str, str | None]:
     Brackets right behind a name are a unit only if they can be read as one; ``a[1]``, ``a[1,2]`` and ``a[left]`` are
     elements of arrays. Brackets after a space are a unit whatever they hold.
 
+    Args:
+        heading: of a column.
+
     Returns:
         The name, and the unit or None where the heading names none; ``[-]`` and ``[]`` are pure numbers, ``1``.
     """
@@ -36,7 +39,12 @@ def split_unit(heading: str) -> tuple[str, str | None]:
 
 
 def with_unit(name: str, unit: str) -> str:
-    """The heading of which `split_unit` gives back both; a pure number gets no brackets unless its name needs them."""
+    """The heading of which `split_unit` gives back both; a pure number gets no brackets unless its name needs them.
+
+    Args:
+        name: of the column.
+        unit: its unit.
+    """
     return name if unit == "1" and split_unit(name) == (name, None) else f"{name} [{unit}]"
 
 

@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.io import loadmat, savemat
+import scipy
 
 from cosim.results.data import BaliseRecord, ResultData, SignalInfo
 from cosim.results.events_file import COLUMNS, NUMBERS, record_from_row, record_row
+from cosim.results.formats.format import Format
 from cosim.results.formats.matlab_names import matlab_names
 from cosim.results.table_layout import column_names, table_dtype
 
@@ -71,7 +72,7 @@ def write_mat(path: str | Path, result: ResultData) -> None:
     content["signals"] = _signals_struct(signals, legal)
     content["events"] = _events_struct(result.events)
     with Path(path).open("wb") as file:
-        savemat(file, content, long_field_names=True, do_compression=True, oned_as="column")
+        scipy.io.savemat(file, content, long_field_names=True, do_compression=True, oned_as="column")
 
 
 def _read_signals(struct: Mapping[str, Any]) -> tuple[list[str], list[SignalInfo]]:
@@ -103,7 +104,7 @@ def read_mat(path: str | Path) -> ResultData:
     """
     with Path(path).open("rb") as file:
         try:
-            content = loadmat(file, simplify_cells=True)
+            content = scipy.io.loadmat(file, simplify_cells=True)
             variables, signals = _read_signals(content["signals"])
             columns = [content["time"], *(content[variable] for variable in variables)]
             events = _read_events(content["events"])
@@ -114,3 +115,18 @@ def read_mat(path: str | Path) -> ResultData:
     for name, column in zip(names, columns, strict=True):
         table[name] = np.ravel(column)
     return ResultData(table, signals, events)
+
+
+class MatFormat(Format):
+    """MATLAB 5."""
+
+    name = "mat"
+    endings = (".mat",)
+
+    @staticmethod
+    def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format
+        write_mat(path, result)
+
+    @staticmethod
+    def read(path: Path) -> ResultData:  # noqa: D102 - see Format
+        return read_mat(path)

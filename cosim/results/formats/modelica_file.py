@@ -98,6 +98,9 @@ def split_description(text: str) -> tuple[str, str | None, str | None]:
     """Description, unit and display unit of a description in such a file, e.g. ``Mass of the train [kg]``.
 
     Dymola puts types in too, ``[:#(type=Boolean)]``, which are left out.
+
+    Args:
+        text: the description.
     """
     start = text.rfind("[")
     if start < 0 or not text.endswith("]"):

@@ -11,6 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
+from cosim.results.data import ResultData
+from cosim.results.formats.format import Format, bare
 from cosim.results.table_layout import column_names
 
 HEADER = 1 << 26  # bytes; thousands of names need more than NumPy allows unasked
@@ -57,6 +59,9 @@ def _is_there(path: Path, table: np.ndarray) -> bool:
 def read_npy(path: str | Path) -> np.ndarray:
     """Read a table written by `write_npy`; it stays in the file, whose pages are read when they are looked at.
 
+    Args:
+        path: the file.
+
     Raises:
         ValueError: the file is not such a table.
         OSError: the file cannot be read.
@@ -67,3 +72,20 @@ def read_npy(path: str | Path) -> np.ndarray:
     except (EOFError, ValueError) as error:
         raise ValueError(f"{path} is not a result table: {error}") from error
     return table
+
+
+class NpyFormat(Format):
+    """NumPy's own."""
+
+    name = "npy"
+    endings = (".npy",)
+    keeps = False
+    speed = 3
+
+    @staticmethod
+    def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format
+        write_npy(path, result.table)
+
+    @staticmethod
+    def read(path: Path) -> ResultData:  # noqa: D102 - see Format
+        return bare(read_npy, path)

@@ -18,6 +18,7 @@ from cosim.errors import OutputError
 from cosim.results.data import ResultData, SignalInfo
 from cosim.results.formats.about import about_text, blocks, signals_of, with_about
 from cosim.results.formats.columns import result_of_columns
+from cosim.results.formats.format import Format
 from cosim.results.optional import optional_module
 from cosim.results.table_layout import table_dtype
 
@@ -64,6 +65,9 @@ def _metadata(signal: SignalInfo) -> dict[str, str]:
 
 def read_parquet(path: str | Path) -> ResultData:
     """Read a file of `write_parquet`, bit by bit, or of another tool: columns of numbers, one of them ``time``.
+
+    Args:
+        path: the file.
 
     Raises:
         OutputError: a column holds no numbers, or pyarrow is not installed; the message names the column.
@@ -117,3 +121,20 @@ def _column(source: str, name: str, column: Any) -> np.ndarray:
     elif not (arrow.types.is_integer(kind) or arrow.types.is_floating(kind) or arrow.types.is_decimal(kind)):
         raise OutputError(f"{source}: column {name!r} must hold numbers, got {kind}. Leave it out.")
     return np.asarray(column.cast(arrow.float64(), safe=False).to_numpy())
+
+
+class ParquetFormat(Format):
+    """Columns with metadata."""
+
+    name = "parquet"
+    endings = (".parquet", ".pq")
+    speed = 2
+    package, extra = "pyarrow", "parquet"
+
+    @staticmethod
+    def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format
+        write_parquet(path, result)
+
+    @staticmethod
+    def read(path: Path) -> ResultData:  # noqa: D102 - see Format
+        return read_parquet(path)

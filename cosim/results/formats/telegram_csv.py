@@ -32,7 +32,11 @@ KINDS = ("true", "missed", "false")
 
 
 def holds_telegrams(path: Path) -> bool:
-    """Whether a file is a CSV with a column ``stamp``."""
+    """Whether a file is a CSV with a column ``stamp``.
+
+    Args:
+        path: the file.
+    """
     if path.suffix.lower() != ".csv" or not path.is_file():
         return False
     return "stamp" in [split_unit(heading)[0] for heading in csv_dialect(path).headings]
@@ -44,6 +48,9 @@ def read_telegrams(path: Path) -> list[BaliseRecord]:
     What is not given: ``delivered_at`` is the stamp, ``identity`` is ``T1``, ``T2``, ... in the order of the file,
     ``kind`` is ``true``, the location accuracy is zero, the odometer reading and the true position are unknown. Units
     in brackets behind the names are converted; without one it is the SI unit.
+
+    Args:
+        path: the file.
 
     Raises:
         ValueError: a column is missing or unknown, or a cell cannot be read; the line is named.

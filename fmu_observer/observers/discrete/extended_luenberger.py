@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
-from scipy.linalg import expm
+import scipy
 
 from fmu_observer.condition import Condition
 from fmu_observer.design.discrete_bounds import centre_of, discrete_bound
@@ -70,7 +70,7 @@ class ExtendedLuenberger(ModelObserver):
         L, T = as_matrix(np.asarray(p.gain), self.model.order, len(self.model.measurements)), float(p.sample_period)
         found, matrix = (
             discrete_bound(self.model, L, T),
-            observability_matrix(expm(centre_of(self.model) * T), self.model.C),
+            observability_matrix(scipy.linalg.expm(centre_of(self.model) * T), self.model.C),
         )
         return Condition(
             holds=found.holds,
@@ -96,7 +96,7 @@ def default_gain(model: ObserverModel) -> np.ndarray:
     """
     centre, T = centre_of(model), model.sample_period
     require_observable(MeasuredSystem(centre, model.C, states=tuple(s.name for s in model.states), name=model.name))
-    A = expm(centre * T)
+    A = scipy.linalg.expm(centre * T)
     if np.linalg.matrix_rank(observability_matrix(A, model.C)) < model.order:
         raise UnobservableError(
             f"{model.name}: samples every {T:g} s are in step with an oscillation of the model; choose another period."

@@ -7,11 +7,11 @@ from __future__ import annotations
 import numpy as np
 
 from fmus.check.bench import WARM_UP_STEPS
+from fmus.check.check import LIMIT, Check
 from fmus.check.checks.life import real_names
 from fmus.check.context import Context
 from fmus.check.derivatives import compare
 from fmus.check.findings import Outcome, skipped
-from fmus.check.slave import FmuSlave
 
 
 def slave_derivatives(context: Context) -> Outcome:
@@ -22,7 +22,6 @@ def slave_derivatives(context: Context) -> Outcome:
     bench.begin()
     bench.steps((bench.h,) * WARM_UP_STEPS)
     slave = bench.component
-    assert isinstance(slave, FmuSlave)
     inputs, outputs = real_names(slave, "input"), real_names(slave, "output")
     if not inputs or not outputs:
         return skipped("has no pair of a continuous input and a continuous output")
@@ -45,3 +44,13 @@ def nominal_of(variable: object) -> float:
     """The nominal value of a variable, 1 where it declares none."""
     declared = getattr(variable, "nominal", None)
     return abs(float(declared)) if declared else 1.0
+
+
+class DirectionalDerivativesCheck(Check):
+    """The check *directional derivatives*."""
+
+    name = "directional derivatives"
+    failing = LIMIT
+    advice = "do not use its derivatives"
+    place = 18
+    run = staticmethod(slave_derivatives)

@@ -12,9 +12,11 @@ from fmpy.model_description import ModelVariable
 
 from fmus.check.behaviour import difference, repeatable
 from fmus.check.bench import SLOW_STEPS, WARM_UP_STEPS
+from fmus.check.check import DISTRUST, LIMIT, MISSING, NOTE, Check
 from fmus.check.context import Context
 from fmus.check.findings import Outcome, Verdict, failed, limited, noted, passed, skipped
 from fmus.check.instance import FmuInstance, SlaveError
+from fmus.fmi.instance import Instance
 from fmus.fmi.library import functions_of_capabilities
 from fmus.fmi.types import FLOATING_TYPES
 
@@ -69,7 +71,6 @@ def values_at_start(context: Context) -> Outcome:
     try:
         bench.begin(excited=False)
         slave = bench.component
-        assert isinstance(slave, FmuInstance)
         outputs, locals_ = slave.names("output"), slave.names("local")
         bad_outputs = not_finite(outputs, slave.read(outputs))
         bad_locals = not_finite(locals_, slave.read(locals_))
@@ -88,7 +89,6 @@ def getters(context: Context) -> Outcome:
     try:
         bench.begin(excited=False)
         slave = bench.component
-        assert isinstance(slave, FmuInstance)
         own = [v for v in slave.description.modelVariables if v.alias is None]
         readable = [v for v in own if v.type != "Clock" and not v.clocks]
         problems = list(filter(None, (_unreadable(slave, variable) for variable in readable)))
@@ -101,7 +101,7 @@ def getters(context: Context) -> Outcome:
     return passed(f"{len(readable)} variables are read{note}")
 
 
-def _unreadable(slave: FmuInstance, variable: ModelVariable) -> str:
+def _unreadable(slave: Instance, variable: ModelVariable) -> str:
     try:
         slave.get(variable)
     except SlaveError as error:
@@ -231,7 +231,109 @@ def listed(names: Sequence[str]) -> str:
     return ", ".join(names[:NAMES_SHOWN]) + more
 
 
-def real_names(instance: FmuInstance, causality: str) -> list[str]:
+def real_names(instance: Instance, causality: str) -> list[str]:
     """Names of its scalar continuous real variables of one causality."""
     found = (instance.variables[n] for n in instance.names(causality))
     return [v.name for v in found if v.type in FLOATING_TYPES and v.variability in (None, "continuous")]
+
+
+class LoadingCheck(Check):
+    """The check *loading*."""
+
+    name = "loading"
+    failing = DISTRUST
+    basis = True
+    place = 1
+    run = staticmethod(loading)
+
+
+class ExportedSymbolsCheck(Check):
+    """The check *exported symbols*."""
+
+    name = "exported symbols"
+    failing = LIMIT
+    advice = MISSING
+    place = 2
+    run = staticmethod(slave_symbols)
+
+
+class InitialiseCheck(Check):
+    """The check *initialise*."""
+
+    name = "initialise"
+    failing = DISTRUST
+    advice = "give start values, if it needs some"
+    basis = True
+    place = 3
+    run = staticmethod(initialise)
+
+
+class ValuesAtStartCheck(Check):
+    """The check *values at start*."""
+
+    name = "values at start"
+    failing = LIMIT
+    advice = "give start values, so that what it feeds does not begin with these"
+    place = 4
+    run = staticmethod(values_at_start)
+
+
+class GettersCheck(Check):
+    """The check *getters*."""
+
+    name = "getters"
+    failing = LIMIT
+    advice = "leave these variables out of connections and recordings"
+    place = 5
+    run = staticmethod(getters)
+
+
+class SteppingCheck(Check):
+    """The check *stepping*."""
+
+    name = "stepping"
+    failing = DISTRUST
+    basis = True
+    place = 6
+    run = staticmethod(stepping)
+
+
+class RepeatedRunCheck(Check):
+    """The check *repeated run*."""
+
+    name = "repeated run"
+    failing = LIMIT
+    advice = "give each run a fresh process, and compare no two runs digit by digit"
+    place = 7
+    run = staticmethod(repeated)
+
+
+class ResetAndReRunCheck(Check):
+    """The check *reset and re-run*."""
+
+    name = "reset and re-run"
+    failing = LIMIT
+    advice = "make a new instance for each run"
+    compares = True
+    place = 8
+    run = staticmethod(reset)
+
+
+class LoggingCheck(Check):
+    """The check *logging*."""
+
+    name = "logging"
+    failing = LIMIT
+    advice = "leave its logging off"
+    compares = True
+    place = 16
+    run = staticmethod(logging)
+
+
+class TimePerStepCheck(Check):
+    """The check *time per step*."""
+
+    name = "time per step"
+    failing = NOTE
+    place = 24
+    run = staticmethod(time_per_step)

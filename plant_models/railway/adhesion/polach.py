@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+import scipy
 
 from plant_models.hybrid.system import Array
 
@@ -88,7 +88,7 @@ class PolachCurve:
                 f"The Polach curve has no peak at {speed:.4g} m/s: its coefficient rises at all slips up to 10."
             )
         bounds = (slips[max(int(falling[0]) - 1, 0)], slips[int(falling[0]) + 1])
-        found = minimize_scalar(
+        found = scipy.optimize.minimize_scalar(
             lambda s: -self.coefficient(s, speed), bounds=bounds, method="bounded", options={"xatol": 1e-10}
         )
         return float(found.x), float(-found.fun)

@@ -151,7 +151,7 @@ def test_a_real_fmu_is_loaded_and_put_away(version: Any) -> None:
     assert read_description(path).modelName == "pushed"
     never, used = load_fmu(path, "never"), load_fmu(path, "used")
     used.instantiate()
-    assert len(os.listdir(tempfile.gettempdir())) == 2  # noqa: PTH208 - the folders themselves
+    assert len(os.listdir(tempfile.gettempdir())) == 3  # noqa: PTH208 - the content, and a folder of each instance
     for made in (never, used):
         made.terminate()
         made.free()

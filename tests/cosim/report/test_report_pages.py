@@ -25,13 +25,15 @@ from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.drawing import thin
 from cosim.report.figures.gap_figure import certified_gaps, sampling_gaps
 from cosim.report.figures.main_picture import main_picture
-from cosim.report.figures.panels import PANELS, Panel, draw_all
+from cosim.report.figures.panel import Panel
+from cosim.report.figures.panels import draw_all, panels
 from cosim.report.figures.zooms import ZOOM_KEYS
 from cosim.report.page.render import first_sentence
 from cosim.report.page.report import report_page, write_report
 from cosim.results.folder import read_results, write_results
 from cosim.results.result import Result
 
+PANELS = panels()
 VOID = {"meta", "img", "br", "hr", "link", "input"}
 
 
@@ -74,22 +76,22 @@ def result() -> Result:
 # --- figures ----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("panel", PANELS, ids=lambda p: p.key)
-def test_axes_have_names_with_units(panel: Panel, result: Result) -> None:
+@pytest.mark.parametrize("panel", PANELS, ids=lambda p: p.name)
+def test_axes_have_names_with_units(panel: type[Panel], result: Result) -> None:
     ax = panel.draw(result, synthetic_spec(), None)
     assert ax.get_xlabel() == "Time [s]"
     assert re.search(r"\[(km/h|m/s|m|%|kN|s)\]", ax.get_ylabel())
     assert ax.get_legend() is not None
 
 
-@pytest.mark.parametrize("panel", PANELS, ids=lambda p: p.key)
-def test_figures_draw_on_the_axes_given(panel: Panel, result: Result) -> None:
+@pytest.mark.parametrize("panel", PANELS, ids=lambda p: p.name)
+def test_figures_draw_on_the_axes_given(panel: type[Panel], result: Result) -> None:
     ax = new_figure().add_subplot()
     assert panel.draw(result, synthetic_spec(), ax) is ax
 
 
-@pytest.mark.parametrize("panel", PANELS, ids=lambda p: p.key)
-def test_figures_leave_matplotlib_as_it_was(panel: Panel, result: Result) -> None:
+@pytest.mark.parametrize("panel", PANELS, ids=lambda p: p.name)
+def test_figures_leave_matplotlib_as_it_was(panel: type[Panel], result: Result) -> None:
     with matplotlib.rc_context({"font.size": 17.0, "axes.grid": False}):
         before = dict(matplotlib.rcParams)
         png(panel.draw(result, synthetic_spec(), None).figure)
@@ -102,8 +104,8 @@ def test_legends_lie_above_the_curves_and_inside_the_picture(result: Result) -> 
         ax.figure.draw_without_rendering()  # type: ignore[union-attr]
         box, legend = ax.get_window_extent(), ax.get_legend().get_window_extent()  # type: ignore[union-attr]
         assert legend.y0 >= box.y1
-        assert legend.x1 <= ax.figure.bbox.x1, panel.key
-        assert box.width > 0.8 * ax.figure.bbox.width, panel.key  # nothing squashes the axes
+        assert legend.x1 <= ax.figure.bbox.x1, panel.name
+        assert box.width > 0.8 * ax.figure.bbox.width, panel.name  # nothing squashes the axes
 
 
 def limits(ax: Axes) -> tuple[float, float]:
@@ -112,7 +114,7 @@ def limits(ax: Axes) -> tuple[float, float]:
 
 @pytest.mark.parametrize("key", ["speed_error", "position_error"])
 def test_diverged_observer_does_not_squash_the_others(key: str, result: Result) -> None:
-    panel = next(p for p in PANELS if p.key == key)
+    panel = next(p for p in PANELS if p.name == key)
     wild = synthetic_result(diverged="takagi_sugeno_cdo")
     normal, diverged = (panel.draw(r, synthetic_spec(), None) for r in (result, wild))
     assert limits(diverged)[1] <= 1.5 * limits(normal)[1]
@@ -220,7 +222,7 @@ def test_page_needs_nothing_from_outside(result: Result, tmp_path: Path) -> None
     text = path.read_text(encoding="utf-8")
     assert not re.search(r"https?:|//[a-z]|url\(|<script|<link|@import", re.sub(r"base64,[^\"]*", "", text))
     images = Page(text).all("img")
-    keys = [*ZOOM_KEYS, *(panel.key for panel in PANELS)]
+    keys = [*ZOOM_KEYS, *(panel.name for panel in PANELS)]
     for image, key in zip(images, keys, strict=True):
         head, _, data = (image["src"] or "").partition(",")
         assert head == "data:image/png;base64"

@@ -270,7 +270,7 @@ def test_endings_of_formats() -> None:
         ".pq": "parquet",
         ".hdf5": "hdf5",
     }
-    with pytest.raises(OutputError, match=r"one of \.csv, \.mat"):
+    with pytest.raises(OutputError, match=r"one of .*\.csv, \.mat"):
         format_of(Path("run.txt"))
 
 

@@ -161,7 +161,7 @@ def test_by_default_all_take_part_that_fit_and_the_others_are_named() -> None:
     scenario = two()
     found, notes = find_candidates(scenario, find_sides(scenario), None)
     names = [candidate.name for candidate in found]
-    assert names == ["observer", "uio", "differentiator_cdo", "multirate_cdo", "adaptive_gain_cdo"]
+    assert names == ["observer", "uio", "adaptive_gain_cdo", "differentiator_cdo", "multirate_cdo"]
     assert any("gradient" in note and "augmented_high_gain_cdo" in note for note in notes)
     fits = {c.name: {signal: link[0] for signal, link in c.sources.items()} for c in found}
     assert fits["adaptive_gain_cdo"] == {"effort": "driver.effort", "odometer": "odometer.reading"}

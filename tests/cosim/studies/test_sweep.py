@@ -12,11 +12,12 @@ import pytest
 from small_scenarios import small
 
 from cosim import Scenario
-from cosim.errors import ComparisonError, CosimError, OutputError, ScenarioError
+from cosim.errors import ComparisonError, CosimError, OutputError, RunError, ScenarioError
 from cosim.master.master import Master
 from cosim.results.folder import read_results
 from cosim.scenario.outcome import Outcome
 from cosim.studies.sampling import uniform
+from cosim.studies.seed_file import seed_file
 from cosim.studies.seeds import seed_study
 from cosim.studies.sweep_result import SweepResult
 
@@ -203,6 +204,39 @@ def test_a_study_over_seeds_is_the_sweep_over_them() -> None:
     study = seed_study(scenario, [3, 5])
     table = scenario.vary({"balises.seed": [3, 5]}).run().table()
     assert study.errors["observer", "whole run"] == [row["observer.speed_error_max"] for row in table]
+
+
+def test_one_failed_seed_is_named_and_the_rest_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario = small().set("balises.layout", "aperiodic").set("balises.max_gap", 0.2)
+    whole, run, rows = seed_study(scenario, [3, 5, 7]), Scenario.run, []
+
+    def failing(self: Scenario, **arguments: Any) -> Outcome:
+        if arguments["overrides"] == {"balises.seed": 5}:
+            raise RunError("the train is lost", "train", 0.1)
+        return run(self, **arguments)
+
+    monkeypatch.setattr(Scenario, "run", failing)
+    with seed_file(tmp_path / "seeds.csv") as done:
+        study = seed_study(scenario, [3, 5, 7], None, lambda row: (rows.append(row), done(row)))
+        lines = (tmp_path / "seeds.csv").read_text().splitlines()  # as they come
+    assert study.seeds == [3, 7]
+    assert study.failures == {5: "the train is lost"}
+    assert [row for row in study.each if row.seed != 5] == [row for row in whole.each if row.seed != 5]
+    assert study.errors["observer", "whole run"] == [whole.errors["observer", "whole run"][i] for i in (0, 2)]
+    assert "over 2 balise seeds" in study.text()
+    assert "seed 5 failed: the train is lost" in study.text()
+    assert [entry["failure"] for entry in study.to_data()["each"]] == [None, "the train is lost", None]
+    assert rows == study.each
+    assert lines[0] == "seed,observer,phase,speed_error_max,failure"
+    assert lines[2] == "5,,,,the train is lost"
+    assert [line.split(",")[0] for line in lines[1:]] == ["3", "5", "7"]
+    with pytest.raises(RunError, match=r"No seed could be run to its end\. Seed 5: the train is lost"):
+        seed_study(scenario, [5])
+
+
+def test_the_order_of_seeds_changes_nothing() -> None:
+    scenario = small().set("balises.layout", "aperiodic").set("balises.max_gap", 0.2)
+    assert seed_study(scenario, [3, 5, 7]).each == seed_study(scenario, [7, 5, 3]).each[::-1]
 
 
 def test_who_interrupts_a_run_stops_the_sweep_and_keeps_what_is_done(

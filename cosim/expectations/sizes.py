@@ -1,83 +1,36 @@
-"""Judges of values: errors of estimates, differences of two signals, bounds of a signal. Imports NumPy only."""
+"""Values over a window against limits: largest size and root mean square of an error, bounds of a signal. Imports NumPy
+only.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import inf, nan
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from cosim.evaluation.metrics import error_size, instants
 from cosim.expectations.judged import Judged, at, given, with_unit
-from cosim.expectations.run import NotRecordedError, Run, span
 from cosim.expectations.window import Window
 
-if TYPE_CHECKING:
-    from cosim.scenario.expectation_tables import DifferenceExpectation, ErrorExpectation, SignalExpectation
 
-ERRORS = {
-    "speed_error": ("true_speed", "speed", "m/s"),
-    "position_error": ("true_position", "position", "m"),
-    "slip_error": ("true_slip", "slip", "1"),
-    "adhesion_force_error": ("true_adhesion_force", "adhesion_force", "N"),
-}
-"""By check: role of the true value in the report, output of the observer, SI unit."""
+def difference(values: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    """One signal minus another, shape (rows,).
 
-
-def judge_error(item: ErrorExpectation, run: Run) -> list[Judged]:
-    """Errors of the estimates of each observer, from the start of the evaluation on where no window is given."""
-    role, output, unit = ERRORS[item.check]
-    true = getattr(run.spec, role)
-    if true is None:
-        raise NotRecordedError(f"nothing measured: the report has no {role}")
-    window = run.window(item.start, item.end, max(run.start, run.spec.evaluate_after))
-    found = []
-    for observer in observers_of(item.of, run):
-        error = _difference(run.recorded(f"{observer}.{output}"), run.recorded(true))
-        name = f"{item.check} of {observer}"
-        found += _judge_sizes(name + "{}" + span(item.start, item.end), item, window, error, unit)
-    return found
-
-
-def observers_of(given: str | Sequence[str] | None, run: Run) -> list[str]:
-    """Names of the observers an expectation speaks of; those of the report where it names none."""
-    if given is None:
-        return list(run.spec.observers)
-    return [given] if isinstance(given, str) else list(given)
-
-
-def judge_difference(item: DifferenceExpectation, run: Run) -> list[Judged]:
-    """One signal minus another."""
-    error = _difference(run.recorded(item.signal), run.recorded(item.reference))
-    window = run.window(item.start, item.end)
-    name = f"difference of {item.signal} and {item.reference}"
-    return _judge_sizes(name + "{}" + span(item.start, item.end), item, window, error, run.unit(item.signal))
-
-
-def judge_signal(item: SignalExpectation, run: Run) -> list[Judged]:
-    """Smallest, largest and last value of a signal."""
-    values, unit, window = run.recorded(item.signal), run.unit(item.signal), run.window(item.start, item.end)
-    shown, when = values[window.rows], window.time
-    base: dict[str, Any] = {"check": item.check, "unit": unit}
-    name = f"{item.signal}{{}}{span(item.start, item.end)}"
-    found = []
-    if item.min is not None:
-        found.append(_bounded(name.format(", min"), base, window, when, shown, item.min, inf))
-    if item.max is not None:
-        found.append(_bounded(name.format(", max"), base, window, when, shown, -inf, item.max))
-    if item.final is not None:
-        found.append(_bounded(name.format(", final"), base, window, when[-1:], shown[-1:], *item.final, last=True))
-    return found
-
-
-def _difference(values: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    Args:
+        values, reference: the signals, shape (rows,).
+    """
     with np.errstate(invalid="ignore", over="ignore"):  # inf - inf: NaN is judged as what it is
         return np.asarray(values - reference)
 
 
-def _judge_sizes(name: str, item: Any, window: Window, error: np.ndarray, unit: str) -> list[Judged]:
-    """Largest size and root mean square of an error, as far as they are limited; `name` has a place for which it is."""
+def judge_sizes(name: str, item: Any, window: Window, error: np.ndarray, unit: str) -> list[Judged]:
+    """Largest size and root mean square of an error, as far as they are limited.
+
+    Args:
+        name: of the expectation, with a place for which of the two it is. item: its table, with `max` and `rms`.
+        window: that it speaks of. error: shape (rows,). unit: of the error.
+    """
     time, shown = window.time, error[window.rows]
     size = error_size(time, shown)
     found = []
@@ -98,7 +51,7 @@ def _judge_sizes(name: str, item: Any, window: Window, error: np.ndarray, unit: 
     return found
 
 
-def _bounded(
+def bounded(
     name: str,
     base: dict[str, Any],
     window: Window,
@@ -109,7 +62,12 @@ def _bounded(
     *,
     last: bool = False,
 ) -> Judged:
-    """Whether values lie between two bounds, one of which may be infinite."""
+    """Whether values lie between two bounds, one of which may be infinite.
+
+    Args:
+        name: of the expectation. base: what else is known of it. window: that it speaks of.
+        time, values: in the window, shape (rows,). low, high: the bounds. last: whether only the last value counts.
+    """
     unit = base["unit"]
     nothing = _nothing_measured(window, time, values, 1 if last else window.fewest)
     if nothing is not None:

@@ -1,0 +1,77 @@
+"""The gains of an observer are certified for the gaps that occur."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Literal, Self
+
+from cosim.errors import ScenarioError, nearest
+from cosim.evaluation.facts import mapping_entry, number_entry
+from cosim.expectations.expectation import Expectation
+from cosim.expectations.judged import Judged
+from cosim.expectations.run import NotRecordedError, Run
+from cosim.table import Name
+
+if TYPE_CHECKING:
+    from cosim.expectations.before import Before
+
+NEVER_CERTIFIED = 'certificates = "ignore" leaves nothing to judge; remove that line'
+
+
+class CertificateExpectation(Expectation):
+    """The gains of an observer are certified for the gaps that were expected and for those that occurred."""
+
+    check: Literal["certificate"]
+    of: Name | list[Name] | None = None
+
+    def prepare(self, before: Before) -> Self:
+        """There are balises, and certificates are asked for.
+
+        Args:
+            before: what is known before the run.
+        """
+        if before.table.balises is None:
+            raise ScenarioError("this scenario has no balises, so there are no gaps to be certified for")
+        if before.table.certificates == "ignore":
+            raise ScenarioError(NEVER_CERTIFIED)
+        for name in before.named(self.of, before.receivers, "observer"):
+            if name not in before.receivers:
+                raise ScenarioError(f"{name!r} is told of no telegrams; {nearest(name, before.receivers)}")
+        return self
+
+    def judge(self, run: Run) -> list[Judged]:
+        """Certified for the longest gap that was expected, where that was known, and for the longest that occurred."""
+        certificates = mapping_entry(run.result, "certificates")
+        names = list(certificates) if self.of is None else [self.of] if isinstance(self.of, str) else list(self.of)
+        if not names:
+            raise NotRecordedError("nothing to judge: no observer of this run has a certificate")
+        return [_certificate(name, certificates.get(name), run) for name in names]
+
+
+def _certificate(observer: str, entry: Any, run: Run) -> Judged:
+    name = f"certificate of {observer}"
+    if not isinstance(entry, Mapping):
+        return Judged(name, "certificate", passed=False, unit="s", text="nothing to judge: it has no certificate")
+    limit, seen = number_entry(entry, "aperiodic_limit"), number_entry(entry, "largest_gap_seen")
+    expected, bound = number_entry(entry, "max_gap"), "any gap" if limit is None else f"gaps up to {limit:.4g} s"
+    wanted = "longer gaps" if expected is None else f"gaps of {expected:.4g} s"
+    values: dict[str, Any] = {"limit": float("inf") if limit is None else limit, "unit": "s"}
+    if entry.get("holds") is False:
+        text = f"certified for {bound}, expected were {wanted}"
+        return Judged(
+            name,
+            "certificate",
+            passed=False,
+            measured=float("nan") if expected is None else expected,
+            text=text,
+            **values,
+        )
+    before = f"expected were {wanted}" if expected is not None else "what to expect was not known before the run"
+    if seen is None:
+        return Judged(
+            name, "certificate", passed=False, text=f"certified for {bound}, {before}; no gap was seen", **values
+        )
+    passed = (limit is None or seen <= limit) and run.result.failure is None
+    text = f"certified for {bound}, {before}, {seen:.4g} s occurred"
+    text += "; not reached: the run ended early" if run.result.failure is not None else ""
+    return Judged(name, "certificate", passed=passed, measured=seen, text=text, **values)

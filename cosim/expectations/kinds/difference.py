@@ -1,0 +1,38 @@
+"""Two signals stay close to each other."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal, Self
+
+from cosim.expectations.expectation import LimitedExpectation
+from cosim.expectations.judged import Judged
+from cosim.expectations.run import Run, span
+from cosim.expectations.sizes import difference, judge_sizes
+
+if TYPE_CHECKING:
+    from cosim.expectations.before import Before
+
+
+class DifferenceExpectation(LimitedExpectation):
+    """Two signals stay close to each other."""
+
+    check: Literal["difference"]
+    signal: str
+    reference: str
+
+    def prepare(self, before: Before) -> Self:
+        """Both signals exist, and have one dimension.
+
+        Args:
+            before: what is known before the run.
+        """
+        super().prepare(before)
+        before.demand_same_dimension(self.signal, self.reference)
+        return self
+
+    def judge(self, run: Run) -> list[Judged]:
+        """One signal minus another."""
+        error = difference(run.recorded(self.signal), run.recorded(self.reference))
+        window = run.window(self.start, self.end)
+        name = f"difference of {self.signal} and {self.reference}"
+        return judge_sizes(name + "{}" + span(self.start, self.end), self, window, error, run.unit(self.signal))

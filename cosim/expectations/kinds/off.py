@@ -1,0 +1,60 @@
+"""An indicator never goes on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal, Self
+
+import numpy as np
+
+from cosim.expectations.expectation import WindowExpectation
+from cosim.expectations.indicators import held, threshold_of
+from cosim.expectations.judged import Judged, at, given
+from cosim.expectations.run import Run, span
+
+if TYPE_CHECKING:
+    from cosim.expectations.before import Before
+
+
+class OffExpectation(WindowExpectation):
+    """An indicator never goes on."""
+
+    check: Literal["off"]
+    signal: str
+    threshold: float | None = None
+
+    def prepare(self, before: Before) -> Self:
+        """The signal exists, and its threshold is known.
+
+        Args:
+            before: what is known before the run.
+        """
+        super().prepare(before)
+        before.unit(self.signal)
+        if self.threshold is not None:
+            return self
+        return self.model_copy(update={"threshold": before.threshold(self.signal)})
+
+    def judge(self, run: Run) -> list[Judged]:
+        """Never on within the window."""
+        name = f"{self.signal} off{span(self.start, self.end)}"
+        values, threshold, window = (
+            run.recorded(self.signal),
+            threshold_of(self.signal, self.threshold),
+            run.window(self.start, self.end),
+        )
+        common: dict[str, Any] = {"check": self.check, "limit": 0.0, "unit": "s"}
+        if window.reached < window.start or window.reached == window.start < window.end:
+            return [Judged(name, passed=False, text=window.unreached, **common)]
+        time, shown = held(run.result.time, values, window.start, window.end)
+        bad = np.isnan(shown)
+        if bad.any():
+            when = float(time[np.argmax(bad)])
+            return [Judged(name, passed=False, when=when, text=f"not a number at {given(when)} s", **common)]
+        on = shown > threshold
+        if not on.any():
+            text = f"stays off (threshold {given(threshold)})" + (f"; {window.unreached}" if window.broken else "")
+            return [Judged(name, passed=not window.broken, measured=0.0, text=text, **common)]
+        until = np.append(time[1:], min(window.end, max(window.reached, window.start)))
+        seconds, when = float(np.sum((until - time)[on])), float(time[np.argmax(on)])
+        text = f"on for {given(seconds, 's')}{at(when, 'first at')}, expected never"
+        return [Judged(name, passed=False, measured=seconds, when=when, text=text, **common)]

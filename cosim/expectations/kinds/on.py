@@ -1,0 +1,64 @@
+"""An indicator is on in time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from cosim.expectations.expectation import Expectation
+from cosim.expectations.indicators import ROUNDING, first_on, threshold_of
+from cosim.expectations.judged import Judged, given
+from cosim.expectations.run import Run, span
+
+if TYPE_CHECKING:
+    from cosim.expectations.before import Before
+
+
+class OnExpectation(Expectation):
+    """An indicator is on at a time at the latest, from the start of the window on; one that is on there already is on
+    in time.
+    """
+
+    check: Literal["on"]
+    signal: str
+    start: float | None = Field(default=None, alias="from")
+    before: float
+    threshold: float | None = None
+
+    @model_validator(mode="after")
+    def _in_order(self) -> OnExpectation:
+        if self.start is not None and self.before <= self.start:
+            raise ValueError(f"'before' ({self.before:g} s) must lie behind 'from' ({self.start:g} s)")
+        return self
+
+    def prepare(self, before: Before) -> Self:
+        """The signal exists, and its threshold is known.
+
+        Args:
+            before: what is known before the run.
+        """
+        before.demand_within("from", self.start)
+        before.demand_within("before", self.before)
+        before.unit(self.signal)
+        if self.threshold is not None:
+            return self
+        return self.model_copy(update={"threshold": before.threshold(self.signal)})
+
+    def judge(self, run: Run) -> list[Judged]:
+        """On at `before` at the latest; an indicator that is on when the window begins is on in time."""
+        name = f"{self.signal} on by {given(self.before)} s{span(self.start, None)}"
+        values, threshold = run.recorded(self.signal), threshold_of(self.signal, self.threshold)
+        start = run.start if self.start is None else self.start
+        first = first_on(run.result.time, values, threshold, start)
+        window = run.window(self.start, self.before)
+        common: dict[str, Any] = {"check": self.check, "limit": self.before, "unit": "s"}
+        if first is None or (
+            first > self.before + ROUNDING * max(1.0, abs(self.before)) and window.reached < self.before
+        ):
+            text = window.unreached if window.reached < self.before else "never on"
+            return [Judged(name, passed=False, text=f"{text} (threshold {given(threshold)})", **common)]
+        passed = first <= self.before + ROUNDING * max(1.0, abs(self.before))
+        already = " already, when the window begins" if first == start else ""
+        text = f"on at {given(first, 's')}{already}, expected by {given(self.before, 's')}"
+        return [Judged(name, passed=passed, measured=first, when=first, text=text, **common)]

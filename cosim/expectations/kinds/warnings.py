@@ -1,0 +1,31 @@
+"""The run gave so many warnings at most."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from cosim.evaluation.facts import list_entry
+from cosim.expectations.expectation import Count, Expectation
+from cosim.expectations.judged import Judged
+from cosim.expectations.run import Run
+
+WARNINGS_SHOWN = 3
+
+
+class WarningsExpectation(Expectation):
+    """The run gave so many warnings at most."""
+
+    check: Literal["warnings"]
+    at_most: Count = 0
+
+    def judge(self, run: Run) -> list[Judged]:
+        """The number of warnings of the run."""
+        warnings = [str(text) for text in list_entry(run.result, "warnings")]
+        passed = len(warnings) <= self.at_most
+        text = f"{len(warnings)}, expected at most {self.at_most}"
+        if not passed:
+            text += ": " + " | ".join(warnings[:WARNINGS_SHOWN]) + (" | ..." if len(warnings) > WARNINGS_SHOWN else "")
+        if run.result.failure is not None:
+            text += "; not reached: the run ended early" if passed else ""
+            passed = False
+        return [Judged("warnings", "warnings", passed, float(len(warnings)), float(self.at_most), text=text)]

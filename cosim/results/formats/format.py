@@ -1,0 +1,56 @@
+"""What a format of result tables is: a name, file endings, a writer and a reader."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, ClassVar
+
+from cosim.results.data import ResultData, SignalInfo
+
+
+class Format(ABC):
+    """A format. A class of it in a file of this room is a format that can be asked for by its name.
+
+    Attributes:
+        name: in scenarios. endings: of file names, the usual one first.
+        keeps: whether units, telegrams and summary are in the file, beside the table.
+        speed: the larger, the sooner it is read where a folder holds several; CSV has 0.
+        package, extra: which package it needs, and the extra of ours that brings it; None for none.
+    """
+
+    name: ClassVar[str]
+    endings: ClassVar[tuple[str, ...]]
+    keeps: ClassVar[bool] = True
+    speed: ClassVar[int] = -1
+    package: ClassVar[str | None] = None
+    extra: ClassVar[str | None] = None
+
+    @staticmethod
+    @abstractmethod
+    def write(path: Path, result: ResultData) -> None:
+        """Write a result.
+
+        Args:
+            path: of the file. result: what to write.
+        """
+
+    @staticmethod
+    @abstractmethod
+    def read(path: Path) -> ResultData:
+        """Read what `write` wrote, bit by bit.
+
+        Args:
+            path: of the file.
+        """
+
+
+def bare(read: Callable[[Path], Any], path: Path) -> ResultData:
+    """The result of a file that holds nothing but a table.
+
+    Args:
+        read: reads the table. path: of the file.
+    """
+    table = read(path)
+    return ResultData(table, [SignalInfo(name) for name in table.dtype.names[1:]])

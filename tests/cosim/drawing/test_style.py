@@ -1,0 +1,45 @@
+"""One style of drawing: colours stand in one room, figures leave the caller's settings alone, equal figures are equal
+bytes.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import matplotlib as mpl
+
+import cosim
+from cosim.drawing.style import OBSERVER_LINES, new_figure, png, styled
+
+ROOM = Path(cosim.__file__).parent
+
+
+def test_no_figure_has_colours_of_its_own() -> None:
+    colour = re.compile(r"""["']#[0-9A-Fa-f]{3,8}["']""")
+    drawing = {path for path in ROOM.rglob("*.py") if "matplotlib" in path.read_text(encoding="utf-8")}
+    assert len(drawing) > 10
+    own = {
+        str(path.relative_to(ROOM)): found
+        for path in drawing - {ROOM / "drawing" / "style.py"}
+        if (found := colour.findall(path.read_text(encoding="utf-8")))
+    }
+    assert own == {}
+
+
+def test_no_two_observers_have_the_same_colour_or_the_same_dashes() -> None:
+    for key in ("color", "linestyle"):
+        assert len({str(line[key]) for line in OBSERVER_LINES}) == len(OBSERVER_LINES)
+
+
+def test_equal_figures_are_equal_bytes_and_the_settings_of_the_caller_stay() -> None:
+    @styled
+    def draw() -> bytes:
+        assert mpl.rcParams["axes.spines.top"] is False
+        figure = new_figure((2.0, 1.0))
+        figure.add_subplot().plot([0.0, 1.0], [1.0, 0.0])
+        return png(figure)
+
+    before = dict(mpl.rcParams)
+    assert draw() == draw()
+    assert dict(mpl.rcParams) == before
