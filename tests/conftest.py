@@ -1,4 +1,4 @@
-"""What holds for all tests: two tiers, no deadline on shared machines, the same examples at every continuous
+"""What holds for all tests: two tiers, one cache, no deadline on shared machines, the same examples at every continuous
 integration.
 """
 
@@ -39,6 +39,19 @@ def quick_builds(request: pytest.FixtureRequest) -> Iterator[None]:
         if "not slow" in request.config.option.markexpr:
             patch.setattr(compiling, "FLAGS", tuple(QUICK if flag == "-O3" else flag for flag in compiling.FLAGS))
         yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """What tests build is kept for the session, for all its workers together, and never in the user's own cache; for
+    several sessions where $FMU_OBSERVER_CACHE names a folder, as in .ci/run.
+    """
+    temporary = tmp_path_factory.getbasetemp()
+    shared = temporary.parent if "PYTEST_XDIST_WORKER" in os.environ else temporary
+    folder = Path(os.environ.get("FMU_OBSERVER_CACHE") or shared / "cache")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("FMU_OBSERVER_CACHE", str(folder))
+        yield folder
 
 
 @pytest.hookimpl(tryfirst=True)

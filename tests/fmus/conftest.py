@@ -4,7 +4,6 @@ instances.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -17,6 +16,7 @@ from fmpy import extract
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi3 import FMU3Slave
 
+from fmu_observer.description import can_exchange
 from fmu_observer.event_protocol import EventProtocol
 from fmus import RECIPES, cached_fmu, recipe
 from plant_models.hybrid import (
@@ -251,37 +251,43 @@ SMALL: dict[str, type[HybridSystem]] = {
     cls.name: cls for cls in (Oscillator, Slider, Sampler, Tracker, Gain, Booster, Hopper)
 }
 SHIPPED = tuple(RECIPES)
-OF_EACH_KIND = {
-    "locomotive",
-    "train",
-    "odometer",
-    "balise_reader",
-    "gps",
-    "driver",
-    "mdpe_controller",
-    "takagi_sugeno_cdo",
-    "multirate_cdo",
-    "discrete_uio",
-    "differentiator_cdo",
-    "augmented_high_gain_cdo",
-    "levant_differentiator",
-    "kalman_filter",
-    "exponential_gain",
-    "slip_indicator",
-}
-"""Both interfaces of FMI stand on one model code, so every shipped system is tested as FMI 3.0, and as FMI 2.0 one of
-each
-kind: stiff with dry friction, sampled, noisy, with memory, with events of its own and from outside, with a sliding
-mode, with matrices."""
+
+
+@cache
+def make_system(name: str) -> HybridSystem:
+    """A small system of this file, or one that ships: one object in a process, so that it is traced once."""
+    return SMALL[name]() if name in SMALL else recipe(name)
+
+
+def kind(system: HybridSystem) -> tuple[object, ...]:
+    """What of the runtime in C a system uses, by what it declares."""
+    return (
+        system.method,
+        bool(system.frictions),
+        bool(system.switchings),
+        *sorted({type(event).__name__ for event in system.events}),
+        bool(system.noises),
+        bool(system.resources),
+        any(signal.integer for signal in system.outputs),
+        system.continuous_count < sum(signal.width for signal in system.states),
+        can_exchange(system),
+    )
+
+
+OF_EACH_KIND = {kind(make_system(name)): name for name in reversed(SHIPPED)}
+"""Both interfaces of FMI stand on one model code: every shipped system is tested as FMI 3.0, the first of each kind as
+FMI 2.0 too.
+"""
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """FMI 2.0 of what ships: leave out those that are none of `OF_EACH_KIND`, the others belong to the second tier."""
+    """FMI 2.0 of what ships: leave out those that are no first of a kind, the others belong to the second tier."""
+    kinds = set(OF_EACH_KIND.values())
     again = {item: _shipped_as_fmi2(getattr(item, "callspec", None)) for item in items}
-    beside = [item for item, names in again.items() if names and not names & OF_EACH_KIND]
+    beside = [item for item, names in again.items() if names and not names & kinds]
     for item, names in again.items():
-        if names & OF_EACH_KIND:
+        if names & kinds:
             item.add_marker(pytest.mark.slow)
     if beside:
         config.hook.pytest_deselected(items=beside)
@@ -292,22 +298,6 @@ def _shipped_as_fmi2(callspec: Any) -> set[str]:
     if callspec is None or callspec.params.get("version") != 2:
         return set()
     return {callspec.params.get("name"), callspec.params.get("system_name")} & set(SHIPPED)
-
-
-@cache
-def make_system(name: str) -> HybridSystem:
-    """A small system of this file, or one that ships: one object in a process, so that it is traced once."""
-    return SMALL[name]() if name in SMALL else recipe(name)
-
-
-@pytest.fixture(scope="session", autouse=True)
-def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """FMUs of the tests are cached for the session, for all its workers together, and never in the user's own cache."""
-    temporary = tmp_path_factory.getbasetemp()
-    with pytest.MonkeyPatch.context() as patch:
-        folder = (temporary.parent if "PYTEST_XDIST_WORKER" in os.environ else temporary) / "fmu_cache"
-        patch.setenv("FMU_OBSERVER_CACHE", str(folder))
-        yield folder
 
 
 @pytest.fixture(scope="session")

@@ -17,7 +17,7 @@ import pytest
 
 from fmus import CompilerMissing, UnknownRecipeError, build_fmu, cached_fmu, recipe
 from fmus.cli import main
-from fmus.cli.failures import words
+from fmus.cli.failures import in_words
 from fmus.content.names import NameRefusedError
 from fmus.pack import check_target
 from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, output_signal, state, vector
@@ -347,15 +347,15 @@ def test_an_unexpected_key_error_says_what_failed(
 
 def test_words_for_errors_without_a_file_name() -> None:
     building = Namespace(names=["trolley"], output=Path("out"))
-    full = words(OSError(28, "No space left on device"), building)
+    full = in_words(OSError(28, "No space left on device"), building)
     assert full == "No space left on device, while building trolley into out"
-    assert words(OSError(27, "File too large", "x.fmu"), building) == "x.fmu: File too large"
-    assert words(IndexError("list index out of range"), building).startswith(
+    assert in_words(OSError(27, "File too large", "x.fmu"), building) == "x.fmu: File too large"
+    assert in_words(IndexError("list index out of range"), building).startswith(
         "unexpected IndexError: list index out of range while"
     )
-    assert words(UnknownRecipeError("There is no model 'x'."), building) == "There is no model 'x'."
+    assert in_words(UnknownRecipeError("There is no model 'x'."), building) == "There is no model 'x'."
     assert (
-        words(RuntimeError(), Namespace(file=Path("a.fmu")))
+        in_words(RuntimeError(), Namespace(file=Path("a.fmu")))
         == "unexpected RuntimeError while reading a.fmu; please look there, or report it."
     )
 

@@ -23,7 +23,7 @@ pytestmark = pytest.mark.compiler
 
 SMALL = ("oscillator", "slider", "sampler", "tracker", "gain")
 EXCHANGED = (*SMALL, *(n for n in RECIPES if can_exchange(recipe(n))))
-POINTS = settings(max_examples=15, deadline=None, derandomize=True)
+POINTS = settings(max_examples=6, deadline=None, derandomize=True)
 RAW = {2: "Real", 3: "Float64"}
 
 

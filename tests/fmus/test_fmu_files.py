@@ -110,7 +110,8 @@ def test_cache_serves_many_at_once(
 ) -> None:
     monkeypatch.setenv("FMU_OBSERVER_CACHE", str(tmp_path / "shared"))
     with ThreadPoolExecutor(4) as pool:
-        paths = list(pool.map(lambda _: cached_fmu(reference("gain").system), range(4)))
+        systems = [type(reference("gain").system)() for _ in range(4)]  # each to be built, as in four processes
+        paths = list(pool.map(cached_fmu, systems))
     assert len(set(paths)) == 1
     assert sorted(p.name for p in paths[0].parent.iterdir()) == ["gain.fmu", "gain.sha256"]
 

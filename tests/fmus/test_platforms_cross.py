@@ -25,6 +25,8 @@ from fmus.toolchain.compile import header_folder
 from fmus.toolchain.platforms import PLATFORMS, host_platform
 from plant_models.hybrid import HybridSystem, input_signal, output_signal
 
+fcntl = pytest.importorskip("fcntl")  # locks of files
+
 MACHINES = {
     "x86_64-linux": (lief.Binary.FORMATS.ELF, lief.ELF.ARCH.X86_64),
     "aarch64-linux": (lief.Binary.FORMATS.ELF, lief.ELF.ARCH.AARCH64),
@@ -46,18 +48,29 @@ def zig_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """The C libraries of the targets are compiled once for all workers (a minute), or were in a folder of the user's
     choice.
     """
-    base = tmp_path_factory.getbasetemp()
-    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "zig"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ZIG_GLOBAL_CACHE_DIR", os.environ.get("ZIG_GLOBAL_CACHE_DIR") or str(folder))
+        patch.setenv(
+            "ZIG_GLOBAL_CACHE_DIR", os.environ.get("ZIG_GLOBAL_CACHE_DIR") or str(_shared(tmp_path_factory) / "zig")
+        )
         yield
+
+
+def _shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of all workers."""
+    base = tmp_path_factory.getbasetemp()
+    return base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
 
 
 @pytest.fixture(scope="module", params=[2, 3], ids=["fmi2", "fmi3"])
 def everywhere(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[int, Path]:
-    """FMI version, and an observer built for all platforms."""
-    folder = tmp_path_factory.mktemp("everywhere")
-    return request.param, build_fmu(recipe("takagi_sugeno_cdo"), folder, request.param, platforms="all")
+    """FMI version, and an observer built for all platforms, by the worker that first needs it."""
+    folder = _shared(tmp_path_factory) / f"everywhere{request.param}"
+    folder.mkdir(exist_ok=True)
+    with (folder / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        for fmu in folder.glob("*.fmu"):
+            return request.param, fmu
+        return request.param, build_fmu(recipe("takagi_sugeno_cdo"), folder, request.param, platforms="all")
 
 
 def libraries(version: int, fmu: Path, folder: Path) -> dict[str, Any]:

@@ -4,6 +4,8 @@ step.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -28,9 +30,14 @@ def _settled(speed: float, slip: float, effort: float) -> np.ndarray:
     return runtime.x.copy()
 
 
+@cache
+def _traced() -> TracedSystem:
+    return TracedSystem(LOCOMOTIVE)
+
+
 def _reference(speed: float, slip: float, effort: float) -> np.ndarray:
     """Another method, with error control, on the same equations; the train does not stop in these runs."""
-    traced = TracedSystem(LOCOMOTIVE)
+    traced = _traced()
     p = LOCOMOTIVE.start_parameters()
     given = LOCOMOTIVE.unpack_inputs(np.array([effort])), LOCOMOTIVE.unpack_parameters(p)
     signs = np.concatenate([np.ones(2), LOCOMOTIVE.switches(0.0, _start(speed, slip), *given)])
