@@ -12,7 +12,7 @@ from time import perf_counter
 from fmpy.model_description import ModelDescription
 
 from fmus.check.bench import end_of_experiment
-from fmus.check.catalogue import CATALOGUE
+from fmus.check.catalogue import checks_of
 from fmus.check.checks.static import platforms, validation
 from fmus.check.findings import Class, Finding, Verdict, class_of
 from fmus.check.instance import LOADING
@@ -132,7 +132,7 @@ def check_fmu(
             if interface == SCHEDULED_EXECUTION:
                 findings.append(Finding("scheduled execution", Verdict.SKIPPED, "looked at, never run"))
                 continue
-            names = tuple(check.name for check in CATALOGUE[interface])
+            names = tuple(check.name for check in checks_of(interface))
             job = Job(str(folder), interface, names, size, start_time, timeout, count, chosen)
             findings += _meant(archive, interface, run_isolated(job, progress))
     _demand_runnable(archive, findings)
@@ -148,7 +148,7 @@ def check_count(archive: Archive) -> int:
     Args:
         archive: the FMU file.
     """
-    return len(STATIC) + sum(len(CATALOGUE.get(interface, ())) for interface in archive.interfaces)
+    return len(STATIC) + sum(len(checks_of(interface)) for interface in archive.interfaces)
 
 
 def default_step(description: ModelDescription) -> float:
@@ -191,7 +191,7 @@ def _meant(archive: Archive, interface: str, findings: list[Finding]) -> list[Fi
     """Findings by what they mean for co-simulation: beside it those of model exchange are notes."""
     if interface == CO_SIMULATION or CO_SIMULATION not in archive.interfaces:
         return findings
-    own = {check.name for check in CATALOGUE[interface]}
+    own = {check.name for check in checks_of(interface)}
     meant = {Verdict.LIMIT, Verdict.DISTRUST}
     return [
         replace(f, verdict=Verdict.NOTE, advice="") if f.check in own and f.verdict in meant else f for f in findings

@@ -15,7 +15,8 @@ from pathlib import Path
 from traceback import extract_tb
 from typing import Any, NoReturn
 
-from fmus.check.catalogue import CATALOGUE, REPEATED, Check
+from fmus.check.catalogue import checks_of
+from fmus.check.check import REPEATED, Check
 from fmus.check.context import Context
 from fmus.check.findings import Finding, Outcome, Verdict, failed
 from fmus.check.instance import SlaveError
@@ -57,14 +58,14 @@ def run(job: Job, tell: Callable[[dict[str, Any]], None]) -> None:
     """
     description = read_description(Path(job.folder))
     context = Context(Path(job.folder), description, job.step, job.start_time, job.starts, job.budget, job.steps)
-    wanted = [check for check in CATALOGUE[job.interface] if check.name in job.checks]
+    wanted = [check for check in checks_of(job.interface) if check.name in job.checks]
     for finding in findings(wanted, context, lambda name: tell({"start": name})):
         tell({"finding": finding.to_dict()})
     context.close()
 
 
 def findings(
-    checks: list[Check], context: Context, starting: Callable[[str], None] = lambda _: None
+    checks: list[type[Check]], context: Context, starting: Callable[[str], None] = lambda _: None
 ) -> Iterator[Finding]:
     """Run checks one after the other; where one that is the basis of the others fails, these are skipped.
 
@@ -94,7 +95,7 @@ def unrun(name: str, basis: str) -> Finding:
     return Finding(name, Verdict.SKIPPED, f"not run, because '{basis}' failed")
 
 
-def _outcome(check: Check, context: Context) -> Outcome:
+def _outcome(check: type[Check], context: Context) -> Outcome:
     """What a check says; what an FMU raises is its failure, what a mistake in the check raises is the check's own."""
     try:
         return check.run(context)

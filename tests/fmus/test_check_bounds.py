@@ -5,14 +5,14 @@ from __future__ import annotations
 import os
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from lying_fmus import build, description
 
 from fmus.check import Class, Verdict, check_fmu, isolated
-from fmus.check.catalogue import REPEATED, Check
+from fmus.check.check import REPEATED, Check
 from fmus.check.context import Context
 from fmus.check.findings import Outcome, class_of, passed
 from fmus.check.instance import FmuInstance
@@ -79,13 +79,17 @@ def test_memory_is_bounded(marked: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     assert report.verdict is Class.DISTRUST
 
 
+def made(name: str, run: Callable[[Context], Outcome], failing: Verdict, compares: bool = False) -> type[Check]:
+    return type("Made", (Check,), {"name": name, "run": staticmethod(run), "failing": failing, "compares": compares})
+
+
 @pytest.mark.parametrize("error", [KeyError("x"), TypeError("x"), ValueError("x"), AssertionError("x")])
 def test_an_error_of_the_check_is_not_told_of_the_fmu(error: Exception) -> None:
     def broken(_context: Context) -> Outcome:
         raise error
 
     context = Context(Path(), None, 0.01, 0.0, {}, 1.0, 1)
-    checks = [Check("one", broken, Verdict.DISTRUST), Check("two", lambda _: passed(), Verdict.LIMIT)]
+    checks = [made("one", broken, Verdict.DISTRUST), made("two", lambda _: passed(), Verdict.LIMIT)]
     one, two = findings(checks, context)
     assert one.verdict is Verdict.ERROR
     assert "an error of this check, not of the FMU" in one.detail
@@ -103,8 +107,8 @@ def test_a_wrong_call_of_ours_is_no_failure_of_the_fmu() -> None:
 
 def test_where_equal_runs_differ_nothing_is_compared() -> None:
     context = Context(Path(), None, 0.01, 0.0, {}, 1.0, 1)
-    differs = Check(REPEATED, lambda _: Outcome(None, "they differ"), Verdict.LIMIT)
-    compared = Check("compared", lambda _: passed(), Verdict.LIMIT, compares=True)
+    differs = made(REPEATED, lambda _: Outcome(None, "they differ"), Verdict.LIMIT)
+    compared = made("compared", lambda _: passed(), Verdict.LIMIT, compares=True)
     assert [f.verdict for f in findings([differs, compared], context)] == [Verdict.LIMIT, Verdict.SKIPPED]
 
 

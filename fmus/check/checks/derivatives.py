@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from fmus.check.bench import WARM_UP_STEPS
+from fmus.check.check import LIMIT, Check
 from fmus.check.checks.life import real_names
 from fmus.check.context import Context
 from fmus.check.derivatives import compare
@@ -43,3 +44,13 @@ def nominal_of(variable: object) -> float:
     """The nominal value of a variable, 1 where it declares none."""
     declared = getattr(variable, "nominal", None)
     return abs(float(declared)) if declared else 1.0
+
+
+class DirectionalDerivativesCheck(Check):
+    """The check *directional derivatives*."""
+
+    name = "directional derivatives"
+    failing = LIMIT
+    advice = "do not use its derivatives"
+    place = 18
+    run = staticmethod(slave_derivatives)

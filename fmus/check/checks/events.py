@@ -13,6 +13,7 @@ import numpy as np
 
 from fmus.check.behaviour import RESOLUTION, STEP_TOLERANCE, UNEVEN, divided_steps, worst
 from fmus.check.bench import WARM_UP_STEPS, Bench
+from fmus.check.check import DISTRUST, Check
 from fmus.check.checks.life import listed, not_finite
 from fmus.check.context import Context
 from fmus.check.findings import Outcome, failed, limited, passed, skipped
@@ -94,3 +95,12 @@ def _crossing(bench: Bench, name: str, before: Sequence[float], after: Sequence[
     buffer[:] = stamp, slave.read([f"{name}_count"])[0] + 1.0
     write()
     return bench.steps(after)[-1]
+
+
+class EventsCheck(Check):
+    """The check *events*."""
+
+    name = "events"
+    failing = DISTRUST
+    place = 17
+    run = staticmethod(events)

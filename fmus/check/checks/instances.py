@@ -11,6 +11,7 @@ from time import perf_counter
 
 from fmus.check.behaviour import difference
 from fmus.check.bench import WARM_UP_STEPS, elsewhere, end_of_experiment
+from fmus.check.check import LIMIT, ONE_INSTANCE, Check
 from fmus.check.checks.life import SHARE_OF_BUDGET, by
 from fmus.check.context import Context
 from fmus.check.findings import Outcome, failed, passed, skipped
@@ -105,3 +106,24 @@ def _growth(first: tuple[int, int | None, int | None], last: tuple[int, int | No
     else:
         said.append(f"memory grew by {max(last[1] - first[1], 0) / 1024:.0f} kB over the last {count}")
     return passed(f"{last[0]} instances, {', '.join(said)}")
+
+
+class TwoInstancesCheck(Check):
+    """The check *two instances*."""
+
+    name = "two instances"
+    failing = LIMIT
+    advice = ONE_INSTANCE
+    compares = True
+    place = 14
+    run = staticmethod(two_instances)
+
+
+class RepeatedInstantiationCheck(Check):
+    """The check *repeated instantiation*."""
+
+    name = "repeated instantiation"
+    failing = LIMIT
+    advice = "do not make many instances in one process"
+    place = 15
+    run = staticmethod(repeated_instantiation)

@@ -12,6 +12,7 @@ from fmpy.model_description import ModelVariable
 
 from fmus.check.behaviour import difference, repeatable
 from fmus.check.bench import SLOW_STEPS, WARM_UP_STEPS
+from fmus.check.check import DISTRUST, LIMIT, MISSING, NOTE, Check
 from fmus.check.context import Context
 from fmus.check.findings import Outcome, Verdict, failed, limited, noted, passed, skipped
 from fmus.check.instance import FmuInstance, SlaveError
@@ -234,3 +235,105 @@ def real_names(instance: Instance, causality: str) -> list[str]:
     """Names of its scalar continuous real variables of one causality."""
     found = (instance.variables[n] for n in instance.names(causality))
     return [v.name for v in found if v.type in FLOATING_TYPES and v.variability in (None, "continuous")]
+
+
+class LoadingCheck(Check):
+    """The check *loading*."""
+
+    name = "loading"
+    failing = DISTRUST
+    basis = True
+    place = 1
+    run = staticmethod(loading)
+
+
+class ExportedSymbolsCheck(Check):
+    """The check *exported symbols*."""
+
+    name = "exported symbols"
+    failing = LIMIT
+    advice = MISSING
+    place = 2
+    run = staticmethod(slave_symbols)
+
+
+class InitialiseCheck(Check):
+    """The check *initialise*."""
+
+    name = "initialise"
+    failing = DISTRUST
+    advice = "give start values, if it needs some"
+    basis = True
+    place = 3
+    run = staticmethod(initialise)
+
+
+class ValuesAtStartCheck(Check):
+    """The check *values at start*."""
+
+    name = "values at start"
+    failing = LIMIT
+    advice = "give start values, so that what it feeds does not begin with these"
+    place = 4
+    run = staticmethod(values_at_start)
+
+
+class GettersCheck(Check):
+    """The check *getters*."""
+
+    name = "getters"
+    failing = LIMIT
+    advice = "leave these variables out of connections and recordings"
+    place = 5
+    run = staticmethod(getters)
+
+
+class SteppingCheck(Check):
+    """The check *stepping*."""
+
+    name = "stepping"
+    failing = DISTRUST
+    basis = True
+    place = 6
+    run = staticmethod(stepping)
+
+
+class RepeatedRunCheck(Check):
+    """The check *repeated run*."""
+
+    name = "repeated run"
+    failing = LIMIT
+    advice = "give each run a fresh process, and compare no two runs digit by digit"
+    place = 7
+    run = staticmethod(repeated)
+
+
+class ResetAndReRunCheck(Check):
+    """The check *reset and re-run*."""
+
+    name = "reset and re-run"
+    failing = LIMIT
+    advice = "make a new instance for each run"
+    compares = True
+    place = 8
+    run = staticmethod(reset)
+
+
+class LoggingCheck(Check):
+    """The check *logging*."""
+
+    name = "logging"
+    failing = LIMIT
+    advice = "leave its logging off"
+    compares = True
+    place = 16
+    run = staticmethod(logging)
+
+
+class TimePerStepCheck(Check):
+    """The check *time per step*."""
+
+    name = "time per step"
+    failing = NOTE
+    place = 24
+    run = staticmethod(time_per_step)

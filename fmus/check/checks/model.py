@@ -7,12 +7,14 @@ from contextlib import contextmanager
 
 import numpy as np
 
+from fmus.check.check import DISTRUST, LIMIT, MISSING, Check
 from fmus.check.checks.derivatives import nominal_of
 from fmus.check.checks.life import by, exported_symbols, listed, not_finite, real_names
 from fmus.check.context import Context
 from fmus.check.derivatives import compare
 from fmus.check.findings import Outcome, failed, passed, skipped
 from fmus.check.model import FmuModel
+from fmus.fmi.standard import MODEL_EXCHANGE
 
 NO_STATES = "has no continuous states"
 SHIFT = 0.01
@@ -181,3 +183,91 @@ def _path(model: FmuModel, context: Context) -> np.ndarray:
 
 def _numbered(count: int) -> list[str]:
     return [f"[{k}]" for k in range(1, count + 1)]
+
+
+class ModelExchangeLoadingCheck(Check):
+    """The check *model exchange: loading*."""
+
+    name = "model exchange: loading"
+    failing = DISTRUST
+    basis = True
+    interface = MODEL_EXCHANGE
+    place = 1
+    run = staticmethod(loading)
+
+
+class ModelExchangeExportedSymbolsCheck(Check):
+    """The check *model exchange: exported symbols*."""
+
+    name = "model exchange: exported symbols"
+    failing = LIMIT
+    advice = MISSING
+    interface = MODEL_EXCHANGE
+    place = 2
+    run = staticmethod(model_symbols)
+
+
+class ModelExchangeInitialiseCheck(Check):
+    """The check *model exchange: initialise*."""
+
+    name = "model exchange: initialise"
+    failing = DISTRUST
+    advice = "give start values, if it needs some"
+    basis = True
+    interface = MODEL_EXCHANGE
+    place = 3
+    run = staticmethod(initialise)
+
+
+class ModelExchangeValuesAtStartCheck(Check):
+    """The check *model exchange: values at start*."""
+
+    name = "model exchange: values at start"
+    failing = DISTRUST
+    advice = "give start values"
+    interface = MODEL_EXCHANGE
+    place = 4
+    run = staticmethod(finite_derivatives)
+
+
+class ModelExchangeStatesCheck(Check):
+    """The check *model exchange: states*."""
+
+    name = "model exchange: states"
+    failing = DISTRUST
+    interface = MODEL_EXCHANGE
+    place = 5
+    run = staticmethod(states)
+
+
+class ModelExchangeResetAndReRunCheck(Check):
+    """The check *model exchange: reset and re-run*."""
+
+    name = "model exchange: reset and re-run"
+    failing = LIMIT
+    advice = "make a new instance for each run"
+    interface = MODEL_EXCHANGE
+    place = 6
+    run = staticmethod(reset)
+
+
+class ModelExchangeStateRoundTripCheck(Check):
+    """The check *model exchange: state round trip*."""
+
+    name = "model exchange: state round trip"
+    failing = LIMIT
+    advice = "do not rely on saved states"
+    interface = MODEL_EXCHANGE
+    place = 7
+    run = staticmethod(round_trip)
+
+
+class ModelExchangeDirectionalDerivativesCheck(Check):
+    """The check *model exchange: directional derivatives*."""
+
+    name = "model exchange: directional derivatives"
+    failing = LIMIT
+    advice = "do not use its derivatives"
+    interface = MODEL_EXCHANGE
+    place = 8
+    run = staticmethod(directional)

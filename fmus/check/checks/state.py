@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fmus.check.behaviour import again, continuation, difference, go_elsewhere
 from fmus.check.bench import WARM_UP_STEPS
+from fmus.check.check import LIMIT, NO_BYTES, NO_REDOING, Check
 from fmus.check.context import Context
 from fmus.check.findings import Outcome, failed, limited, passed, skipped
 from fmus.check.restoring import near, restoring
@@ -11,7 +12,7 @@ from fmus.fmi.slave import Slave
 
 NO_STATE = "does not declare canGetAndSetFMUstate"
 WITHIN = "steps may be redone, and what is redone differs by as much; the master tells it in its bounds"
-NO_BYTES = "does not declare canSerializeFMUstate"
+NOT_SERIALISED = "does not declare canSerializeFMUstate"
 
 
 def round_trip(context: Context) -> Outcome:
@@ -42,7 +43,7 @@ def _through_bytes(context: Context, *, elsewhere: bool) -> Outcome:
     bench = context.bench
     slave = bench.component
     if not slave.can_save or not slave.capabilities.canSerializeFMUState:
-        return skipped(NO_BYTES)
+        return skipped(NOT_SERIALISED)
     path = continuation(bench)
     bench.begin()
     bench.steps((bench.h,) * WARM_UP_STEPS)
@@ -82,3 +83,36 @@ def _restore(slave: Slave, content: bytes) -> None:
         slave.restore(state)
     finally:
         slave.release(state)
+
+
+class StateRoundTripCheck(Check):
+    """The check *state round trip*."""
+
+    name = "state round trip"
+    failing = LIMIT
+    advice = NO_REDOING
+    compares = True
+    place = 11
+    run = staticmethod(round_trip)
+
+
+class SerialisedStateCheck(Check):
+    """The check *serialised state*."""
+
+    name = "serialised state"
+    failing = LIMIT
+    advice = NO_BYTES
+    compares = True
+    place = 12
+    run = staticmethod(serialised)
+
+
+class StateInAnotherInstanceCheck(Check):
+    """The check *state in another instance*."""
+
+    name = "state in another instance"
+    failing = LIMIT
+    advice = NO_BYTES
+    compares = True
+    place = 13
+    run = staticmethod(other_instance)

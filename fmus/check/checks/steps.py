@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fmus.check.behaviour import divided_steps, short_step
+from fmus.check.check import FIXED_STEP, LIMIT, NOTE, Check
 from fmus.check.checks.life import by, listed, not_finite
 from fmus.check.context import Context
 from fmus.check.findings import Outcome, failed, noted, passed, skipped
@@ -113,3 +114,75 @@ def _still_or_refused(what: str, moved: bool, bad: str) -> Outcome:
 def _must_refuse(what: str, moved: bool, bad: str) -> Outcome:
     effect = f"not finite: {bad}" if bad else "the outputs move" if moved else "the outputs stay"
     return noted(f"accepts {what} instead of refusing it; {effect}")
+
+
+class DividedStepsCheck(Check):
+    """The check *divided steps*."""
+
+    name = "divided steps"
+    failing = LIMIT
+    advice = FIXED_STEP
+    compares = True
+    place = 9
+    run = staticmethod(divided)
+
+
+class ShortStepCheck(Check):
+    """The check *short step*."""
+
+    name = "short step"
+    failing = LIMIT
+    advice = FIXED_STEP
+    compares = True
+    place = 10
+    run = staticmethod(short)
+
+
+class TinyStepCheck(Check):
+    """The check *tiny step*."""
+
+    name = "tiny step"
+    failing = LIMIT
+    advice = "use no step far below its communication step"
+    place = 19
+    run = staticmethod(tiny)
+
+
+class HugeStepCheck(Check):
+    """The check *huge step*."""
+
+    name = "huge step"
+    failing = NOTE
+    advice = "use no step far above its communication step"
+    place = 20
+    run = staticmethod(huge)
+
+
+class ZeroStepCheck(Check):
+    """The check *zero step*."""
+
+    name = "zero step"
+    failing = NOTE
+    advice = "never send a step of length zero, as some masters do"
+    place = 21
+    run = staticmethod(zero)
+
+
+class NegativeStepCheck(Check):
+    """The check *negative step*."""
+
+    name = "negative step"
+    failing = NOTE
+    advice = "never send a negative step"
+    place = 22
+    run = staticmethod(negative)
+
+
+class StepFromElsewhereCheck(Check):
+    """The check *step from elsewhere*."""
+
+    name = "step from elsewhere"
+    failing = NOTE
+    advice = "never step it from where it does not stand"
+    place = 23
+    run = staticmethod(wrong_time)

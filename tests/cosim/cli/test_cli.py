@@ -29,7 +29,7 @@ def test_run_writes_everything_and_prints_a_table(tmp_path: Path, capsys: pytest
     assert "Small run: 0.3 s simulated" in printed
     assert "localised by 'rollback'" in printed
     written = {p.name for p in (tmp_path / "out").iterdir()}
-    assert written >= {"table.csv", "table.mat", "events.csv", "summary.json", "report.html"}
+    assert written >= {"table.csv", "events.csv", "summary.json", "report.html"}
     result = read_results(tmp_path / "out")
     assert result.time[-1] == 0.3
     assert result.summary["scenario"] == "script"

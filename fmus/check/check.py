@@ -1,0 +1,76 @@
+"""What a check of an FMU is: a name, what it does, and what it means where it fails.
+
+What a failure means is judged by what becomes of a run of this package's master: NOTE, where no master of this package
+does such a thing; LIMIT, where a run is right as long as the advice is followed; DISTRUST, where a plain run may be
+wrong or may not come to its end. A crash is never less than a limit.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+from fmus.check.context import Context
+from fmus.check.findings import Finding, Outcome, Verdict
+from fmus.fmi.standard import CO_SIMULATION
+
+NOTE, LIMIT, DISTRUST = Verdict.NOTE, Verdict.LIMIT, Verdict.DISTRUST
+
+REPEATED = "repeated run"
+ONE_INSTANCE = "have one instance of it in a process, a fresh process for each run"
+NO_PROBE = "with balises on it, choose the method early-return or interpolate: the probe for the others would crash too"
+SLOW = "it hangs or is slow there: a longer --timeout tells which"
+MISSING = "do not use the capabilities whose functions are missing"
+NO_REDOING = "do not redo steps: the master finds crossings by shorter steps or interpolation, and iterates nothing"
+FIXED_STEP = "keep to one communication step; an event inside it can only be interpolated"
+NO_BYTES = "do not store its states or take them to another instance"
+
+
+class Check(ABC):
+    """A check. A class of it in a file of `fmus.check.checks` is made of each FMU.
+
+    Attributes:
+        name: as it is reported. failing: what a failure means. advice: what to do then.
+        basis: where it is distrusted, the FMU cannot be run at all and the rest is skipped.
+        compares: compares two runs, which tells nothing where equal runs differ anyway.
+        interface: that it is about. place: when it is made, from small to large.
+    """
+
+    name: ClassVar[str]
+    failing: ClassVar[Verdict]
+    advice: ClassVar[str] = ""
+    basis: ClassVar[bool] = False
+    compares: ClassVar[bool] = False
+    interface: ClassVar[str] = CO_SIMULATION
+    place: ClassVar[float] = 100.0
+
+    @staticmethod
+    @abstractmethod
+    def run(context: Context) -> Outcome:
+        """Make it.
+
+        Args:
+            context: the FMU, and what was seen of it so far.
+
+        Raises:
+            SlaveError: the FMU refuses or throws, which is a failure.
+        """
+
+    @classmethod
+    def finding(cls, outcome: Outcome) -> Finding:
+        """The finding of an outcome."""
+        verdict = outcome.verdict or cls.failing
+        advice = outcome.advice or cls.advice
+        return Finding(cls.name, verdict, outcome.detail, advice if verdict.rank >= Verdict.ERROR.rank else "")
+
+    @classmethod
+    def lost(cls, detail: str, *, crashed: bool) -> Finding:
+        """The finding where the process ended or fell silent in this check.
+
+        Args:
+            detail: how the process ended, in words.
+            crashed: whether it ended by itself, and not by the time limit.
+        """
+        verdict = LIMIT if crashed and cls.failing is NOTE else cls.failing
+        advice = f"{cls.advice}; {NO_PROBE}" if crashed and cls.advice else cls.advice if crashed else SLOW
+        return Finding(cls.name, verdict, detail, advice)
