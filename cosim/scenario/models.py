@@ -29,6 +29,9 @@ from plant_models.user_file import UserFileError, make
 OWN_PACKAGES = ("plant_models", "fmu_observer")
 LATE_PARAMETERS = frozenset({"late_policy", "replay_horizon"})
 
+LASTING = 100
+"""Systems that are kept; a sweep over options makes ever new ones."""
+
 _systems: dict[tuple[type[HybridSystem], str], HybridSystem] = {}
 
 
@@ -199,8 +202,12 @@ def _lasting(table: ComponentTable, system: HybridSystem) -> HybridSystem:
     """The first system of the same class and options in this process: what has been traced need not be traced for each
     run. An instance that a script gave may differ from others of its class, and lasts itself.
     """
-    given = (table.model or table.observer or ModelName()).given is system
-    return system if given else _systems.setdefault((type(system), repr(sorted(table.options.items()))), system)
+    if (table.model or table.observer or ModelName()).given is system:
+        return system
+    lasting = _systems.setdefault((type(system), repr(sorted(table.options.items()))), system)
+    while len(_systems) > LASTING:
+        _systems.pop(next(iter(_systems)))
+    return lasting
 
 
 def protocol_parameters(table: ComponentTable, component: Component, where: str) -> dict[str, float | str]:
