@@ -202,7 +202,8 @@ def _lasting(table: ComponentTable, system: HybridSystem) -> HybridSystem:
     """The first system of the same class and options in this process: what has been traced need not be traced for each
     run. An instance that a script gave may differ from others of its class, and lasts itself.
     """
-    if (table.model or table.observer or ModelName()).given is system:
+    given = (table.model or table.observer or ModelName()).given is system
+    if given:
         return system
     lasting = _systems.setdefault((type(system), repr(sorted(table.options.items()))), system)
     while len(_systems) > LASTING:
