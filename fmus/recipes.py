@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from importlib import import_module
 from inspect import Parameter, isabstract, signature
@@ -91,22 +91,33 @@ def legal_values(choices: Sequence[Any] | None) -> str:
     return f", one of {', '.join(map(str, choices))}"
 
 
-def by_room(names: Iterable[str]) -> dict[str, list[str]]:
-    """Names of models, grouped by the room of the house a system lives in.
+def recipe_entry(name: str) -> dict[str, Any]:
+    """What is known of a model, for lists: the fields of `fmus.catalogue.Entry` as plain data.
 
     Args:
-        names: of `RECIPES`.
-
-    Returns:
-        Names by the first line of the room's description; then those of installed packages and of this program.
+        name: model name, one of `RECIPES`.
     """
-    rooms: dict[str, list[str]] = {}
-    for name in names:
-        registry = PLANTS if name in PLANTS else OBSERVERS
-        room = registry.room(name)
-        words = (import_module(room).__doc__ or room).splitlines()[0].rstrip(".") if room else registry.origin(name)
-        rooms.setdefault(words[0].upper() + words[1:], []).append(name)
-    return dict(sorted(rooms.items(), key=lambda item: item[0].startswith("Registered by")))
+    cls = RECIPES[name]
+    presets, chosen = recipe_presets(name)
+    options = [
+        {
+            "name": option,
+            "default": None if default is None else str(default),
+            "legal": legal_values(cls.option_choices.get(option)),
+            "listed": option in cls.option_choices,
+        }
+        for option, default in recipe_options(name).items()
+    ]
+    said = {"name": name, "room": _room(name), "description": cls.description, "source": cls.source}
+    return said | {"presets": presets, "preset": chosen, "options": options}
+
+
+def _room(name: str) -> str:
+    """The first line of the room's description; for others than shipped models, who brings it."""
+    registry = PLANTS if name in PLANTS else OBSERVERS
+    room = registry.room(name)
+    words = (import_module(room).__doc__ or room).splitlines()[0].rstrip(".") if room else registry.origin(name)
+    return words[0].upper() + words[1:]
 
 
 def recipe_presets(name: str) -> tuple[list[str], str | None]:

@@ -11,6 +11,11 @@ PACKAGES = ("fmu-observer", "fmpy", "numpy", "scipy", "casadi")
 
 def versions() -> dict[str, str]:
     """Versions of Python and the packages, and the platform, by name."""
+    return dict(_versions())
+
+
+@cache
+def _versions() -> dict[str, str]:
     return {"python": platform.python_version(), "platform": platform.platform(), **{p: _version(p) for p in PACKAGES}}
 
 

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-import fmu_observer
-import plant_models
-from cosim.scenario.includes import shipped_scenarios
 from cosim.scenario.package_names import is_package
-from cosim.simulation.scenario import Scenario
-from cosim.ssp.load import list_variants
-from fmus.recipes import RECIPES, by_room, legal_values, recipe_presets
+from cosim.scenario.shipped import shipped_scenarios, shipped_tables
+from fmu_observer import OBSERVERS
+from fmus.catalogue import Entry, by_room
+from fmus.catalogue import catalogue as models
 from fmus.text_table import text_table
+from plant_models import PLANTS
 
 KINDS = ("scenarios", "models", "observers", "all")
 
@@ -39,45 +38,43 @@ def execute(options: argparse.Namespace) -> int:
     """
     if is_package(options.what):
         return _execute_package(options)
-    data = {kind: entries for kind, entries in catalogue().items() if options.what in (kind, "all")}
+    known = models()
+    data = {kind: entries for kind, entries in catalogue(known).items() if options.what in (kind, "all")}
     if options.json:
         print(json.dumps(data, indent=2))
         return 0
     for kind, entries in data.items():
         print(f"{kind}:")
-        for room, names in _rooms(kind, entries).items():
+        for room, names in _rooms(kind, entries, known).items():
             if room:
                 print(f"\n  # {room}")
             rows = []
             for name in names:
-                entry = entries[name]
-                rows += [[name, entry["description"]], *(["", line] for line in _details(kind, name, entry))]
+                lines = _details(entries[name], known.get(name))
+                rows += [[name, entries[name]["description"]], *(["", line] for line in lines)]
             for line in text_table(rows, left=(0, 1)):
                 print(f"  {line}")
         print()
     return 0
 
 
-def _rooms(kind: str, entries: Mapping[str, Any]) -> dict[str, list[str]]:
+def _rooms(kind: str, entries: Mapping[str, Any], known: Mapping[str, Entry]) -> dict[str, list[str]]:
     """Names by the room they live in; scenarios live in none."""
     if kind == "scenarios":
         return {"": list(entries)}
-    return by_room(entries)
+    chosen = [entry for name, entry in known.items() if name in entries]
+    return {room: [entry.name for entry in members] for room, members in by_room(chosen).items()}
 
 
-def _details(kind: str, name: str, entry: Mapping[str, Any]) -> list[str]:
-    """Source, presets and options of an entry, a line each."""
+def _details(entry: Mapping[str, Any], model: Entry | None) -> list[str]:
+    """Source, presets and options of a model, a line each; of a scenario its source."""
     lines = [f"[{entry['source']}]"] if entry["source"] else []
-    if kind == "scenarios":
+    if model is None or "presets" not in entry:
         return lines
-    choices = RECIPES[name].option_choices
-    if entry["presets"]:
-        lines.append(f"presets: {', '.join(entry['presets'])}")
+    if model.presets:
+        lines.append(f"presets: {', '.join(model.presets)}")
     if entry["options"]:
-        words = {
-            option: legal_values(choices[option]).removeprefix(", ").removeprefix("one of ")
-            for option in entry["options"]
-        }
+        words = {o.name: o.legal.removeprefix(", ").removeprefix("one of ") for o in model.options if o.listed}
         lines.append(
             "options: " + ", ".join(f"{option} ({values})" if values else option for option, values in words.items())
         )
@@ -91,6 +88,8 @@ def _what(text: str) -> str:
 
 
 def _execute_package(options: argparse.Namespace) -> int:
+    from cosim.ssp.load import list_variants  # noqa: PLC0415 - lxml only for those who read SSP
+
     variants = list_variants(options.what)
     if options.json:
         print(json.dumps({"variants": variants}, indent=2))
@@ -101,26 +100,26 @@ def _execute_package(options: argparse.Namespace) -> int:
     return 0
 
 
-def catalogue() -> dict[str, dict[str, dict[str, Any]]]:
-    """Everything that ships, as plain data."""
+def catalogue(known: Mapping[str, Entry]) -> dict[str, dict[str, dict[str, Any]]]:
+    """Everything that ships, as plain data.
+
+    Args:
+        known: the models by name.
+    """
     scenarios = {}
     for name in shipped_scenarios():
-        table = Scenario.load(name).table()
-        scenarios[name] = {"description": table.title, "source": table.source}
-    return {
-        "scenarios": scenarios,
-        "models": _systems(plant_models.PLANTS),
-        "observers": _systems(fmu_observer.OBSERVERS),
-    }
+        data = shipped_tables(name)
+        scenarios[name] = {"description": data.get("title", ""), "source": data.get("source", "")}
+    return {"scenarios": scenarios, "models": _systems(PLANTS, known), "observers": _systems(OBSERVERS, known)}
 
 
-def _systems(registry: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+def _systems(registry: Iterable[str], known: Mapping[str, Entry]) -> dict[str, dict[str, Any]]:
     return {
         name: {
-            "description": " ".join(system.description.split()),
-            "source": system.source,
-            "presets": recipe_presets(name)[0],
-            "options": list(system.option_choices),
+            "description": " ".join(known[name].description.split()),
+            "source": known[name].source,
+            "presets": list(known[name].presets),
+            "options": [option.name for option in known[name].options if option.listed],
         }
-        for name, system in registry.items()
+        for name in registry
     }

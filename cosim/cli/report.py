@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from cosim.errors import ComparisonError, nearest
 from cosim.evaluation.stored_spec import is_guessed, spec_of
+from cosim.report.overlay.runs import make_runs
 from cosim.results.load import load_result
 
 if TYPE_CHECKING:
@@ -93,7 +94,6 @@ def _one(options: argparse.Namespace, path: Path, result: Result, spec: ReportSp
 def _several(
     options: argparse.Namespace, results: Sequence[Result], specs: Sequence[ReportSpec], labels: Sequence[str]
 ) -> Path:
-    from cosim.report.overlay.runs import make_runs  # noqa: PLC0415
     from cosim.report.page.overlay import write_overlay_page  # noqa: PLC0415 - matplotlib is loaded last
 
     names = list(dict.fromkeys(name for result in results for name in (result.table.dtype.names or ())[1:]))

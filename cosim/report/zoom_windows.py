@@ -24,7 +24,7 @@ from cosim.results.result import BaliseRecord, Result
 FEWEST_ROWS = 3  # below these there is nothing to enlarge
 MOST = 6  # windows; more would hide what matters
 NOT_TAKEN = ("late", "ignored", "rejected", "undelivered")
-SPIKE = 3.0  # an observer whose error leaves the scale by this factor has diverged: its error is no moment
+SPIKE = 3.0  # an observer whose error leaves the scale by this factor has diverged: its error is no window
 UNITS: dict[Quantity, str] = {"speed": "m/s", "position": "m"}
 View = Literal["errors", "slip"]
 
@@ -54,19 +54,19 @@ def notable_windows(result: Result, spec: ReportSpec, most: int = MOST) -> list[
         result: the run. spec: roles, zones, start of the evaluation. most: how many at most; the most telling are kept.
 
     Returns:
-        Windows of which none holds another's moment; where two would, they are one with both reasons.
+        Windows of which none holds the instant of another; where two would, they are one with both reasons.
     """
     if len(result.time) < FEWEST_ROWS or not (
         _all_errors(result, spec, "speed") or _all_errors(result, spec, "position")
     ):
         return []
     chosen: list[ZoomWindow] = []
-    for moment in _candidates(result, spec, _Scale(result)):
-        home = next((i for i, m in enumerate(chosen) if m.start <= moment.time <= m.end), None)
+    for window in _candidates(result, spec, _Scale(result)):
+        home = next((i for i, m in enumerate(chosen) if m.start <= window.time <= m.end), None)
         if home is not None:
-            chosen[home] = replace(chosen[home], reasons=(*chosen[home].reasons, *moment.reasons))
+            chosen[home] = replace(chosen[home], reasons=(*chosen[home].reasons, *window.reasons))
         elif len(chosen) < most:
-            chosen.append(moment)
+            chosen.append(window)
     return sorted(chosen, key=lambda m: m.time)
 
 
@@ -129,9 +129,9 @@ def _largest_error(result: Result, spec: ReportSpec, scale: _Scale, quantity: Qu
         yield _worst_point(result, spec, scale, quantity, worst, errors[worst])
     others = max(working, key=lambda o: sizes[o], default=None)
     if others is not None and sizes[others] != 0.0:
-        moment = _worst_point(result, spec, scale, quantity, others, errors[others])
+        window = _worst_point(result, spec, scale, quantity, others, errors[others])
         among = "" if worst in working else " of the others"
-        yield replace(moment, reasons=(moment.reasons[0].replace(" error", f" error{among}", 1),), about=None)
+        yield replace(window, reasons=(window.reasons[0].replace(" error", f" error{among}", 1),), about=None)
 
 
 def _worst_point(

@@ -72,9 +72,7 @@ def _write_all(result: ResultData, folder: Path, formats: Sequence[str]) -> list
     return [*(usual_file(name) for name in dict.fromkeys(formats)), EVENTS, MESSAGES, SUMMARY]
 
 
-def write_results(
-    result: ResultData, directory: str | Path, formats: Sequence[str] = ("csv", "mat")
-) -> dict[str, Path]:
+def write_results(result: ResultData, directory: str | Path, formats: Sequence[str] = ("csv",)) -> dict[str, Path]:
     """Write a result to a folder, replacing what an earlier run left there.
 
     Args:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 
 from cosim.coupling.connection import Link
 from cosim.coupling.transformation import Transformation
 from cosim.errors import ScenarioError
+from cosim.scenario.merging import BETWEEN_TARGETS
 from cosim.scenario.tables import ConnectionTable
-
-BETWEEN_TARGETS = re.compile(r",(?![^\[\]]*\])")
-"""A comma, but not one between the indices of an array element."""
 
 
 def parse_connections(items: Iterable[str | ConnectionTable], where: str) -> list[Link]:

@@ -7,14 +7,17 @@ input free.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from cosim.errors import ScenarioError, nearest
-from cosim.scenario.connections import BETWEEN_TARGETS
 
 ORIGINS = ("fmu", "model", "observer", "recording")
 FILES = ("fmu", "recording")
+BETWEEN_TARGETS = re.compile(r",(?![^\[\]]*\])")
+"""A comma, but not one between the indices of an array element."""
+
 Line = tuple[Any, str]
 """A connection, and the file it stands in."""
 

@@ -35,7 +35,7 @@ class Outcome:
 
     result: Result
     spec: ReportSpec
-    tables: tuple[str, ...] = ("csv", "mat")
+    tables: tuple[str, ...] = ("csv",)
     origin: Origin | None = field(default=None, repr=False, compare=False)
 
     def __getitem__(self, name: str) -> np.ndarray:

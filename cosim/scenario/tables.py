@@ -238,4 +238,4 @@ class ReportTable(Table):
     published: dict[str, dict[str, float]] = {}
     independent: dict[str, dict[str, float]] = {}
     notes: list[str] = []
-    tables: list[Annotated[str, AfterValidator(_format)]] = ["csv", "mat"]
+    tables: list[Annotated[str, AfterValidator(_format)]] = ["csv"]

@@ -44,7 +44,10 @@ class Schedule:
     def of(
         cls, system: HybridSystem, event: str, members: ArrayLike, stamps: ArrayLike, payload: Mapping[str, ArrayLike]
     ) -> Schedule:
-        """Events of one kind in the order given; arguments as for `Batch.notify`.
+        """Events of one kind in the order given.
+
+        Args:
+            system: that declares them. event, members, stamps, payload: as for `Batch.notify`.
 
         Raises:
             BatchError: there is no such event or payload, or the shapes do not fit.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from fmus.recipes import RECIPES, by_room, legal_values, recipe_options, recipe_presets
+from fmus.catalogue import Entry, by_room, catalogue
 from fmus.text_table import text_table
 
 
@@ -24,30 +24,23 @@ def execute(_options: argparse.Namespace) -> int:
     Args:
         _options: of the command line.
     """
-    for room, names in by_room(RECIPES).items():
+    for room, entries in by_room(catalogue().values()).items():
         print(f"# {room}")
         rows = []
-        for name in names:
-            rows += [
-                [name, _first_line(RECIPES[name].description)],
-                *(["", f"  {line}"] for line in _choices(name)),
-            ]
+        for entry in entries:
+            rows += [[entry.name, _first_line(entry.description)], *(["", f"  {line}"] for line in _choices(entry))]
         print("\n".join(text_table(rows, left=(0, 1))), end="\n\n")
     return 0
 
 
-def _choices(name: str) -> list[str]:
+def _choices(entry: Entry) -> list[str]:
     """Presets and options of a model in words; an option that no word can set is left out."""
-    cls, lines = RECIPES[name], []
-    presets, chosen = recipe_presets(name)
-    if presets:
-        default = f" (default {chosen})" if chosen else ""
-        lines.append(f"presets: {', '.join(presets)}{default}")
-    for option, value in recipe_options(name).items():
-        legal = legal_values(cls.option_choices.get(option))
-        if legal or value is not None:
-            lines.append(f"option {option} = {value}{legal}")
-    return lines
+    lines = []
+    if entry.presets:
+        default = f" (default {entry.preset})" if entry.preset else ""
+        lines.append(f"presets: {', '.join(entry.presets)}{default}")
+    settable = [option for option in entry.options if option.legal or option.default is not None]
+    return [*lines, *(f"option {option.name} = {option.default}{option.legal}" for option in settable)]
 
 
 def _first_line(text: str) -> str:

@@ -22,7 +22,7 @@ SYSTEM, SCENARIO = "takagi_sugeno_cdo", "freight_profile_d"
 
 
 def main(arguments: list[str]) -> None:
-    what, count = (arguments[0], int(arguments[1])) if arguments else ("", 0)
+    what, count = ((*arguments, "0")[0], int((*arguments, "0", "0")[1])) if arguments else ("", 0)
     if what in ("", "members"):
         members(count or 10_000)
     if what in ("", "seeds"):

@@ -56,6 +56,27 @@ class SlidingMass(HybridSystem):
         return {"speed_out": x[1], "place_out": x[0]}
 
 
+class SwitchedMass(HybridSystem):
+    """A mass at rest on dry friction. By a switch a force of twice the friction begins, which then fades at a rate of
+    one friction a second.
+    """
+
+    name = "switched_mass"
+    states = (state("speed", "m/s"),)
+    parameters = (parameter("begin", "s", 0.5),)
+    frictions = ("speed",)
+    switchings = ("begin",)
+
+    def switching(self, t: Any, x: Any, u: Any, p: Any) -> Any:
+        return vector(t - p.begin + 0.0 * x[0])
+
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
+        return vector(GRIP / MASS * (2.0 - (t - p.begin)) * self.switches(t, x, u, p)[0])
+
+    def friction(self, t: Any, x: Any, u: Any, p: Any) -> Any:
+        return vector(GRIP / MASS)
+
+
 SYSTEM = SlidingMass()
 
 
@@ -79,6 +100,17 @@ def test_ramp_sticks_then_breaks_away(version: int, exchange: Callable[..., Exch
     got = importer.run.values()
     np.testing.assert_allclose(got, expected, rtol=0.0, atol=AGREEMENT)
     assert np.all(got[times < breakaway] == 0.0)  # exactly
+
+
+def test_a_force_that_a_switch_turns_on_breaks_away_at_once(version: int, exchange: Callable[..., Exchange]) -> None:
+    """Whether the mass breaks away is decided with the force after the switch: it then moves, and does not stop where
+    the force has faded to what the friction could hold.
+    """
+    model = exchange(SwitchedMass(), version)
+    importer = _importer(model)
+    importer.advance(2.0)
+    assert importer.run.state_events == pytest.approx([0.5], abs=AGREEMENT)
+    assert model.get("speed")[0] == pytest.approx(GRIP / MASS * (1.5 - 1.5**2 / 2.0), abs=AGREEMENT)
 
 
 def _sine_cycle(amplitude: float, pulsation: float) -> tuple[float, float, Callable[[float], float]]:

@@ -1,4 +1,4 @@
-"""Zoom on one moment of a run: errors row by row, jumps at telegrams, stamp and delivery. Draws on a figure of its
+"""Zoom on one window of a run: errors row by row, jumps at telegrams, stamp and delivery. Draws on a figure of its
 own.
 """
 
@@ -31,45 +31,45 @@ Curves = dict[str, np.ndarray]
 
 
 @styled
-def zoom_figure(result: Result, spec: ReportSpec, moment: ZoomWindow) -> Figure:
+def zoom_figure(result: Result, spec: ReportSpec, window: ZoomWindow) -> Figure:
     """One or two panels over a window of time: speed error, and position error or slip.
 
     Args:
-        result: the run. spec: roles. moment: the window, and what to show.
+        result: the run. spec: roles. window: the window, and what to show.
 
     Returns:
         The figure. Rows before and after an event are joined upright, with a hollow and a filled mark.
     """
-    panels = [panel for panel in _panels(result, spec, moment) if panel[1]]
+    panels = [panel for panel in _panels(result, spec, window) if panel[1]]
     figure = new_figure(SIZE if len(panels) > 1 else ONE_PANEL)
     if not panels:
         return figure
     axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-    rows = _rows(result.time, moment)
+    rows = _rows(result.time, window)
     for ax, (text, curves, true) in zip(axes, panels, strict=True):
-        _background(ax, result, spec, moment)
+        _background(ax, result, spec, window)
         if true is not None:
             ax.plot(result.time[rows], true[rows], **TRUE)
             axes[0].plot([], [], label="true", **TRUE)  # for the legend
         shown = {o: values[rows] for o, values in curves.items()}
-        own = None if moment.about is None else shown.get(moment.about)
+        own = None if window.about is None else shown.get(window.about)
         _draw(ax, result.time[rows], shown, spec, _reach(list(shown.values()), own))
         others = [] if true is None else [true[rows]]
         _limits(ax, [*shown.values(), *others], _reach([*shown.values(), *others], own), zero=true is None)
         ax.set_ylabel(text)
     axes[-1].set_xlabel(TIME)
-    axes[-1].set_xlim(moment.start, moment.end)
+    axes[-1].set_xlim(window.start, window.end)
     axes[-1].ticklabel_format(axis="x", useOffset=False)
     legend_above(axes[0])
     return figure
 
 
-def _panels(result: Result, spec: ReportSpec, moment: ZoomWindow) -> list[tuple[str, Curves, np.ndarray | None]]:
+def _panels(result: Result, spec: ReportSpec, window: ZoomWindow) -> list[tuple[str, Curves, np.ndarray | None]]:
     """Label, curves and true curve of each panel."""
     speed = ("Speed error [m/s]", _errors(result, spec, "speed"), None)
     slip = {o: 100.0 * bounded(v) for o in spec.observers if (v := estimate(result, o, "slip")) is not None}
     true_slip = recorded(result, spec.true_slip)
-    if moment.view == "slip" and slip:
+    if window.view == "slip" and slip:
         return [speed, ("Slip [%]", slip, None if true_slip is None else 100.0 * bounded(true_slip))]
     return [speed, ("Position error [m]", _errors(result, spec, "position"), None)]
 
@@ -79,9 +79,9 @@ def _errors(result: Result, spec: ReportSpec, quantity: Any) -> Curves:
     return {o: bounded(e) for o, e in found.items() if e is not None}
 
 
-def _rows(time: np.ndarray, moment: ZoomWindow) -> np.ndarray:
+def _rows(time: np.ndarray, window: ZoomWindow) -> np.ndarray:
     """Indices of the rows in a window, and one more on either side, so that curves reach its edges."""
-    first, beyond = np.searchsorted(time, moment.start, "left") - 1, np.searchsorted(time, moment.end, "right") + 1
+    first, beyond = np.searchsorted(time, window.start, "left") - 1, np.searchsorted(time, window.end, "right") + 1
     return np.arange(max(int(first), 0), min(int(beyond), len(time)))
 
 
@@ -126,22 +126,22 @@ def _limits(ax: Axes, curves: list[np.ndarray], reach: float, *, zero: bool) -> 
     ax.set_ylim(low - room, high + room)
 
 
-def _background(ax: Axes, result: Result, spec: ReportSpec, moment: ZoomWindow) -> None:
+def _background(ax: Axes, result: Result, spec: ReportSpec, window: ZoomWindow) -> None:
     """Low-adhesion zones, stamps and deliveries."""
-    inside = [z for z in spec.zones if z[1] > moment.start and z[0] < moment.end]
+    inside = [z for z in spec.zones if z[1] > window.start and z[0] < window.end]
     for start, end in inside:
         text = "low adhesion" if (start, end) == inside[0] else "_"
         ax.axvspan(start, end, color=ZONE, linewidth=0, zorder=0, label=text)
     seen: set[str] = set()
-    for event in _in_window(result, moment):
+    for event in _in_window(result, window):
         for instant, text, line in _instants(event):
             ax.axvline(instant, label="_" if text in seen else text, **line)
             seen.add(text)
 
 
-def _in_window(result: Result, moment: ZoomWindow) -> list[BaliseRecord]:
-    near = [e for e in result.events if e.stamp <= moment.end and max(e.stamp, e.delivered_at) >= moment.start]
-    return sorted(near, key=lambda e: abs(e.stamp - moment.time))[:MOST_TELEGRAMS]
+def _in_window(result: Result, window: ZoomWindow) -> list[BaliseRecord]:
+    near = [e for e in result.events if e.stamp <= window.end and max(e.stamp, e.delivered_at) >= window.start]
+    return sorted(near, key=lambda e: abs(e.stamp - window.time))[:MOST_TELEGRAMS]
 
 
 def _instants(event: BaliseRecord) -> list[tuple[float, str, dict[str, Any]]]:

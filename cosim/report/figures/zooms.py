@@ -38,13 +38,13 @@ def draw_zooms(result: Result, spec: ReportSpec) -> list[Zoom]:
         spec: roles of the signals, labels, phases and zones.
     """
     windows = notable_windows(result, spec)
-    pictures = [png(zoom_figure(result, spec, moment)) for moment in windows]
+    pictures = [png(zoom_figure(result, spec, window)) for window in windows]
     return [
-        Zoom(key, moment.reasons[0], _caption(moment), picture)
-        for key, moment, picture in zip(ZOOM_KEYS, windows, pictures, strict=False)
+        Zoom(key, window.reasons[0], _caption(window), picture)
+        for key, window, picture in zip(ZOOM_KEYS, windows, pictures, strict=False)
     ]
 
 
-def _caption(moment: ZoomWindow) -> str:
-    span = f"{VIEWS[moment.view]}, {number(moment.start, 4)} s to {number(moment.end, 4)} s."
-    return " ".join([span, *(f"{reason}." for reason in moment.reasons[1:])])
+def _caption(window: ZoomWindow) -> str:
+    span = f"{VIEWS[window.view]}, {number(window.start, 4)} s to {number(window.end, 4)} s."
+    return " ".join([span, *(f"{reason}." for reason in window.reasons[1:])])

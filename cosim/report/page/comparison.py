@@ -6,18 +6,17 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from math import inf, isfinite
 from pathlib import Path
 
 from cosim.comparison.verdict import Comparison, Finding, SignalComparison
 from cosim.drawing.style import png
-from cosim.errors import OutputError
 from cosim.evaluation.numbers import DASH, number
 from cosim.report.figures.comparison_figure import comparison_picture
-from cosim.report.page.files import write_file
+from cosim.report.page.files import explained, page_bytes, write_file
 from cosim.report.page.render import render
 from cosim.report.page.table import Table, simple_table
 from cosim.report.page.verdict import Fact
@@ -70,8 +69,8 @@ def write_comparison(
     with _explained(folder):
         _remove_pictures(folder / PICTURES)
         drawn = _write_pictures(pictures, folder / PICTURES)
-        write_file(folder / PAGE, _bytes(comparison_page(comparison, pictures)))
-        write_file(folder / DATA, _bytes(comparison_json(comparison)))
+        write_file(folder / PAGE, page_bytes(comparison_page(comparison, pictures)))
+        write_file(folder / DATA, page_bytes(comparison_json(comparison)))
     paths = {"html": folder / PAGE, "json": folder / DATA}
     return paths | ({"png": next(iter(drawn.values())), "pictures": folder / PICTURES} if drawn else {})
 
@@ -93,7 +92,7 @@ def write_page(comparison: Comparison, path: str | Path, most_pictures: int = MO
     file = Path(path)
     text = comparison_page(comparison, draw_pictures(comparison, most_pictures))
     with _explained(file):
-        write_file(file, _bytes(text))
+        write_file(file, page_bytes(text))
     return file
 
 
@@ -274,18 +273,8 @@ def _row(signal: SignalComparison) -> list[str]:
 # -- files ------------------------------------------------------------------------------------------------------------
 
 
-@contextmanager
-def _explained(place: Path) -> Iterator[None]:
-    """Turns what the file system refuses into an error for users."""
-    try:
-        yield
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise OutputError(f"The comparison cannot be written to {place}: {reason}. Choose another place.") from error
-
-
-def _bytes(text: str) -> bytes:
-    return text.encode("utf-8", "backslashreplace")
+def _explained(place: Path) -> AbstractContextManager[None]:
+    return explained(f"The comparison cannot be written to {place}", "Choose another place.")
 
 
 def _write_pictures(pictures: Mapping[str, bytes], folder: Path) -> dict[str, Path]:

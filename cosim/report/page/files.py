@@ -1,13 +1,32 @@
-"""Files written whole or not at all. Touches only the file it is given, and a hidden folder beside it while it
+"""Files written whole or not at all. Touches only the places it is given, and a hidden folder beside them while it
 writes.
 """
 
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 from cosim.errors import OutputError
+
+
+@contextmanager
+def explained(what: str, advice: str) -> Iterator[None]:
+    """Turns what the file system refuses into an error for users.
+
+    Args:
+        what: what is written, and where to.
+        advice: what to do where it cannot be.
+
+    Raises:
+        OutputError: the file system refused something.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"{what}: {error.strerror or error}. {advice}") from error
 
 
 def write_page(path: str | Path, text: str) -> Path:
@@ -24,13 +43,18 @@ def write_page(path: str | Path, text: str) -> Path:
         OutputError: it cannot be written.
     """
     file = Path(path)
-    try:
-        write_file(file, text.encode("utf-8", "backslashreplace"))
-    except OSError as error:
-        raise OutputError(
-            f"{file} cannot be written: {error.strerror or error}. Choose another place with --out."
-        ) from error
+    with explained(f"{file} cannot be written", "Choose another place with --out."):
+        write_file(file, page_bytes(text))
     return file
+
+
+def page_bytes(text: str) -> bytes:
+    """A text as it stands in a file, whatever is in it.
+
+    Args:
+        text: of the page.
+    """
+    return text.encode("utf-8", "backslashreplace")
 
 
 def write_file(path: Path, data: bytes) -> None:
@@ -43,8 +67,22 @@ def write_file(path: Path, data: bytes) -> None:
     Raises:
         OSError: it cannot be written; a former one is still whole.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".writing-") as scratch:
-        part = Path(scratch) / path.name
-        part.write_bytes(data)
-        part.replace(path)
+    write_files(path.parent, {path.name: data})
+
+
+def write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
+    """Write files that belong together: none takes its place before all are written.
+
+    Args:
+        folder: created where it does not exist.
+        contents: by name of the file.
+
+    Raises:
+        OSError: one cannot be written; former ones are still whole.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as scratch:
+        for name, data in contents.items():
+            (Path(scratch) / name).write_bytes(data)
+        for name in contents:
+            (Path(scratch) / name).replace(folder / name)

@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cosim.drawing.style import png
-from cosim.errors import OutputError
 from cosim.evaluation.numbers import DASH, cell, number
 from cosim.report.figures.error_figures import speed_error_figure
 from cosim.report.figures.observers_figure import observers_picture
-from cosim.report.page.files import write_file
+from cosim.report.page.files import explained, write_files
 from cosim.report.page.phases import errors_table
 from cosim.report.page.render import render
 from cosim.report.page.run_tables import HOLDS, telegrams_table
@@ -45,14 +44,8 @@ def write_benchmark(benchmark: ObserverBenchmark, directory: str | Path) -> dict
     picture = png(observers_picture(benchmark.scores))
     data = json.dumps(jsonable(benchmark.to_data()), indent=2) + "\n"
     contents = {PAGE: benchmark_page(benchmark, picture).encode("utf-8"), PICTURE: picture, DATA: data.encode("utf-8")}
-    try:
-        for name, content in contents.items():
-            write_file(folder / name, content)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise OutputError(
-            f"The comparison cannot be written to {folder}: {reason}. Choose another output folder."
-        ) from error
+    with explained(f"The comparison cannot be written to {folder}", "Choose another output folder."):
+        write_files(folder, contents)
     return {"page": folder / PAGE, "picture": folder / PICTURE, "data": folder / DATA}
 
 

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
 
-from cosim.errors import OutputError
 from cosim.evaluation.facts import number_entry
 from cosim.evaluation.numbers import DASH, error_number, number
 from cosim.evaluation.spec import ReportSpec
@@ -16,7 +15,7 @@ from cosim.report.figures.overlay_figures import OverlayPicture, changing_signal
 from cosim.report.overlay.differences import differences, layout_note
 from cosim.report.overlay.measures import DETAIL_HEADINGS, ERROR_HEADINGS, Measured, cell, detailed, headings, measured
 from cosim.report.overlay.runs import Run, make_runs
-from cosim.report.page.files import write_file, write_page
+from cosim.report.page.files import explained, write_file, write_page
 from cosim.report.page.render import render
 from cosim.report.page.table import Table, grouped_table, simple_table
 from cosim.report.page.verdict import Fact
@@ -52,17 +51,13 @@ def write_overlay(
     """
     folder = Path(directory)
     runs = make_runs(results, specs, labels)
-    try:
+    with explained(f"Figures cannot be written to {folder}", "Choose another folder."):
         (folder / FIGURES).mkdir(parents=True, exist_ok=True)  # before much is drawn
         pictures = _pictures(runs, signals)
         for stale in (folder / FIGURES).glob("overlay_*.png"):
             stale.unlink()
         for drawn in pictures:
             write_file(folder / FIGURES / f"{drawn.key}.png", drawn.png)
-    except OSError as error:
-        raise OutputError(
-            f"Figures cannot be written to {folder}: {error.strerror or error}. Choose another folder."
-        ) from error
     return write_overlay_page(runs, folder / PAGE, pictures)
 
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from cosim.errors import OutputError
 from cosim.evaluation.cost import was_compiled
 from cosim.evaluation.event_counts import count_events
 from cosim.evaluation.facts import list_entry, mapping_entry, statement
@@ -20,7 +19,7 @@ from cosim.report.figures.panel import Panel
 from cosim.report.figures.panels import draw_all, panels
 from cosim.report.figures.zooms import ZOOM_KEYS, Zoom, draw_zooms
 from cosim.report.page import run_tables
-from cosim.report.page.files import write_file, write_page
+from cosim.report.page.files import explained, page_bytes, write_file, write_page
 from cosim.report.page.phases import errors_table, phases_table
 from cosim.report.page.render import render
 from cosim.report.page.verdict import verdict_facts
@@ -48,18 +47,13 @@ def write_report(result: Result, spec: ReportSpec, directory: str | Path) -> Pat
     text = report_page(result, spec, figures, zooms)
     files = {panel.name: data for panel, data in figures.items()} | {zoom.key: zoom.png for zoom in zooms}
     stale = ({panel.name for panel in panels()} | set(ZOOM_KEYS)) - set(files)  # of an earlier run
-    try:
+    with explained(f"The report cannot be written to {folder}", "Choose another output folder."):
         (folder / FIGURES).mkdir(parents=True, exist_ok=True)
         for key, data in files.items():
             write_file(folder / FIGURES / f"{key}.png", data)
         for key in stale:
             (folder / FIGURES / f"{key}.png").unlink(missing_ok=True)
-        write_file(folder / PAGE, text.encode("utf-8", "backslashreplace"))
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise OutputError(
-            f"The report cannot be written to {folder}: {reason}. Choose another output folder."
-        ) from error
+        write_file(folder / PAGE, page_bytes(text))
     return folder / PAGE
 
 

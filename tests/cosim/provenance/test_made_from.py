@@ -49,7 +49,7 @@ def test_the_folder_holds_scenario_files_and_hashes(tmp_path: Path) -> None:
     }
     assert manifest["files"] == [{"key": "components.train.fmu", "path": str(fmu), "parts": [part]}]
     assert {name: entry["sha256"] for name, entry in manifest["results"].items()} == {
-        name: digest(out / name) for name in ("table.csv", "table.mat", "events.csv")
+        name: digest(out / name) for name in ("table.csv", "events.csv")
     }
     assert manifest["components"][0]["guid"] == outcome.result.summary["components"][0]["guid"]
     assert manifest["versions"]["numpy"] == np.__version__
@@ -85,7 +85,7 @@ def test_all_kinds_of_foreign_files_are_kept_and_the_scenario_runs_from_them(tmp
         [
             "files/balises/line.csv",
             "files/first/coast.fmu",
-            *(f"files/folder/before/{n}" for n in (*results, "table.csv", "table.mat")),
+            *(f"files/folder/before/{n}" for n in (*results, "table.csv")),
             *(f"files/table/{n}" for n in (*results, "table.csv")),
         ]
     )

@@ -60,7 +60,7 @@ def rows(events: tuple[BaliseRecord, ...] = ()) -> np.ndarray:
 
 
 def reasons(result: Result, spec: ReportSpec = SPEC) -> list[str]:
-    return [reason for moment in notable_windows(result, spec) for reason in moment.reasons]
+    return [reason for window in notable_windows(result, spec) for reason in window.reasons]
 
 
 # --- corrections ------------------------------------------------------------------------------------------------------
@@ -131,9 +131,9 @@ def test_telegrams_gone_wrong_are_windows() -> None:
 
 
 def test_a_window_holds_stamp_and_delivery() -> None:
-    (moment,) = notable_windows(hand_made((telegram(50.0, 4.0),)), SPEC)
-    assert moment.start < 50.0
-    assert moment.end > 54.0
+    (window,) = notable_windows(hand_made((telegram(50.0, 4.0),)), SPEC)
+    assert window.start < 50.0
+    assert window.end > 54.0
 
 
 def test_the_largest_correction_is_a_moment() -> None:
@@ -157,8 +157,8 @@ def test_zones_and_false_alarms_are_windows() -> None:
 def test_what_happens_together_is_one_window() -> None:
     speed = np.zeros(1001)
     speed[502] = 1.0
-    (moment, *_) = notable_windows(hand_made((), None, speed), replace(SPEC, zones=[(50.0, 90.0)]))
-    assert moment.reasons == ("Largest speed error, 1.00 m/s (obs)", "A low-adhesion zone begins at 50.0 s")
+    (window, *_) = notable_windows(hand_made((), None, speed), replace(SPEC, zones=[(50.0, 90.0)]))
+    assert window.reasons == ("Largest speed error, 1.00 m/s (obs)", "A low-adhesion zone begins at 50.0 s")
 
 
 @pytest.mark.parametrize("rows_left_out", [0, 40])  # it ends in infinity, or well before
@@ -231,8 +231,8 @@ def test_test_fmusm_shows_jumps_stamp_and_delivery() -> None:
 
 
 def test_test_fmusm_of_a_zone_shows_the_slip() -> None:
-    moment = next(m for m in notable_windows(synthetic_result(), synthetic_spec()) if m.view == "slip")
-    axes = zoom_figure(synthetic_result(), synthetic_spec(), moment).axes
+    window = next(m for m in notable_windows(synthetic_result(), synthetic_spec()) if m.view == "slip")
+    axes = zoom_figure(synthetic_result(), synthetic_spec(), window).axes
     assert [ax.get_ylabel() for ax in axes] == ["Speed error [m/s]", "Slip [%]"]
 
 

@@ -1,0 +1,107 @@
+"""The catalogue: what is known of every model that can be exported, without loading the models.
+
+What ships is read once and kept in the cache under a digest of the files it follows from; what installed packages bring
+is loaded.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from fmu_observer import OBSERVERS
+from plant_models import PLANTS
+from plant_models.disk_cache.entries import remembered
+from plant_models.disk_cache.files import file_digest
+
+PACKAGES = ("plant_models", "fmu_observer")
+READERS = ("catalogue.py", "recipes.py")
+"""Files beside this one that decide what an entry says."""
+
+
+@dataclass(frozen=True)
+class Option:
+    """An option of a model.
+
+    Args:
+        name: keyword of the constructor. default: its default as text; None where it has none.
+        legal: its legal values in words, empty where any is legal. listed: whether the model lists them.
+    """
+
+    name: str
+    default: str | None
+    legal: str
+    listed: bool
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What is known of a model.
+
+    Args:
+        name: of the model. room: where it lives, in words. description, source: as the model says.
+        presets: their names. preset: the default one, or None. options: that shape its equations.
+    """
+
+    name: str
+    room: str
+    description: str
+    source: str
+    presets: tuple[str, ...]
+    preset: str | None
+    options: tuple[Option, ...]
+
+
+def catalogue() -> dict[str, Entry]:
+    """All models by name: plants first, then observers."""
+    shipped = [name for registry in (PLANTS, OBSERVERS) for name in registry if registry.room(name)]
+    others = [name for registry in (PLANTS, OBSERVERS) for name in registry if not registry.room(name)]
+    entries = remembered("catalogue", _key(), lambda: _read(shipped)) + _read(others)
+    known = {data["name"]: _entry(data) for data in entries}
+    return {name: known[name] for registry in (PLANTS, OBSERVERS) for name in registry}
+
+
+def by_room(entries: Iterable[Entry]) -> dict[str, list[Entry]]:
+    """Entries grouped by the room of the house a model lives in; what this program registered comes last.
+
+    Args:
+        entries: of the catalogue.
+    """
+    rooms: dict[str, list[Entry]] = {}
+    for entry in entries:
+        rooms.setdefault(entry.room, []).append(entry)
+    return dict(sorted(rooms.items(), key=lambda item: item[0].startswith("Registered by")))
+
+
+def _read(names: Iterable[str]) -> list[dict[str, Any]]:
+    """Entries as plain data, from the models themselves."""
+    chosen = list(names)
+    if not chosen:
+        return []
+    from fmus.recipes import recipe_entry  # noqa: PLC0415 - it loads the models
+
+    return [recipe_entry(name) for name in chosen]
+
+
+def _entry(data: dict[str, Any]) -> Entry:
+    options = tuple(Option(**option) for option in data["options"])
+    return Entry(**data | {"presets": tuple(data["presets"]), "options": options})
+
+
+def _key() -> str:
+    """Digest of all files that decide what the shipped models say of themselves."""
+    folders = [Path(place) for package in PACKAGES for place in _places(package)]
+    paths = [path for folder in folders for path in sorted(folder.rglob("*.py"))]
+    paths += [Path(__file__).with_name(name) for name in READERS]
+    digests = "\n".join(f"{path.name} {file_digest(path)}" for path in paths)
+    return hashlib.sha256(f"{sys.version}\n{digests}".encode()).hexdigest()
+
+
+def _places(package: str) -> Iterable[str]:
+    spec = find_spec(package)
+    return (spec.submodule_search_locations if spec is not None else None) or ()
