@@ -35,7 +35,8 @@ def test_what_a_package_offers_stands_in_it_once(package: str, pages: dict[str, 
     for name in module.__all__:
         thing = getattr(module, name)
         if callable(thing) and hasattr(thing, "__qualname__"):
-            assert pages[package].count(f":: {thing.__module__}.{thing.__qualname__}\n") == 1, name
+            home = thing.__module__.partition(".")[0]  # a package may offer what a lower one defines
+            assert pages[home].count(f":: {thing.__module__}.{thing.__qualname__}\n") == 1, name
 
 
 def test_what_a_page_imports_stands_in_it(pages: dict[str, str]) -> None:
