@@ -20,6 +20,7 @@ class EarlyReturnLocaliser(Localiser):
 
     Args:
         clock: name of the plant's triggered output clock.
+        watch: the monitored plant. layout: where the balises are.
 
     Raises:
         CouplingError: the plant has no event mode, or no such clock.

@@ -96,6 +96,9 @@ class HermiteStep:
         ``D h^2 / 16``, and its slope within ``D h / 4`` (bang-bang second derivative +D, -D, +D over h/4, h/2, h/4).
         The first divided by the lowest possible speed is a time. Where the train may stand, nothing better than the
         step itself is known.
+
+        Args:
+            acceleration_spread: D [m/s2].
         """
         slowest = self._lowest_speed() - acceleration_spread * self.h / 4.0
         if slowest <= 0.0:

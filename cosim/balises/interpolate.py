@@ -21,6 +21,7 @@ class InterpolateLocaliser(Localiser):
 
     Args:
         jerk_bound: how fast the plant's acceleration may change between two sudden changes [m/s3].
+        watch: the monitored plant. layout: where the balises are.
     """
 
     method: Method = "interpolate"

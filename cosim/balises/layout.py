@@ -131,7 +131,11 @@ class InstantLayout:
         return self._sorted[first : bisect_right(self._sorted, until, first)]
 
     def identity(self, instant: float) -> str:
-        """Name of the balise at one of the instants [s]: ``I1`` for the first."""
+        """Name of the balise at one of the instants [s]: ``I1`` for the first.
+
+        Args:
+            instant: of the crossing [s].
+        """
         return f"I{bisect_left(self._sorted, instant) + 1}"
 
 
@@ -140,6 +144,9 @@ Layout = TrackLayout | InstantLayout
 
 def by_spacing(spacing: float, first: float, last: float, location_accuracy: float = 0.0) -> TrackLayout:
     """Balises every `spacing` metres from `first` to `last` [m].
+
+    Args:
+        location_accuracy: Q_LOCACC [m].
 
     Raises:
         ScenarioError: the spacing is not positive, or there is no balise.
@@ -153,12 +160,19 @@ def by_spacing(spacing: float, first: float, last: float, location_accuracy: flo
 
 
 def by_positions(positions: Sequence[float], location_accuracy: float = 0.0) -> TrackLayout:
-    """Balises at the given positions [m], in increasing order."""
+    """Balises at the given positions [m], in increasing order.
+
+    Args:
+        location_accuracy: Q_LOCACC [m].
+    """
     return TrackLayout(tuple(Balise(f"B{i + 1}", float(p), location_accuracy) for i, p in enumerate(positions)))
 
 
 def from_csv(path: str | Path) -> TrackLayout:
     """Balises from a CSV file with a header: ``position`` [m], optional ``identity`` and ``location_accuracy`` [m].
+
+    Args:
+        path: of the file.
 
     Raises:
         ScenarioError: the file is missing, has no such column, or a row cannot be read; the row is named.

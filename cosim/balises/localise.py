@@ -50,6 +50,10 @@ def make_localiser(
 ) -> Localiser:
     """A localiser by name.
 
+    Args:
+        watch: the monitored plant. layout: where the balises are.
+        clock: name of the plant's clock that announces crossings. jerk_bound: largest jerk of the plant [m/s3].
+
     Raises:
         CouplingError: the method is unknown, or needs something the plant or the scenario does not have.
     """

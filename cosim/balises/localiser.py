@@ -51,7 +51,11 @@ class Localiser(ABC):
         return None
 
     def restore(self, state: Any) -> None:
-        """Return to what was saved."""
+        """Return to what was saved.
+
+        Args:
+            state: as `save` gave it.
+        """
         return
 
     def crossings_between(

@@ -87,7 +87,11 @@ class PlantMonitor:
         return outputs
 
     def step(self, t: float, until: float) -> None:
-        """Send the inputs, advance to `until` [s], read outputs."""
+        """Send the inputs, advance to `until` [s], read outputs.
+
+        Args:
+            t: start of the step [s].
+        """
         self._planned.drive(t, until)
 
     def send(self, t: float, until: float) -> None:

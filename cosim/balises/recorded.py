@@ -142,6 +142,9 @@ def read_layout(path: Path) -> RecordedLayout:
     """The telegrams of a results folder, of its ``events.csv``, or of another file that keeps telegrams, alone or
     beside rows.
 
+    Args:
+        path: of the file.
+
     Raises:
         ScenarioError: there is no such file, or it is not one that holds telegrams; the line is named.
     """

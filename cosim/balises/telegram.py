@@ -124,7 +124,11 @@ class Mailbox:
         return taken
 
     def delivered(self, telegram: BaliseRecord, outcomes: Mapping[str, str]) -> None:
-        """Log a delivered telegram with what became of it."""
+        """Log a delivered telegram with what became of it.
+
+        Args:
+            outcomes: by receiver.
+        """
         self.log.append(replace(telegram, outcomes=dict(outcomes)))
 
 

@@ -45,7 +45,11 @@ class Crossings:
         self._prepare(program, plan)
 
     def allow(self, wanted: bool) -> bool:
-        """Whether the coming chunk may hold such steps; to be asked before each."""
+        """Whether the coming chunk may hold such steps; to be asked before each.
+
+        Args:
+            wanted: whether crossings may be handled in C.
+        """
         idle = wanted and self._possible and self.service.has_nothing_found
         idle = idle and all(telling.component.next_event == NEVER for telling in self._tellings.values())
         self._head.on = idle

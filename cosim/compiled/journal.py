@@ -38,7 +38,11 @@ class Call(IntEnum):
     RELEASE = 11
 
     def function(self, version: int) -> str | None:
-        """Name of the function; None where it depends on the type of the variables."""
+        """Name of the function; None where it depends on the type of the variables.
+
+        Args:
+            version: of FMI.
+        """
         if self in (Call.SET, Call.GET):
             return None
         if self is Call.STEP:

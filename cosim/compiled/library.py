@@ -28,7 +28,11 @@ def load_stepper() -> ctypes.CDLL:
 
 
 def stepper_library(compiler: Compiler, folder: Path) -> Path:
-    """Path of the library in a cache folder, built there where it is missing."""
+    """Path of the library in a cache folder, built there where it is missing.
+
+    Args:
+        compiler: that builds the library.
+    """
     sources = {name: (files("cosim.compiled") / name).read_bytes() for name in SOURCES}
     return cached_library("stepper", sources, SOURCES[0], compiler, folder)
 

@@ -96,7 +96,11 @@ class Telling:
         self._arguments = program.address, place, ctypes.addressof(self.telegram), ctypes.addressof(self._times)
 
     def step(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
-        """As `Receiver.step`."""
+        """As `Receiver.step`.
+
+        Args:
+            t: start of the step [s]. until: end of the step [s]. telegrams: to be delivered in it.
+        """
         receiver, component = self.receiver, self.component
         if len(telegrams) != 1 or receiver.busy or component.next_event != NEVER or not self._idle():
             return self._slowly(t, until, telegrams)

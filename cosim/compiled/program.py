@@ -226,7 +226,11 @@ class Program:
         return ctypes.addressof(self.head)
 
     def reads_straight(self, which: int) -> bool:
-        """Whether the outputs of an FMI 3 slave are read by one call, as doubles, into their place."""
+        """Whether the outputs of an FMI 3 slave are read by one call, as doubles, into their place.
+
+        Args:
+            which: number of the component.
+        """
         reads = ctypes.cast(self.slaves[which].reads, ctypes.POINTER(CPort))
         return self.reads[which] == ["fmi3GetFloat64"] and reads[0].places is None
 
@@ -318,7 +322,11 @@ class Program:
         return port
 
     def function(self, component: Component, name: str) -> int:
-        """Address of a function of the component's library."""
+        """Address of a function of the component's library.
+
+        Args:
+            name: of a C function.
+        """
         return _address_of(component.slave._functions[name])
 
     def keep(self, array: np.ndarray) -> int:

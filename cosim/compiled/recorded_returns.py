@@ -38,7 +38,11 @@ class Answer:
 
 @contextmanager
 def answered(slave: Any, answers: Mapping[str, Sequence[Answer]]) -> Iterator[None]:
-    """Within this context each function in `answers` answers its first calls so; further calls reach the library."""
+    """Within this context each function in `answers` answers its first calls so; further calls reach the library.
+
+    Args:
+        slave: that is driven.
+    """
     functions: dict[str, Any] = slave._functions
     real = {name: functions[name] for name in answers}
 

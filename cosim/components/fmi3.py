@@ -16,7 +16,11 @@ from fmus.fmi.ports import is_native
 
 
 class FMI3Component(Component, FMI3Slave):
-    """An FMI 3.0 co-simulation slave. Arguments as for `Component`."""
+    """An FMI 3.0 co-simulation slave. Arguments as for `Component`.
+
+    Args:
+        name: of the component. description: model description of the FMU. more: as for `Component`.
+    """
 
     def __init__(self, name: str, slave: Any, description: ModelDescription, **more: Any) -> None:
         super().__init__(name, slave, description, **more)

@@ -44,7 +44,11 @@ COMPILED_STAGE_TEXT = "compiled stepper"
 
 
 def unchanged(inner: Any) -> Any:
-    """What a stage does around a call that it leaves alone: nothing."""
+    """What a stage does around a call that it leaves alone: nothing.
+
+    Args:
+        inner: the call inside the stage.
+    """
     return inner
 
 
@@ -71,7 +75,11 @@ class Stage:
 
 
 def around(way: Callable[[Mover, float, float], None]) -> Callable[[Mover], Mover]:
-    """What a stage does around a call, by a function that is handed the call inside it and both times [s]."""
+    """What a stage does around a call, by a function that is handed the call inside it and both times [s].
+
+    Args:
+        way: called with the call inside, start and end of the step [s].
+    """
     return lambda inner: partial(way, inner)
 
 

@@ -70,6 +70,9 @@ class Connection:
 def split_name(name: str, components: Iterable[str], what: str) -> tuple[str, str]:
     """``component.signal`` as a pair; the signal's own name may hold dots.
 
+    Args:
+        components: names of the components. what: kind of name, for the message.
+
     Raises:
         CouplingError: the name has no dot or the component does not exist.
     """
@@ -86,6 +89,9 @@ def split_name(name: str, components: Iterable[str], what: str) -> tuple[str, st
 def connect(pairs: Sequence[Link], components: Mapping[str, Component]) -> list[Connection]:
     """Checked connections from ``(source, target)`` names, with a transformation or without; one for each element of
     arrays.
+
+    Args:
+        pairs: links as the scenario has them. components: by name, or those to look at.
 
     Raises:
         CouplingError: an unknown variable, a wrong causality, types, shapes or units that do not fit, or two sources
@@ -232,6 +238,9 @@ def _without_source(component: Component, variable: ModelVariable, taken: set[tu
 def local_sources(connections: Iterable[Connection], components: Mapping[str, Component]) -> dict[str, list[str]]:
     """Local variables that other components read, element by element, by component: sealed FMUs hide what others
     need.
+
+    Args:
+        connections: of the run.
     """
     found: dict[str, list[str]] = {}
     for c in connections:

@@ -34,7 +34,11 @@ class AlgebraicLoop:
 
 
 def declared_feedthrough(component: Component) -> dict[str, list[str]]:
-    """Outputs and the inputs they declare to depend on directly; undeclared dependencies count as none."""
+    """Outputs and the inputs they declare to depend on directly; undeclared dependencies count as none.
+
+    Args:
+        component: an instantiated component.
+    """
     table: dict[str, list[str]] = {}
     for unknown in component.description.outputs:
         if unknown.variable is not None and unknown.dependencies is not None:
@@ -47,6 +51,9 @@ def undeclared_outputs(component: Component) -> list[str]:
     input.
 
     Locals that are continuous states depend on none at once.
+
+    Args:
+        component: an instantiated component.
     """
     declared, variables = declared_feedthrough(component), component.description.modelVariables
     states = {v.derivative.valueReference for v in variables if v.derivative is not None}
@@ -56,7 +63,11 @@ def undeclared_outputs(component: Component) -> list[str]:
 
 
 def undeclared(components: Iterable[Component]) -> list[str]:
-    """Components that declare no dependencies although they have inputs and outputs."""
+    """Components that declare no dependencies although they have inputs and outputs.
+
+    Args:
+        components: the components.
+    """
     return [
         c.name
         for c in components

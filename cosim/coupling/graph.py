@@ -135,6 +135,9 @@ def execution_order(
 def check_algebraic_loops(components: Mapping[str, Component], connections: Sequence[Connection]) -> None:
     """Refuse cycles of declared direct feedthrough.
 
+    Args:
+        components: by name, or those to look at. connections: of the run.
+
     Raises:
         CouplingError: there is one; its signals are named in order.
     """
@@ -195,7 +198,11 @@ class Inside:
     rank: Mapping[str, int]
 
     def blocks(self, ties: Sequence[Pair]) -> list[tuple[str, ...]]:
-        """The components in order; those tied together into loops stand together."""
+        """The components in order; those tied together into loops stand together.
+
+        Args:
+            ties: pairs of an input and an output that acts on it.
+        """
         knots, after = self._knots(ties)
         if len(knots) == len(self.names):
             return [(name,) for name in self._arranged(self.names, self.levels, self.signals)]

@@ -26,7 +26,11 @@ that do.
 
 
 def non_numeric_cells(connections: Sequence[Connection]) -> tuple[Cells, dict[Node, int]]:
-    """The array of objects, shape (2 * number of exact sources,), and where each source is in it."""
+    """The array of objects, shape (2 * number of exact sources,), and where each source is in it.
+
+    Args:
+        connections: of the run.
+    """
     sources = list(dict.fromkeys(c.source for c in connections if c.exact))
     return np.empty(2 * len(sources), dtype=object), {source: i for i, source in enumerate(sources)}
 
@@ -34,7 +38,11 @@ def non_numeric_cells(connections: Sequence[Connection]) -> tuple[Cells, dict[No
 def with_non_numeric(
     read_numbers: Callable[[], None], component: Component, places: Mapping[Node, int], cells: Cells
 ) -> Callable[[], None]:
-    """A call that reads a component's numbers, and its exact sources into the cells where it has any."""
+    """A call that reads a component's numbers, and its exact sources into the cells where it has any.
+
+    Args:
+        read_numbers: reads the numeric outputs. places: column of each signal in the row of values.
+    """
     wanted: dict[str, list[tuple[int, int]]] = {}
     for (owner, name), place in places.items():
         if owner == component.name:
@@ -57,7 +65,12 @@ def with_non_numeric(
 def non_numeric_inputs(
     component: Component, connections: Sequence[Connection], places: Mapping[Node, int], cells: Cells
 ) -> UntouchedInputs | None:
-    """The exact inputs of a component that have a source, or None where there are none."""
+    """The exact inputs of a component that have a source, or None where there are none.
+
+    Args:
+        connections: of the run. places: column of each signal in the row of values.
+        cells: of the non-numeric values.
+    """
     own = [c for c in connections if c.exact and c.target[0] == component.name]
     return UntouchedInputs(component, own, places, cells) if own else None
 

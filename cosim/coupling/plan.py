@@ -32,7 +32,11 @@ class Service(Protocol):
         """What moving components changes."""
 
     def restore_within(self, state: Any) -> None:
-        """Return to what was saved, as often as wanted: components are moved over the same way again."""
+        """Return to what was saved, as often as wanted: components are moved over the same way again.
+
+        Args:
+            state: as `save_within` or `save` gave it.
+        """
 
 
 FLOATING_TYPES = frozenset({"Real", "Float64", "Float32"})
@@ -102,6 +106,9 @@ class Plan:
 
     def column(self, name: str) -> int:
         """Position of ``component.signal`` in `values`.
+
+        Args:
+            name: of the signal.
 
         Raises:
             CouplingError: the signal is neither an output nor recorded.

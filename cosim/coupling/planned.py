@@ -24,7 +24,11 @@ class InputInterpolator(Protocol):
         """A step begins: what is held over it was true where its source stands now."""
 
     def prepare(self, until: float, *, ends_known: bool | np.ndarray = False) -> None:
-        """Gather the inputs for a step to `until` [s]."""
+        """Gather the inputs for a step to `until` [s].
+
+        Args:
+            ends_known: for which inputs the value at the end of the step is known.
+        """
 
     def send(self, t: float, until: float) -> None:
         """Tell of the line for a step from `t` to `until` [s]."""
@@ -36,7 +40,11 @@ class InputInterpolator(Protocol):
         """What a step changes."""
 
     def restore(self, state: Any) -> None:
-        """Return to what was saved."""
+        """Return to what was saved.
+
+        Args:
+            state: as `save_within` or `save` gave it.
+        """
 
 
 @dataclass

@@ -55,7 +55,11 @@ def topological(nodes: Sequence[Node], edges: Edges[Node]) -> list[Node] | None:
 
 
 def closed_path(start: Node, edges: Edges[Node]) -> list[Node]:
-    """A shortest path along the edges from a node that lies on a cycle back to itself, both ends included."""
+    """A shortest path along the edges from a node that lies on a cycle back to itself, both ends included.
+
+    Args:
+        start: a node of the loop.
+    """
     successors: dict[Node, list[Node]] = {}
     for a, b in edges:
         successors.setdefault(a, []).append(b)

@@ -30,7 +30,11 @@ class Described:
 
 
 class Names:
-    """Names of variables by type and value reference."""
+    """Names of variables by type and value reference.
+
+    Args:
+        description: model description of the FMU.
+    """
 
     def __init__(self, description: ModelDescription) -> None:
         self._names: dict[tuple[str, int], str] = {}
@@ -39,12 +43,20 @@ class Names:
                 self._names.setdefault((str(kind), variable.valueReference), variable.name)
 
     def of(self, kind: str, references: Sequence[int]) -> list[str]:
-        """Names of variables of a type; the number where there is no such variable."""
+        """Names of variables of a type; the number where there is no such variable.
+
+        Args:
+            kind: type of the variables in FMI's words. references: value references.
+        """
         return [self._names.get((kind, r)) or self._names.get(("", r)) or f"#{r}" for r in references]
 
 
 def describe_native(names: Names, function: str, argument_names: Sequence[str], arguments: Sequence[Any]) -> Described:
-    """A call of a native function: values that it gives are read from its arguments afterwards."""
+    """A call of a native function: values that it gives are read from its arguments afterwards.
+
+    Args:
+        names: of the variables of the FMU. argument_names: in FMI's words.
+    """
     verb, kind = function[4:7], function[7:]
     transfers = verb in ("Get", "Set") and len(arguments) >= 4 and _is_references(arguments[1])
     if transfers:
@@ -66,7 +78,11 @@ def describe_native(names: Names, function: str, argument_names: Sequence[str], 
 
 
 def describe_python(names: Names, function: str, arguments: Sequence[Any], named: Mapping[str, Any]) -> Described:
-    """A call of a slave in Python: values that it gives are what it returns."""
+    """A call of a slave in Python: values that it gives are what it returns.
+
+    Args:
+        names: of the variables of the FMU. function: name of the call. arguments: by position. named: by name.
+    """
     verb, kind = function[:3], function[3:]
     if verb in ("get", "set") and arguments and _is_whole(arguments[0]) and kind not in ("RealStatus", "BooleanStatus"):
         called = names.of(kind, list(arguments[0]))
@@ -78,7 +94,12 @@ def describe_python(names: Names, function: str, arguments: Sequence[Any], named
 
 
 def describe_prepared(names: Names, verb: str, kind: str, references: Sequence[int], values: Any) -> Described:
-    """A prepared call of a block, which reads into or writes from an array."""
+    """A prepared call of a block, which reads into or writes from an array.
+
+    Args:
+        names: of the variables of the FMU. verb: ``set`` or ``get``. kind: type of the variables in FMI's words.
+        references: value references. values: what was set or got.
+    """
     called = names.of(kind, references)
     if verb == "set":
         return Described(f"set{kind}({_pairs(called, values.tolist())})", lambda _result: ("ok", ""))

@@ -51,7 +51,11 @@ def log_switch(name: str, description: ModelDescription, choice: LogChoice | Non
 
 
 def switch_log(slave: Any, fmi_version: int, switch: LogSwitch) -> str | None:
-    """Call setDebugLogging; what the slave answers if it refuses, since a refused log is no reason not to run."""
+    """Call setDebugLogging; what the slave answers if it refuses, since a refused log is no reason not to run.
+
+    Args:
+        fmi_version: 1, 2 or 3. switch: of the slave's log.
+    """
     try:
         if fmi_version == 1:
             slave.setDebugLogging(switch.on)  # FMI 1.0 knows no categories

@@ -116,7 +116,11 @@ class MessageLog:
 
 
 def in_order(logs: Iterable[MessageLog]) -> list[Message]:
-    """All kept messages of several components by time; those before initialisation come first."""
+    """All kept messages of several components by time; those before initialisation come first.
+
+    Args:
+        logs: one a component.
+    """
     kept = [message for log in logs for message in log.kept()]
     return sorted(kept, key=lambda m: m.time if m.time == m.time else float("-inf"))
 
@@ -129,6 +133,9 @@ COLUMNS = tuple(f.name for f in fields(Message))
 def write_messages(path: str | Path, messages: Iterable[Message]) -> None:
     """Write messages as CSV, one row each; line breaks inside a text stay inside its quotes.
 
+    Args:
+        path: of the file.
+
     Raises:
         OSError: the file cannot be written.
     """
@@ -140,6 +147,9 @@ def write_messages(path: str | Path, messages: Iterable[Message]) -> None:
 
 def read_messages(path: str | Path) -> list[Message]:
     """The messages that `write_messages` wrote.
+
+    Args:
+        path: of the file.
 
     Raises:
         OSError: the file cannot be read. ValueError: it is not such a file.

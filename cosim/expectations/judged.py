@@ -46,13 +46,21 @@ class Judged:
 
     @classmethod
     def from_data(cls, data: Mapping[str, Any]) -> Judged:
-        """From the summary of a run, also from a file, where NaN has become None."""
+        """From the summary of a run, also from a file, where NaN has become None.
+
+        Args:
+            data: plain data of a judgement.
+        """
         values: dict[str, Any] = {field.name: data[field.name] for field in fields(cls) if field.name in data}
         return cls(**(values | {key: nan for key, value in values.items() if value is None}))
 
 
 def judged_text(judged: Sequence[Judged]) -> str:
-    """A list for people, what is not met first; empty without expectations; ends without a line break."""
+    """A list for people, what is not met first; empty without expectations; ends without a line break.
+
+    Args:
+        judged: of the run.
+    """
     if not judged:
         return ""
     unmet = [j for j in judged if not j.passed]
@@ -62,17 +70,29 @@ def judged_text(judged: Sequence[Judged]) -> str:
 
 
 def with_unit(value: float, unit: str, digits: int = 4) -> str:
-    """A measured number with its unit, without one for pure numbers."""
+    """A measured number with its unit, without one for pure numbers.
+
+    Args:
+        value: number in the unit. digits: significant ones.
+    """
     return _unit_behind(number(value, digits), unit)
 
 
 def given(value: float, unit: str = "") -> str:
-    """A number as it was given, a limit or an instant, with its unit."""
+    """A number as it was given, a limit or an instant, with its unit.
+
+    Args:
+        value: number in the unit.
+    """
     return _unit_behind(f"{value:.6g}", unit)
 
 
 def at(when: float, what: str = "at") -> str:
-    """When, in brackets; empty where no instant is known."""
+    """When, in brackets; empty where no instant is known.
+
+    Args:
+        when: instant [s]. what: that happened then.
+    """
     return f" ({what} {given(when)} s)" if isfinite(when) else ""
 
 

@@ -49,7 +49,12 @@ class NotRecordedError(Exception):
 
 
 def span(start: float | None, end: float | None) -> str:
-    """The window as given, to stand behind the name of an expectation; empty for the whole run."""
+    """The window as given, to stand behind the name of an expectation; empty for the whole run.
+
+    Args:
+        start: of the window [s]; None for the begin of the run.
+        end: of the window [s]; None for the end of the run.
+    """
     begin = f" from {given(start)}" if start is not None else ""
     until = f" to {given(end)}" if end is not None else ""
     return f",{begin}{until} s" if begin or until else ""

@@ -225,7 +225,11 @@ class Master:
 
 
 def close(plan: Plan) -> None:
-    """Terminate and free all components; never raises."""
+    """Terminate and free all components; never raises.
+
+    Args:
+        plan: of the run.
+    """
     for step in plan.steps:
         step.component.terminate()
         step.component.free()

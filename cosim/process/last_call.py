@@ -104,7 +104,11 @@ class LastCall:
 
     @contextmanager
     def making(self, component: str, what: str, time: float = nan) -> Iterator[None]:
-        """Within this context a call is the present one; arguments as for `begin`."""
+        """Within this context a call is the present one; arguments as for `begin`.
+
+        Args:
+            component: its name.
+        """
         self.begin(component, what, time)
         try:
             yield

@@ -107,14 +107,22 @@ def abilities(component: Component) -> tuple[str, ...]:
 
 
 def rate_text(every: int, substeps: int) -> str:
-    """How often a component is stepped, in words; empty for once in every communication step."""
+    """How often a component is stepped, in words; empty for once in every communication step.
+
+    Args:
+        substeps: for one step of the master.
+    """
     if every > 1:
         return f"every {every} steps"
     return f"{substeps} in each step" if substeps > 1 else ""
 
 
 def group_index(groups: Iterable[Sequence[str]]) -> Mapping[str, int]:
-    """Number of the group of each component."""
+    """Number of the group of each component.
+
+    Args:
+        groups: names of components that influence one another.
+    """
     return {name: i for i, group in enumerate(groups) for name in group}
 
 

@@ -100,7 +100,11 @@ def draw_structure(structure: Structure, path: str | Path) -> Path:
 
 @styled
 def structure_figure(structure: Structure) -> Figure:
-    """The picture as a figure of matplotlib, as large as it needs."""
+    """The picture as a figure of matplotlib, as large as it needs.
+
+    Args:
+        structure: of the run.
+    """
     edges = wires_of(structure)
     layout = lay_out(structure, {part.name: box_size(part, edges) for part in structure.parts}, edges)
     kinds = [kind for kind in MEANINGS if any(edge.kind == kind for edge in edges)]
@@ -126,7 +130,11 @@ def structure_figure(structure: Structure) -> Figure:
 
 
 def wires_of(structure: Structure) -> list[Edge]:
-    """The wires to draw: connections by kind, and telegrams from the watched plant to those who are told."""
+    """The wires to draw: connections by kind, and telegrams from the watched plant to those who are told.
+
+    Args:
+        structure: of the run.
+    """
     edges = [Edge(link.source, link.target, _kind(link)) for link in structure.links]
     edges += [Edge(clock.source, clock.target, "event") for clock in structure.clocks]
     balises = structure.balises
@@ -142,7 +150,11 @@ def _kind(link: Link) -> str:
 
 
 def box_size(part: Part, edges: Sequence[Edge]) -> Size:
-    """Ports that have wires, and the width that everything in the box needs."""
+    """Ports that have wires, and the width that everything in the box needs.
+
+    Args:
+        part: component of the structure. edges: wires at the component.
+    """
     inputs = tuple(dict.fromkeys(e.target[1] for e in edges if e.target[0] == part.name))
     outputs = tuple(dict.fromkeys(e.source[1] for e in edges if e.source[0] == part.name))
     left, right = (max((text_width(name, PORT) for name in names), default=0.0) for names in (inputs, outputs))
@@ -159,13 +171,21 @@ def box_size(part: Part, edges: Sequence[Edge]) -> Size:
 
 
 def kind_text(part: Part) -> str:
-    """What stands below the name of a component."""
+    """What stands below the name of a component.
+
+    Args:
+        part: component of the structure.
+    """
     what = f"{part.kind}, FMI {part.fmi_version}"
     return f"{what}, {part.rate}" if part.rate else what
 
 
 def foot_text(part: Part) -> str:
-    """How many ports are not drawn, since nothing is connected there."""
+    """How many ports are not drawn, since nothing is connected there.
+
+    Args:
+        part: component of the structure.
+    """
     inputs, outputs = (sum(not port.connected for port in ports) for ports in (part.inputs, part.outputs))
     counts = [_counted(inputs, "input"), _counted(outputs, "output")]
     texts = [text for text in counts if text]
@@ -309,7 +329,11 @@ def _draw_wire(ax: Axes, wire: Wire, drawn: set[object]) -> None:
 
 
 def forward_curves(points: Sequence[tuple[float, float]]) -> list[Curve]:
-    """Straight across columns, swinging between them; one piece each."""
+    """Straight across columns, swinging between them; one piece each.
+
+    Args:
+        points: corners of the wire in the figure.
+    """
     pieces = []
     for number, ((x, y), (u, v)) in enumerate(pairwise(points)):
         if (x, y) == (u, v):
@@ -323,7 +347,11 @@ def forward_curves(points: Sequence[tuple[float, float]]) -> list[Curve]:
 
 
 def back_curve(points: Sequence[tuple[float, float]]) -> Curve:
-    """Along right angles with rounded corners."""
+    """Along right angles with rounded corners.
+
+    Args:
+        points: corners of the wire in the figure.
+    """
     vertices, codes = [points[0]], [Curve.MOVETO]
     for before, corner, after in zip(points, points[1:], points[2:], strict=False):
         vertices += [_towards(corner, before), corner, _towards(corner, after)]

@@ -59,7 +59,11 @@ class Box:
         return self.y + self.size.height
 
     def row(self, ports: Sequence[str], name: str) -> float:
-        """Height of a port [inch]."""
+        """Height of a port [inch].
+
+        Args:
+            ports: on one side of the box. name: of the port.
+        """
         return self.y + TITLE + ROW * (ports.index(name) + 0.5)
 
 

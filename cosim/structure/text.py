@@ -129,7 +129,11 @@ def _connections(structure: Structure) -> list[str]:
 
 
 def when(link: Link) -> str:
-    """Which value the target uses."""
+    """Which value the target uses.
+
+    Args:
+        link: between two components.
+    """
     text = (
         "held, of the start of the step"
         if link.held

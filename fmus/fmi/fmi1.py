@@ -27,7 +27,11 @@ NOTHING = {"String": "", "Boolean": False}
 
 
 class FMI1Slave(Slave):
-    """A co-simulation slave of FMI 1.0. Arguments as for `Slave`."""
+    """A co-simulation slave of FMI 1.0. Arguments as for `Slave`.
+
+    Args:
+        name: of the component, for messages. description: model description of the FMU.
+    """
 
     fmi_version = 1
     event_needs_step = True

@@ -41,6 +41,8 @@ class FMU1SlaveRepaired(FMU1Slave):
 
         Args:
             arguments: as for the function of FMI.
+            c: the instance. vr: value references. nvr: their number. order: order of the derivative of each.
+            value: of the derivatives.
         """
         return self._call("fmi1SetRealInputDerivatives", *arguments)
 

@@ -67,6 +67,9 @@ class FMI3Slave(FMI3Instance, Slave):
     It handles its events itself, unless somebody coordinates it: then it stops at an event (`EventMet`), says so
     (`event_pending`), and is taken through Event Mode from outside. `next_event` is when something known in advance is
     due, `clocks` are its time-based input clocks.
+
+    Args:
+        name: of the component, for messages. description: model description of the FMU.
     """
 
     def __init__(self, name: str, slave: Any, description: ModelDescription) -> None:

@@ -66,5 +66,9 @@ def is_sealed(path: Path) -> bool:
 
 
 def seal_of(path: Path) -> Path:
-    """Where the digest of a file is noted."""
+    """Where the digest of a file is noted.
+
+    Args:
+        path: of the entry.
+    """
     return path.with_suffix(".sha256")

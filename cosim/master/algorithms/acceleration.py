@@ -49,7 +49,11 @@ class Acceleration(ABC):
         return None
 
     def restore(self, state: Any) -> None:
-        """Return to what was saved."""
+        """Return to what was saved.
+
+        Args:
+            state: as `save` gave it.
+        """
         return
 
 
@@ -176,7 +180,12 @@ class Newton(Acceleration):
 def make_acceleration(
     method: str, size: int, relaxation: float = 1.0, jacobian: Jacobian | None = None
 ) -> Acceleration:
-    """An acceleration by name: ``fixed-point``, ``aitken`` or ``newton``."""
+    """An acceleration by name: ``fixed-point``, ``aitken`` or ``newton``.
+
+    Args:
+        method: name of the acceleration. size: number of values that are iterated.
+        relaxation: share of the change that is taken [1]. jacobian: of one sweep; None where it is not known.
+    """
     if method == "newton":
         return Newton(size, jacobian)
     return Aitken(size, relaxation) if method == "aitken" else FixedPoint(size, relaxation)

@@ -59,7 +59,11 @@ class Algorithm(ABC):
         return None
 
     def restore(self, state: Any) -> None:
-        """Return to what was saved."""
+        """Return to what was saved.
+
+        Args:
+            state: as `save` gave it.
+        """
         return
 
     def summary(self) -> Mapping[str, Any]:

@@ -42,7 +42,11 @@ class History:
     last: Search | None = field(default=None)
 
     def add(self, search: Search) -> None:
-        """A step converged."""
+        """A step converged.
+
+        Args:
+            search: of the step that was solved.
+        """
         self.steps += 1
         self.sweeps += search.iterations
         self.largest = max(self.largest, search.residuals[-1])

@@ -50,7 +50,11 @@ def plan_links(plan: Plan) -> list[Link]:
 
 
 def fed_back(links: Sequence[Link], members: range | None = None) -> list[Link]:
-    """Links whose target is stepped no later than their source, among consecutive members of the plan or among all."""
+    """Links whose target is stepped no later than their source, among consecutive members of the plan or among all.
+
+    Args:
+        links: between the components of the loop.
+    """
     return [
         link
         for link in links
@@ -59,12 +63,20 @@ def fed_back(links: Sequence[Link], members: range | None = None) -> list[Link]:
 
 
 def interface(links: Sequence[Link], members: range | None = None) -> np.ndarray:
-    """Columns of the values that are fed back, each once, ascending, shape (n,)."""
+    """Columns of the values that are fed back, each once, ascending, shape (n,).
+
+    Args:
+        links: between the components of the loop. members: of the loop, by number; None for all.
+    """
     return np.unique(np.array([link.column for link in fed_back(links, members)], dtype=np.intp))
 
 
 def downstream(plan: Plan, names: Collection[str]) -> np.ndarray:
-    """Mask of the values of components that take something of the named ones, directly or round about, shape (n,)."""
+    """Mask of the values of components that take something of the named ones, directly or round about, shape (n,).
+
+    Args:
+        plan: of the run. names: of components.
+    """
     links = plan_links(plan)
     reached: set[int] = set()
     new = {place for place, step in enumerate(plan.steps) if step.component.name in names}
@@ -78,5 +90,9 @@ def downstream(plan: Plan, names: Collection[str]) -> np.ndarray:
 
 
 def span(steps: Sequence[PlannedComponent]) -> slice:
-    """Where the values of consecutive components of the plan lie."""
+    """Where the values of consecutive components of the plan lie.
+
+    Args:
+        steps: planned components in order.
+    """
     return slice(steps[0].columns.start, steps[-1].columns.stop)

@@ -105,7 +105,11 @@ class EventCoordinator:
         return [participant.save() for participant in self._participants], self.iteration.count, self.iteration.longest
 
     def restore(self, state: Any) -> None:
-        """Return to what was saved."""
+        """Return to what was saved.
+
+        Args:
+            state: as `save` gave it.
+        """
         participants, self.iteration.count, self.iteration.longest = state
         for participant, saved in zip(self._participants, participants, strict=True):
             participant.restore(saved)

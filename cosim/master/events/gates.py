@@ -94,7 +94,11 @@ class Gate:
         return self._sent, dict(self._sent_clocked)
 
     def restore(self, state: object) -> None:
-        """Return to what was saved."""
+        """Return to what was saved.
+
+        Args:
+            state: as `save` gave it.
+        """
         assert isinstance(state, tuple)
         self._sent, self._sent_clocked = state[0], dict(state[1])
 

@@ -107,7 +107,11 @@ class Participant:
         return self.gate.save(), set(self._waiting)
 
     def restore(self, state: Any) -> None:
-        """Return to what was saved."""
+        """Return to what was saved.
+
+        Args:
+            state: as `save` gave it.
+        """
         gate, waiting = state
         self.gate.restore(gate)
         self._waiting = set(waiting)

@@ -42,7 +42,11 @@ class InputInterpolator(ABC):
         self.line.begin()
 
     def prepare(self, until: float, *, ends_known: bool | np.ndarray = False) -> None:
-        """Gather the inputs and bend the line for a step to `until` [s]; arguments as for `Line.bend`."""
+        """Gather the inputs and bend the line for a step to `until` [s]; arguments as for `Line.bend`.
+
+        Args:
+            ends_known: for which inputs the value at the end of the step is known.
+        """
         self._inputs.gather()
         self.line.bend(self._inputs.buffer, until, held=self._inputs.held, ends_known=ends_known)
 
@@ -55,12 +59,20 @@ class InputInterpolator(ABC):
         return self.line.save()
 
     def restore(self, state: Any) -> None:
-        """Return to what was saved."""
+        """Return to what was saved.
+
+        Args:
+            state: as `save` gave it.
+        """
         self.line.restore(state)
 
 
 class MeanInterpolator(InputInterpolator):
-    """Holds the mean of the line: exact for its integral, so of second order where states integrate the input."""
+    """Holds the mean of the line: exact for its integral, so of second order where states integrate the input.
+
+    Args:
+        inputs: the connected inputs of the component. component: that receives them.
+    """
 
     name = "mean"
 
@@ -76,7 +88,11 @@ class MeanInterpolator(InputInterpolator):
 
 
 class DerivativeInterpolator(InputInterpolator):
-    """Sets value and first derivative at the start of the step (setRealInputDerivatives)."""
+    """Sets value and first derivative at the start of the step (setRealInputDerivatives).
+
+    Args:
+        line: of the inputs. inputs: the connected inputs of the component. component: that receives them.
+    """
 
     name = "derivatives"
 
@@ -94,7 +110,11 @@ class DerivativeInterpolator(InputInterpolator):
 
 
 class IntermediateInterpolator(InputInterpolator):
-    """Sets the value of the line whenever the slave asks for it within its step (intermediateUpdate)."""
+    """Sets the value of the line whenever the slave asks for it within its step (intermediateUpdate).
+
+    Args:
+        inputs: the connected inputs of the component. component: that receives them.
+    """
 
     name = "intermediate"
 
@@ -115,7 +135,11 @@ class IntermediateInterpolator(InputInterpolator):
 
 
 def make_interpolator(line: Line, inputs: Inputs, component: Component) -> InputInterpolator:
-    """The best interpolator that a component takes."""
+    """The best interpolator that a component takes.
+
+    Args:
+        line: of the inputs. inputs: the connected inputs of the component.
+    """
     if component.fmi_version in (1, 2) and component.capabilities.canInterpolateInputs and component.kind == "FMU":
         return DerivativeInterpolator(line, inputs, component)
     if isinstance(component, FMI3Component):

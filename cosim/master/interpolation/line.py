@@ -94,7 +94,11 @@ class Line:
         return values
 
     def forget(self, which: np.ndarray) -> None:
-        """Inputs whose source jumped, as a mask of shape (m,): no line leads over it."""
+        """Inputs whose source jumped, as a mask of shape (m,): no line leads over it.
+
+        Args:
+            which: inputs to forget, shape (m,) of booleans.
+        """
         self._history.earlier_at[which] = self._history.later_at[which] = np.nan
 
     def save(self) -> History:
@@ -102,7 +106,11 @@ class Line:
         return self._history.copy()
 
     def restore(self, state: History) -> None:
-        """Return to what was saved."""
+        """Return to what was saved.
+
+        Args:
+            state: as `save` gave it.
+        """
         self._history = state.copy()
 
     def _times(self) -> np.ndarray:
