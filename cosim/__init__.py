@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from cosim.results.load import load_result
     from cosim.results.result import Result
     from cosim.results.save import save_result
-    from cosim.scenario.includes import shipped_scenarios
     from cosim.scenario.outcome import Outcome
+    from cosim.scenario.shipped import shipped_scenarios
     from cosim.simulation.scenario import Scenario
     from cosim.studies.sampling import log_uniform, uniform, whole
     from cosim.studies.sweep import Sweep
@@ -65,7 +65,7 @@ _HOMES = {
     "log_uniform": "cosim.studies.sampling",
     "rerun": "cosim.provenance",
     "save_result": "cosim.results.save",
-    "shipped_scenarios": "cosim.scenario.includes",
+    "shipped_scenarios": "cosim.scenario.shipped",
     "uniform": "cosim.studies.sampling",
     "whole": "cosim.studies.sampling",
 }

@@ -7,8 +7,8 @@ import json
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from cosim.scenario.includes import find_file, read_tables, shipped_scenarios
 from cosim.scenario.package_names import is_package
+from cosim.scenario.shipped import shipped_scenarios, shipped_tables
 from fmu_observer import OBSERVERS
 from fmus.catalogue import Entry, by_room
 from fmus.catalogue import catalogue as models
@@ -108,7 +108,7 @@ def catalogue(known: Mapping[str, Entry]) -> dict[str, dict[str, dict[str, Any]]
     """
     scenarios = {}
     for name in shipped_scenarios():
-        data = read_tables(find_file(name)).data
+        data = shipped_tables(name)
         scenarios[name] = {"description": data.get("title", ""), "source": data.get("source", "")}
     return {"scenarios": scenarios, "models": _systems(PLANTS, known), "observers": _systems(OBSERVERS, known)}
 

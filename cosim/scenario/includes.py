@@ -8,7 +8,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +16,9 @@ from cosim.scenario.merging import Line, join, merge, removed_components
 from cosim.scenario.override import flat, override
 from cosim.scenario.package_names import is_package
 from cosim.scenario.paths import absolute, map_paths
+from cosim.scenario.shipped import shipped_file, shipped_scenarios
 from cosim.scenario.toml_file import read_toml
 
-SHIPPED = files("cosim") / "scenarios"
 CONNECTIONS = "connections"
 Key = tuple[str, ...]
 NUMBERED = re.compile(r"connections, line (\d+)")
@@ -70,11 +69,6 @@ def _place(text: str, places: Mapping[Key, str]) -> str | None:
     return next((places[keys[:n]] for n in range(len(keys), 0, -1) if keys[:n] in places), None)
 
 
-def shipped_scenarios() -> list[str]:
-    """Names of the scenarios that come with the package."""
-    return sorted(Path(str(entry)).stem for entry in SHIPPED.iterdir() if str(entry).endswith(".toml"))
-
-
 def find_file(name: str | Path, folder: Path = Path()) -> Path:
     """The file of a scenario: a path, or the name of a shipped one.
 
@@ -86,7 +80,7 @@ def find_file(name: str | Path, folder: Path = Path()) -> Path:
     """
     path = folder / name
     if path.suffix != ".toml" and not path.is_file():
-        shipped = Path(str(SHIPPED)) / f"{name}.toml"
+        shipped = shipped_file(str(name))
         if not shipped.is_file():
             raise ScenarioError(f"No scenario {str(name)!r}; {nearest(str(name), shipped_scenarios())}")
         path = shipped

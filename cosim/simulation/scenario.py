@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from cosim.errors import CosimError, ScenarioError
-from cosim.scenario.includes import Key, attribute, find_file, read_tables, shipped_scenarios
+from cosim.scenario.includes import Key, attribute, find_file, read_tables
 from cosim.scenario.manifest import read_manifest
 from cosim.scenario.model_name import ModelName, is_model, settings_of
 from cosim.scenario.origin import Origin
@@ -22,6 +22,7 @@ from cosim.scenario.paths import COMPONENT_PATHS, MODEL_KEYS, absolute, move_fil
 from cosim.scenario.run import run_scenario
 from cosim.scenario.save import plain, save_scenario, scenario_text
 from cosim.scenario.schema import ScenarioTable, parse_scenario
+from cosim.scenario.shipped import shipped_scenarios
 from cosim.scenario.single import single_tables
 from cosim.scenario.streaming import finish_stream, streaming_to
 from cosim.scenario.structure import scenario_structure

@@ -81,6 +81,10 @@ def test_the_peak_is_held_and_forgotten() -> None:
     assert bench.outputs()["peak_tension"] == 200e3
     bench.runtime.advance(5.04)
     assert bench.outputs()["peak_tension"] == 50e3
+    for force, until in ((100e3, 5.1), (60e3, 9.9)):  # a later one is held as long
+        bench.set("u", {"coupler_force": force})
+        bench.runtime.advance(until)
+    assert bench.outputs()["peak_tension"] == 100e3
 
 
 @settings(max_examples=25, deadline=None)

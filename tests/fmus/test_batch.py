@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import SHIPPED, SMALL, make_system
 
 from fmus import Batch, BatchError
 from plant_models.hybrid import HybridSystem, scalar_names
@@ -78,18 +77,17 @@ def _starts(signals: Any) -> list[float]:
     return [float(v) for s in signals for v in (s.start if isinstance(s.start, tuple) else [s.start] * s.width)]
 
 
-@pytest.mark.parametrize("name", [*SMALL, *SHIPPED])
-def test_a_member_is_the_fmu_alone(name: str, component: Callable[..., Any]) -> None:
-    case = Case(make_system(name))
+def test_a_member_is_the_fmu_alone(system_name: str, system: HybridSystem, component: Callable[..., Any]) -> None:
+    case = Case(system)
     together = case.run([0, 1, 2])
     for member in range(MEMBERS):
-        alone = np.array(list(case.alone(component(name, 3), member)))
+        alone = np.array(list(case.alone(component(system_name, 3), member)))
         np.testing.assert_array_equal(together[member], alone)
     np.testing.assert_array_equal(case.run([2, 0]), together[[2, 0]])  # whoever is beside it, in whatever order
 
 
-def test_events_change_the_members_that_have_them() -> None:
-    case = Case(make_system("tracker"))
+def test_events_change_the_members_that_have_them(reference: Callable[[str], Any]) -> None:
+    case = Case(reference("tracker").system)
     batch = case.batch([0, 1, 2])
     batch.start()
     batch.run(case.instants[1:])
@@ -97,8 +95,8 @@ def test_events_change_the_members_that_have_them() -> None:
     assert len(set(batch.get("position"))) == MEMBERS
 
 
-def test_a_member_that_fails_leaves_the_rest_as_it_was() -> None:
-    case = Case(make_system("tracker"))
+def test_a_member_that_fails_leaves_the_rest_as_it_was(reference: Callable[[str], Any]) -> None:
+    case = Case(reference("tracker").system)
     whole = case.run([0, 1, 2])
     batch = case.batch([0, 1, 2])
     batch.set("gain", [0.7, np.nan, 0.7 * (1.0 + 2e-7)])  # is used at the events, so member 1 begins
@@ -113,8 +111,8 @@ def test_a_member_that_fails_leaves_the_rest_as_it_was() -> None:
     assert np.isnan(batch.get("position")[1])
 
 
-def test_parameters_that_are_refused_are_told_and_the_others_start() -> None:
-    batch = Batch(make_system("booster"), 3)
+def test_parameters_that_are_refused_are_told_and_the_others_start(reference: Callable[[str], Any]) -> None:
+    batch = Batch(reference("booster").system, 3)
     batch.set("stretch", [[0.25, 0.6], [0.6, 0.25], [0.1, 0.2]])
     batch.start()
     assert list(batch.failures) == [1]
@@ -126,9 +124,9 @@ def test_parameters_that_are_refused_are_told_and_the_others_start() -> None:
     assert not batch.failures
 
 
-def test_many_events_in_one_step_and_events_announced_on_the_way() -> None:
+def test_many_events_in_one_step_and_events_announced_on_the_way(reference: Callable[[str], Any]) -> None:
     stamps = np.linspace(0.001, 0.999, 200)
-    at_once, by_and_by = Batch(make_system("tracker"), 2), Batch(make_system("tracker"), 2)
+    at_once, by_and_by = Batch(reference("tracker").system, 2), Batch(reference("tracker").system, 2)
     at_once.notify("balise", 1, stamps, position=stamps)
     at_once.start()
     by_and_by.start()
@@ -160,9 +158,11 @@ def test_many_events_in_one_step_and_events_announced_on_the_way() -> None:
         (lambda b: (b.start(1.0), b.notify("balise", 0, 0.5)), "the members stand at 1 s"),
         (lambda b: (b.notify("balise", 0, 0.5), b.start(1.0)), "the members stand at 1 s"),
         (lambda b: (b.start(), b.run([0.1], inputs={"odometer": [1.0]})), r"expected shape \(2,\) or \(2, 2\)"),
-        (lambda _: Batch(make_system("tracker"), 0), "at least one member"),
+        (lambda b: Batch(b.system, 0), "at least one member"),
     ],
 )
-def test_what_cannot_be_is_refused_in_words(ask: Callable[[Batch], Any], said: str) -> None:
+def test_what_cannot_be_is_refused_in_words(
+    ask: Callable[[Batch], Any], said: str, reference: Callable[[str], Any]
+) -> None:
     with pytest.raises(BatchError, match=said):
-        ask(Batch(make_system("tracker"), 2))
+        ask(Batch(reference("tracker").system, 2))

@@ -114,7 +114,7 @@ def test_module_has_docstrings_and_annotations(name: str) -> None:
 def test_the_walk_finds_what_is_known() -> None:
     found = {n for n, _ in public(import_module("cosim.simulation.scenario"))}
     assert {"Scenario", "Scenario.load", "Scenario.name", "Scenario.run"} <= found
-    assert "shipped_scenarios" in {n for n, _ in public(import_module("cosim.scenario.includes"))}
+    assert "shipped_scenarios" in {n for n, _ in public(import_module("cosim.scenario.shipped"))}
 
 
 def test_the_law_can_fail() -> None:
