@@ -118,8 +118,9 @@ def _details(signal: SignalComparison, verbose: bool, shared: Mapping[str, int])
     if len(findings) > limit:
         lines.append(f"  {signal.name}: ... and {len(findings) - limit} more findings")
     if any(finding.kind == "value" for finding in findings):
-        lines.append("    worst points:      time [s]       reference          result           error")
-        lines += [f"                  {t:14.9g} {a:15.8g} {b:15.8g} {e:+15.4g}" for t, a, b, e in signal.worst]
+        points = [[f"{t:.9g}", f"{a:.8g}", f"{b:.8g}", f"{e:+.4g}"] for t, a, b, e in signal.worst]
+        table = text_table([["time [s]", "reference", "result", "error"], *points], left=())
+        lines += ["    worst points:", *(f"      {line}" for line in table)]
     return lines
 
 

@@ -24,7 +24,11 @@ class Linkage:
 
 
 def read_linkage(path: Path) -> Linkage | None:
-    """The linkage of a 64-bit little-endian ELF file; None of any other file, and of a damaged one."""
+    """The linkage of a 64-bit little-endian ELF file; None of any other file, and of a damaged one.
+
+    Args:
+        path: of the file.
+    """
     try:
         content = path.read_bytes()
         return _linkage(content) if content[:6] == MAGIC + b"\x02\x01" else None

@@ -64,9 +64,11 @@ def load_shipped(path: Path, name: str) -> Component:
     _kept.move_to_end((path, name))
     known.used += 1
     pattern = known.component
+    slave = copy(pattern.slave)
+    slave._functions = dict(slave._functions)  # who answers in place of a function does so for one instance
     component: Component = COMPONENTS[fmi_version(pattern.description)](
         name,
-        copy(pattern.slave),
+        slave,
         pattern.description,
         source=pattern.source,
         kind=pattern.kind,

@@ -90,6 +90,10 @@ def load_fmu(path: str | Path, name: str, tolerance: float | str | None = None) 
 def read_description(path: str | Path, name: str = "FMU") -> ModelDescription:
     """The model description of an FMU file.
 
+    Args:
+        path: the ``.fmu`` file.
+        name: of the component, for messages.
+
     Raises:
         FmuLoadError: the file is missing, broken or dangerous, or of an FMI version that is not supported.
     """
@@ -98,6 +102,9 @@ def read_description(path: str | Path, name: str = "FMU") -> ModelDescription:
 
 def runs_here(path: Path) -> str:
     """``yes``, or why the co-simulation of an FMU file cannot run on this machine.
+
+    Args:
+        path: the ``.fmu`` file.
 
     Raises:
         FmuLoadError: as for `read_description`.
@@ -111,6 +118,10 @@ def runs_here(path: Path) -> str:
 
 def describe_fmu(path: str | Path, name: str) -> Component:
     """A component of an FMU file that can be asked for its variables and not stepped: nothing is unpacked or loaded.
+
+    Args:
+        path: the ``.fmu`` file.
+        name: of the component.
 
     Raises:
         FmuLoadError: as for `read_description`.
@@ -129,7 +140,13 @@ def _open(path: Path, name: str) -> Archive:
 
 
 def load_block(system: HybridSystem, name: str, fmi_version: Literal[2, 3] = 3, **arguments: Any) -> Component:
-    """A Python block as a component; further arguments as for `fmu_observer.block.FMIInterface`."""
+    """A Python block as a component; further arguments as for `fmu_observer.block.FMIInterface`.
+
+    Args:
+        system: what the block runs.
+        name: of the component.
+        fmi_version: of its call surface.
+    """
     from fmu_observer.block import make_block  # noqa: PLC0415 - CasADi only for those who run in Python
 
     block = make_block(system, fmi_version, instance_name=name, **arguments)

@@ -29,6 +29,9 @@ from plant_models.user_file import UserFileError, make
 OWN_PACKAGES = ("plant_models", "fmu_observer")
 LATE_PARAMETERS = frozenset({"late_policy", "replay_horizon"})
 
+LASTING = 100
+"""Systems that are kept; a sweep over options makes ever new ones."""
+
 _systems: dict[tuple[type[HybridSystem], str], HybridSystem] = {}
 
 
@@ -200,7 +203,12 @@ def _lasting(table: ComponentTable, system: HybridSystem) -> HybridSystem:
     run. An instance that a script gave may differ from others of its class, and lasts itself.
     """
     given = (table.model or table.observer or ModelName()).given is system
-    return system if given else _systems.setdefault((type(system), repr(sorted(table.options.items()))), system)
+    if given:
+        return system
+    lasting = _systems.setdefault((type(system), repr(sorted(table.options.items()))), system)
+    while len(_systems) > LASTING:
+        _systems.pop(next(iter(_systems)))
+    return lasting
 
 
 def protocol_parameters(table: ComponentTable, component: Component, where: str) -> dict[str, float | str]:

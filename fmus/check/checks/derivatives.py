@@ -15,7 +15,11 @@ from fmus.check.findings import Outcome, skipped
 
 
 def slave_derivatives(context: Context) -> Outcome:
-    """Directional derivatives of the outputs along the inputs between two steps."""
+    """Directional derivatives of the outputs along the inputs between two steps.
+
+    Args:
+        context: what is checked.
+    """
     if not context.description.coSimulation.providesDirectionalDerivative:
         return skipped("does not declare providesDirectionalDerivative")
     bench = context.bench

@@ -24,7 +24,11 @@ NONE = "declares neither a triggered input clock nor a counted event"
 
 
 def events(context: Context) -> Outcome:
-    """Every declared event happens once, and the run goes on."""
+    """Every declared event happens once, and the run goes on.
+
+    Args:
+        context: what is checked.
+    """
     slave = context.bench.component
     names = list(slave.events)
     if not names:

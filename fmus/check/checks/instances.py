@@ -25,7 +25,11 @@ LEAK = 16 * 1024
 
 
 def repeated_instantiation(context: Context) -> Outcome:
-    """Many instances, one after the other: memory and open files must not grow."""
+    """Many instances, one after the other: memory and open files must not grow.
+
+    Args:
+        context: what is checked.
+    """
     if context.only_once:
         return skipped("declares canBeInstantiatedOnlyOncePerProcess")
     slave = context.slave()
@@ -49,7 +53,11 @@ def repeated_instantiation(context: Context) -> Outcome:
 
 
 def two_instances(context: Context) -> Outcome:
-    """Two instances at once, under different inputs, step by step in turn: the first one must not notice."""
+    """Two instances at once, under different inputs, step by step in turn: the first one must not notice.
+
+    Args:
+        context: what is checked.
+    """
     if context.only_once:
         return skipped("declares canBeInstantiatedOnlyOncePerProcess")
     bench, other = context.bench, context.fresh_bench()

@@ -27,13 +27,21 @@ NAMES_SHOWN = 4
 
 
 def loading(context: Context) -> Outcome:
-    """The library can be loaded here, with all that it needs."""
+    """The library can be loaded here, with all that it needs.
+
+    Args:
+        context: what is checked.
+    """
     context.slave().free()
     return passed("the library and what it needs are loaded")
 
 
 def exported_symbols(instance: FmuInstance) -> Outcome:
-    """The functions of the standard that the library exports, against what the FMU declares."""
+    """The functions of the standard that the library exports, against what the FMU declares.
+
+    Args:
+        instance: loaded, not instantiated; it is freed here.
+    """
     try:
         missing = {name.lower(): name for name in instance.missing_functions}
     finally:
@@ -51,12 +59,20 @@ def exported_symbols(instance: FmuInstance) -> Outcome:
 
 
 def slave_symbols(context: Context) -> Outcome:
-    """`exported_symbols` for co-simulation."""
+    """`exported_symbols` for co-simulation.
+
+    Args:
+        context: what is checked.
+    """
     return exported_symbols(context.slave())
 
 
 def initialise(context: Context) -> Outcome:
-    """Instantiate, initialise, terminate, free."""
+    """Instantiate, initialise, terminate, free.
+
+    Args:
+        context: what is checked.
+    """
     bench = context.quiet_bench()
     try:
         bench.begin(excited=False)
@@ -66,7 +82,11 @@ def initialise(context: Context) -> Outcome:
 
 
 def values_at_start(context: Context) -> Outcome:
-    """NaN or infinite outputs and local variables after initialisation, under the start values of the inputs."""
+    """NaN or infinite outputs and local variables after initialisation, under the start values of the inputs.
+
+    Args:
+        context: what is checked.
+    """
     bench = context.quiet_bench()
     try:
         bench.begin(excited=False)
@@ -84,7 +104,11 @@ def values_at_start(context: Context) -> Outcome:
 
 
 def getters(context: Context) -> Outcome:
-    """Every variable can be read by the getter of its type."""
+    """Every variable can be read by the getter of its type.
+
+    Args:
+        context: what is checked.
+    """
     bench = context.quiet_bench()
     try:
         bench.begin(excited=False)
@@ -112,6 +136,9 @@ def _unreadable(slave: Instance, variable: ModelVariable) -> str:
 def stepping(context: Context) -> Outcome:
     """A run of steps without an error, all outputs finite; where the inputs that excite it break it, under its start
     values.
+
+    Args:
+        context: what is checked.
     """
     bench = context.bench
     try:
@@ -158,7 +185,11 @@ def _run(context: Context) -> Outcome:
 
 
 def repeated(context: Context) -> Outcome:
-    """Two instances, one after the other, under the same inputs: identical outputs."""
+    """Two instances, one after the other, under the same inputs: identical outputs.
+
+    Args:
+        context: what is checked.
+    """
     bench = context.bench
     pattern = (bench.h,) * (2 * WARM_UP_STEPS)
     bench.begin()
@@ -169,12 +200,20 @@ def repeated(context: Context) -> Outcome:
 
 
 def reset(context: Context) -> Outcome:
-    """After a reset the same steps give the identical outputs."""
+    """After a reset the same steps give the identical outputs.
+
+    Args:
+        context: what is checked.
+    """
     return by(repeatable(context.bench), "the same run after a reset is identical")
 
 
 def logging(context: Context) -> Outcome:
-    """The outputs must not depend on whether the FMU is asked to log."""
+    """The outputs must not depend on whether the FMU is asked to log.
+
+    Args:
+        context: what is checked.
+    """
     if context.only_once:
         return skipped("declares canBeInstantiatedOnlyOncePerProcess")
     bench = context.bench
@@ -191,7 +230,11 @@ def logging(context: Context) -> Outcome:
 
 
 def time_per_step(context: Context) -> Outcome:
-    """Median time of one step."""
+    """Median time of one step.
+
+    Args:
+        context: what is checked.
+    """
     bench = context.bench
     bench.begin()
     seconds: list[float] = []
@@ -216,7 +259,11 @@ def time_per_step(context: Context) -> Outcome:
 
 
 def by(problem: str, good: str) -> Outcome:
-    """Failed with the problem where there is one, else passed."""
+    """Failed with the problem where there is one, else passed.
+
+    Args:
+        good: what to say where there is no problem.
+    """
     return failed(problem) if problem else passed(good)
 
 
@@ -226,13 +273,21 @@ def not_finite(names: Sequence[str], values: np.ndarray) -> list[str]:
 
 
 def listed(names: Sequence[str]) -> str:
-    """The first few, and how many more."""
+    """The first few, and how many more.
+
+    Args:
+        names: what is listed.
+    """
     more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
     return ", ".join(names[:NAMES_SHOWN]) + more
 
 
 def real_names(instance: Instance, causality: str) -> list[str]:
-    """Names of its scalar continuous real variables of one causality."""
+    """Names of its scalar continuous real variables of one causality.
+
+    Args:
+        instance: whose variables they are.
+    """
     found = (instance.variables[n] for n in instance.names(causality))
     return [v.name for v in found if v.type in FLOATING_TYPES and v.variability in (None, "continuous")]
 

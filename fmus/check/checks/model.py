@@ -25,7 +25,11 @@ kink.
 
 @contextmanager
 def started(context: Context) -> Iterator[FmuModel]:
-    """An instance in continuous-time mode, freed at the end."""
+    """An instance in continuous-time mode, freed at the end.
+
+    Args:
+        context: what is checked.
+    """
     model = context.model()
     try:
         model.instantiate()
@@ -43,24 +47,40 @@ def _start(model: FmuModel, context: Context) -> None:
 
 
 def loading(context: Context) -> Outcome:
-    """The library can be loaded here, with all that it needs."""
+    """The library can be loaded here, with all that it needs.
+
+    Args:
+        context: what is checked.
+    """
     context.model().free()
     return passed("the library and what it needs are loaded")
 
 
 def model_symbols(context: Context) -> Outcome:
-    """`exported_symbols` for model exchange."""
+    """`exported_symbols` for model exchange.
+
+    Args:
+        context: what is checked.
+    """
     return exported_symbols(context.model())
 
 
 def initialise(context: Context) -> Outcome:
-    """Instantiate, initialise, reach continuous-time mode, terminate, free."""
+    """Instantiate, initialise, reach continuous-time mode, terminate, free.
+
+    Args:
+        context: what is checked.
+    """
     with started(context) as model:
         return passed(f"reaches continuous-time mode; {model.state_count} continuous states")
 
 
 def finite_derivatives(context: Context) -> Outcome:
-    """Outputs, derivatives and event indicators are finite at the start."""
+    """Outputs, derivatives and event indicators are finite at the start.
+
+    Args:
+        context: what is checked.
+    """
     with started(context) as model:
         outputs = model.names("output")
         values = {
@@ -77,7 +97,11 @@ def finite_derivatives(context: Context) -> Outcome:
 
 
 def states(context: Context) -> Outcome:
-    """States that are set are read back, and derivatives depend on nothing else."""
+    """States that are set are read back, and derivatives depend on nothing else.
+
+    Args:
+        context: what is checked.
+    """
     with started(context) as model:
         if not model.state_count:
             return skipped(NO_STATES)
@@ -95,7 +119,11 @@ def states(context: Context) -> Outcome:
 
 
 def round_trip(context: Context) -> Outcome:
-    """Save, integrate on, restore, integrate again: bit-identical."""
+    """Save, integrate on, restore, integrate again: bit-identical.
+
+    Args:
+        context: what is checked.
+    """
     with started(context) as model:
         if not model.can_save:
             return skipped("does not declare canGetAndSetFMUstate")
@@ -115,7 +143,11 @@ def round_trip(context: Context) -> Outcome:
 
 
 def reset(context: Context) -> Outcome:
-    """After a reset the same path has the identical derivatives."""
+    """After a reset the same path has the identical derivatives.
+
+    Args:
+        context: what is checked.
+    """
     with started(context) as model:
         if not model.state_count:
             return skipped(NO_STATES)
@@ -131,7 +163,11 @@ def reset(context: Context) -> Outcome:
 
 
 def directional(context: Context) -> Outcome:
-    """Directional derivatives of derivatives and outputs along states and inputs."""
+    """Directional derivatives of derivatives and outputs along states and inputs.
+
+    Args:
+        context: what is checked.
+    """
     if not context.description.modelExchange.providesDirectionalDerivative:
         return skipped("does not declare providesDirectionalDerivative")
     with started(context) as model:

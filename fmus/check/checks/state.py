@@ -16,7 +16,11 @@ NOT_SERIALISED = "does not declare canSerializeFMUstate"
 
 
 def round_trip(context: Context) -> Outcome:
-    """Save, go on, go elsewhere, restore, redo: identical, or as near as its solver is, or something else."""
+    """Save, go on, go elsewhere, restore, redo: identical, or as near as its solver is, or something else.
+
+    Args:
+        context: what is checked.
+    """
     if not context.bench.component.can_save:
         return skipped(NO_STATE)
     found = restoring(context.bench)
@@ -28,12 +32,20 @@ def round_trip(context: Context) -> Outcome:
 
 
 def serialised(context: Context) -> Outcome:
-    """The same through bytes, in the same instance."""
+    """The same through bytes, in the same instance.
+
+    Args:
+        context: what is checked.
+    """
     return _through_bytes(context, elsewhere=False)
 
 
 def other_instance(context: Context) -> Outcome:
-    """The same in a second instance, through bytes: a state itself belongs to the instance it was taken from."""
+    """The same in a second instance, through bytes: a state itself belongs to the instance it was taken from.
+
+    Args:
+        context: what is checked.
+    """
     if context.only_once:
         return skipped("declares canBeInstantiatedOnlyOncePerProcess")
     return _through_bytes(context, elsewhere=True)

@@ -13,7 +13,11 @@ SHOWN = 3
 
 
 def validation(archive: Archive) -> Outcome:
-    """The XML schema and fmpy's validation of the model description."""
+    """The XML schema and fmpy's validation of the model description.
+
+    Args:
+        archive: the FMU file.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # libraries below warn about what the FMU did
         try:
@@ -29,7 +33,11 @@ def validation(archive: Archive) -> Outcome:
 
 
 def platforms(archive: Archive) -> Outcome:
-    """The platforms there are libraries for."""
+    """The platforms there are libraries for.
+
+    Args:
+        archive: the FMU file.
+    """
     others = [p for p in archive.platforms if p not in archive.here]
     foreign = f"; not checked here: {', '.join(others)}" if others else ""
     return passed(f"a library for this platform ({', '.join(archive.here)}){foreign}")

@@ -22,7 +22,11 @@ NO_VARIABLE_STEP = "does not declare canHandleVariableCommunicationStepSize"
 
 
 def divided(context: Context) -> Outcome:
-    """A step of h against 2 x h/2 and an uneven split, for several h."""
+    """A step of h against 2 x h/2 and an uneven split, for several h.
+
+    Args:
+        context: what is checked.
+    """
     bench = context.bench
     if not bench.component.can_vary_step:
         return skipped(NO_VARIABLE_STEP)
@@ -34,37 +38,61 @@ def divided(context: Context) -> Outcome:
 
 
 def short(context: Context) -> Outcome:
-    """The first change after a short step."""
+    """The first change after a short step.
+
+    Args:
+        context: what is checked.
+    """
     if not context.bench.component.can_vary_step:
         return skipped(NO_VARIABLE_STEP)
     return by(short_step(context.bench), "tiny steps after a short one move the outputs by their share")
 
 
 def tiny(context: Context) -> Outcome:
-    """A step of a billionth of a second."""
+    """A step of a billionth of a second.
+
+    Args:
+        context: what is checked.
+    """
     if not context.bench.component.can_vary_step:
         return skipped(NO_VARIABLE_STEP)
     return _odd(context, lambda _h: TINY, _done_or_refused)
 
 
 def huge(context: Context) -> Outcome:
-    """A step a thousand times the communication step, or to the end of the experiment."""
+    """A step a thousand times the communication step, or to the end of the experiment.
+
+    Args:
+        context: what is checked.
+    """
     left = context.bench.end - context.start_time - BEFORE * context.step
     return _odd(context, lambda h: max(min(HUGE * h, left), h), _done_or_refused)
 
 
 def zero(context: Context) -> Outcome:
-    """A step of length zero, which the standard does not know."""
+    """A step of length zero, which the standard does not know.
+
+    Args:
+        context: what is checked.
+    """
     return _odd(context, lambda _h: 0.0, _still_or_refused)
 
 
 def negative(context: Context) -> Outcome:
-    """A step back in time, which the standard forbids."""
+    """A step back in time, which the standard forbids.
+
+    Args:
+        context: what is checked.
+    """
     return _odd(context, lambda h: -h, _must_refuse)
 
 
 def wrong_time(context: Context) -> Outcome:
-    """A step from a currentCommunicationPoint where the FMU does not stand."""
+    """A step from a currentCommunicationPoint where the FMU does not stand.
+
+    Args:
+        context: what is checked.
+    """
     return _odd(context, lambda h: h, _done_or_refused, lambda h: 0.5 * h)
 
 
