@@ -10,7 +10,7 @@ from cosim.errors import OutputError, nearest
 from cosim.results.data import ResultData
 from cosim.results.events_file import EVENTS_SUFFIX, read_events
 from cosim.results.folder import SUMMARY, read_results
-from cosim.results.formats.catalogue import table_files
+from cosim.results.formats.catalogue import fastest_first, table_files
 from cosim.results.formats.columns import check_time
 from cosim.results.formats.foreign_csv import read_foreign_csv
 from cosim.results.formats.foreign_mat import read_foreign_mat
@@ -105,7 +105,8 @@ def _reader(path: Path) -> Callable[[Path], ResultData]:
         raise OutputError(
             f"{path} is an archive (FMU, spreadsheet, zip or gzip), not a table. Unpack it, or export it as CSV."
         )
-    return read_foreign_csv
+    named = [item for item in fastest_first() if item.name != "csv" and path.name.lower().endswith(item.endings)]
+    return named[0].read if named else read_foreign_csv
 
 
 def _with_events(result: ResultData, source: Path) -> ResultData:

@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from small_scenarios import small
@@ -13,6 +14,7 @@ from small_scenarios import small
 from cosim import Scenario
 from cosim.cli import main
 from cosim.cli.scenarios import parse_setting
+from cosim.errors import RunError
 from cosim.results.folder import read_results
 
 
@@ -70,6 +72,20 @@ def test_seeds_add_quartiles_to_print_and_report(
     assert study["seeds"] == [0, 1, 2]
     assert row["lower quartile"] <= row["median"] <= row["upper quartile"]
     assert row["published"] == 0.5
+    assert [line.split(",")[0] for line in (tmp_path / "seeds.csv").read_text().splitlines()] == ["seed", "0", "1", "2"]
+
+    run, failing = Scenario.run, {"balises.seed": 1}
+
+    def lost(self: Scenario, *args: Any, overrides: Any = None, **others: Any) -> Any:
+        if overrides == failing:
+            raise RunError("the train is lost", "train", 0.1)
+        return run(self, *args, overrides=overrides, **others)
+
+    monkeypatch.setattr(Scenario, "run", lost)
+    assert main(["run", "any", "--out", str(tmp_path), "--seeds", "3", "--no-report"]) == 1
+    printed = capsys.readouterr().out
+    assert "over 2 balise seeds" in printed
+    assert "seed 1 failed: the train is lost" in printed
 
 
 def test_list_names_everything_with_its_source(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,154 @@
+"""Registries find members without importing them; what installed packages and users bring is checked in words."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from importlib.metadata import EntryPoint
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+import fmu_observer
+import plant_models
+from cosim.expectations.registry import EXPECTATIONS
+from cosim.report.figures.panels import FIGURES
+from cosim.results.formats.catalogue import FORMATS
+from cosim.scenario.tables import ComponentTable
+from cosim.simulation.scenario import Scenario
+from fmus.check.catalogue import CHECKS
+from plant_models import registry
+from plant_models.registry import Registry, RegistryError
+
+ALL: tuple[Registry[Any], ...] = (
+    plant_models.PLANTS,
+    fmu_observer.OBSERVERS,
+    FORMATS,
+    FIGURES,
+    EXPECTATIONS,
+    CHECKS,
+)
+
+
+@pytest.mark.parametrize("members", ALL, ids=lambda r: r.kind)
+def test_every_name_has_one_member_which_loads(members: Registry[Any]) -> None:
+    assert len(members) > 5
+    assert [name for name, found in members.members.items() if len(found) > 1] == []
+    assert all(registry.descends_from(members[name], members.base) for name in members)
+
+
+def test_listing_imports_no_member() -> None:
+    code = (
+        "import sys, plant_models, fmu_observer; "
+        "assert 'takagi_sugeno_cdo' in fmu_observer.OBSERVERS and len(plant_models.PLANTS) > 10; "
+        "assert not {'casadi', 'numpy', 'scipy'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def announced(name: str, value: str, package: str) -> Any:
+    entry = SimpleNamespace(name=name, value=value, dist=SimpleNamespace(name=package, version="1.0"))
+    return EntryPoint, entry
+
+
+@pytest.fixture
+def plugins(monkeypatch: pytest.MonkeyPatch) -> Registry[Any]:
+    """A registry with what three installed packages announce."""
+    entries = [
+        announced("thau", "other.module:Thau", "clashing")[1],
+        announced("mine", "fmu_observer.observers.continuous.thau:Thau", "honest")[1],
+        announced("gone", "no_such_module:Gone", "broken")[1],
+        announced("wrong", "math:pi", "odd")[1],
+    ]
+    monkeypatch.setattr(registry, "entry_points", lambda group: entries if group == "some.group" else [])
+    members: Registry[Any] = Registry("observer", fmu_observer.ROOMS, "some.group", plant_models.SYSTEM)
+    monkeypatch.setattr(fmu_observer, "OBSERVERS", members)
+    return members
+
+
+def test_an_installed_package_brings_a_member(plugins: Registry[Any]) -> None:
+    assert plugins["mine"].name == "thau"
+    assert plugins.origin("mine").startswith("the package honest 1.0")
+    assert plugins.room("mine") == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("thau", "taken twice, by this package .* and the package clashing 1.0 .*; uninstall one of them"),
+        ("gone", "'gone' of the package broken 1.0 .* cannot be loaded: ModuleNotFoundError"),
+        ("wrong", "'wrong' of the package odd 1.0 .* is no subclass of plant_models.hybrid.system.HybridSystem"),
+    ],
+)
+def test_what_a_package_announces_wrongly_is_told(plugins: Registry[Any], name: str, words: str) -> None:
+    with pytest.raises(RegistryError, match=words):
+        plugins[name]
+    with pytest.raises(Exception, match=f"components.observer: .*{words}"):
+        Scenario(stop=1.0, step=0.1).add("observer", observer=name).run()
+
+
+def test_a_program_adds_and_takes_away() -> None:
+    members: Registry[Any] = Registry("plant", plant_models.ROOMS, "none", plant_models.SYSTEM)
+    members["own"] = plant_models.Train
+    assert list(members)[-1] == "own"
+    assert members.origin("own") == "registered by this program"
+    del members["own"]
+    with pytest.raises(KeyError):
+        members["own"]
+
+
+FAULTS = {
+    "missing.py:Bias": (None, "missing.py does not exist; write path/to/file.py:Class"),
+    "empty.py:Bias": ("x = 1\n", "no .*HybridSystem.* named 'Bias'; it has: none"),
+    "raises.py:Bias": ("\n\n1 / 0\n", r"cannot be run: ZeroDivisionError: division by zero \(.*raises.py:3\)"),
+    "syntax.py:Bias": ("class Bias(:\n", r"cannot be run: SyntaxError: .*syntax.py:1\)"),
+    "leaves.py:Bias": ("import sys\nsys.exit('bye')\n", r"cannot be run: SystemExit: bye \(.*leaves.py:2\)"),
+    "number.py:Bias": ("Bias = 3.0\n", r"named 'Bias' \(Bias is of type float\)"),
+    "bare.py:Bias": ("class Bias:\n    pass\n", r"named 'Bias' \(Bias is a class\)"),
+    "two.py": ("class A:\n    step = print\nclass B:\n    step = print\n", "it has: A, B. Write .*two.py:Class"),
+    "no.such.module:Bias": (None, "no module named 'no'"),
+    "math:Bias": (None, "module 'math' has no attribute 'Bias'"),
+    "needs.py:Bias": (
+        "class Bias:\n    def __init__(self, gain):\n        pass\n    def step(self, t, inputs, dt):\n        pass\n",
+        "missing a required argument: 'gain'",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_users_file_that_is_wrong_is_told_without_traceback(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from cosim.cli import main
+
+    content, words = FAULTS[name]
+    if content is not None:
+        (tmp_path / name.partition(":")[0]).write_text(content)
+    (tmp_path / "s.toml").write_text(f'stop = 1.0\nstep = 0.1\ncomponents.observer.observer = "{name}"\n')
+    assert main(["run", str(tmp_path / "s.toml"), "--no-report", "--out", str(tmp_path / "out")]) != 0
+    said = capsys.readouterr().err
+    assert "Traceback" not in said
+    assert "observer" in said
+    with pytest.raises(AssertionError, match=words):
+        raise AssertionError(said.replace("\n", " "))
+
+
+def test_a_changed_file_is_read_again(tmp_path: Path) -> None:
+    file = tmp_path / "own.py"
+    text = "class Own:\n    outputs = ['x']\n    x = {}\n    def step(self, t, inputs, dt):\n        pass\n"
+    values = []
+    for number in (1.0, 2.0):
+        file.write_text(text.format(number))
+        outcome = Scenario(folder=tmp_path, stop=1.0, step=0.5).add("own", model="own.py").run()
+        values.append(outcome["own.x"][-1])
+    assert values == [1.0, 2.0]
+
+
+def test_names_remember_classes_through_copies_and_processes() -> None:
+    import pickle
+
+    table = ComponentTable.model_validate({"model": plant_models.Train})
+    assert pickle.loads(pickle.dumps(table)).model.given is plant_models.Train
+    assert str(table.model) == "plant_models.railway.vehicle.train:Train"
