@@ -308,7 +308,11 @@ def _signal(name: str, given: Any, causality: Causality) -> Signal:
 
 
 def is_python_model(found: Any) -> bool:
-    """Whether an object, or the instances of a class, can be stepped by ``step(t, inputs, dt)``."""
+    """Whether an object, or the instances of a class, can be stepped by ``step(t, inputs, dt)``.
+
+    Args:
+        found: the object or the class.
+    """
     return callable(getattr(found, "step", None))
 
 

@@ -70,7 +70,7 @@ def spied(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[Wrap], None]]:
 
 def _in_front(slave: Any, function: str, wrap: Wrap, counts: dict[str, int], kept: list[Any]) -> Any:
     known = slave._functions[function]
-    real = getattr(known, "behind", known)  # instances of one library may share their table
+    real = getattr(known, "behind", known)  # a library that is kept for the next run keeps its table
     steps = since = 0
 
     def call(*arguments: Any) -> int:
