@@ -29,6 +29,8 @@ from fmpy.model_description import (
 )
 
 from fmu_observer.event_protocol import JOURNAL_CAPACITY, LATE_POLICIES, OUTCOME_TEXTS, OUTCOME_VARIABLES, EventProtocol
+from plant_models.disk_cache.entries import remembered
+from plant_models.disk_cache.identity import identity
 from plant_models.hybrid import HybridSystem, Signal, TracedSystem, TriggeredEvent, width
 from plant_models.hybrid.units import BASE_SYMBOLS, conversion, parse_unit
 
@@ -433,6 +435,12 @@ def _unknown(variable: ModelVariable, known: list[ModelVariable]) -> Unknown:
 
 def _dependencies(system: HybridSystem, function: str, count: int) -> list[list[int]]:
     """Value references that each row of `output` or `derivative` depends on; all of them where it cannot be traced."""
+    key = identity(system, function, count, code=("fmu_observer",))
+    found: list[list[int]] = remembered("dependencies", key, lambda: _traced_dependencies(system, function, count))
+    return found
+
+
+def _traced_dependencies(system: HybridSystem, function: str, count: int) -> list[list[int]]:
     table = VariableTable.of(system)
     inputs, parameters = width(exposed_inputs(system)), width(system.parameter_signals)
     groups = (
@@ -452,6 +460,11 @@ def _dependencies(system: HybridSystem, function: str, count: int) -> list[list[
     return rows
 
 
+def _equations_digest(system: HybridSystem) -> str:
+    digest: str = remembered("equations", identity(system), lambda: TracedSystem(system).digest())
+    return digest
+
+
 def _token(system: HybridSystem, description: ModelDescription) -> str:
     """A name for the content: other equations, variables, starts, options or events, another token."""
     content: list[object] = [
@@ -466,6 +479,6 @@ def _token(system: HybridSystem, description: ModelDescription) -> str:
     content += [[e.name, e.period, e.offset, len(e.noises)] for e in system.periodic_events]
     structure = (*description.outputs, *description.derivatives)
     content += [[u.variable.name, *(known.name for known in u.dependencies)] for u in structure]
-    content += [TracedSystem(system).digest() if system.traceable else type(system).__qualname__]
+    content += [_equations_digest(system) if system.traceable else type(system).__qualname__]
     digest = hashlib.sha256(json.dumps(content).encode()).hexdigest()
     return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"

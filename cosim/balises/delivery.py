@@ -1,7 +1,7 @@
 """Delivery: a receiver is stepped through the telegrams that reach it within a communication step.
 
-What a receiver allows decides how: it is stopped at the instant where it can be, told beforehand with a stamp where it
-cannot, and told too late where the run asks for that.
+What a receiver allows decides how. It is stopped at the instant where it can be. It is notified beforehand with a stamp
+where it cannot, and too late where the run asks for that.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Delivery:
     """What one telegram did to one receiver.
 
     Args:
-        time: when the receiver was told [s].
+        time: when the receiver was notified [s].
         before, after: its outputs before and after, shape (q,); None where it could not be stopped there.
         outcome: what became of it: ``accepted``, ``replayed``, ``late``, ``rejected``, ``doubted`` (and used),
             ``ignored``, or ``told`` where that is not known.
@@ -86,11 +86,7 @@ class Receiver:
         return dict(self.seen), list(self.backlog), self._announced
 
     def restore(self, state: Any) -> None:
-        """Return to what was saved.
-
-        Args:
-            state: as `save` gave it.
-        """
+        """Return to what was saved."""
         seen, backlog, self._announced = state
         self.seen, self.backlog = dict(seen), list(backlog)
 
@@ -100,7 +96,7 @@ class Receiver:
         Args:
             t: where the component stands [s]. until: end of the step [s]. telegrams: delivered within the step.
 
-        Afterwards `arrived` holds the outputs on reaching `until`, before anything was told there, shape (q,).
+        Afterwards `arrived` holds the outputs on reaching `until`, before it was notified there, shape (q,).
 
         Returns:
             What became of each telegram, in the same order.
@@ -108,18 +104,14 @@ class Receiver:
         return (self.compiled or self.step_in_python)(t, until, telegrams)
 
     def step_in_python(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
-        """As `step`, without the compiled stepper's way through a single telegram.
-
-        Args:
-            t: start of the step [s]. until: end of the step [s].
-        """
+        """As `step`, without the compiled stepper's way through a single telegram."""
         self.planned.send(t, until)
         self._open.clear()
         waiting, self.backlog = self.backlog, []
         if self.timing == "stale":
-            return self._step_then_tell(t, until, telegrams)
+            return self._step_then_notify(t, until, telegrams)
         if not self.planned.component.can_vary_step:
-            return self._tell_then_step(t, until, [*waiting, *telegrams])[len(waiting) :]
+            return self._notify_then_step(t, until, [*waiting, *telegrams])[len(waiting) :]
         return self._step_through(t, until, [*waiting, *telegrams])[len(waiting) :]
 
     def hold_back(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
@@ -133,7 +125,7 @@ class Receiver:
         self.arrived = self.planned.outputs.copy()
         return [Delivery(snapped(telegram.delivered_at, t, until)) for telegram in telegrams]
 
-    def told(self, delivery: Delivery, arrived: np.ndarray) -> None:
+    def stepped_elsewhere(self, delivery: Delivery, arrived: np.ndarray) -> None:
         """Somebody else has stepped it through one telegram, all as `step` would have done.
 
         Args:
@@ -149,57 +141,57 @@ class Receiver:
         deliveries: list[Delivery] = []
         arrived = None
         for telegram in telegrams:
-            told_at = snapped(telegram.delivered_at, now, until)
-            deliveries.append(self._deliver(now, told_at, telegram))
-            if told_at == until and arrived is None:
+            notified_at = snapped(telegram.delivered_at, now, until)
+            deliveries.append(self._deliver(now, notified_at, telegram))
+            if notified_at == until and arrived is None:
                 arrived = deliveries[-1].before
-            now = told_at
+            now = notified_at
         if until > now:
             self._advance(now, until)
             self.planned.read()
         self.arrived = self.planned.outputs.copy() if arrived is None else arrived
         return deliveries
 
-    def _deliver(self, now: float, told_at: float, telegram: BaliseRecord) -> Delivery:
+    def _deliver(self, now: float, notified_at: float, telegram: BaliseRecord) -> Delivery:
         component = self.planned.component
         if not component.event_needs_step:
-            if told_at > now:
-                self._advance(now, told_at)
-            return self._tell_here(told_at, telegram, telegram.stamp)
-        on_time = abs(telegram.stamp - told_at) <= TIME_TOLERANCE
-        if on_time and told_at > now and not self._announced:
-            return self._announce(now, told_at, telegram)
-        if told_at > now:
-            self._advance(now, told_at)
+            if notified_at > now:
+                self._advance(now, notified_at)
+            return self._notify_here(notified_at, telegram, telegram.stamp)
+        on_time = abs(telegram.stamp - notified_at) <= TIME_TOLERANCE
+        if on_time and notified_at > now and not self._announced:
+            return self._announce(now, notified_at, telegram)
+        if notified_at > now:
+            self._advance(now, notified_at)
         if self._announced:
             self.backlog.append(telegram)
-            return Delivery(told_at)
+            return Delivery(notified_at)
         self._announced = True
-        return self._tell_here(told_at, telegram, telegram.stamp)
+        return self._notify_here(notified_at, telegram, telegram.stamp)
 
-    def _tell_here(self, t: float, telegram: BaliseRecord, stamp: float) -> Delivery:
+    def _notify_here(self, t: float, telegram: BaliseRecord, stamp: float) -> Delivery:
         before = self._outputs()
         delivery = Delivery(t, before, before)
-        self._tell(t, telegram, stamp, delivery)
+        self._notify(t, telegram, stamp, delivery)
         delivery.after = self._outputs()
         return delivery
 
-    def _announce(self, now: float, told_at: float, telegram: BaliseRecord) -> Delivery:
-        """FMI 2: the event happens at the end of the step from `now` to `told_at` [s]."""
-        delivery = Delivery(told_at, self._look_ahead(now, told_at))
-        self._tell(now, telegram, min(telegram.stamp, told_at), delivery)
-        self._advance(now, told_at)
+    def _announce(self, now: float, notified_at: float, telegram: BaliseRecord) -> Delivery:
+        """FMI 2: the event happens at the end of the step from `now` to `notified_at` [s]."""
+        delivery = Delivery(notified_at, self._look_ahead(now, notified_at))
+        self._notify(now, telegram, min(telegram.stamp, notified_at), delivery)
+        self._advance(now, notified_at)
         delivery.after = self._outputs()
         return delivery
 
-    def _look_ahead(self, now: float, told_at: float) -> np.ndarray | None:
-        """Outputs at `told_at` [s] without the event, where going there and back is known to leave no trace."""
+    def _look_ahead(self, now: float, notified_at: float) -> np.ndarray | None:
+        """Outputs at `notified_at` [s] without the event, where going there and back is known to leave no trace."""
         component = self.planned.component
         if not component.restores_exactly:
             return None
         state = component.save()
         try:
-            self.planned.advance(now, told_at)
+            self.planned.advance(now, notified_at)
             outputs = self._outputs()
             component.restore(state)
             return outputs
@@ -208,22 +200,22 @@ class Receiver:
 
     # -- a receiver that takes whole steps only ---------------------------------------------------------------------
 
-    def _tell_then_step(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
+    def _notify_then_step(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
         """Stamps inside the coming step tell the receiver what it may not be stopped for; without stamps it is told
         late.
         """
         if self._port.stamp is None:
-            return self._step_then_tell(t, until, telegrams)
+            return self._step_then_notify(t, until, telegrams)
         at_once = 1 if self.planned.component.event_needs_step else len(telegrams)
         self.backlog.extend(telegrams[at_once:])
         deliveries = [Delivery(snapped(telegram.delivered_at, t, until)) for telegram in telegrams]
         for telegram, delivery in zip(telegrams[:at_once], deliveries, strict=False):
-            self._tell(t, telegram, telegram.stamp, delivery)
+            self._notify(t, telegram, telegram.stamp, delivery)
         self._advance(t, until)
         self.arrived = self._outputs()
         return deliveries
 
-    def _step_then_tell(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
+    def _step_then_notify(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
         """Whatever was passed in the step is told at its end, as if it had happened there."""
         self._advance(t, until)
         self.arrived = self._outputs()
@@ -231,7 +223,7 @@ class Receiver:
         known = telegrams[-1:] if self.planned.component.event_needs_step else telegrams
         overwritten = len(telegrams) - len(known)
         return [Delivery(until, self.arrived, self.arrived, "rejected") for _ in range(overwritten)] + [
-            self._tell_here(until, telegram, until) for telegram in known
+            self._notify_here(until, telegram, until) for telegram in known
         ]
 
     # -- internals --------------------------------------------------------------------------------------------------
@@ -249,7 +241,7 @@ class Receiver:
         self.planned.read()
         return self.planned.outputs.copy()
 
-    def _tell(self, t: float, telegram: BaliseRecord, stamp: float, delivery: Delivery) -> None:
+    def _notify(self, t: float, telegram: BaliseRecord, stamp: float, delivery: Delivery) -> None:
         self.planned.component.notify(self._port, t, stamp, payload(telegram))
         self._open.append(delivery)
         self._note_outcome()
@@ -269,12 +261,8 @@ class Receiver:
 
 
 def snapped(delivered_at: float, now: float, until: float) -> float:
-    """Time of delivery within ``[now, until]`` [s], on an end where it is too near for a step in between.
-
-    Args:
-        delivered_at: instant of delivery [s].
-    """
-    told_at = min(max(delivered_at, now), until)
-    if until - told_at <= TIME_TOLERANCE:
+    """Time of delivery within ``[now, until]`` [s], on an end where it is too near for a step in between."""
+    notified_at = min(max(delivered_at, now), until)
+    if until - notified_at <= TIME_TOLERANCE:
         return until
-    return now if told_at - now <= TIME_TOLERANCE else told_at
+    return now if notified_at - now <= TIME_TOLERANCE else notified_at

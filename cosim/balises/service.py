@@ -1,4 +1,4 @@
-"""The balise service of a run: the plant is watched, telegrams are sent, receivers are told, events become rows.
+"""The balise service of a run: the plant is watched, telegrams are sent, receivers are notified, events become rows.
 
 It takes over how the watched plant and the receivers are moved; whoever steps the components need not know of it. The
 trajectory of the plant does not depend on whether anybody looks for balises (methods `rollback` and `interpolate`).
@@ -35,7 +35,7 @@ class BaliseService:
     Args:
         localiser: steps the watched plant and finds crossings.
         channel: latency, misses, false telegrams.
-        receivers: components that are told.
+        receivers: components that receive telegrams.
         odometer: column of the odometer reading that a telegram carries, or None.
         position: column of the plant's position.
 
@@ -55,7 +55,7 @@ class BaliseService:
         self._snapshots: list[Snapshot] = []
         self._ahead: list[Snapshot] = []
         self._telegrams: list[BaliseRecord] | None = None
-        self._told: dict[str, list[Delivery]] = {}
+        self._deliveries: dict[str, list[Delivery]] = {}
 
     @property
     def plant(self) -> str:
@@ -64,9 +64,6 @@ class BaliseService:
 
     def attach(self, plan: Plan) -> None:
         """Add the stages that find crossings on the way of the plant, and deliver telegrams on that of the receivers.
-
-        Args:
-            plan: of the run.
 
         Raises:
             CouplingError: a receiver is stepped before the watched plant, or is the plant itself.
@@ -89,7 +86,7 @@ class BaliseService:
         self._t, self._until = t, until
         self._snapshots = [found for found in self._ahead if found[0].stamp <= until + TIME_TOLERANCE]
         self._ahead = self._ahead[len(self._snapshots) :]
-        self._telegrams, self._told = None, {}
+        self._telegrams, self._deliveries = None, {}
 
     def _move_plant(self, t: float, until: float) -> None:
         self._snapshots += self.localiser.step(t, until)
@@ -98,45 +95,41 @@ class BaliseService:
         """Step a receiver through what is delivered to it; what it needs of plant and odometer has been stepped
         before.
         """
-        if self._telegrams is None and self._something_to_tell:
+        if self._telegrams is None and self._something_to_deliver:
             self._telegrams = self._collect(t, until)
         if self._telegrams or receiver.busy:
-            self._told[receiver.planned.component.name] = receiver.step(t, until, self._telegrams or [])
+            self._deliveries[receiver.planned.component.name] = receiver.step(t, until, self._telegrams or [])
         else:
             drive(t, until)
 
     def holder(self, name: str) -> Mover:
-        """What to call instead of moving a receiver that waits: telegrams of that time are kept for its next step.
-
-        Args:
-            name: of a component.
-        """
+        """What to call instead of moving a receiver that waits: telegrams of that time are kept for its next step."""
 
         def hold(t: float, until: float) -> None:
-            if self._telegrams is None and self._something_to_tell:
+            if self._telegrams is None and self._something_to_deliver:
                 self._telegrams = self._collect(t, until)
-            self._told[name] = self._by_name[name].hold_back(t, until, self._telegrams or [])
+            self._deliveries[name] = self._by_name[name].hold_back(t, until, self._telegrams or [])
 
         return hold
 
     @property
-    def _something_to_tell(self) -> bool:
+    def _something_to_deliver(self) -> bool:
         return bool(self._snapshots or self.mailbox.waiting or self._false)
 
     def rows(self) -> Sequence[Row]:
         """The step is done: log the telegrams delivered in it.
 
         Returns:
-            Rows before and after each, at the times at which receivers were told.
+            Rows before and after each, at the times at which receivers were notified.
         """
-        if self._telegrams is None and self._something_to_tell:
+        if self._telegrams is None and self._something_to_deliver:
             self._telegrams = self._collect(self._t, self._until)
         return self._event_rows(self._t, self._until, self._telegrams) if self._telegrams else NO_ROWS
 
     @property
     def touched(self) -> Collection[str]:
         """Names of the receivers on which a telegram may have acted in the last step."""
-        return self._told.keys()
+        return self._deliveries.keys()
 
     @property
     def idle_until(self) -> float:
@@ -160,7 +153,7 @@ class BaliseService:
         """Whether no crossing is known that lies ahead of the receivers."""
         return not self._ahead
 
-    def told_elsewhere(self, crossing: Crossing, odometer_reading: float, outcomes: Mapping[str, str]) -> None:
+    def delivered_elsewhere(self, crossing: Crossing, odometer_reading: float, outcomes: Mapping[str, str]) -> None:
         """Somebody else did a step in which a balise was passed and all receivers were told at once.
 
         Args:
@@ -200,17 +193,13 @@ class BaliseService:
     def save_within(self) -> Any:
         """The same in the middle of a step, with what the step has brought so far."""
         telegrams = None if self._telegrams is None else list(self._telegrams)
-        return self.save(), list(self._snapshots), telegrams, dict(self._told)
+        return self.save(), list(self._snapshots), telegrams, dict(self._deliveries)
 
     def restore_within(self, state: Any) -> None:
-        """Return to the middle of the step.
-
-        Args:
-            state: as `save` gave it.
-        """
-        saved, snapshots, telegrams, told = state
+        """Return to the middle of the step."""
+        saved, snapshots, telegrams, deliveries = state
         self.restore(saved)
-        self._snapshots, self._told = list(snapshots), dict(told)
+        self._snapshots, self._deliveries = list(snapshots), dict(deliveries)
         self._telegrams = None if telegrams is None else list(telegrams)
 
     # -- telegrams --------------------------------------------------------------------------------------------------
@@ -242,7 +231,7 @@ class BaliseService:
         at_stamp = {crossing.stamp: outputs for crossing, outputs in self._snapshots}
         rows: list[Row] = []
         for i, telegram in enumerate(telegrams):
-            deliveries = {name: several[i] for name, several in self._told.items()}
+            deliveries = {name: several[i] for name, several in self._deliveries.items()}
             nominal = min(max(telegram.delivered_at, t), until)
             times = sorted({d.time for d in deliveries.values()}) or [nominal]
             late = times[0] - telegram.delivered_at > TIME_TOLERANCE

@@ -18,7 +18,7 @@ from typing import Any
 from cosim.balises.rollback import RollbackLocaliser
 from cosim.compiled.crossings import Crossings
 from cosim.compiled.library import load_stepper
-from cosim.compiled.notifying import Telling, can_be_told
+from cosim.compiled.notifying import CompiledDelivery, can_be_notified
 from cosim.compiled.program import NotCompilable, Program, Stop
 from cosim.compiled.recorded_returns import Answer, answered
 from cosim.components.component import Component
@@ -96,7 +96,7 @@ class CompiledStepper:
         wanted = min(free, self._longest)
         rows = recorder.block(wanted + ROWS_OF_EVENTS if own_crossings else wanted)
         head = self._program.head
-        self._program.tell_rows(recorder.count_address, recorder.block_start)
+        self._program.count_rows_at(recorder.count_address, recorder.block_start)
         self._first = k
         run = self._library.stepper_run
         done = int(run(self._program.address, k, k + wanted, rows.ctypes.data, len(rows)))
@@ -210,14 +210,16 @@ class CompiledStepper:
             return None
         if not isinstance(service.localiser, RollbackLocaliser):
             raise NotCompilable(f"balises are localised by '{service.localiser.method}'")
-        names, tellings = [step.component.name for step in self.plan.steps], {}
+        names, deliveries = [step.component.name for step in self.plan.steps], {}
         for receiver in service.receivers:
             place = names.index(receiver.planned.component.name)
-            if can_be_told(receiver, place, self._program):
+            if can_be_notified(receiver, place, self._program):
                 idle = lambda: not self._answering  # noqa: E731 - one word of state
-                tellings[place] = Telling(receiver, place, self._program, self._library, self._answered, idle)
-                receiver.compiled = tellings[place].step
-        return Crossings(self._program, self.plan, service, tellings)
+                deliveries[place] = CompiledDelivery(
+                    receiver, place, self._program, self._library, self._answered, idle
+                )
+                receiver.compiled = deliveries[place].step
+        return Crossings(self._program, self.plan, service, deliveries)
 
     def _answered_move(self, move: Mover, t: float, until: float) -> None:
         """Move a component in Python that the stepper has moved in part."""

@@ -16,7 +16,7 @@ from cosim.balises.localiser import ACCELERATION_LIMIT
 from cosim.balises.rollback import RollbackLocaliser
 from cosim.balises.service import BaliseService
 from cosim.compiled.journal import Call
-from cosim.compiled.notifying import Telling
+from cosim.compiled.notifying import CompiledDelivery
 from cosim.compiled.program import CPassed, Program
 from cosim.coupling.plan import Plan
 from fmus.fmi.standard import NEVER
@@ -33,14 +33,16 @@ class Crossings:
 
     Args:
         program: the plan in C. plan: prepared. service: of the run.
-        tellings: of the receivers that can be told by the stepper, by place in the plan.
+        deliveries: of the receivers that can be told by the stepper, by place in the plan.
     """
 
-    def __init__(self, program: Program, plan: Plan, service: BaliseService, tellings: dict[int, Telling]) -> None:
+    def __init__(
+        self, program: Program, plan: Plan, service: BaliseService, deliveries: dict[int, CompiledDelivery]
+    ) -> None:
         assert isinstance(service.localiser, RollbackLocaliser)
         self.service, self.localiser, self._head = service, service.localiser, program.head.balises
-        self._tellings, self._slaves, self._told = tellings, len(plan.steps), 0
-        self._places = {telling.component.name: place for place, telling in sorted(tellings.items())}
+        self._deliveries, self._slaves, self._delivered = deliveries, len(plan.steps), 0
+        self._places = {delivery.component.name: place for place, delivery in sorted(deliveries.items())}
         self._possible = set(self._places) == {r.planned.component.name for r in service.receivers} and self._is_plain()
         self._prepare(program, plan)
 
@@ -51,11 +53,11 @@ class Crossings:
             wanted: whether crossings may be handled in C.
         """
         idle = wanted and self._possible and self.service.has_nothing_found
-        idle = idle and all(telling.component.next_event == NEVER for telling in self._tellings.values())
+        idle = idle and all(delivery.component.next_event == NEVER for delivery in self._deliveries.values())
         self._head.on = idle
         if idle:
-            for telling in self._tellings.values():
-                telling.begin()
+            for delivery in self._deliveries.values():
+                delivery.begin()
         return idle
 
     def collect(self) -> None:
@@ -67,27 +69,31 @@ class Crossings:
         balises = layout.balises if isinstance(layout, TrackLayout) else None
         for i, passed in enumerate(self._passed[:count]):
             first = i * self._slaves
-            told = {name: WORDS[self._outcomes[first + place]] for name, place in self._places.items()}
+            outcomes = {name: WORDS[self._outcomes[first + place]] for name, place in self._places.items()}
             balise = None if balises is None else balises[passed.which]
             crossing = self.localiser.crossing(passed.stamp, balise, passed.position, passed.speed)
-            self.service.told_elsewhere(crossing, passed.reading, told)
-        for telling in self._tellings.values():
-            telling.end()
+            self.service.delivered_elsewhere(crossing, passed.reading, outcomes)
+        for delivery in self._deliveries.values():
+            delivery.end()
         self._head.passed_count = 0
-        self._told += count
+        self._delivered += count
 
     def close(self) -> None:
         """Add events and states to the counters of the components; they are timed with the steps that they belong
         to.
         """
-        for telling in self._tellings.values():
+        for delivery in self._deliveries.values():
             # a step to the telegram and one from there on: inputs and outputs once more
             for kind in ("event", "get", "set"):
-                telling.component.call_statistics[kind].add(0.0, self._told)
+                delivery.component.call_statistics[kind].add(0.0, self._delivered)
         plant = self.localiser.watch.component.call_statistics
-        for kind, count in (("save", self._told), ("restore", self._plant.more_calls), ("release", self._told)):
+        for kind, count in (
+            ("save", self._delivered),
+            ("restore", self._plant.more_calls),
+            ("release", self._delivered),
+        ):
             plant[kind].add(0.0, int(count))  # each step of the plant beyond the first begins with its state restored
-        self._told = 0
+        self._delivered = 0
 
     # -- set-up -----------------------------------------------------------------------------------------------------
 
@@ -121,9 +127,9 @@ class Crossings:
                 setattr(head, name, program.function(watch.component, str(call.function(watch.component.fmi_version))))
         head.odometer = -1 if self.service.odometer is None else self.service.odometer
         head.continuous = keep(plan.continuous.astype(np.uint8))
-        told = [self._tellings.get(i) for i in range(self._slaves)]
+        by_place = [self._deliveries.get(i) for i in range(self._slaves)]
         self._telegrams = (ctypes.c_void_p * self._slaves)(
-            *(None if t is None else ctypes.addressof(t.telegram) for t in told)
+            *(None if t is None else ctypes.addressof(t.telegram) for t in by_place)
         )
         head.telegrams = ctypes.addressof(self._telegrams)
         for name in ("start", "final", "there", "arrived"):

@@ -50,6 +50,6 @@ def _loaded(path: Path) -> ctypes.CDLL:
     ]
     library.stepper_move.restype = ctypes.c_int64
     library.stepper_move.argtypes = [ctypes.c_void_p, ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_int64]
-    library.stepper_tell.restype = ctypes.c_int64
-    library.stepper_tell.argtypes = [ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p]
+    library.stepper_deliver.restype = ctypes.c_int64
+    library.stepper_deliver.argtypes = [ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p]
     return library

@@ -106,7 +106,7 @@ static bool tell(Program *program, int64_t which, Telegram *telegram, const doub
 
 /* A receiver with event mode is stepped through one telegram: from times[0] to times[1], where it is told, and on to times[2] [s]. Its
    outputs there go to `before` and `after`. Returns 1 where all was ordinary, else 0: the calls are in the journal. Counts nothing. */
-EXPORTED int64_t stepper_tell(Program *program, int64_t which, Telegram *telegram, const double times[3]) {
+EXPORTED int64_t stepper_deliver(Program *program, int64_t which, Telegram *telegram, const double times[3]) {
     program->journal.count = program->journal.used = 0;
     program->journal.on = 1;
     bool ordinary = tell(program, which, telegram, times);

@@ -1,4 +1,4 @@
-"""Telling: a receiver with event mode is stepped through one telegram by one call into the stepper.
+"""CompiledDelivery: a receiver with event mode is stepped through one telegram by one call into the stepper.
 
 What is not ordinary is finished by the receiver's own Python, which is handed what the FMU has said so far.
 """
@@ -47,11 +47,12 @@ class CTelegram(ctypes.Structure):
     )
 
 
-class Telling:
+class CompiledDelivery:
     """Steps one receiver.
 
     Args:
-        receiver: see `can_be_told`. place: of its component in the plan. program: the plan in C. library: the stepper.
+        receiver: see `can_be_notified`. place: of its component in the plan. program: the plan in C.
+        library: the stepper.
         answering: context in which slaves give answers and nothing calls the stepper. idle: whether it may be called
             now.
     """
@@ -92,7 +93,7 @@ class Telling:
         for i, name in enumerate(self._counts):
             self.telegram.count_ranks[i] = OUTCOMES.index(name) if name in OUTCOMES else -1
         self._times = (ctypes.c_double * 3)()
-        self._call, self._slowly = library.stepper_tell, receiver.step_in_python
+        self._call, self._slowly = library.stepper_deliver, receiver.step_in_python
         self._arguments = program.address, place, ctypes.addressof(self.telegram), ctypes.addressof(self._times)
 
     def step(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
@@ -104,8 +105,8 @@ class Telling:
         receiver, component = self.receiver, self.component
         if len(telegrams) != 1 or receiver.busy or component.next_event != NEVER or not self._idle():
             return self._slowly(t, until, telegrams)
-        told_at = snapped(telegrams[0].delivered_at, t, until)
-        self._times[0], self._times[1], self._times[2] = t, told_at, until
+        notified_at = snapped(telegrams[0].delivered_at, t, until)
+        self._times[0], self._times[1], self._times[2] = t, notified_at, until
         self._payload[:] = [getattr(telegrams[0], name) for name in self._names]
         self.begin()
         begin = perf_counter()
@@ -113,13 +114,13 @@ class Telling:
             with self._answering(self.program.journalled()):
                 return self._slowly(t, until, telegrams)
         before, after = self._before.copy(), self._after.copy()
-        component.time, component.calls = until, component.calls + (told_at > t) + (until > told_at)
+        component.time, component.calls = until, component.calls + (notified_at > t) + (until > notified_at)
         component.seconds += perf_counter() - begin
-        delivery = Delivery(told_at, before, after)
+        delivery = Delivery(notified_at, before, after)
         self.end()
         if self.telegram.outcome >= 0:
             delivery.outcome = OUTCOMES[self.telegram.outcome]
-        receiver.told(delivery, before if told_at == until else receiver.planned.outputs.copy())
+        receiver.stepped_elsewhere(delivery, before if notified_at == until else receiver.planned.outputs.copy())
         return [delivery]
 
     def begin(self) -> None:
@@ -136,9 +137,9 @@ class Telling:
             self.receiver.seen = dict(zip(self._counts, self.telegram.seen, strict=False))
 
 
-def can_be_told(receiver: Receiver, place: int, program: Program) -> bool:
-    """Whether a receiver is one for which `Telling` is right: an FMI 3 slave that can be stopped anywhere and is told
-    exactly.
+def can_be_notified(receiver: Receiver, place: int, program: Program) -> bool:
+    """Whether `CompiledDelivery` is right for a receiver: an FMI 3 slave that can be stopped anywhere and is notified
+    at the exact instant.
 
     Args:
         receiver: of the run. place: of its component in the plan. program: the plan in C.

@@ -180,14 +180,14 @@ class Program:
         self.head.last_call = LAST_CALL.address
         self.head.last_time = LAST_CALL.address + 8
         self._nobody_reads = ctypes.c_int64()
-        self.tell_rows(None, 0)
+        self.count_rows_at(None, 0)
         self._versions = [step.component.fmi_version for step in plan.steps]
         calls = [len(writes) + len(reads) + 1 for writes, reads in zip(self.writes, self.reads, strict=True)]
         self.journal = Journal(
             self.head.journal, sum(calls), sum(int(r.raw_bytes) for s in self.slaves for r in _ports_read(s))
         )
 
-    def tell_rows(self, place: int | None, before: int) -> None:
+    def count_rows_at(self, place: int | None, before: int) -> None:
         """Have the stepper count the rows it fills.
 
         Args:

@@ -16,7 +16,9 @@ class FMI1Component(Component, FMI1Slave):
     """An FMI 1.0 co-simulation slave.
 
     Args:
-        name, slave, description: as for `Component`.
+        name: name in the scenario.
+        slave: object with fmpy's slave call surface.
+        description: its model description.
         negated: names of variables with ``alias="negatedAlias"``: the slave holds the value with the other sign.
         more: further arguments of `Component`.
 

@@ -16,10 +16,13 @@ from fmus.fmi.ports import is_native
 
 
 class FMI3Component(Component, FMI3Slave):
-    """An FMI 3.0 co-simulation slave. Arguments as for `Component`.
+    """An FMI 3.0 co-simulation slave.
 
     Args:
-        name: of the component. description: model description of the FMU. more: as for `Component`.
+        name: name in the scenario.
+        slave: object with fmpy's slave call surface.
+        description: its model description.
+        more: further arguments of `Component`.
     """
 
     def __init__(self, name: str, slave: Any, description: ModelDescription, **more: Any) -> None:

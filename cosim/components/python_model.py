@@ -311,7 +311,7 @@ def is_python_model(found: Any) -> bool:
     """Whether an object, or the instances of a class, can be stepped by ``step(t, inputs, dt)``.
 
     Args:
-        found: class or instance.
+        found: the object or the class.
     """
     return callable(getattr(found, "step", None))
 

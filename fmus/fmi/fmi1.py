@@ -27,10 +27,12 @@ NOTHING = {"String": "", "Boolean": False}
 
 
 class FMI1Slave(Slave):
-    """A co-simulation slave of FMI 1.0. Arguments as for `Slave`.
+    """A co-simulation slave of FMI 1.0.
 
     Args:
-        name: of the component, for messages. description: model description of the FMU.
+        name: of the instance.
+        slave: object with fmpy's slave call surface, not yet instantiated.
+        description: its model description.
     """
 
     fmi_version = 1

@@ -40,9 +40,8 @@ class FMU1SlaveRepaired(FMU1Slave):
         """The call that this name says.
 
         Args:
-            arguments: as for the function of FMI.
-            c: the instance. vr: value references. nvr: their number. order: order of the derivative of each.
-            value: of the derivatives.
+            arguments: as for the function of FMI: c, the instance; vr, value references of the inputs; nvr, how many;
+                order of each derivative; value of each.
         """
         return self._call("fmi1SetRealInputDerivatives", *arguments)
 

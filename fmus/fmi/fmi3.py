@@ -62,14 +62,16 @@ class FMI3Instance(Instance):
 
 
 class FMI3Slave(FMI3Instance, Slave):
-    """A co-simulation slave of FMI 3.0. Arguments as for `Slave`.
+    """A co-simulation slave of FMI 3.0.
 
     It handles its events itself, unless somebody coordinates it: then it stops at an event (`EventMet`), says so
     (`event_pending`), and is taken through Event Mode from outside. `next_event` is when something known in advance is
     due, `clocks` are its time-based input clocks.
 
     Args:
-        name: of the component, for messages. description: model description of the FMU.
+        name: of the instance.
+        slave: object with fmpy's slave call surface, not yet instantiated.
+        description: its model description.
     """
 
     def __init__(self, name: str, slave: Any, description: ModelDescription) -> None:

@@ -9,7 +9,7 @@ from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import cached_property, partial
 from pathlib import Path
-from types import FunctionType, MappingProxyType
+from types import FunctionType, MappingProxyType, MethodType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,8 @@ from plant_models.disk_cache.files import file_digest
 
 OWN_PACKAGES = ("plant_models", "fmu_observer", "fmus", "cosim")
 """The floors of this project: each uses only those before it."""
+NUMERICAL_PACKAGES = ("numpy", "scipy", "casadi")
+"""Packages whose classes and functions count by their version."""
 PLAIN = (bool, int, float, complex, str, bytes)
 CONTAINERS = (dict, list, tuple, set, frozenset, MappingProxyType)
 MAX_DEPTH = 50
@@ -41,6 +43,8 @@ class Description:
             (Path, lambda path, _: f"file {file_digest(path)}"),
             (type, lambda kind, _: f"class {self._class(kind)}"),
             (FunctionType, self._function),
+            (MethodType, lambda method, depth: f"method {self.text((method.__func__, method.__self__), depth)}"),
+            (ModuleType, lambda module, _: f"module {self._module(module.__name__)}"),
             (partial, lambda call, depth: f"partial {self.text((call.func, call.args, call.keywords), depth)}"),
         )
 
@@ -76,8 +80,11 @@ class Description:
 
     def _kind(self, value: Any) -> str:
         kind = type(value)
-        foreign = kind in CONTAINERS or kind.__module__ == "casadi.casadi"
-        return kind.__qualname__ if foreign else self._class(kind)
+        if kind in CONTAINERS or (kind.__module__ == "casadi.casadi" and hasattr(value, "serialize")):
+            return kind.__qualname__
+        if _is_numerical(kind.__module__):
+            raise NoIdentityError(f"What a {kind.__qualname__} holds is not known.")
+        return self._class(kind)
 
     def _content(self, value: Any, depth: int) -> str:
         """What an object holds, in its own order."""
@@ -98,6 +105,8 @@ class Description:
 
     def _function(self, function: FunctionType, depth: int) -> str:
         """A function by its place in the files of this project, with what it holds of the call that made it."""
+        if _is_numerical(function.__module__):
+            return f"function {function.__module__}.{function.__qualname__}"
         module, code = sys.modules.get(function.__module__), function.__code__
         if code.co_filename != getattr(module, "__file__", ""):
             raise NoIdentityError(f"{function.__module__}.{function.__qualname__} is not where it says.")
@@ -108,6 +117,8 @@ class Description:
 
     def _class(self, kind: type) -> str:
         """The name by which anybody finds this very class; its bases are of this project too, or of Python."""
+        if _is_numerical(kind.__module__):
+            return f"{kind.__module__}.{kind.__qualname__}"
         for base in kind.__mro__:
             if base is kind or base.__module__.partition(".")[0] not in sys.stdlib_module_names:
                 self._rests_on(base.__module__)
@@ -118,11 +129,20 @@ class Description:
                     raise NoIdentityError(f"{base.__module__}.{base.__qualname__} is not where it says.")
         return f"{kind.__module__}.{kind.__qualname__}"
 
+    def _module(self, name: str) -> str:
+        if not _is_numerical(name) and name.partition(".")[0] not in sys.stdlib_module_names:
+            self._rests_on(name)
+        return name
+
     def _rests_on(self, module: str) -> None:
         package = module.partition(".")[0]
         if package not in OWN_PACKAGES:
             raise NoIdentityError(f"{module} is not of this project.")
         self.packages.add(package)
+
+
+def _is_numerical(module: str) -> bool:
+    return module.partition(".")[0] in NUMERICAL_PACKAGES
 
 
 def _attributes(value: Any) -> dict[str, Any]:

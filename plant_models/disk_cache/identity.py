@@ -18,9 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.disk_cache.description import OWN_PACKAGES, Description, NoIdentityError
+from plant_models.disk_cache.description import NUMERICAL_PACKAGES, OWN_PACKAGES, Description, NoIdentityError
 
-NUMERICAL_PACKAGES = ("numpy", "scipy", "casadi")
 LOADED_AT = time.time()
 
 

@@ -163,7 +163,17 @@ def test_what_is_not_known_by_its_content_has_no_identity() -> None:
     circle: list[Any] = []
     circle.append(circle)
     pair = namedtuple("pair", "a b")
-    for value in (Own(), circle, pair(1, 2), never, open, object(), iter([]), np.array([object()])):
+    for value in (
+        Own(),
+        circle,
+        pair(1, 2),
+        never,
+        open,
+        object(),
+        iter([]),
+        np.array([object()]),
+        np.random.default_rng(1),
+    ):
         assert identity.identity(value) is None
         assert identity.identity({"deep": [value]}) is None
 

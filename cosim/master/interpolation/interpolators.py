@@ -100,13 +100,13 @@ class DerivativeInterpolator(InputInterpolator):
         super().__init__(line, inputs)
         self._moving = np.flatnonzero(line.continuous)
         names = [inputs.names[i] for i in self._moving]
-        self._tell, self._slopes = component.make_derivative_writer(names)
+        self._write_slopes, self._slopes = component.make_derivative_writer(names)
 
     def send(self, t: float, until: float) -> None:  # noqa: D102 - see InputInterpolator
         self._inputs.buffer[:] = self.line.at(t)
         self._inputs.send()
         self._slopes[:] = self.line.slope[self._moving]
-        self._tell()
+        self._write_slopes()
 
 
 class IntermediateInterpolator(InputInterpolator):

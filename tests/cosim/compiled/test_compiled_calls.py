@@ -14,6 +14,7 @@ from compiled_runs import assert_same, both
 
 import fmus.fmi.fmi3 as dialect
 from cosim import Scenario
+from cosim.master.master import Master
 
 RECEIVER, PLANT = "takagi_sugeno_cdo", "locomotive"
 FUNCTIONS = (
@@ -68,7 +69,8 @@ def spied(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[Wrap], None]]:
 
 
 def _in_front(slave: Any, function: str, wrap: Wrap, counts: dict[str, int], kept: list[Any]) -> Any:
-    real = slave._functions[function]
+    known = slave._functions[function]
+    real = getattr(known, "behind", known)  # a library that is kept for the next run keeps its table
     steps = since = 0
 
     def call(*arguments: Any) -> int:
@@ -80,7 +82,7 @@ def _in_front(slave: Any, function: str, wrap: Wrap, counts: dict[str, int], kep
         return int(real(*arguments)) if said is None else said
 
     made = ctypes.CFUNCTYPE(ctypes.c_int, *real.argtypes)(call)
-    made.argnames, made.restype = real.argnames, ctypes.c_int
+    made.argnames, made.restype, made.behind = real.argnames, ctypes.c_int, real
     kept.append(made)
     return made
 
@@ -102,23 +104,27 @@ def scenario(latency: float) -> Scenario:
 
 
 @pytest.mark.parametrize("latency", [0.0, 0.013, 0.007])
-def test_the_same_calls_in_the_same_order(spied: Callable[[Wrap], None], latency: float) -> None:
-    """With a latency of 7 ms the first telegram is delivered at a communication point."""
+def test_the_same_calls_in_the_same_order(
+    spied: Callable[[Wrap], None], latency: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From the begin of the run on: what builds and probes an FMU before it depends on the caches. With a latency of
+    7 ms the first telegram is delivered at a communication point.
+    """
     calls: list[tuple[Any, ...]] = []
 
     def note(call: Call) -> None:
         calls.append((call.component, call.function, *(call.arguments[1:3] if call.function == "fmi3DoStep" else ())))
 
-    scenario(latency).run(warn=lambda _: None)  # where FMUs are built their functions are called as well
+    run = Master.run
+    monkeypatch.setattr(Master, "run", lambda master: (calls.clear(), run(master))[1])
     spied(note)
     runs = []
     for stepper in ("python", "compiled"):
-        calls.clear()
         outcome = scenario(latency).run(overrides={"master.stepper": stepper}, warn=lambda _: None)
         assert outcome.failure is None
         assert len(outcome.result.events) == 3
         runs.append(list(calls))
-    assert len(runs[0]) > 300
+    assert len(runs[0]) > 200
     assert runs[1] == runs[0]
 
 
