@@ -86,7 +86,11 @@ class Receiver:
         return dict(self.seen), list(self.backlog), self._announced
 
     def restore(self, state: Any) -> None:
-        """Return to what was saved."""
+        """Return to what was saved.
+
+        Args:
+            state: as `save` gave it.
+        """
         seen, backlog, self._announced = state
         self.seen, self.backlog = dict(seen), list(backlog)
 
@@ -104,7 +108,11 @@ class Receiver:
         return (self.compiled or self.step_in_python)(t, until, telegrams)
 
     def step_in_python(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
-        """As `step`, without the compiled stepper's way through a single telegram."""
+        """As `step`, without the compiled stepper's way through a single telegram.
+
+        Args:
+            t: start of the step [s]. until: end of the step [s].
+        """
         self.planned.send(t, until)
         self._open.clear()
         waiting, self.backlog = self.backlog, []
@@ -261,7 +269,11 @@ class Receiver:
 
 
 def snapped(delivered_at: float, now: float, until: float) -> float:
-    """Time of delivery within ``[now, until]`` [s], on an end where it is too near for a step in between."""
+    """Time of delivery within ``[now, until]`` [s], on an end where it is too near for a step in between.
+
+    Args:
+        delivered_at: instant of delivery [s].
+    """
     notified_at = min(max(delivered_at, now), until)
     if until - notified_at <= TIME_TOLERANCE:
         return until

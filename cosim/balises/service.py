@@ -65,6 +65,9 @@ class BaliseService:
     def attach(self, plan: Plan) -> None:
         """Add the stages that find crossings on the way of the plant, and deliver telegrams on that of the receivers.
 
+        Args:
+            plan: of the run.
+
         Raises:
             CouplingError: a receiver is stepped before the watched plant, or is the plant itself.
         """
@@ -103,7 +106,11 @@ class BaliseService:
             drive(t, until)
 
     def holder(self, name: str) -> Mover:
-        """What to call instead of moving a receiver that waits: telegrams of that time are kept for its next step."""
+        """What to call instead of moving a receiver that waits: telegrams of that time are kept for its next step.
+
+        Args:
+            name: of a component.
+        """
 
         def hold(t: float, until: float) -> None:
             if self._telegrams is None and self._something_to_deliver:
@@ -196,7 +203,11 @@ class BaliseService:
         return self.save(), list(self._snapshots), telegrams, dict(self._deliveries)
 
     def restore_within(self, state: Any) -> None:
-        """Return to the middle of the step."""
+        """Return to the middle of the step.
+
+        Args:
+            state: as `save` gave it.
+        """
         saved, snapshots, telegrams, deliveries = state
         self.restore(saved)
         self._snapshots, self._deliveries = list(snapshots), dict(deliveries)
