@@ -158,8 +158,8 @@ def key_table(table: str) -> str:
     if set(fields) != set(words):
         bare, extra = sorted(set(fields) - set(words)), sorted(set(words) - set(fields))
         raise ValueError(
-            f"{table}: keys without words {bare}, words without key {extra}; write Field(description=...) in the class, "
-            f"or a line in {WORDS.name}"
+            f"{table}: keys without words {bare}, words without key {extra}; write Field(description=...) in the "
+            f"class, or a line in {WORDS.name}"
         )
     rows = ["| key | type | default | unit | meaning |", "|---|---|---|---|---|"]
     for key, info in fields.items():

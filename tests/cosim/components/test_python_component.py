@@ -196,7 +196,7 @@ def declared(**attributes: Any) -> type:
         (declared(outputs=["odometer"]), "the name 'odometer' is taken twice"),
         (declared(direct={"position": "odometer"}), "write direct = "),
         (declared(balise=lambda _, place: place), "balise takes 'place'; of a telegram is known: stamp, position"),
-        (declared(step=lambda _, t, dt: None), r"step\(_, t, dt\) cannot be called as step\(t, inputs, dt\)"),
+        (declared(step=lambda _, t: t), r"step\(_, t\) cannot be called as step\(t, inputs, dt\)"),
         (declared(outputs=["no name"]), "'no name' is not a legal identifier"),
     ],
 )
