@@ -18,11 +18,13 @@ from cosim.expectations.expectation import WindowExpectation
 from cosim.expectations.registry import EXPECTATIONS
 from cosim.report.figures.panels import FIGURES
 from cosim.results.formats.catalogue import FORMATS
+from cosim.scenario.model_name import EXPECTED
 from cosim.scenario.tables import ComponentTable
 from cosim.simulation.scenario import Scenario
 from fmus.check.catalogue import CHECKS
 from plant_models import registry
 from plant_models.registry import Registry, RegistryError
+from plant_models.user_file import UserFileError, load_class
 
 ALL: tuple[Registry[Any], ...] = (
     plant_models.PLANTS,
@@ -135,6 +137,15 @@ def test_a_users_file_that_is_wrong_is_told_without_traceback(
     assert "observer" in said
     with pytest.raises(AssertionError, match=words):
         raise AssertionError(said.replace("\n", " "))
+
+
+def test_a_missing_import_of_a_users_module_is_not_taken_for_a_missing_module(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "needs_more.py").write_text("import numppy\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(UserFileError, match=r"cannot be imported: ModuleNotFoundError: .*'numppy' \(.*needs_more.py:1"):
+        load_class("needs_more:Bias", EXPECTED)
 
 
 def test_a_changed_file_is_read_again(tmp_path: Path) -> None:
