@@ -9,11 +9,12 @@ Standard library only.
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -128,8 +129,18 @@ class Registry(MutableMapping[str, T], Generic[T]):
                         yield Member(name, target, f"this package ({target})", room)
 
     def _announced(self) -> Iterator[Member]:
-        for entry in entry_points(group=self.group):
+        for entry in announcements(tuple(sys.path)).select(group=self.group):
             yield Member(entry.name, entry.value, f"{_package(entry)} ({entry.value})")
+
+
+@cache
+def announcements(path: tuple[str, ...]) -> EntryPoints:  # noqa: ARG001 - found anew where it changed
+    """All entry points of installed packages, read once for all registries.
+
+    Args:
+        path: the folders that modules come from.
+    """
+    return entry_points()
 
 
 @cache

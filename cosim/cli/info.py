@@ -11,9 +11,9 @@ from typing import Any
 
 import fmpy
 
-from cosim.components.loading import read_description, runs_here
+from cosim import ssp
+from cosim.components.description import read_description, runs_here
 from cosim.scenario.package_names import is_package
-from cosim.ssp.describe import describe_package, text_of_package
 from fmus.fmi.capabilities import read_capabilities
 from fmus.text_table import text_table
 
@@ -60,8 +60,8 @@ def execute(options: argparse.Namespace) -> int:
 
 
 def _execute_package(options: argparse.Namespace) -> int:
-    data = describe_package(str(options.file))
-    print(json.dumps(data, indent=2) if options.json else text_of_package(data))
+    data = ssp.describe_package(str(options.file))
+    print(json.dumps(data, indent=2) if options.json else ssp.text_of_package(data))
     return 0
 
 

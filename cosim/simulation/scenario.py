@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
+from cosim import studies
 from cosim.errors import CosimError, ScenarioError
 from cosim.scenario.includes import Key, attribute, find_file, read_tables
 from cosim.scenario.manifest import read_manifest
@@ -27,10 +28,10 @@ from cosim.scenario.single import single_tables
 from cosim.scenario.streaming import finish_stream, streaming_to
 from cosim.scenario.structure import scenario_structure
 from cosim.structure.structure import Structure
-from cosim.studies.sweep import Sweep, make_sweep
 
 if TYPE_CHECKING:
     from cosim.studies.sampling import Mode, Range
+    from cosim.studies.sweep import Sweep
 
 LOG = logging.getLogger("cosim")
 
@@ -311,7 +312,7 @@ class Scenario:
             ScenarioError: a name or a value cannot be; nothing has been run then.
             CosimError: a component that is varied cannot be described.
         """
-        return make_sweep(self, values, mode, count, seed)
+        return studies.make_sweep(self, values, mode, count, seed)
 
     def run(
         self,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.metadata
+import os
 import platform
 import sys
 import time
@@ -71,13 +72,19 @@ def folder_digest(name: str) -> str:
         raise NoIdentityError(f"The files of {name} are not on disk.")
     root = Path(next(iter(spec.submodule_search_locations)), rest)
     digest = hashlib.sha256()
-    for path in [root] if root.is_file() else sorted(root.rglob("*")):
-        if path.is_file() and "__pycache__" not in path.parts:
-            if path.stat().st_mtime > LOADED_AT:
+    for path in [str(root)] if root.is_file() else _files(str(root)):
+        with Path(path).open("rb") as file:
+            if os.fstat(file.fileno()).st_mtime > LOADED_AT:
                 raise NoIdentityError(f"{path} was changed after it was loaded.")
-            content = path.read_bytes()
-            digest.update(f"{path.relative_to(root)} {len(content)}\0".encode() + content)
+            content = file.read()
+        digest.update(f"{path[len(str(root)) :]} {len(content)}\0".encode() + content)
     return f"{name} {digest.hexdigest()}"
+
+
+def _files(folder: str) -> list[str]:
+    """All files in a folder and those in it, without byte code, in an order of their own."""
+    walk = os.walk(folder)
+    return sorted(f"{at}{os.sep}{name}" for at, _, names in walk if "__pycache__" not in at for name in names)
 
 
 @cache
