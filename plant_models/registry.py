@@ -17,7 +17,7 @@ from importlib import import_module
 from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar, cast
 
 T = TypeVar("T")
 
@@ -140,7 +140,8 @@ def announcements(path: tuple[str, ...]) -> EntryPoints:  # noqa: ARG001 - found
     Args:
         path: the folders that modules come from.
     """
-    return entry_points()
+    found: Any = entry_points()  # the type hints speak of Python 3.9
+    return cast(EntryPoints, found)
 
 
 @cache

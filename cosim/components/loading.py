@@ -21,6 +21,7 @@ from cosim.components.unpacking import unpack
 from cosim.errors import FmuLoadError
 from cosim.process.last_call import LAST_CALL
 from cosim.process.sentinel import guard_exit
+from fmu_observer.description import describe
 from fmus.fmi.archive import NotAnFmuError
 from fmus.fmi.binaries import platform_folder
 from fmus.fmi.description import negated_aliases
@@ -118,6 +119,24 @@ def load_block(system: HybridSystem, name: str, fmi_version: Literal[2, 3] = 3, 
     source = system.source or type(system).__qualname__
     face = COMPONENTS[fmi_version]
     component: Component = face(name, block, block.model_description, source=source, kind="block")
+    return component
+
+
+def describe_system(
+    system: HybridSystem, name: str, fmi_version: Literal[2, 3] = 3, preset: str | None = None
+) -> Component:
+    """A component of a system that can be asked for its variables and not stepped: its equations are not prepared.
+
+    Args:
+        system: the hybrid system. name: of the component. fmi_version: of its interface.
+        preset: whose values become the start values; None for the default.
+
+    Raises:
+        ValueError: the preset is unknown.
+    """
+    description = describe(system, fmi_version, preset=preset)
+    source = system.source or type(system).__qualname__
+    component: Component = COMPONENTS[fmi_version](name, None, description, source=source, kind="block")
     return component
 
 

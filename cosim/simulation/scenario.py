@@ -312,7 +312,8 @@ class Scenario:
             ScenarioError: a name or a value cannot be; nothing has been run then.
             CosimError: a component that is varied cannot be described.
         """
-        return studies.make_sweep(self, values, mode, count, seed)
+        sweep: Sweep = studies.make_sweep(self, values, mode, count, seed)
+        return sweep
 
     def run(
         self,

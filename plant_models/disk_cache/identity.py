@@ -7,7 +7,6 @@ import has to be followed; a class of another package cannot be known so, and ha
 from __future__ import annotations
 
 import hashlib
-import importlib.metadata
 import os
 import platform
 import sys
@@ -20,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from plant_models.disk_cache.description import NUMERICAL_PACKAGES, OWN_PACKAGES, Description, NoIdentityError
+from plant_models.installed import installed_version
 
 LOADED_AT = time.time()
 
@@ -98,7 +98,7 @@ def _surroundings() -> str:
 
 
 def _version(name: str) -> str:
-    try:
-        return importlib.metadata.version(name)
-    except importlib.metadata.PackageNotFoundError as error:
-        raise NoIdentityError(f"The version of {name} is not known.") from error
+    version = installed_version(name)
+    if version is None:
+        raise NoIdentityError(f"The version of {name} is not known.")
+    return version
