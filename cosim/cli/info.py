@@ -1,5 +1,5 @@
-"""``cosim info FILE``: what an FMU says about itself and whether it can run here, or what is in a system structure
-package.
+"""``cosim info WHAT``: what an FMU says about itself and whether it can run here, what is in a system structure
+package, or what a model declares.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from cosim.components.description import read_description, runs_here
 from cosim.scenario.package_names import is_package
 from fmus.fmi.capabilities import read_capabilities
 from fmus.text_table import text_table
+from plant_models.user_file import names_a_file, names_code
 
 
 def register(commands: Any) -> None:
@@ -26,10 +27,14 @@ def register(commands: Any) -> None:
     """
     parser = commands.add_parser(
         "info",
-        description="Interfaces, platforms and variables of an FMU, or the systems, components and connections in an "
-        "SSP.",
+        description="Interfaces, platforms and variables of an FMU; the systems, components and connections in an SSP; "
+        "or what a plant or an observer declares.",
     )
-    parser.add_argument("file", type=Path)
+    parser.add_argument(
+        "what",
+        metavar="WHAT",
+        help="an .fmu or .ssp file, a name of 'cosim list', file.py:Class or package.module:Class",
+    )
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.set_defaults(execute=execute)
 
@@ -40,9 +45,9 @@ def execute(options: argparse.Namespace) -> int:
     Args:
         options: of the command line.
     """
-    if is_package(options.file):
+    if is_package(options.what):
         return _execute_package(options)
-    data = describe_file(options.file)
+    data = _described_model(options.what) if names_a_model(options.what) else describe_file(Path(options.what))
     if options.json:
         print(json.dumps(data, indent=2))
         return 0
@@ -60,9 +65,27 @@ def execute(options: argparse.Namespace) -> int:
 
 
 def _execute_package(options: argparse.Namespace) -> int:
-    data = ssp.describe_package(str(options.file))
+    data = ssp.describe_package(options.what)
     print(json.dumps(data, indent=2) if options.json else ssp.text_of_package(data))
     return 0
+
+
+def _described_model(name: str) -> dict[str, Any]:
+    from cosim.cli.model_info import describe_model  # noqa: PLC0415 - models and the schema, not for files
+
+    return describe_model(name)
+
+
+def names_a_model(text: str) -> bool:
+    """Whether what was typed is meant as the name of a model, and not as that of an FMU or SSP file.
+
+    Args:
+        text: as it was typed.
+    """
+    path = Path(text)
+    if names_a_file(text) or path.suffix.lower() in (".fmu", ".ssp"):
+        return names_a_file(text)
+    return not path.exists() and (names_code(text) or not path.suffix)
 
 
 def describe_file(path: Path) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from cosim import studies
+from cosim import ssp, studies
 from cosim.errors import CosimError, ScenarioError
 from cosim.scenario.includes import Key, attribute, find_file, read_tables
 from cosim.scenario.manifest import read_manifest
@@ -94,9 +94,7 @@ class Scenario:
 
     @classmethod
     def _from_package(cls, name: str, strict: bool) -> Scenario:
-        from cosim.ssp.load import load_package  # noqa: PLC0415 - lxml only for those who read such files
-
-        loaded = load_package(name, strict)
+        loaded = ssp.load_package(name, strict)
         scenario = cls(where=name, **loaded.tables)
         scenario._doubts, scenario._files = loaded.doubts, loaded.unpacked
         return scenario
@@ -176,9 +174,8 @@ class Scenario:
             CosimError: the scenario cannot be set up, or has something that this version cannot say.
             OutputError: the file cannot be written.
         """
-        from cosim.ssp.export import export_package  # noqa: PLC0415 - lxml only for those who write such files
-
-        return export_package(self.table(), self.name, self.folder, self.where, Path(path), version)
+        written: Path = ssp.export_package(self.table(), self.name, self.folder, self.where, Path(path), version)
+        return written
 
     @property
     def name(self) -> str:
