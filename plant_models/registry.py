@@ -167,17 +167,22 @@ class Registry(MutableMapping[str, T], Generic[T]):
                         yield Member(name, target, f"this package ({target})", room)
 
     def _announced(self) -> Iterator[Member]:
-        for entry in announcements(tuple(sys.path)).select(group=self.group):
+        for entry in announced(self.group):
             yield Member(entry.name, entry.value, f"{_package(entry)} ({entry.value})")
 
 
-@cache
-def announcements(path: tuple[str, ...]) -> EntryPoints:  # noqa: ARG001 - found anew where it changed
-    """All entry points of installed packages, read once for all registries.
+def announced(group: str) -> EntryPoints:
+    """The entry points of installed packages that belong to a group.
 
     Args:
-        path: the folders that modules come from.
+        group: its name.
     """
+    return _all_announced(tuple(sys.path)).select(group=group)
+
+
+@cache
+def _all_announced(_: tuple[str, ...]) -> EntryPoints:
+    """Read once for the folders that modules come from, and not for each registry."""
     found: Any = entry_points()  # the type hints speak of Python 3.9
     return cast(EntryPoints, found)
 

@@ -66,11 +66,7 @@ def plugins(monkeypatch: pytest.MonkeyPatch) -> Registry[Any]:
         announced("gone", "no_such_module:Gone", "broken")[1],
         announced("wrong", "math:pi", "odd")[1],
     ]
-
-    def brought(group: str) -> list[Any]:
-        return entries if group == "some.group" else []
-
-    monkeypatch.setattr(registry, "announcements", lambda _: SimpleNamespace(select=brought))
+    monkeypatch.setattr(registry, "announced", lambda group: entries if group == "some.group" else [])
     members: Registry[Any] = Registry("observer", fmu_observer.ROOMS, "some.group", plant_models.SYSTEM)
     monkeypatch.setattr(fmu_observer, "OBSERVERS", members)
     return members
