@@ -60,7 +60,7 @@ class RunError(CosimError, RuntimeError):
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """A hint with the names nearest to a misspelt one, or all of them where none is near.
+    """A hint with the names nearest to a misspelt one, or all of them, 20 at most, where none is near.
 
     Args:
         name: as it was given. known: names that exist.
@@ -69,5 +69,5 @@ def nearest(name: str, known: Iterable[str]) -> str:
     close = get_close_matches(name, names, 3, 0.5)
     if close:
         return f"did you mean {', '.join(repr(n) for n in close)}?"
-    shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
+    shown = ", ".join(names[:20]) + (f", and {len(names) - 20} more" if len(names) > 20 else "")
     return f"known: {shown or 'none'}."

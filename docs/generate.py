@@ -144,20 +144,23 @@ def schema_page(table: str) -> Callable[[], str]:
 
 def key_table(table: str) -> str:
     """Keys of one table of the schema, types and defaults from the code, units and meanings from
-    ``scenario_keys.toml``.
+    ``scenario_keys.toml`` or the descriptions of the fields.
 
     Raises:
         ValueError: the code has a key without words, or there are words without a key.
     """
-    model, words = (
-        (schema_tables() | expectation_tables())[table],
-        tomllib.loads(WORDS.read_text(encoding="utf-8")).get(table, {}),
-    )
+    model = (schema_tables() | expectation_tables())[table]
+    every = tomllib.loads(WORDS.read_text(encoding="utf-8"))
     fields: Mapping[str, FieldInfo] = {info.alias or name: info for name, info in model.model_fields.items()}
-    words = {name: ("", info.description) for name, info in fields.items() if info.description} | words
+    described = {name: ("", info.description) for name, info in fields.items() if info.description}
+    shared = every["expect"] if table.startswith("expect_") else {}
+    words = {name: shared[name] for name in shared if name in fields} | described | every.get(table, {})
     if set(fields) != set(words):
         bare, extra = sorted(set(fields) - set(words)), sorted(set(words) - set(fields))
-        raise ValueError(f"{WORDS.name}, [{table}]: keys without words {bare}, words without key {extra}")
+        raise ValueError(
+            f"{table}: keys without words {bare}, words without key {extra}; write Field(description=...) in the "
+            f"class, or a line in {WORDS.name}"
+        )
     rows = ["| key | type | default | unit | meaning |", "|---|---|---|---|---|"]
     for key, info in fields.items():
         unit, meaning = words[key]
@@ -195,7 +198,7 @@ def all_expectations() -> str:
     rows = ["| `check` | demands |", "|---|---|"]
     for name, kind in sorted(EXPECTATIONS.items()):
         rows.append(f"| `{name}` | {' '.join(str(kind.__doc__).split())} |")
-    others = [f"\nKeys of `{name}`:\n\n{key_table(name)}" for name in expectation_tables() if not on_page(name)]
+    others = [f"\nKeys of `{name[7:]}`:\n\n{key_table(name)}" for name in expectation_tables() if not on_page(name)]
     return "\n".join([*rows, "", *others])
 
 

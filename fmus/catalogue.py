@@ -18,10 +18,14 @@ from fmu_observer import OBSERVERS
 from plant_models import PLANTS
 from plant_models.disk_cache.entries import remembered
 from plant_models.disk_cache.files import file_digest
+from plant_models.registry import Registry, RegistryError
+from plant_models.user_file import explained
 
 PACKAGES = ("plant_models", "fmu_observer")
 READERS = ("catalogue.py", "recipes.py")
 """Files beside this one that decide what an entry says."""
+UNUSABLE = "Cannot be used"
+"""The room of models that cannot be loaded or made; their description says why."""
 
 
 @dataclass(frozen=True)
@@ -60,14 +64,15 @@ class Entry:
 def catalogue() -> dict[str, Entry]:
     """All models by name: plants first, then observers."""
     shipped = [name for registry in (PLANTS, OBSERVERS) for name in registry if registry.room(name)]
-    others = [name for registry in (PLANTS, OBSERVERS) for name in registry if not registry.room(name)]
-    entries = remembered("catalogue", _key(), lambda: _read(shipped)) + _read(others)
-    known = {data["name"]: _entry(data) for data in entries}
+    others = [(registry, name) for registry in (PLANTS, OBSERVERS) for name in registry if not registry.room(name)]
+    known = {data["name"]: _entry(data) for data in remembered("catalogue", _key(shipped), lambda: _read(shipped))}
+    known |= {name: _entry_of_others(registry, name) for registry, name in others}
     return {name: known[name] for registry in (PLANTS, OBSERVERS) for name in registry}
 
 
 def by_room(entries: Iterable[Entry]) -> dict[str, list[Entry]]:
-    """Entries grouped by the room of the house a model lives in; what this program registered comes last.
+    """Entries grouped by the room of the house a model lives in; what this program registered comes last, and after
+    it what cannot be used.
 
     Args:
         entries: of the catalogue.
@@ -75,17 +80,23 @@ def by_room(entries: Iterable[Entry]) -> dict[str, list[Entry]]:
     rooms: dict[str, list[Entry]] = {}
     for entry in entries:
         rooms.setdefault(entry.room, []).append(entry)
-    return dict(sorted(rooms.items(), key=lambda item: item[0].startswith("Registered by")))
+    return dict(sorted(rooms.items(), key=lambda item: (item[0] == UNUSABLE, item[0].startswith("Registered by"))))
 
 
 def _read(names: Iterable[str]) -> list[dict[str, Any]]:
     """Entries as plain data, from the models themselves."""
-    chosen = list(names)
-    if not chosen:
-        return []
     from fmus.recipes import recipe_entry  # noqa: PLC0415 - it loads the models
 
-    return [recipe_entry(name) for name in chosen]
+    return [recipe_entry(name) for name in names]
+
+
+def _entry_of_others(registry: Registry[Any], name: str) -> Entry:
+    """An entry that does not ship; where its code fails, the reason is its description."""
+    try:
+        return _entry(_read([name])[0])
+    except Exception as error:  # whatever the code of others raises
+        reason = str(error) if isinstance(error, RegistryError) else f"{registry.origin(name)}: {explained(error)}"
+        return Entry(name, UNUSABLE, " ".join(reason.split()), "", (), None, ())
 
 
 def _entry(data: dict[str, Any]) -> Entry:
@@ -93,13 +104,13 @@ def _entry(data: dict[str, Any]) -> Entry:
     return Entry(**data | {"presets": tuple(data["presets"]), "options": options})
 
 
-def _key() -> str:
-    """Digest of all files that decide what the shipped models say of themselves."""
+def _key(names: list[str]) -> str:
+    """Digest of the names of the shipped models, and of all files that decide what these say of themselves."""
     folders = [Path(place) for package in PACKAGES for place in _places(package)]
     paths = [path for folder in folders for path in sorted(folder.rglob("*.py"))]
     paths += [Path(__file__).with_name(name) for name in READERS]
     digests = "\n".join(f"{path.name} {file_digest(path)}" for path in paths)
-    return hashlib.sha256(f"{sys.version}\n{digests}".encode()).hexdigest()
+    return hashlib.sha256(f"{sys.version}\n{names}\n{digests}".encode()).hexdigest()
 
 
 def _places(package: str) -> Iterable[str]:

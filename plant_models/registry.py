@@ -8,6 +8,7 @@ Standard library only.
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 T = TypeVar("T")
+LOG = logging.getLogger("plant_models")
 
 NAMED_CLASS = re.compile(
     r'^(?:class (\w+)|    (?:name(?:: [^=\n]+)? = |check: Literal\[)((?:"[^"\n]+"(?:, )?)+))', re.M
@@ -28,6 +30,16 @@ NAMED_CLASS = re.compile(
 
 class RegistryError(ValueError):
     """A member cannot be had: two bear its name, or what an installed package announces cannot be used."""
+
+
+@cache
+def log_left_out(name: str, reason: str) -> None:
+    """Warn of a member that is left out, once in a process.
+
+    Args:
+        name: of the member. reason: why, in words.
+    """
+    LOG.warning("%r is left out: %s", name, reason)
 
 
 @dataclass(frozen=True)
@@ -72,12 +84,36 @@ class Registry(MutableMapping[str, T], Generic[T]):
         return self._members
 
     def room(self, name: str) -> str:
-        """The package that a shipped member lives in; empty for one of an installed package or of this program.
+        """The package that a shipped member lives in; empty for one of an installed package or of this program, and
+        for a name that is taken twice.
 
         Args:
             name: of the member.
         """
-        return "" if name in self._own or name not in self.members else self.members[name][0].room
+        found = [] if name in self._own else self.members.get(name, [])
+        return found[0].room if len(found) == 1 else ""
+
+    def own(self, name: str) -> T | None:
+        """A member that this program has registered; None for others.
+
+        Args:
+            name: of the member.
+        """
+        return self._own.get(name)
+
+    def usable(self, left_out: Callable[[str, str], None] = log_left_out) -> dict[str, T]:
+        """The members that can be loaded, by name.
+
+        Args:
+            left_out: is called with name and reason for each of the others.
+        """
+        found = {}
+        for name in self:
+            try:
+                found[name] = self[name]
+            except RegistryError as error:
+                left_out(name, str(error))
+        return found
 
     def origin(self, name: str) -> str:
         """Who brings a member, for people.
@@ -102,6 +138,8 @@ class Registry(MutableMapping[str, T], Generic[T]):
         return loaded
 
     def __setitem__(self, name: str, member: T) -> None:
+        if not _is_member(member, self.base):
+            raise RegistryError(f"the {self.kind} {name!r} is no subclass of {self.base.replace(':', '.')}.")
         self._own[name] = member
 
     def __delitem__(self, name: str) -> None:
@@ -195,15 +233,19 @@ def _load(member: Member, kind: str, base: str) -> Any:
         return load(member.target)
     try:
         found = load(member.target)
-    except Exception as error:  # whatever the code of others raises while it is imported
+    except (Exception, SystemExit) as error:  # whatever the code of others raises while it is imported
         raise RegistryError(
             f"the {kind} {member.name!r} of {member.origin} cannot be loaded: {type(error).__name__}: {error}"
         ) from error
-    if not (isinstance(found, type) and descends_from(found, base)):
+    if not _is_member(found, base):
         raise RegistryError(
             f"the {kind} {member.name!r} of {member.origin} is no subclass of {base.replace(':', '.')}."
         )
     return found
+
+
+def _is_member(found: Any, base: str) -> bool:
+    return isinstance(found, type) and descends_from(found, base)
 
 
 def _package(entry: EntryPoint) -> str:

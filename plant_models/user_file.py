@@ -91,8 +91,8 @@ def load_class(name: str, expected: Expected, folder: Path | str = ".") -> Any:
         return found
     what = f" ({wanted} is {_kind(found)})" if found is not None else ""
     raise UserFileError(
-        f"{path} has no {expected.noun} named {wanted!r}{what}; it has: {', '.join(fitting) or 'none'}. "
-        f"Write {path}:Class."
+        f"{path} has no {expected.noun} named {wanted!r}{what}; it has: {', '.join(fitting) or 'none'}."
+        + (f" Write {path}:Class." if fitting else "")
     )
 
 
@@ -162,6 +162,8 @@ def _imported(name: str) -> Any:
     try:
         return load(name)
     except ModuleNotFoundError as error:
+        if not f"{name.partition(':')[0]}.".startswith(f"{error.name}."):  # an import in that module
+            raise UserFileError(f"{name} cannot be imported: {explained(error)}") from error
         raise UserFileError(f"{name}: no module named {error.name!r}; write package.module:Class.") from error
     except AttributeError as error:
         raise UserFileError(f"{name}: {error}") from error

@@ -32,7 +32,7 @@ COMMANDS = (
     Command("new", "cosim.cli.new", "write a starter scenario for an FMU"),
     Command("show", "cosim.cli.show", "show how components hang together"),
     Command("list", "cosim.cli.listing", "list what ships"),
-    Command("info", "cosim.cli.info", "describe an FMU or SSP file"),
+    Command("info", "cosim.cli.info", "describe an FMU, an SSP file or a model"),
     Command("export", "cosim.cli.export", "write a scenario as SSP"),
 )
 

@@ -1,5 +1,5 @@
-"""``cosim info FILE``: what an FMU says about itself and whether it can run here, or what is in a system structure
-package.
+"""``cosim info WHAT``: what an FMU says about itself and whether it can run here, what is in a system structure
+package, or what a model declares.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from typing import Any
 
 import fmpy
 
+from cosim.cli.model_info import describe_model, names_a_model
 from cosim.components.loading import read_description, runs_here
 from cosim.scenario.package_names import is_package
 from cosim.ssp.describe import describe_package, text_of_package
@@ -26,10 +27,14 @@ def register(commands: Any) -> None:
     """
     parser = commands.add_parser(
         "info",
-        description="Interfaces, platforms and variables of an FMU, or the systems, components and connections in an "
-        "SSP.",
+        description="Interfaces, platforms and variables of an FMU; the systems, components and connections in an SSP; "
+        "or what a plant or an observer declares.",
     )
-    parser.add_argument("file", type=Path)
+    parser.add_argument(
+        "what",
+        metavar="WHAT",
+        help="an .fmu or .ssp file, a name of 'cosim list', file.py:Class or package.module:Class",
+    )
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.set_defaults(execute=execute)
 
@@ -40,9 +45,9 @@ def execute(options: argparse.Namespace) -> int:
     Args:
         options: of the command line.
     """
-    if is_package(options.file):
+    if is_package(options.what):
         return _execute_package(options)
-    data = describe_file(options.file)
+    data = describe_model(options.what) if names_a_model(options.what) else describe_file(Path(options.what))
     if options.json:
         print(json.dumps(data, indent=2))
         return 0
@@ -60,7 +65,7 @@ def execute(options: argparse.Namespace) -> int:
 
 
 def _execute_package(options: argparse.Namespace) -> int:
-    data = describe_package(str(options.file))
+    data = describe_package(options.what)
     print(json.dumps(data, indent=2) if options.json else text_of_package(data))
     return 0
 

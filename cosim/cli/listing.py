@@ -117,6 +117,7 @@ def _systems(registry: Iterable[str], known: Mapping[str, Entry]) -> dict[str, d
     return {
         name: {
             "description": " ".join(known[name].description.split()),
+            "room": known[name].room,
             "source": known[name].source,
             "presets": list(known[name].presets),
             "options": [option.name for option in known[name].options if option.listed],

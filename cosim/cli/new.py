@@ -24,7 +24,9 @@ def register(commands: Any) -> None:
     parser.add_argument("fmu", type=Path, help="the FMU")
     parser.add_argument("-o", "--out", type=Path, metavar="FILE", help="scenario file to write (default: NAME.toml)")
     parser.add_argument(
-        "--observer", metavar="NAME", help="shipped observer to put beside it (default: takagi_sugeno_cdo)"
+        "--observer",
+        metavar="NAME",
+        help="observer to put beside it, a name or file.py:Class (default: takagi_sugeno_cdo)",
     )
     parser.add_argument("--force", action="store_true", help="replace a file that exists")
     parser.set_defaults(execute=execute)

@@ -61,6 +61,7 @@ class PythonModel:
         self.kinds: dict[str, type] = {}  # of the parameters, by name
         self.parameter_signals = self._parameters()
         self.telegram = self._telegram()
+        self._check_step()
         self.direct = self._direct()
         names = Counter(s.name for s in (*self.inputs, *self.outputs, *self.parameter_signals))
         doubled = [name for name, count in names.items() if count > 1]
@@ -130,6 +131,17 @@ class PythonModel:
             if output not in outputs or isinstance(sources, str) or not set(sources) <= set(inputs):
                 raise self._refused(f"direct = {declared!r} cannot be; write direct = {{'output': ['input']}}")
         return {output: list(sources) for output, sources in declared.items()}
+
+    def _check_step(self) -> None:
+        bound = self.given is not self.cls or isinstance(getattr_static(self.cls, "step"), staticmethod)
+        try:
+            arguments = signature(self.given.step)
+        except (TypeError, ValueError):  # of compiled code, say
+            return
+        try:
+            arguments.bind(*(("t", "inputs", "dt") if bound else ("self", "t", "inputs", "dt")))
+        except TypeError as error:
+            raise self._refused(f"step{arguments} cannot be called as step(t, inputs, dt)") from error
 
     def _telegram(self) -> tuple[str, ...] | None:
         """What ``balise`` takes; None where there is no such method."""
@@ -254,7 +266,7 @@ class PythonModel:
             wanted = "one number, shape ()" if expected == () else f"shape {expected}"
             raise PythonModelError(f"output {signal.name!r} has shape {value.shape}{after}, expected {wanted}")
         if not np.isfinite(value).all():
-            raise PythonModelError(f"output {signal.name!r} is {found!r}{after}, expected finite numbers")
+            raise PythonModelError(f"output {signal.name!r} is {value}{after}, expected finite numbers")
         return value
 
     def save(self, made: Any) -> Any:

@@ -248,7 +248,7 @@ def train_observers() -> dict[str, type[TrainObserver]]:
     """The shipped train observers by name."""
     return {
         n: kind
-        for n, kind in fmu_observer.OBSERVERS.items()
+        for n, kind in fmu_observer.OBSERVERS.usable().items()
         if isinstance(kind, type) and issubclass(kind, TrainObserver)
     }
 

@@ -95,9 +95,9 @@ def settings_of(given: Any) -> dict[str, dict[str, Any]]:
     """What an instance was made with, as keys of a component's table, so that a file can say it too.
 
     Args:
-        given: an instance; a class or a text has no settings.
+        given: an instance; a class, a text or None has no settings.
     """
-    if isinstance(given, str | type):
+    if given is None or isinstance(given, str | type):
         return {}
     if descends_from(given, SYSTEM):
         return {"options": dict(given.options)} if given.options else {}

@@ -6,12 +6,12 @@ Unknown keys, wrong types and values out of range are refused with the place and
 from __future__ import annotations
 
 import json
-from contextlib import suppress
+from functools import cache
 from math import ulp
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, PlainValidator, SerializeAsAny, TypeAdapter, ValidationError, model_validator
 
 from cosim.errors import ScenarioError, nearest
 from cosim.expectations.expectation import Expectation
@@ -30,24 +30,27 @@ from cosim.scenario.tables import (
 )
 from cosim.table import Name, Table
 from fmus.fmi.standard import TIME_TOLERANCE
-from plant_models.registry import RegistryError
 
 
-def _kinds() -> Any:
-    """One of all expectations; what an installed package announces and cannot be loaded is told where it is asked
-    for.
-    """
-    found = []
-    for name in EXPECTATIONS:
-        with suppress(RegistryError):
-            found.append(EXPECTATIONS[name])
-    return Union[tuple(dict.fromkeys(found))]  # noqa: UP007 - as many as there are
+def _expectation(given: Any) -> Expectation:
+    """An expectation by its ``check``, of those that are registered when the scenario is read."""
+    if isinstance(given, Expectation):
+        return given
+    check = given.get("check") if isinstance(given, dict) else None
+    if not isinstance(check, str):
+        raise ValueError(f"expected a table with the key 'check', which is one of: {', '.join(EXPECTATIONS)}")
+    if check not in EXPECTATIONS:
+        raise ValueError(f"unknown check {check!r}; {nearest(check, EXPECTATIONS)}")
+    return _adapter(EXPECTATIONS[check]).validate_python({check: given})[check]
 
 
-if TYPE_CHECKING:
-    ExpectationItem = Expectation
-else:
-    ExpectationItem = Annotated[_kinds(), Field(discriminator="check")]
+@cache
+def _adapter(kind: type[Expectation]) -> TypeAdapter[dict[str, Expectation]]:
+    """Validates under the name of the check, so that errors are placed there."""
+    return TypeAdapter(dict[str, kind])  # type: ignore[valid-type]
+
+
+ExpectationItem = Annotated[SerializeAsAny[Expectation], PlainValidator(_expectation)]
 
 
 class ScenarioTable(Table):
@@ -165,8 +168,6 @@ def _explain(item: dict[str, Any]) -> str:
     if item["type"] == "extra_forbidden":
         key = str(item["loc"][-1])
         return f"{place}: unknown key; {nearest(key, _known_keys(item['loc']))}"
-    if item["type"].startswith("union_tag_"):
-        return f"{place}: {_wrong_check(item.get('input'))}"
     given = item.get("input")
     if item["type"] == "value_error" or isinstance(given, dict):
         return f"{place}: {message}"
@@ -183,17 +184,6 @@ def _place(location: tuple[Any, ...]) -> str:
         check = f", '{location[2]}'" if len(location) > 2 else ""
         return f"expect, number {location[1] + 1}{check}" + "".join(f", {part}" for part in location[3:4])
     return ".".join(str(p) for p in location if not _is_form(str(p))) or "scenario"
-
-
-def _wrong_check(given: Any) -> str:
-    """What to say of an expectation whose kind is not known."""
-    if not isinstance(given, dict) or "check" not in given:
-        return f"expected a table with the key 'check', which is one of: {', '.join(EXPECTATIONS)}"
-    try:
-        EXPECTATIONS.get(str(given["check"]))
-    except RegistryError as error:
-        return str(error)
-    return f"unknown check {given['check']!r}; {nearest(str(given['check']), EXPECTATIONS)}"
 
 
 def _is_form(place: str) -> bool:

@@ -19,7 +19,7 @@ from cosim.errors import CosimError, CouplingError, OutputError, ScenarioError, 
 from cosim.scenario.backends import NATIVE
 from cosim.scenario.connections import parse_connections
 from cosim.scenario.layouts import make_layout
-from cosim.scenario.models import LATE_PARAMETERS, make_system, native_fmu
+from cosim.scenario.models import LATE_PARAMETERS, OWN_PACKAGES, make_system, native_fmu
 from cosim.scenario.schema import ScenarioTable
 from cosim.scenario.starts import start_values
 from cosim.scenario.tables import ComponentTable
@@ -37,6 +37,7 @@ from plant_models.railway.sensors.balise_reader import BaliseReader
 ELEMENT_OF_ARRAY = re.compile(r"(.+)\[(\d+(?:,\d+)*)\]")
 BALISES_FILE = "resources/balises.csv"
 MOST_BALISES = max(BaliseReader.option_choices["balise_capacity"])
+MADE_FROM = frozenset({"model", "observer", "backend", "preset", "options"})
 LOG = logging.getLogger("cosim")
 
 
@@ -46,13 +47,15 @@ class Part:
 
     Args:
         table: of the scenario. fmu: its FMU. member: name of that in the package. interface: what it says of its
-            variables.
+            variables. left_out: keys of the table that mean nothing elsewhere: what it was made from, where that is
+            code of the user's; its FMU stands for it.
     """
 
     table: ComponentTable
     fmu: Path
     member: str
     interface: Interface
+    left_out: frozenset[str] = frozenset()
 
 
 def export_package(table: ScenarioTable, name: str, folder: Path, where: str, path: Path, version: str) -> Path:
@@ -182,7 +185,8 @@ class _Exporter:
         content = fmu.read_bytes()
         member = next((m for m, known in self.files.items() if known == content), f"resources/{name}.fmu")
         self.files[member] = content
-        return Part(component, fmu, member, interface)
+        foreign = system is not None and type(system).__module__.partition(".")[0] not in OWN_PACKAGES
+        return Part(component, fmu, member, interface, MADE_FROM if foreign else frozenset())
 
     def checked(self, fmu: Path, name: str, table: ComponentTable) -> ModelDescription:
         """The description of an FMU, arrays as its structural parameters make them, once its parameters fit."""
@@ -207,7 +211,9 @@ class _Exporter:
         if values is not None:
             self.files[f"resources/{name}.ssv"] = values
             child(child(node, "ssd", "ParameterBindings"), "ssd", "ParameterBinding", source=f"resources/{name}.ssv")
-        own = part.table.model_dump(mode="json", by_alias=True, exclude_unset=True, exclude={"fmu", "parameters"})
+        own = part.table.model_dump(
+            mode="json", by_alias=True, exclude_unset=True, exclude={"fmu", "parameters", *part.left_out}
+        )
         node.append(write_extras(own | {DIGEST: digest(part.fmu), **more}))
 
     def parameter_file(self, name: str, part: Part) -> bytes | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cosim.errors import CosimError, OutputError, ScenarioError, nearest
-from cosim.scenario.paths import relative
+from cosim.scenario.paths import move_file, relative
 from cosim.simulation.scenario import Scenario
 from cosim.starter.alone import alone
 from cosim.starter.look import Look, look_into
@@ -15,8 +15,9 @@ from cosim.starter.observer import observer_beside
 from cosim.starter.render import render
 from cosim.starter.roles import PlantRoles, is_observer, observer_roles, plant_roles
 from cosim.starter.toml_lines import LISTED, one_line
-from cosim.starter.train import DEFAULT_OBSERVER, train
+from cosim.starter.train import DEFAULT_OBSERVER, declared_observer, train
 from fmu_observer import OBSERVERS
+from plant_models.user_file import names_code
 
 WANTED = frozenset({"effort", "odometer"})
 """Inputs of the observers that a starter can connect."""
@@ -43,7 +44,8 @@ def starter(fmu: str | Path, target: str | Path, observer: str | None = None) ->
     Args:
         fmu: path of the FMU.
         target: the scenario file to be; paths in the text are relative to it.
-        observer: name of a shipped observer to put beside a plant; by default the Takagi-Sugeno observer.
+        observer: name of the observer to put beside a plant, or ``file.py:Class``; by default the Takagi-Sugeno
+            observer.
 
     Returns:
         The text of the file, and what the user should be told.
@@ -56,11 +58,15 @@ def starter(fmu: str | Path, target: str | Path, observer: str | None = None) ->
     path, target = Path(fmu), Path(target)
     look = look_into(path)
     place = relative(path, target.parent)
-    roles = plant_roles(look)
+    written = move_file(observer or DEFAULT_OBSERVER, lambda file: relative(file, target.parent))
+    roles, beside = plant_roles(look), observer or DEFAULT_OBSERVER
     if is_observer(look):
         kind, values = "observer", observer_beside(look, observer_roles(look))
     elif roles.is_train:
-        kind, values = "train", train(look, roles, observer or DEFAULT_OBSERVER)
+        kind, values = (
+            "train",
+            train(look, roles, beside, written),
+        )
     else:
         kind, values = "alone", alone(look)
     known = {"look": look, "fmu": place, "target": target.name, "about": _about(look), "listed": LISTED}
@@ -74,7 +80,8 @@ def write_starter(fmu: str | Path, target: str | Path, observer: str | None = No
     Args:
         fmu: path of the FMU.
         target: the scenario file; paths in it are relative to it.
-        observer: name of a shipped observer to put beside a plant; by default the Takagi-Sugeno observer.
+        observer: name of the observer to put beside a plant, or ``file.py:Class``; by default the Takagi-Sugeno
+            observer.
         force: replace a file that exists.
 
     Returns:
@@ -108,11 +115,19 @@ def write_starter(fmu: str | Path, target: str | Path, observer: str | None = No
 def _check_observer(observer: str | None) -> None:
     if observer is None:
         return
-    able = [name for name, system in OBSERVERS.items() if {s.name for s in system().inputs} >= WANTED]
-    if observer not in able:
+    known = names_code(observer) or observer in OBSERVERS
+    if not (known and {s.name for s in declared_observer(observer).inputs} >= WANTED):
+        able = [name for name in OBSERVERS if _listens(name)]
         raise ScenarioError(
             f"No observer {observer!r} that listens to an effort and an odometer; {nearest(observer, able)}"
         )
+
+
+def _listens(name: str) -> bool:
+    try:
+        return {s.name for s in declared_observer(name).inputs} >= WANTED
+    except ScenarioError:  # of an installed package that is wrong
+        return False
 
 
 def _about(look: Look) -> str:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from cosim.scenario.models import make_declared
 from cosim.scenario.schema import step_count
+from cosim.scenario.tables import ComponentTable
 from cosim.starter.guess import Guess, fits
 from cosim.starter.look import Look, number
 from cosim.starter.roles import PlantRoles
 from cosim.starter.toml_lines import Link, guessed, one_line
-from fmu_observer import OBSERVERS
 from fmus.fmi.capabilities import read_capabilities
 
 PLANT, OBSERVER = "plant", "observer"
@@ -22,19 +23,19 @@ unstable.
 """
 
 
-def train(look: Look, roles: PlantRoles, observer: str) -> dict[str, Any]:
+def train(look: Look, roles: PlantRoles, observer: str, place: str) -> dict[str, Any]:
     """What the template of this starter inserts.
 
     Args:
         look: what the FMU says.
         roles: what its signals were guessed to be.
-        observer: name of a shipped observer.
+        observer: name of the observer, or ``file.py:Class``. place: the same as the scenario file says it.
 
     Returns:
         Values by name.
     """
     stop, step, source = train_times(look)
-    system = OBSERVERS[observer]()
+    declared = declared_observer(observer)
     driven = roles.effort.signal.name if roles.effort else None
     needed = {"position": roles.position, "speed": roles.speed}
     return {
@@ -46,11 +47,23 @@ def train(look: Look, roles: PlantRoles, observer: str) -> dict[str, Any]:
         "roles": roles,
         "others": [s for s in look.inputs if s.name != driven],
         "settings": [s for s in look.parameters if s.start is not None and not s.name.endswith("]")],
-        "observer": observer,
+        "observer": place,
         "preset": PRESETS.get(observer),
-        "known": {s.name: s.start for s in (*system.parameters, *system.states)},
+        "known": {s.name: s.start for s in (*declared.parameter_signals, *getattr(declared, "states", ()))},
         "lacking": [what for what, found in needed.items() if found is None or not found.signal.readable],
     }
+
+
+def declared_observer(name: str) -> Any:
+    """What an observer declares, see `cosim.scenario.models.make_declared`.
+
+    Args:
+        name: of the observer, or ``file.py:Class``.
+
+    Raises:
+        ScenarioError: there is no such observer, or it cannot be loaded.
+    """
+    return make_declared(ComponentTable.model_validate({"observer": name}), "observer")
 
 
 def train_times(look: Look) -> tuple[float, float, str]:

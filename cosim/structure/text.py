@@ -179,8 +179,8 @@ def _balises(structure: Structure) -> list[str]:
         return []
     how = "chosen by a probe of the plant when the run is set up" if balises.method == "auto" else "asked for"
     rows = [
-        ["watched plant", f"{balises.plant} ({balises.position}, {balises.speed})" if balises.position else "none"],
-        ["told", ", ".join(balises.receivers) or "nobody"],
+        ["monitored plant", f"{balises.plant} ({balises.position}, {balises.speed})" if balises.position else "none"],
+        ["notified", ", ".join(balises.receivers) or "nobody"],
         ["localisation", f"{balises.method}, {how}"],
         ["timing", balises.timing],
     ]

@@ -21,7 +21,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
 from typing import IO, Any
 
-from fmus.check.catalogue import check_of
+from fmus.check.catalogue import CHECKS
 from fmus.check.findings import Finding, Verdict
 from fmus.check.job import Job
 from fmus.check.worker import unrun
@@ -83,7 +83,7 @@ def run_isolated(job: Job, progress: Callable[[str], None] = lambda _: None) -> 
             if not left:
                 break
             lost = child.current or left[0]
-            check = check_of(job.interface, lost)
+            check = CHECKS[lost]
             found.append(check.lost(f"{child.end} in '{lost}'", crashed=child.crashed))
             left = tuple(name for name in left if name != lost)
             if check.basis:

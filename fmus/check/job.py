@@ -17,6 +17,7 @@ class Job:
         checks: names of the checks, in order.
         step: communication step [s]. start_time: [s]. starts: start values by name.
         budget: time that one check may take [s]. steps: of the longest run.
+        places: of checks that the program has registered, ``file.py:Class`` by name.
     """
 
     folder: str
@@ -27,6 +28,7 @@ class Job:
     budget: float
     steps: int
     starts: Mapping[str, float] = field(default_factory=dict)
+    places: Mapping[str, str] = field(default_factory=dict)
 
     def only(self, checks: tuple[str, ...]) -> Job:
         """The same job with other checks."""

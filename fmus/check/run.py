@@ -12,7 +12,7 @@ from time import perf_counter
 from fmpy.model_description import ModelDescription
 
 from fmus.check.bench import end_of_experiment
-from fmus.check.catalogue import checks_of
+from fmus.check.catalogue import checks_of, registered_places
 from fmus.check.checks.static import platforms, validation
 from fmus.check.findings import Class, Finding, Verdict, class_of
 from fmus.check.instance import LOADING
@@ -107,7 +107,8 @@ def check_fmu(
 
     Raises:
         NotAnFmuError: the file is no FMU, is dangerous, or has no library that can be loaded here.
-        ValueError: step, steps, until, timeout or a start value cannot be.
+        ValueError: step, steps, until, timeout or a start value cannot be, or a check that this program has registered
+            cannot be found by the child processes.
     """
     begin = perf_counter()
     archive = open_archive(Path(path))
@@ -122,7 +123,8 @@ def check_fmu(
     _demand_settable(description, chosen)
     start_time = _start_time(description)
     count = _steps(description, size, steps, until)
-    findings = []
+    findings: list[Finding] = []
+    left_out: dict[str, str] = {}
     for name, static in STATIC.items():
         progress(name)
         outcome = static(archive)
@@ -132,10 +134,12 @@ def check_fmu(
             if interface == SCHEDULED_EXECUTION:
                 findings.append(Finding("scheduled execution", Verdict.SKIPPED, "looked at, never run"))
                 continue
-            names = tuple(check.name for check in checks_of(interface))
-            job = Job(str(folder), interface, names, size, start_time, timeout, count, chosen)
+            names = tuple(checks_of(interface, left_out.__setitem__))
+            places = registered_places(names)
+            job = Job(str(folder), interface, names, size, start_time, timeout, count, chosen, places)
             findings += _meant(archive, interface, run_isolated(job, progress))
     _demand_runnable(archive, findings)
+    findings += [Finding(name, Verdict.NOTE, f"left out: {reason}") for name, reason in left_out.items()]
     if CO_SIMULATION not in archive.interfaces:
         findings.append(Finding("interface", Verdict.LIMIT, NO_SLAVE, "integrate it with a solver of your own"))
     found = _merged(findings)
@@ -191,7 +195,7 @@ def _meant(archive: Archive, interface: str, findings: list[Finding]) -> list[Fi
     """Findings by what they mean for co-simulation: beside it those of model exchange are notes."""
     if interface == CO_SIMULATION or CO_SIMULATION not in archive.interfaces:
         return findings
-    own = {check.name for check in checks_of(interface)}
+    own = checks_of(interface)
     meant = {Verdict.LIMIT, Verdict.DISTRUST}
     return [
         replace(f, verdict=Verdict.NOTE, advice="") if f.check in own and f.verdict in meant else f for f in findings

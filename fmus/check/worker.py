@@ -15,13 +15,14 @@ from pathlib import Path
 from traceback import extract_tb
 from typing import Any, NoReturn
 
-from fmus.check.catalogue import checks_of
+from fmus.check.catalogue import CHECKS, EXPECTED
 from fmus.check.check import REPEATED, Check
 from fmus.check.context import Context
 from fmus.check.findings import Finding, Outcome, Verdict, failed
 from fmus.check.instance import SlaveError
 from fmus.check.job import Job
 from fmus.fmi.description import read_description
+from plant_models.user_file import UserFileError, load_class
 
 BY_HAND = "check this by hand"
 DIFFERS = "not run, because equal runs differ"
@@ -58,7 +59,12 @@ def run(job: Job, tell: Callable[[dict[str, Any]], None]) -> None:
     """
     description = read_description(Path(job.folder))
     context = Context(Path(job.folder), description, job.step, job.start_time, job.starts, job.budget, job.steps)
-    wanted = [check for check in checks_of(job.interface) if check.name in job.checks]
+    for name, place in job.places.items():
+        try:
+            CHECKS[name] = load_class(place, EXPECTED)
+        except UserFileError as error:
+            tell({"finding": Finding(name, Verdict.ERROR, str(error), BY_HAND).to_dict()})
+    wanted = [CHECKS[name] for name in job.checks if name in CHECKS]
     for finding in findings(wanted, context, lambda name: tell({"start": name})):
         tell({"finding": finding.to_dict()})
     context.close()

@@ -11,6 +11,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Literal
 
+from fmu_observer import OBSERVERS
 from fmu_observer.event_protocol import LATE_POLICIES, EventProtocol
 from fmus.build import build_fmu, fmu_path
 from fmus.cli.progress import ProgressBar
@@ -19,6 +20,7 @@ from fmus.pack import check_target
 from fmus.recipes import RECIPES, SYSTEM, legal_values, recipe
 from fmus.report import platforms_of
 from fmus.toolchain.targets import choose_targets
+from plant_models import PLANTS
 from plant_models.user_file import load_class, make, names_a_file, names_code
 
 Version = Literal[2, 3]
@@ -179,7 +181,7 @@ def _names(options: argparse.Namespace) -> list[str]:
         raise ValueError("Give the names of models, see 'fmus list', or --all.")
     if not options.all:
         return list(options.names)
-    return [name for name in RECIPES if RECIPES[name].traceable]
+    return [name for registry in (PLANTS, OBSERVERS) for name, cls in registry.usable().items() if cls.traceable]
 
 
 def _system(name: str, words: Sequence[str]) -> Any:

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from fmu_observer.observers.continuous.differentiator import filtering_differentiator_flow
 from fmu_observer.observers.discrete import ImplicitDifferentiator
-from fmu_observer.observers.discrete import implicit_step as module
-from fmu_observer.observers.discrete.implicit_step import (
+from fmu_observer.observers.discrete import implicit_recursion as module
+from fmu_observer.observers.discrete.implicit_recursion import (
     equation_coefficients,
     implicit_step,
     solve_first_filter_equation,

@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 
 import fmu_observer
 import plant_models
+from cosim.expectations.expectation import WindowExpectation
 from cosim.expectations.registry import EXPECTATIONS
 from cosim.report.figures.panels import FIGURES
 from cosim.results.formats.catalogue import FORMATS
+from cosim.scenario.model_name import EXPECTED
 from cosim.scenario.tables import ComponentTable
 from cosim.simulation.scenario import Scenario
 from fmus.check.catalogue import CHECKS
 from plant_models import registry
 from plant_models.registry import Registry, RegistryError
+from plant_models.user_file import UserFileError, load_class
 
 ALL: tuple[Registry[Any], ...] = (
     plant_models.PLANTS,
@@ -107,7 +111,7 @@ FAULTS = {
     "leaves.py:Bias": ("import sys\nsys.exit('bye')\n", r"cannot be run: SystemExit: bye \(.*leaves.py:2\)"),
     "number.py:Bias": ("Bias = 3.0\n", r"named 'Bias' \(Bias is of type float\)"),
     "bare.py:Bias": ("class Bias:\n    pass\n", r"named 'Bias' \(Bias is a class\)"),
-    "two.py": ("class A:\n    step = print\nclass B:\n    step = print\n", "it has: A, B. Write .*two.py:Class"),
+    "two.py": ("class A:\n    step = print\nclass B:\n    step = print\n", "it has: A, B. Write [^ ]*two.py:Class"),
     "no.such.module:Bias": (None, "no module named 'no'"),
     "math:Bias": (None, "module 'math' has no attribute 'Bias'"),
     "needs.py:Bias": (
@@ -135,6 +139,15 @@ def test_a_users_file_that_is_wrong_is_told_without_traceback(
         raise AssertionError(said.replace("\n", " "))
 
 
+def test_a_missing_import_of_a_users_module_is_not_taken_for_a_missing_module(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "needs_more.py").write_text("import numppy\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(UserFileError, match=r"cannot be imported: ModuleNotFoundError: .*'numppy' \(.*needs_more.py:1"):
+        load_class("needs_more:Bias", EXPECTED)
+
+
 def test_a_changed_file_is_read_again(tmp_path: Path) -> None:
     file = tmp_path / "own.py"
     text = "class Own:\n    outputs = ['x']\n    x = {}\n    def step(self, t, inputs, dt):\n        pass\n"
@@ -152,3 +165,50 @@ def test_names_remember_classes_through_copies_and_processes() -> None:
     table = ComponentTable.model_validate({"model": plant_models.Train})
     assert pickle.loads(pickle.dumps(table)).model.given is plant_models.Train
     assert str(table.model) == "plant_models.railway.vehicle.train:Train"
+
+
+def test_no_name_of_a_lazy_room_is_that_of_a_file_in_it() -> None:
+    """Once the file is imported, ``room.name`` would be the module and not what it holds."""
+    root = Path(plant_models.__file__).parents[1]
+    rooms = [path.parent for path in root.glob("*/**/__init__.py") if "= lazy_names(" in path.read_text()]
+    assert len(rooms) > 5
+    clashes = [
+        f"{path}:{name}"
+        for room in rooms
+        for path in room.glob("*.py")
+        for name in re.findall(r"^(?:class |def )?(\w+)(?=.*[=(:])", path.read_text(), re.MULTILINE)
+        if (room / f"{name}.py").exists()
+    ]
+    assert clashes == []
+
+
+def test_an_expectation_may_be_registered_at_any_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(EXPECTATIONS, "_own", {})
+    scenario = Scenario(stop=1.0, step=0.5).add("driver", model="driver")
+    given = {"check": "settles", "signal": "driver.effort", "within": 1e9}
+    with pytest.raises(ValueError, match="expect, number 1: unknown check 'settles'"):
+        scenario.set("expect", [given]).table()
+
+    class SettlesExpectation(WindowExpectation):
+        check: Literal["settles"] = "settles"
+        signal: str
+        within: float
+
+        def judge(self, run: Any) -> list[Any]:
+            return []
+
+    EXPECTATIONS["settles"] = SettlesExpectation
+    (found,) = scenario.table().expect
+    assert isinstance(found, SettlesExpectation)
+    with pytest.raises(ValueError, match="expect, number 1, 'settles', within: "):
+        scenario.set("expect", [given | {"within": "x"}]).table()
+
+
+def test_a_member_that_is_left_out_is_told_once(plugins: Registry[Any], caplog: pytest.LogCaptureFixture) -> None:
+    registry.log_left_out.cache_clear()
+    for _ in range(2):
+        assert "mine" in plugins.usable()
+    said = [record.getMessage() for record in caplog.records]
+    assert [text.split()[0] for text in said] == ["'thau'", "'gone'", "'wrong'"]
+    with pytest.raises(RegistryError, match="the observer 'number' is no subclass of"):
+        plugins["number"] = 3

@@ -106,8 +106,8 @@ def test_module_has_docstrings_and_annotations(name: str) -> None:
     module = import_module(name)
     assert module.__doc__, f"{name} has no docstring"
     things = list(public(module))
-    assert [n for n, thing in things if not documented(thing)] == []
-    assert {n: bare(thing) for n, thing in things if bare(thing)} == {}
+    assert [n for n, thing in things if not documented(thing)] == [], "without docstring"
+    assert {n: bare(thing) for n, thing in things if bare(thing)} == {}, "without annotation"
     assert {n: unnamed(thing) for n, thing in things if unnamed(thing)} == {}
 
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
-
 from cosim.drawing.style import png
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.panel import Panel
 from cosim.results.result import Result
-from plant_models.registry import Registry, RegistryError
+from plant_models.registry import Registry
 
 FIGURES: Registry[type[Panel]] = Registry(
     "figure", ("cosim.report.figures",), "cosim.figures", "cosim.report.figures.panel:Panel"
@@ -16,12 +14,8 @@ FIGURES: Registry[type[Panel]] = Registry(
 
 
 def panels() -> list[type[Panel]]:
-    """All figures in the order of the report; one of an installed package that cannot be loaded is left out."""
-    found = []
-    for name in FIGURES:
-        with suppress(RegistryError):
-            found.append(FIGURES[name])
-    return sorted(found, key=lambda panel: panel.place)
+    """All figures in the order of the report; the log tells of one that cannot be loaded."""
+    return sorted(FIGURES.usable().values(), key=lambda panel: panel.place)
 
 
 def draw_all(result: Result, spec: ReportSpec) -> dict[type[Panel], bytes]:

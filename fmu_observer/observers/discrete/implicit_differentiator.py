@@ -1,11 +1,11 @@
-"""O6: the implicit discrete filtering differentiator as a system. The equations are in `implicit_step`."""
+"""O6: the implicit discrete filtering differentiator as a system. The equations are in `implicit_recursion`."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
-from fmu_observer.observers.discrete.implicit_step import implicit_step
+from fmu_observer.observers.discrete.implicit_recursion import implicit_step
 from fmu_observer.observers.discrete.sampling import at_sample, primed_memory
 from fmu_observer.observers.signal_differentiator import LARGEST, SignalDifferentiator
 from plant_models.hybrid import PeriodicEvent, memory, parameter, vector

@@ -138,6 +138,7 @@ class Broken(DeadReckoning):
     ("gives", "words"),
     [
         (lambda good: good | {"position": float("nan")}, "output 'position' is nan after step, expected finite"),
+        (lambda good: good | {"position": np.float64("nan")}, "output 'position' is nan after step, expected finite"),
         (lambda good: good | {"position": np.zeros(3)}, r"output 'position' has shape \(3,\) after step, expected one"),
         (lambda good: good | {"position": "far"}, "output 'position' is no number after step: 'far'"),
         (lambda _: {"count": 1.0}, "no output 'position': return it from step in a dict, or keep it as self.posi"),
@@ -195,6 +196,7 @@ def declared(**attributes: Any) -> type:
         (declared(outputs=["odometer"]), "the name 'odometer' is taken twice"),
         (declared(direct={"position": "odometer"}), "write direct = "),
         (declared(balise=lambda _, place: place), "balise takes 'place'; of a telegram is known: stamp, position"),
+        (declared(step=lambda _, t: t), r"step\(_, t\) cannot be called as step\(t, inputs, dt\)"),
         (declared(outputs=["no name"]), "'no name' is not a legal identifier"),
     ],
 )

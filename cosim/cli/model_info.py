@@ -1,0 +1,72 @@
+"""What a plant, an observer or a class of the user's declares, as plain data for ``cosim info``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from cosim.errors import ScenarioError, nearest
+from cosim.scenario.models import make_declared
+from cosim.scenario.tables import ComponentTable
+from fmu_observer import OBSERVERS
+from fmus.recipes import legal_values
+from plant_models import PLANTS
+from plant_models.hybrid.signal import Signal
+from plant_models.user_file import names_a_file, names_code
+
+
+def names_a_model(text: str) -> bool:
+    """Whether what was typed is meant as the name of a model, and not as that of an FMU or SSP file.
+
+    Args:
+        text: as it was typed.
+    """
+    path = Path(text)
+    if names_a_file(text) or path.suffix.lower() in (".fmu", ".ssp"):
+        return names_a_file(text)
+    return not path.exists() and (names_code(text) or not path.suffix)
+
+
+def describe_model(name: str) -> dict[str, Any]:
+    """What a model declares, as plain data.
+
+    Args:
+        name: of a plant or an observer, ``file.py:Class`` or ``package.module:Class``.
+
+    Returns:
+        The same keys for variables as of an FMU; the others say where the model comes from and what can be chosen.
+
+    Raises:
+        ScenarioError: there is no such model, or it cannot be loaded or made.
+    """
+    registry = PLANTS if name in PLANTS else OBSERVERS
+    if name not in registry and not names_code(name):
+        raise ScenarioError(f"There is no model or observer {name!r}; {nearest(name, [*PLANTS, *OBSERVERS])}")
+    key = "model" if registry is PLANTS else "observer"
+    made = make_declared(ComponentTable.model_validate({key: name}), "info")
+    cls = getattr(made, "cls", type(made))  # of plain Python it is the user's
+    variables = [*made.inputs, *made.outputs, *made.parameter_signals, *getattr(made, "states", ())]
+    return {
+        "model": name,
+        "description": " ".join((getattr(made, "description", "") or cls.__doc__ or "").split()),
+        "source": getattr(made, "source", ""),
+        "origin": registry.origin(name) if name in registry else f"{cls.__module__.partition('@')[0]}:{cls.__name__}",
+        "presets": list(getattr(made, "presets", ())),
+        "options": [
+            f"{k}: {legal_values(v).removeprefix(', ') or 'any'}" for k, v in getattr(cls, "option_choices", {}).items()
+        ],
+        "events": [event.name for event in getattr(made, "triggered_events", ())],
+        "variables": [_variable(signal) for signal in variables],
+    }
+
+
+def _variable(signal: Signal) -> dict[str, Any]:
+    return {
+        "name": signal.name,
+        "causality": signal.causality,
+        "variability": signal.variability,
+        "type": "Float64" if signal.size is None else f"Float64[{signal.size}]",
+        "unit": signal.unit,
+        "start": signal.start if signal.causality != "output" else None,
+        "description": signal.description,
+    }
