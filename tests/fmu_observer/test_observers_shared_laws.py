@@ -147,8 +147,10 @@ def test_the_registry_names_every_observer() -> None:
 
 
 def test_casadi_is_loaded_with_the_first_block() -> None:
-    code = (
-        "import fmu_observer, sys; cls = fmu_observer.OBSERVERS['differentiator_cdo']; "
-        "assert 'casadi' not in sys.modules; from fmu_observer.block import make_block; make_block(cls()).instantiate(); assert 'casadi' in sys.modules"
-    )
+    code = """import sys, fmu_observer
+cls = fmu_observer.OBSERVERS["differentiator_cdo"]
+assert "casadi" not in sys.modules
+from fmu_observer.block import make_block
+make_block(cls()).instantiate()
+assert "casadi" in sys.modules"""
     subprocess.run([sys.executable, "-c", code], check=True)
