@@ -104,7 +104,10 @@ def _keep(
     parts = foreign.parts if foreign.path.exists() else [foreign.path]
     known = copies.get(str(foreign.path))
     folder = name if known is None else known if foreign.path.is_dir() else known.rpartition("/")[0]
-    entry["parts"] = [_keep_part(path, f"{folder}/{path.name}", origin, new, files_up_to) for path in parts]
+    root = foreign.path if foreign.path.is_dir() else foreign.path.parent
+    entry["parts"] = [
+        _keep_part(path, f"{folder}/{path.relative_to(root).as_posix()}", origin, new, files_up_to) for path in parts
+    ]
     if all(part["copy"] is not None for part in entry["parts"]):
         copies[str(foreign.path)] = folder if foreign.path.is_dir() else f"{folder}/{foreign.path.name}"
     else:  # all of it or nothing
