@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from cosim.errors import ProvenanceError
 from cosim.provenance.rerun import rerun
 from cosim.simulation.scenario import Scenario
 from fmus import cached_fmu
@@ -106,3 +108,24 @@ def test_the_fmu_and_the_block_follow_an_edit(tmp_path: Path) -> None:
     assert fmus[0] != fmus[1]
     assert values["block3"] == values["fmu3"]
     assert values["fmu3"][0] != values["fmu3"][1]
+
+
+def test_a_rerun_says_what_is_kept_of_an_instance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "own_gain.py").write_text(
+        "class Own:\n    outputs = ['x']\n    def __init__(self, x0=1.0):\n        self.x0 = x0\n        self.x = x0\n"
+        "    def step(self, t, inputs, dt):\n        pass\n"
+    )
+    own = import_module("own_gain").Own
+    Scenario(stop=1.0, step=0.5).add("own", model=own(x0=2.0)).run().write(tmp_path / "out", report=False)
+    again = rerun(tmp_path / "out")
+    assert again.verdict == "bit-identical"
+    words = "were kept its class and its settings (x0 = 2.0), nothing else."
+    assert [line.endswith(words) for line in again.changes] == [True]
+
+    class Hidden(own):  # type: ignore[misc, valid-type]
+        pass
+
+    Scenario(stop=1.0, step=0.5).add("own", model=Hidden).run().write(tmp_path / "gone", report=False)
+    with pytest.raises(ProvenanceError, match=r"own: the class .*Hidden stands in no file.* It cannot be run again"):
+        rerun(tmp_path / "gone")
