@@ -63,7 +63,7 @@ def run_commands(page: Path, block: Block) -> None:
 
 def run_python(page: Path, block: Block, names: dict[str, Any]) -> None:
     code = "\n" * (block.line - 1) + block.code  # line numbers of a failure are those of the page
-    exec(compile(code, str(page), "exec"), names)
+    exec(compile(code, str(page), "exec", dont_inherit=True), names)  # a page has no __future__ imports of ours
 
 
 @pytest.mark.compiler

@@ -101,7 +101,10 @@ def indicators_table(result: Result, spec: ReportSpec) -> Table:
     headings += [f"Delay in zone {number(a)} to {number(b)} s [s]" for a, b in spec.zones]
     rows = []
     for s in indicator_statistics(result, spec):
-        delays = ["not indicated" if delay is None else number(delay) for delay in s.delays]
+        delays = [
+            "not reached" if zone[0] >= result.time[-1] else "not indicated" if delay is None else number(delay)
+            for zone, delay in zip(spec.zones, s.delays, strict=True)
+        ]
         rows.append([label(spec, s.observer), number(100 * s.on), number(100 * s.on_outside), *delays])
     return simple_table(headings, rows, range(1, len(headings)))
 

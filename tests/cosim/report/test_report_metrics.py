@@ -15,6 +15,7 @@ from cosim.evaluation.metrics import error_size, phase_metrics
 from cosim.evaluation.numbers import error_number, number
 from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.report.figures.scales import error_scale, running_maximum, value_limits
+from cosim.report.page.run_tables import indicators_table
 from cosim.results.result import BaliseRecord, Result
 
 EXACT = 1e-12  # closed forms, up to the rounding of some thousand sums
@@ -125,6 +126,13 @@ def test_indicator_shares_and_delays() -> None:
     assert statistics.delays == (1.0, None, 0.0)
     assert_allclose(statistics.on, 5 / 9, rtol=EXACT)  # 1 + 2 + 2 of 9 seconds
     assert_allclose(statistics.on_outside, 2 / 4, rtol=EXACT)  # [1,2] and [8,9] of [1,3], [7,9]
+
+
+def test_a_zone_that_the_run_does_not_reach_is_not_called_one_without_indication() -> None:
+    result = small_result([0.0, 8.0, 10.0], obs__slip_indicator=[1, 2, 2])
+    table = indicators_table(result, ReportSpec(observers=["obs"], zones=[(2, 4), (7, 9), (10, 12)]))
+    ((_, ((*_, missed, seen, later),)),) = table.groups
+    assert (missed, seen, later) == ("not indicated", "1.00", "not reached")
 
 
 # --- telegrams --------------------------------------------------------------------------------------------------------
