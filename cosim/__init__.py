@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from cosim.comparison.verdict import Comparison
     from cosim.errors import CosimError, UnmetError
     from cosim.observer_benchmark.observers import benchmark_observers
-    from cosim.provenance import rerun
+    from cosim.provenance.rerun import rerun
     from cosim.results.load import load_result
     from cosim.results.result import Result
     from cosim.results.save import save_result

@@ -10,7 +10,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from fmpy.model_description import (
@@ -29,9 +29,10 @@ from fmpy.model_description import (
 )
 
 from fmu_observer.event_protocol import JOURNAL_CAPACITY, LATE_POLICIES, OUTCOME_TEXTS, OUTCOME_VARIABLES, EventProtocol
+from plant_models import hybrid
 from plant_models.disk_cache.entries import remembered
 from plant_models.disk_cache.identity import identity
-from plant_models.hybrid import HybridSystem, Signal, TracedSystem, TriggeredEvent, width
+from plant_models.hybrid import HybridSystem, Signal, TriggeredEvent, width
 from plant_models.hybrid.units import BASE_SYMBOLS, conversion, parse_unit
 
 FmiVersion = Literal[2, 3]
@@ -182,8 +183,9 @@ def describe(
         modelVariables=variables,
     )
     table = VariableTable.of(system)
-    outputs = _unknowns(system, variables, "output", table.outputs, width(system.outputs))
-    derivatives = _unknowns(system, variables, "derivative", table.derivatives, system.continuous_count)
+    facts = _facts(system)
+    outputs = _unknowns(variables, table.outputs, facts["output"])
+    derivatives = _unknowns(variables, table.derivatives, facts["derivative"])
     # A master that is told nothing of these takes each to depend on every input, and sees algebraic loops where there
     # are none.
     description.initialUnknowns = [*outputs, *derivatives]
@@ -193,7 +195,7 @@ def describe(
     indicators = referenced(variables, table.indicators, len(system.frictions) + len(system.switchings))
     description.eventIndicators = [Unknown(index=v.valueReference, variable=v) for v in indicators]
     description.numberOfContinuousStates, description.numberOfEventIndicators = system.continuous_count, len(indicators)
-    description.instantiationToken = _token(system, description)
+    description.instantiationToken = _token(system, description, facts["equations"])
     return description
 
 
@@ -404,15 +406,12 @@ def _unit_definition(name: str, shown: list[str]) -> Unit:
     return Unit(name=name, baseUnit=base, displayUnits=display)
 
 
-def _unknowns(
-    system: HybridSystem, variables: list[ModelVariable], function: str, first: int, count: int
-) -> list[Unknown]:
+def _unknowns(variables: list[ModelVariable], first: int, dependencies: list[list[int]]) -> list[Unknown]:
     """Outputs or derivatives at initialisation: each with the time, inputs, start values and parameters that it depends
     on.
     """
-    named = referenced(variables, first, count)
     unknowns = []
-    for variable, references in zip(named, _dependencies(system, function, count), strict=True):
+    for variable, references in zip(referenced(variables, first, len(dependencies)), dependencies, strict=True):
         known = [known for reference in references for known in referenced(variables, reference)]
         unknowns.append(_unknown(variable, known))
     return unknowns
@@ -433,11 +432,19 @@ def _unknown(variable: ModelVariable, known: list[ModelVariable]) -> Unknown:
     return Unknown(index=variable.valueReference, variable=variable, dependencies=known, dependenciesKind=kinds)
 
 
-def _dependencies(system: HybridSystem, function: str, count: int) -> list[list[int]]:
-    """Value references that each row of `output` or `derivative` depends on; all of them where it cannot be traced."""
-    key = identity(system, function, count, code=("fmu_observer",))
-    found: list[list[int]] = remembered("dependencies", key, lambda: _traced_dependencies(system, function, count))
-    return found
+def _facts(system: HybridSystem) -> dict[str, Any]:
+    """What only the traced equations tell, remembered: ``output`` and ``derivative``, the value references that each
+    row depends on, all of them where it cannot be traced; ``equations``, their digest, or the class.
+    """
+    return dict(remembered("description", identity(system, code=("fmu_observer",)), lambda: _traced_facts(system)))
+
+
+def _traced_facts(system: HybridSystem) -> dict[str, Any]:
+    return {
+        "output": _traced_dependencies(system, "output", width(system.outputs)),
+        "derivative": _traced_dependencies(system, "derivative", system.continuous_count),
+        "equations": hybrid.TracedSystem(system).digest() if system.traceable else type(system).__qualname__,
+    }
 
 
 def _traced_dependencies(system: HybridSystem, function: str, count: int) -> list[list[int]]:
@@ -450,7 +457,7 @@ def _traced_dependencies(system: HybridSystem, function: str, count: int) -> lis
         ("p", table.parameters, parameters),
     )
     rows: list[list[int]] = [[] for _ in range(count)]
-    traced = TracedSystem(system) if system.traceable and count else None
+    traced = hybrid.TracedSystem(system) if system.traceable and count else None
     for group, first, width_ in groups:
         pattern = np.ones((count, width_), dtype=bool)
         if traced is not None and width_:
@@ -460,12 +467,7 @@ def _traced_dependencies(system: HybridSystem, function: str, count: int) -> lis
     return rows
 
 
-def _equations_digest(system: HybridSystem) -> str:
-    digest: str = remembered("equations", identity(system), lambda: TracedSystem(system).digest())
-    return digest
-
-
-def _token(system: HybridSystem, description: ModelDescription) -> str:
+def _token(system: HybridSystem, description: ModelDescription, equations: str) -> str:
     """A name for the content: other equations, variables, starts, options or events, another token."""
     content: list[object] = [
         description.fmiVersion,
@@ -479,6 +481,6 @@ def _token(system: HybridSystem, description: ModelDescription) -> str:
     content += [[e.name, e.period, e.offset, len(e.noises)] for e in system.periodic_events]
     structure = (*description.outputs, *description.derivatives)
     content += [[u.variable.name, *(known.name for known in u.dependencies)] for u in structure]
-    content += [_equations_digest(system) if system.traceable else type(system).__qualname__]
+    content += [equations]
     digest = hashlib.sha256(json.dumps(content).encode()).hexdigest()
     return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"

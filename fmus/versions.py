@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import platform
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
+
+from plant_models.installed import installed_version
 
 PACKAGES = ("fmu-observer", "fmpy", "numpy", "scipy", "casadi")
 
@@ -26,9 +27,5 @@ def version_text() -> str:
     return f"{', '.join(f'{name} {number}' for name, number in known.items())}, Python {python} on {system}"
 
 
-@cache  # reading it takes a millisecond, and it stays
 def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "not installed"
+    return installed_version(package) or "not installed"

@@ -10,14 +10,15 @@ from __future__ import annotations
 
 import logging
 import re
+import sys
 from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar, cast
 
 T = TypeVar("T")
 LOG = logging.getLogger("plant_models")
@@ -166,8 +167,24 @@ class Registry(MutableMapping[str, T], Generic[T]):
                         yield Member(name, target, f"this package ({target})", room)
 
     def _announced(self) -> Iterator[Member]:
-        for entry in entry_points(group=self.group):
+        for entry in announced(self.group):
             yield Member(entry.name, entry.value, f"{_package(entry)} ({entry.value})")
+
+
+def announced(group: str) -> EntryPoints:
+    """The entry points of installed packages that belong to a group.
+
+    Args:
+        group: its name.
+    """
+    return _all_announced(tuple(sys.path)).select(group=group)
+
+
+@cache
+def _all_announced(_: tuple[str, ...]) -> EntryPoints:
+    """Read once for the folders that modules come from, and not for each registry."""
+    found: Any = entry_points()  # the type hints speak of Python 3.9
+    return cast(EntryPoints, found)
 
 
 @cache

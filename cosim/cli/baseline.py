@@ -19,7 +19,7 @@ from cosim.cli.baseline_text import print_json, tell_change, tell_comparison, te
 from cosim.cli.scenarios import OVERRIDES, parse_setting, simulated_time_bar
 from cosim.cli.tolerances import Asked, add_tolerances, asked_tolerances, chosen_tolerances
 from cosim.comparison.tolerance import Tolerances
-from cosim.components.loading import read_description
+from cosim.components.description import read_description
 from cosim.errors import BaselineError
 from cosim.results.load import load_result
 from fmus.cli.progress import ProgressBar

@@ -11,12 +11,12 @@ from typing import Any
 
 import fmpy
 
-from cosim.cli.model_info import describe_model, names_a_model
-from cosim.components.loading import read_description, runs_here
+from cosim import ssp
+from cosim.components.description import read_description, runs_here
 from cosim.scenario.package_names import is_package
-from cosim.ssp.describe import describe_package, text_of_package
 from fmus.fmi.capabilities import read_capabilities
 from fmus.text_table import text_table
+from plant_models.user_file import names_a_file, names_code
 
 
 def register(commands: Any) -> None:
@@ -47,7 +47,7 @@ def execute(options: argparse.Namespace) -> int:
     """
     if is_package(options.what):
         return _execute_package(options)
-    data = describe_model(options.what) if names_a_model(options.what) else describe_file(Path(options.what))
+    data = _described_model(options.what) if names_a_model(options.what) else describe_file(Path(options.what))
     if options.json:
         print(json.dumps(data, indent=2))
         return 0
@@ -65,9 +65,27 @@ def execute(options: argparse.Namespace) -> int:
 
 
 def _execute_package(options: argparse.Namespace) -> int:
-    data = describe_package(options.what)
-    print(json.dumps(data, indent=2) if options.json else text_of_package(data))
+    data = ssp.describe_package(options.what)
+    print(json.dumps(data, indent=2) if options.json else ssp.text_of_package(data))
     return 0
+
+
+def _described_model(name: str) -> dict[str, Any]:
+    from cosim.cli.model_info import describe_model  # noqa: PLC0415 - models and the schema, not for files
+
+    return describe_model(name)
+
+
+def names_a_model(text: str) -> bool:
+    """Whether what was typed is meant as the name of a model, and not as that of an FMU or SSP file.
+
+    Args:
+        text: as it was typed.
+    """
+    path = Path(text)
+    if names_a_file(text) or path.suffix.lower() in (".fmu", ".ssp"):
+        return names_a_file(text)
+    return not path.exists() and (names_code(text) or not path.suffix)
 
 
 def describe_file(path: Path) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import json
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from cosim import ssp
 from cosim.scenario.package_names import is_package
 from cosim.scenario.shipped import shipped_scenarios, shipped_tables
 from fmu_observer import OBSERVERS
@@ -88,9 +89,7 @@ def _what(text: str) -> str:
 
 
 def _execute_package(options: argparse.Namespace) -> int:
-    from cosim.ssp.load import list_variants  # noqa: PLC0415 - lxml only for those who read SSP
-
-    variants = list_variants(options.what)
+    variants = ssp.list_variants(options.what)
     if options.json:
         print(json.dumps({"variants": variants}, indent=2))
         return 0

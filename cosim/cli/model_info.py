@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 from cosim.errors import ScenarioError, nearest
@@ -12,19 +11,7 @@ from fmu_observer import OBSERVERS
 from fmus.recipes import legal_values
 from plant_models import PLANTS
 from plant_models.hybrid.signal import Signal
-from plant_models.user_file import names_a_file, names_code
-
-
-def names_a_model(text: str) -> bool:
-    """Whether what was typed is meant as the name of a model, and not as that of an FMU or SSP file.
-
-    Args:
-        text: as it was typed.
-    """
-    path = Path(text)
-    if names_a_file(text) or path.suffix.lower() in (".fmu", ".ssp"):
-        return names_a_file(text)
-    return not path.exists() and (names_code(text) or not path.suffix)
+from plant_models.user_file import names_code
 
 
 def describe_model(name: str) -> dict[str, Any]:

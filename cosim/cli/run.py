@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from cosim import studies
 from cosim.cli.scenarios import add_scenario, load_scenario, positive, simulated_time_bar
 from cosim.errors import OutputError
 from cosim.evaluation.cost import cost_text
@@ -22,8 +23,6 @@ from cosim.results.summary_file import jsonable
 from cosim.results.unfinished import SPARE
 from cosim.scenario.outcome import Outcome
 from cosim.simulation.scenario import Scenario
-from cosim.studies.seed_file import SEEDS_CSV, seed_file
-from cosim.studies.seeds import seed_study
 from fmus.plain import plain
 
 DONE, NOT_AS_ASKED, ERROR = 0, 1, 2
@@ -64,7 +63,7 @@ def register(commands: Any) -> None:
     parser.add_argument(
         "--stream",
         action="store_true",
-        help="write results while the run goes on, as table.npy, so that they outlive the program",
+        help="write results while the run goes on, as table.npy, so that they survive a crash",
     )
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
     parser.set_defaults(execute=execute)
@@ -106,9 +105,9 @@ def execute(options: argparse.Namespace) -> int:
     outcome, paths = results.outcome, results.paths
     study = None
     if options.seeds and outcome.failure is None:
-        study = _study(scenario, options, directory / SEEDS_CSV)
+        study = _study(scenario, options, directory / studies.SEEDS_CSV)
         outcome = outcome.with_summary(seed_study=study.to_data())
-        paths = outcome.write(directory, report=not options.no_report) | {"seeds": directory / SEEDS_CSV}
+        paths = outcome.write(directory, report=not options.no_report) | {"seeds": directory / studies.SEEDS_CSV}
     _tell(outcome, study, paths | ({"calls": call_log} if call_log is not None else {}), options)
     if outcome.failure is not None:
         return ERROR
@@ -177,8 +176,8 @@ def _study(scenario: Scenario, options: argparse.Namespace, path: Path) -> Any:
         if not (options.quiet or options.json) and sys.stderr.isatty():
             print(f"\rseed {done} of {count}", end="" if done < count else "\n", file=sys.stderr)
 
-    with seed_file(path) as done:
-        return seed_study(scenario.copy().master(log_calls=False), range(options.seeds), tell, done)
+    with studies.seed_file(path) as done:
+        return studies.seed_study(scenario.copy().master(log_calls=False), range(options.seeds), tell, done)
 
 
 def _tell(outcome: Outcome, study: Any, paths: dict[str, Path], options: argparse.Namespace) -> None:

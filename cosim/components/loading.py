@@ -11,16 +11,18 @@ import fmpy
 from fmpy.model_description import ModelDescription
 
 from cosim.components.component import Component
+from cosim.components.description import open_fmu, read_description
 from cosim.components.fmi1 import FMI1Component
 from cosim.components.fmi2 import FMI2Component
 from cosim.components.fmi3 import FMI3Component
 from cosim.components.shared_libraries import refuse_foreign_libraries
 from cosim.components.surroundings import Surroundings
-from cosim.components.unpacking import read_archive, unpack
+from cosim.components.unpacking import unpack
 from cosim.errors import FmuLoadError
 from cosim.process.last_call import LAST_CALL
 from cosim.process.sentinel import guard_exit
-from fmus.fmi.archive import Archive, NotAnFmuError
+from fmu_observer.description import describe
+from fmus.fmi.archive import NotAnFmuError
 from fmus.fmi.binaries import platform_folder
 from fmus.fmi.description import negated_aliases
 from fmus.fmi.library import load
@@ -42,7 +44,7 @@ def load_fmu(path: str | Path, name: str, tolerance: float | str | None = None) 
         FmuLoadError: the file is missing or broken, has no co-simulation, or no library for this platform.
     """
     path = Path(path)
-    archive = _open(path, name)
+    archive = open_fmu(path, name)
     description = archive.description
     if description.coSimulation is None:
         raise FmuLoadError(
@@ -87,35 +89,6 @@ def load_fmu(path: str | Path, name: str, tolerance: float | str | None = None) 
     return component
 
 
-def read_description(path: str | Path, name: str = "FMU") -> ModelDescription:
-    """The model description of an FMU file.
-
-    Args:
-        path: the ``.fmu`` file.
-        name: of the component, for messages.
-
-    Raises:
-        FmuLoadError: the file is missing, broken or dangerous, or of an FMI version that is not supported.
-    """
-    return _open(Path(path), name).description
-
-
-def runs_here(path: Path) -> str:
-    """``yes``, or why the co-simulation of an FMU file cannot run on this machine.
-
-    Args:
-        path: the ``.fmu`` file.
-
-    Raises:
-        FmuLoadError: as for `read_description`.
-    """
-    archive = _open(path, path.name)
-    if archive.description.coSimulation is None:
-        return "no, it offers no co-simulation"
-    reason = archive.why_not_here(CO_SIMULATION)
-    return f"no, it {reason}" if reason else "yes"
-
-
 def describe_fmu(path: str | Path, name: str) -> Component:
     """A component of an FMU file that can be asked for its variables and not stepped: nothing is unpacked or loaded.
 
@@ -132,13 +105,6 @@ def describe_fmu(path: str | Path, name: str) -> Component:
     return component
 
 
-def _open(path: Path, name: str) -> Archive:
-    try:
-        return read_archive(path)
-    except NotAnFmuError as error:
-        raise FmuLoadError(f"{name}: {error}") from error
-
-
 def load_block(system: HybridSystem, name: str, fmi_version: Literal[2, 3] = 3, **arguments: Any) -> Component:
     """A Python block as a component; further arguments as for `fmu_observer.block.FMIInterface`.
 
@@ -153,6 +119,24 @@ def load_block(system: HybridSystem, name: str, fmi_version: Literal[2, 3] = 3, 
     source = system.source or type(system).__qualname__
     face = COMPONENTS[fmi_version]
     component: Component = face(name, block, block.model_description, source=source, kind="block")
+    return component
+
+
+def describe_system(
+    system: HybridSystem, name: str, fmi_version: Literal[2, 3] = 3, preset: str | None = None
+) -> Component:
+    """A component of a system that can be asked for its variables and not stepped: its equations are not prepared.
+
+    Args:
+        system: the hybrid system. name: of the component. fmi_version: of its interface.
+        preset: whose values become the start values; None for the default.
+
+    Raises:
+        ValueError: the preset is unknown.
+    """
+    description = describe(system, fmi_version, preset=preset)
+    source = system.source or type(system).__qualname__
+    component: Component = COMPONENTS[fmi_version](name, None, description, source=source, kind="block")
     return component
 
 

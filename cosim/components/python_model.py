@@ -18,6 +18,7 @@ import numpy as np
 
 from cosim.errors import ScenarioError, nearest
 from plant_models.hybrid.signal import Causality, Signal
+from plant_models.hybrid.units import parse_unit
 from plant_models.local_files import files_digest
 from plant_models.user_file import UserFileError, explained, make
 
@@ -316,6 +317,8 @@ def _signal(name: str, given: Any, causality: Causality) -> Signal:
     unit, size = given if isinstance(given, tuple) else (given, None)
     if not isinstance(unit, str | None) or not (size is None or (isinstance(size, int) and size > 0)):
         raise TypeError(f"{name!r} has {given!r}")
+    if unit:
+        parse_unit(unit)  # refuses what is none
     return Signal(name, unit or UNKNOWN_UNIT, causality, size=size)
 
 

@@ -164,5 +164,12 @@ def png(figure: Figure | SubFigure, dpi: int = DPI) -> bytes:
     metadata: dict[str, Any] = {"Software": None}
     whole = figure.get_figure(root=True)
     assert whole is not None
-    whole.savefig(buffer, format="png", dpi=dpi, metadata=metadata, facecolor="white")
+    before = whole.canvas, whole.dpi, whole.get_facecolor()
+    try:
+        canvas = FigureCanvasAgg(whole)
+        whole.set(dpi=dpi, facecolor="white")
+        canvas.print_png(buffer, metadata=metadata)  # `savefig` would draw it twice, once for the layout alone
+    finally:
+        whole.set_canvas(before[0])
+        whole.set(dpi=before[1], facecolor=before[2])
     return buffer.getvalue()

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from fmpy.model_description import ModelDescription
 
-from cosim.components.loading import read_description
+from cosim.components.description import read_description
 from cosim.errors import CouplingError
 from fmus.fmi.capabilities import read_capabilities
 

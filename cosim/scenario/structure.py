@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.components.component import Component
-from cosim.components.loading import describe_fmu, load_block
+from cosim.components.loading import describe_fmu, describe_system
 from cosim.components.recording import RecordingComponent
 from cosim.coupling.clocks import connect_clocks
 from cosim.coupling.connection import Connection, connect, unconnected_inputs
@@ -101,7 +101,7 @@ def describe_component(
         backend = intended(table, system)
         version: Any = int(backend[-1])
         # the exported FMU carries the same description
-        component = load_block(system, name, version, preset=table.preset)
+        component = describe_system(system, name, version, table.preset)
         component.kind = "block" if backend.startswith("block") else "FMU"
     component.configure(table.parameters)
     return component

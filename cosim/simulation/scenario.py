@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
+from cosim import ssp, studies
 from cosim.errors import CosimError, ScenarioError
 from cosim.scenario.includes import Key, attribute, find_file, read_tables
 from cosim.scenario.manifest import read_manifest
@@ -27,10 +28,10 @@ from cosim.scenario.single import single_tables
 from cosim.scenario.streaming import finish_stream, streaming_to
 from cosim.scenario.structure import scenario_structure
 from cosim.structure.structure import Structure
-from cosim.studies.sweep import Sweep, make_sweep
 
 if TYPE_CHECKING:
     from cosim.studies.sampling import Mode, Range
+    from cosim.studies.sweep import Sweep
 
 LOG = logging.getLogger("cosim")
 
@@ -93,9 +94,7 @@ class Scenario:
 
     @classmethod
     def _from_package(cls, name: str, strict: bool) -> Scenario:
-        from cosim.ssp.load import load_package  # noqa: PLC0415 - lxml only for those who read such files
-
-        loaded = load_package(name, strict)
+        loaded = ssp.load_package(name, strict)
         scenario = cls(where=name, **loaded.tables)
         scenario._doubts, scenario._files = loaded.doubts, loaded.unpacked
         return scenario
@@ -175,9 +174,8 @@ class Scenario:
             CosimError: the scenario cannot be set up, or has something that this version cannot say.
             OutputError: the file cannot be written.
         """
-        from cosim.ssp.export import export_package  # noqa: PLC0415 - lxml only for those who write such files
-
-        return export_package(self.table(), self.name, self.folder, self.where, Path(path), version)
+        written: Path = ssp.export_package(self.table(), self.name, self.folder, self.where, Path(path), version)
+        return written
 
     @property
     def name(self) -> str:
@@ -311,7 +309,8 @@ class Scenario:
             ScenarioError: a name or a value cannot be; nothing has been run then.
             CosimError: a component that is varied cannot be described.
         """
-        return make_sweep(self, values, mode, count, seed)
+        sweep: Sweep = studies.make_sweep(self, values, mode, count, seed)
+        return sweep
 
     def run(
         self,

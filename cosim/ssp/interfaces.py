@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from fmpy.model_description import ModelDescription, ModelVariable
 
-from cosim.components.loading import read_description
+from cosim.components.description import read_description
 from cosim.errors import FmuLoadError, nearest
 from cosim.ssp.common import FAMILIES, NamedUnit
 from cosim.ssp.document import Node, fail

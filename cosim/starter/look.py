@@ -12,7 +12,8 @@ from typing import Any
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from cosim.components.component import Component
-from cosim.components.loading import describe_fmu, read_description, runs_here
+from cosim.components.description import read_description, runs_here
+from cosim.components.loading import describe_fmu
 from cosim.errors import FmuLoadError
 from cosim.starter.guess import Signal
 from fmus.fmi.elements import elements_of

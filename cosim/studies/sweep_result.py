@@ -160,7 +160,7 @@ class SweepResult:
         Raises:
             OutputError: there is no such measure, or this was not varied.
         """
-        from cosim.studies.sweep_figure import sweep_figure  # noqa: PLC0415 - matplotlib only for those who draw
+        from cosim.studies.sweep_drawing import sweep_figure  # noqa: PLC0415 - matplotlib only for those who draw
 
         return sweep_figure(self, measure, against, ax)
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import ctypes
 import inspect
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +76,7 @@ def load(folder: Path, description: ModelDescription, interface: str, name: str,
         Exception: the library cannot be loaded.
     """
     face: Any = FACES[fmi_version(description), interface]
-    face = face if complete else _tolerant(face)
+    face = _complete(face) if complete else _tolerant(face)
     identifier = getattr(description, interface).modelIdentifier
     return face(guid=description.guid, modelIdentifier=identifier, unzipDirectory=str(folder), instanceName=name)
 
@@ -117,6 +118,33 @@ class _Library:
 def _tolerant(face: type) -> Any:
     def load_functions(self: Any) -> None:
         self.dll = _Library(self.dll)
-        face._loadFunctions(self)  # type: ignore[attr-defined]
+        _load_functions(face, self)
 
+    return _with_functions(face, load_functions)
+
+
+@cache
+def _complete(face: type) -> Any:
+    return _with_functions(face, lambda slave: _load_functions(face, slave))
+
+
+def _with_functions(face: type, load_functions: Callable[[Any], None]) -> Any:
     return type(face.__name__, (face,), {"_loadFunctions": load_functions})  # fmpy goes by the name of the class
+
+
+_signatures: dict[type, dict[str, tuple[list[str], list[Any], Any]]] = {}
+
+
+def _load_functions(face: Any, slave: Any) -> None:
+    """fmpy's `_loadFunctions`, which derives the C types of the same functions anew for every library."""
+    known = _signatures.get(face)
+    if known is None:
+        face._loadFunctions(slave)
+        functions = slave._functions.items()
+        _signatures[face] = {name: (c.argnames, c.argtypes, c.restype) for name, c in functions}
+        return
+    old = face.__name__.startswith("FMU1")
+    for name, types in known.items():
+        c_name = f"{slave.modelIdentifier}_{name.replace('fmi1', 'fmi')}" if old else name
+        function = slave._functions[name] = getattr(slave.dll, c_name)
+        function.argnames, function.argtypes, function.restype = types

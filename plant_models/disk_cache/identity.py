@@ -7,7 +7,7 @@ import has to be followed; a class of another package cannot be known so, and ha
 from __future__ import annotations
 
 import hashlib
-import importlib.metadata
+import os
 import platform
 import sys
 import time
@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from plant_models.disk_cache.description import NUMERICAL_PACKAGES, OWN_PACKAGES, Description, NoIdentityError
+from plant_models.installed import installed_version
 
 LOADED_AT = time.time()
 
@@ -71,13 +72,19 @@ def folder_digest(name: str) -> str:
         raise NoIdentityError(f"The files of {name} are not on disk.")
     root = Path(next(iter(spec.submodule_search_locations)), rest)
     digest = hashlib.sha256()
-    for path in [root] if root.is_file() else sorted(root.rglob("*")):
-        if path.is_file() and "__pycache__" not in path.parts:
-            if path.stat().st_mtime > LOADED_AT:
+    for path in [str(root)] if root.is_file() else _files(str(root)):
+        with Path(path).open("rb") as file:
+            if os.fstat(file.fileno()).st_mtime > LOADED_AT:
                 raise NoIdentityError(f"{path} was changed after it was loaded.")
-            content = path.read_bytes()
-            digest.update(f"{path.relative_to(root)} {len(content)}\0".encode() + content)
+            content = file.read()
+        digest.update(f"{path[len(str(root)) :]} {len(content)}\0".encode() + content)
     return f"{name} {digest.hexdigest()}"
+
+
+def _files(folder: str) -> list[str]:
+    """All files in a folder and those in it, without byte code, in an order of their own."""
+    walk = os.walk(folder)
+    return sorted(f"{at}{os.sep}{name}" for at, _, names in walk if "__pycache__" not in at for name in names)
 
 
 @cache
@@ -91,7 +98,7 @@ def _surroundings() -> str:
 
 
 def _version(name: str) -> str:
-    try:
-        return importlib.metadata.version(name)
-    except importlib.metadata.PackageNotFoundError as error:
-        raise NoIdentityError(f"The version of {name} is not known.") from error
+    version = installed_version(name)
+    if version is None:
+        raise NoIdentityError(f"The version of {name} is not known.")
+    return version

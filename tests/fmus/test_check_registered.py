@@ -36,7 +36,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two shipped checks, and an announced one that cannot be loaded."""
     group = CHECKS.group
     entries = [EntryPoint("gone", "no_such_module:Gone", group)]
-    monkeypatch.setattr(registry, "entry_points", lambda group: entries if group == CHECKS.group else [])
+    monkeypatch.setattr(registry, "announced", lambda group: entries if group == CHECKS.group else [])
     monkeypatch.setattr(CHECKS, "_members", None)
     kept = {name: CHECKS.members[name] for name in ("loading", "initialise", "gone")}
     monkeypatch.setattr(CHECKS, "_members", kept)

@@ -197,7 +197,7 @@ def test_code_counts(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_versions_count(monkeypatch: pytest.MonkeyPatch) -> None:
     first = identity.identity(1)
-    monkeypatch.setattr(identity.importlib.metadata, "version", lambda name: f"other {name}")
+    monkeypatch.setattr(identity, "installed_version", lambda name: f"other {name}")
     identity._surroundings.cache_clear()
     other = identity.identity(1)
     identity._surroundings.cache_clear()

@@ -66,7 +66,7 @@ def plugins(monkeypatch: pytest.MonkeyPatch) -> Registry[Any]:
         announced("gone", "no_such_module:Gone", "broken")[1],
         announced("wrong", "math:pi", "odd")[1],
     ]
-    monkeypatch.setattr(registry, "entry_points", lambda group: entries if group == "some.group" else [])
+    monkeypatch.setattr(registry, "announced", lambda group: entries if group == "some.group" else [])
     members: Registry[Any] = Registry("observer", fmu_observer.ROOMS, "some.group", plant_models.SYSTEM)
     monkeypatch.setattr(fmu_observer, "OBSERVERS", members)
     return members

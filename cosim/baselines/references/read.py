@@ -21,7 +21,8 @@ from cosim.baselines.references.manifest import FOLDER, MANIFEST, Experiment, Re
 from cosim.baselines.references.tables import as_of_a_run, prefix
 from cosim.comparison.tolerance import Tolerances
 from cosim.components.component import Component
-from cosim.components.loading import describe_fmu, read_description
+from cosim.components.description import read_description
+from cosim.components.loading import describe_fmu
 from cosim.errors import BaselineError, CosimError, nearest
 from cosim.results.load import load_result
 from cosim.results.result import Result

@@ -57,7 +57,7 @@ def installed(monkeypatch: pytest.MonkeyPatch) -> None:
     }
     group = PLANTS.group
     found = [EntryPoint(name, value, group) for name, value in entries.items()]
-    monkeypatch.setattr(registry, "entry_points", lambda group: found if group == PLANTS.group else [])
+    monkeypatch.setattr(registry, "announced", lambda group: found if group == PLANTS.group else [])
     monkeypatch.setattr(PLANTS, "_members", None)
     monkeypatch.setattr(PLANTS, "_own", {"own": plant_models.Train})
 

@@ -13,7 +13,8 @@ from mock_slaves import FMI2, Mock, Train, component, started, variable
 from test_fmus.build import linear_fmu
 
 import cosim
-from cosim.components.loading import load_fmu, read_description
+from cosim.components.description import read_description
+from cosim.components.loading import load_fmu
 from cosim.errors import CosimError, CouplingError, RunError
 from fmus.check.probe import probe
 from fmus.fmi.capabilities import Capabilities, read_capabilities, tool_warning

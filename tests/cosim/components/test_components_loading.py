@@ -15,7 +15,8 @@ from coupled_runs import Pushed
 
 from cosim.cli import main as cosim_main
 from cosim.components import unpacking
-from cosim.components.loading import load_fmu, read_description
+from cosim.components.description import read_description
+from cosim.components.loading import load_fmu
 from cosim.components.unpacking import forget_all
 from cosim.errors import FmuLoadError
 from cosim.starter.look import look_into

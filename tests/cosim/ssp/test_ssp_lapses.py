@@ -13,7 +13,7 @@ from ssp_files import EXPERIMENT, connector, described_fmu, package, ramp_fmu, s
 
 from cosim import Scenario
 from cosim.cli import main
-from cosim.components.loading import read_description
+from cosim.components.description import read_description
 from cosim.errors import ScenarioError
 from cosim.ssp.load import load_package
 

@@ -17,7 +17,7 @@ from cosim.master.master import Master
 from cosim.results.folder import read_results
 from cosim.scenario.outcome import Outcome
 from cosim.studies.sampling import uniform
-from cosim.studies.seed_file import seed_file
+from cosim.studies.seed_rows import seed_file
 from cosim.studies.seeds import seed_study
 from cosim.studies.sweep_result import SweepResult
 
