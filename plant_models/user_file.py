@@ -9,12 +9,17 @@ import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
+from importlib import invalidate_caches
 from inspect import isabstract, signature
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from plant_models.local_files import files_digest, local_files
 from plant_models.registry import load
+
+_neighbours: dict[str, tuple[ModuleType, str]] = {}
+"""Modules that were imported from beside a user's file as it was run, and the digest of what they rest on."""
 
 
 class UserFileError(ValueError):
@@ -172,14 +177,17 @@ def _imported(name: str) -> Any:
 
 
 def _run(path: Path) -> ModuleType:
-    """The module of a file; one that was run before with this very content is not run again."""
+    """The module of a file; one that was run before with this very content, of what it imports beside it too, is not
+    run again.
+    """
     try:
         content = path.read_bytes()
     except OSError as error:
         raise UserFileError(f"{path} cannot be read: {error.strerror or error}") from error
-    name = f"{path.stem}@{sha256(str(path).encode() + content).hexdigest()[:16]}"
+    name = f"{path.stem}@{sha256(f'{path} {files_digest(path)}'.encode()).hexdigest()[:16]}"
     if name in sys.modules:
         return sys.modules[name]
+    _forget_neighbours(local_files(path))
     module = sys.modules[name] = ModuleType(name)  # known before it runs, as dataclasses want
     module.__file__ = str(path)
     kept, flag = list(sys.path), sys.dont_write_bytecode
@@ -194,4 +202,21 @@ def _run(path: Path) -> ModuleType:
         raise
     finally:
         sys.path[:], sys.dont_write_bytecode = kept, flag
+        for neighbour, file in local_files(path).items():
+            if getattr(sys.modules.get(neighbour), "__file__", None) == str(file):
+                _neighbours.setdefault(neighbour, (sys.modules[neighbour], files_digest(file)))
     return module
+
+
+def _forget_neighbours(files: Mapping[str, Path]) -> None:
+    """Where a module beside a user's file has changed since it was imported, or is another one of its name, it is
+    imported anew.
+    """
+    invalidate_caches()
+    for name, file in files.items():
+        module, digest = _neighbours.get(name, (None, ""))
+        if module is None or (module.__file__ == str(file) and digest == files_digest(file)):
+            continue
+        del _neighbours[name]
+        if sys.modules.get(name) is module:
+            del sys.modules[name]

@@ -30,9 +30,9 @@ COMMANDS = (
     Command("report", "cosim.cli.report", "report of results, or of several laid over each other"),
     Command("convert", "cosim.cli.convert", "write a result in another format"),
     Command("new", "cosim.cli.new", "write a starter scenario for an FMU"),
-    Command("show", "cosim.cli.show", "show how components hang together"),
-    Command("list", "cosim.cli.listing", "list what ships"),
-    Command("info", "cosim.cli.info", "describe an FMU, an SSP file or a model"),
+    Command("show", "cosim.cli.show", "show components, connections, order and loops"),
+    Command("list", "cosim.cli.listing", "list scenarios, plants and observers"),
+    Command("info", "cosim.cli.info", "describe an FMU, an SSP file, a plant or an observer"),
     Command("export", "cosim.cli.export", "write a scenario as SSP"),
 )
 

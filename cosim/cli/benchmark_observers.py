@@ -33,7 +33,7 @@ def register(commands: Any) -> None:
     )
     epilog = (
         "Exit codes: 0 done, 1 an observer failed or could not be coupled, 2 error or interrupted; what was "
-        "judged is told."
+        "judged is printed."
     )
     parser = commands.add_parser("benchmark-observers", description=description, epilog=epilog)
     add_scenario(parser)

@@ -22,9 +22,8 @@ def register(commands: Any) -> None:
         commands: subparsers of the program.
     """
     text = (
-        "Write a result in another format: the ending of TARGET says which, one of .csv, .mat (MATLAB), .modelica.mat "
-        "(Dymola, "
-        "OpenModelica), .npy, .parquet, .h5. SOURCE is a results folder or a table of ours or of another tool."
+        "Write a result in another format: the ending of TARGET says which, such as .csv, .mat (MATLAB), .modelica.mat "
+        "(Dymola, OpenModelica), .npy, .parquet, .h5. SOURCE is a results folder, or a table of any tool."
     )
     epilog = "Exit codes: 0 written, 2 error."
     parser = commands.add_parser("convert", description=text, epilog=epilog)

@@ -63,7 +63,7 @@ def register(commands: Any) -> None:
     parser.add_argument(
         "--stream",
         action="store_true",
-        help="write results while the run goes on, as table.npy, so that they outlive the program",
+        help="write results while the run goes on, as table.npy, so that they survive a crash",
     )
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
     parser.set_defaults(execute=execute)

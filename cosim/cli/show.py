@@ -1,4 +1,4 @@
-"""``cosim show``: how the components of a scenario hang together, without running it."""
+"""``cosim show``: components of a scenario, their connections, order and loops, without running it."""
 
 from __future__ import annotations
 

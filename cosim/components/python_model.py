@@ -18,6 +18,8 @@ import numpy as np
 
 from cosim.errors import ScenarioError, nearest
 from plant_models.hybrid.signal import Causality, Signal
+from plant_models.hybrid.units import parse_unit
+from plant_models.local_files import files_digest
 from plant_models.user_file import UserFileError, explained, make
 
 TELEGRAM = ("stamp", "position", "location_accuracy", "odometer_reading", "delivered_at")
@@ -77,10 +79,9 @@ class PythonModel:
 
     @property
     def identity(self) -> str:
-        """A digest of the class and of its file."""
-        path = None if self.file is None else Path(self.file)
-        content = path.read_bytes() if path is not None and path.is_file() else b""
-        return sha256(self.cls.__qualname__.encode() + content).hexdigest()
+        """A digest of the class, of its file and of what this imports beside it."""
+        files = files_digest(Path(self.file)) if self.file is not None else ""
+        return sha256(f"{self.cls.__qualname__} {files}".encode()).hexdigest()
 
     # -- what it declares -------------------------------------------------------------------------------------------
 
@@ -316,6 +317,8 @@ def _signal(name: str, given: Any, causality: Causality) -> Signal:
     unit, size = given if isinstance(given, tuple) else (given, None)
     if not isinstance(unit, str | None) or not (size is None or (isinstance(size, int) and size > 0)):
         raise TypeError(f"{name!r} has {given!r}")
+    if unit:
+        parse_unit(unit)  # refuses what is none
     return Signal(name, unit or UNKNOWN_UNIT, causality, size=size)
 
 

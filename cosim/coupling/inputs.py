@@ -13,7 +13,7 @@ import numpy as np
 from cosim.components.component import Component
 from cosim.coupling.connection import Connection
 from cosim.coupling.instants import Signal
-from cosim.coupling.non_numeric import UntouchedInputs
+from cosim.coupling.non_numeric import NonNumericInputs
 
 FEW = 4  # inputs that are gathered faster one by one
 
@@ -48,7 +48,7 @@ class Inputs:
         buffer: np.ndarray,
         send: Callable[[], None],
         tables: Mapping[int, Mapping[float, float]] | None = None,
-        non_numeric: UntouchedInputs | None = None,
+        non_numeric: NonNumericInputs | None = None,
     ) -> None:
         self.names, self.sources, self.factors, self.offsets = tuple(names), sources, factors, offsets
         self.buffer, self.send = buffer, send
@@ -96,7 +96,7 @@ def connected_inputs(
     connections: Sequence[Connection],
     columns: Mapping[tuple[str, str], int],
     values: np.ndarray,
-    non_numeric: UntouchedInputs | None = None,
+    non_numeric: NonNumericInputs | None = None,
 ) -> Inputs:
     """The inputs of a component that have a source.
 

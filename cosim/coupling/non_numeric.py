@@ -1,5 +1,5 @@
-"""Untouched values: texts, bytes and 64-bit integers on their way from outputs to inputs, as Python objects beside the
-doubles.
+"""Non-numeric values: texts, bytes and 64-bit integers on their way from outputs to inputs, as Python objects beside
+the doubles.
 
 One array of objects `cells` for the whole plan, two for each connected source (now, and as it was at the start of the
 step), is to these values what the doubled values of the plan are to the numbers: outputs are read into it, inputs are
@@ -64,7 +64,7 @@ def with_non_numeric(
 
 def non_numeric_inputs(
     component: Component, connections: Sequence[Connection], places: Mapping[Node, int], cells: Cells
-) -> UntouchedInputs | None:
+) -> NonNumericInputs | None:
     """The exact inputs of a component that have a source, or None where there are none.
 
     Args:
@@ -72,10 +72,10 @@ def non_numeric_inputs(
         cells: of the non-numeric values.
     """
     own = [c for c in connections if c.exact and c.target[0] == component.name]
-    return UntouchedInputs(component, own, places, cells) if own else None
+    return NonNumericInputs(component, own, places, cells) if own else None
 
 
-class UntouchedInputs:
+class NonNumericInputs:
     """The exact inputs of one component: gathered from the cells, then sent; see `cosim.coupling.inputs`.
 
     Args:

@@ -28,7 +28,7 @@ class Checkpoint:
     Args:
         states: of the components, in the order of the plan.
         values: shape (n,).
-        lines: of the inputs that follow one, in the order of the plan; None for the others.
+        interpolators: states of the input interpolators, in the order of the plan; None where a component has none.
         balises: of the balise service, or None.
         non_numeric: the values that are no doubles, shape (m,).
         algorithm: what the algorithm remembers, or None.
@@ -37,7 +37,7 @@ class Checkpoint:
 
     states: list[Any]
     values: np.ndarray
-    lines: list[Any]
+    interpolators: list[Any]
     balises: Any
     non_numeric: np.ndarray
     algorithm: Any = None
@@ -94,10 +94,10 @@ class System:
         self.algorithm.advance(t, until)
         rows = self.balises.rows()
         if self.balises.touched:
-            self._begin_lines_of(self.balises.touched, until)
+            self._restart_interpolation_from(self.balises.touched, until)
         return rows
 
-    def begin_lines(self, t: float, jumped: np.ndarray, stale: np.ndarray) -> None:
+    def restart_interpolation(self, t: float, jumped: np.ndarray, stale: np.ndarray) -> None:
         """Lines of inputs do not lead over a jump at `t` [s].
 
         Args:
@@ -113,14 +113,14 @@ class System:
                 step.interpolator.prepare(t)
                 step.interpolator.forget(stale & ~jumped)
 
-    def _begin_lines_of(self, names: Collection[str], t: float) -> None:
+    def _restart_interpolation_from(self, names: Collection[str], t: float) -> None:
         """The outputs of these components may have jumped on the way to `t` [s]."""
         if not self.plan.interpolators:
             return
         jumped = np.zeros(len(self.plan.values), dtype=bool)
         for name in names:
             jumped[self.plan.find(name).columns] = True
-        self.begin_lines(t, jumped, downstream(self.plan, names))
+        self.restart_interpolation(t, jumped, downstream(self.plan, names))
 
     def demand_states(self, what: str) -> None:
         """All components must be able to save their state.
@@ -144,11 +144,17 @@ class System:
             anyway: leave out components that cannot save their state.
         """
         states = [step.component.save() if step.component.can_save or not anyway else None for step in self.plan.steps]
-        lines = [None if step.interpolator is None else step.interpolator.save() for step in self.plan.steps]
+        interpolators = [None if step.interpolator is None else step.interpolator.save() for step in self.plan.steps]
         balises = None if self.balises is None else self.balises.save()
         events = None if self.events is None else self.events.save()
         return Checkpoint(
-            states, self.plan.values.copy(), lines, balises, self.plan.non_numeric.copy(), self.algorithm.save(), events
+            states,
+            self.plan.values.copy(),
+            interpolators,
+            balises,
+            self.plan.non_numeric.copy(),
+            self.algorithm.save(),
+            events,
         )
 
     def restore(self, checkpoint: Checkpoint, keep: Set[str] = frozenset()) -> None:
@@ -165,9 +171,9 @@ class System:
         for step, state in zip(self.plan.steps, checkpoint.states, strict=True):
             if step not in stay:
                 step.component.restore(state)
-        for step, line in zip(self.plan.steps, checkpoint.lines, strict=True):
+        for step, state in zip(self.plan.steps, checkpoint.interpolators, strict=True):
             if step.interpolator is not None:
-                step.interpolator.restore(line)
+                step.interpolator.restore(state)
         self.plan.values[:] = checkpoint.values
         self.plan.non_numeric[:] = checkpoint.non_numeric
         self.algorithm.restore(checkpoint.algorithm)

@@ -126,6 +126,7 @@ def rerun(
     for name, value in settings.items():
         scenario.set(name, value)
     gone = manifest.missing({f"components.{name}" for name in settings} | set(settings))
+    gone += [f"{told['text']} It cannot be run again." for told in manifest.objects.values() if not told["class"]]
     if gone:
         raise ProvenanceError("\n".join(gone))
     stored = load_result(directory)
@@ -197,6 +198,7 @@ def _changes(manifest: Manifest, outcome: Outcome) -> list[str]:
         for part in foreign["parts"]
         if part.get("note")
     ]
+    notes += [told["text"] for told in manifest.objects.values()]
     return lines + notes + manifest.moved_on()
 
 

@@ -53,14 +53,14 @@ def coupling_warnings(
     return doubts, notes
 
 
-def lines_note(lines: Mapping[str, str], inputs: str) -> str:
+def interpolation_note(interpolators: Mapping[str, str], inputs: str) -> str:
     """How components are told of inputs that follow a line.
 
     Args:
-        lines: interpolator of each component. inputs: what the scenario asks for.
+        interpolators: name of the interpolator of each component. inputs: what the scenario asks for.
     """
     by_interpolator: dict[str, list[str]] = {}
-    for name, interpolator in lines.items():
+    for name, interpolator in interpolators.items():
         by_interpolator.setdefault(interpolator, []).append(name)
     said = "; ".join(f"{CARRIED[interpolator]}: {', '.join(names)}" for interpolator, names in by_interpolator.items())
     return f"Inputs between communication points ({inputs}): {said or 'none are connected'}."

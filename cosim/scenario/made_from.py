@@ -23,6 +23,7 @@ from cosim.scenario.origin import ForeignFile, Origin, stamp
 from cosim.scenario.paths import map_paths
 from cosim.scenario.save import plain
 from fmus.versions import versions
+from plant_models.user_file import names_code
 
 FILES_UP_TO = 50e6
 """Files of others up to this size are copied into the results [bytes]."""
@@ -92,7 +93,26 @@ def _prepare(origin: Origin, new: Path, files_up_to: float) -> dict[str, Any]:
         "asked_by": "script" if origin.command is None else origin.command,
         "seeds": _seeds(data),
         "files": files,
+        "objects": _objects(origin),
     }
+
+
+def _objects(origin: Origin) -> dict[str, dict[str, Any]]:
+    """What is kept of classes and instances that a script gave, by component."""
+    told = {}
+    for name, table in origin.table.components.items():
+        model = table.model or table.observer
+        given = None if model is None else model.given
+        if model is None or given is None or (names_code(model) and isinstance(given, type)):
+            continue
+        if not names_code(model):
+            text = f"{name}: the class {model} stands in no file, or within a function, so nothing of it was kept."
+        else:
+            values = {**table.options, **table.parameters}
+            kept = ", ".join(f"{key} = {value}" for key, value in values.items()) or "none"
+            text = f"{name}: of the instance of {model} were kept its class and its settings ({kept}), nothing else."
+        told[name] = {"class": names_code(model), "text": text}
+    return told
 
 
 def _keep(
@@ -104,7 +124,10 @@ def _keep(
     parts = foreign.parts if foreign.path.exists() else [foreign.path]
     known = copies.get(str(foreign.path))
     folder = name if known is None else known if foreign.path.is_dir() else known.rpartition("/")[0]
-    entry["parts"] = [_keep_part(path, f"{folder}/{path.name}", origin, new, files_up_to) for path in parts]
+    root = foreign.path if foreign.path.is_dir() else foreign.path.parent
+    entry["parts"] = [
+        _keep_part(path, f"{folder}/{path.relative_to(root).as_posix()}", origin, new, files_up_to) for path in parts
+    ]
     if all(part["copy"] is not None for part in entry["parts"]):
         copies[str(foreign.path)] = folder if foreign.path.is_dir() else f"{folder}/{foreign.path.name}"
     else:  # all of it or nothing

@@ -42,6 +42,13 @@ class Manifest:
         """Of Python, platform and packages, when the results were made."""
         return dict(self.data["versions"])
 
+    @property
+    def objects(self) -> dict[str, dict[str, Any]]:
+        """What was kept of classes and instances that a script gave: ``class``, whether it can be found again, and
+        ``text``, by component.
+        """
+        return dict(self.data.get("objects", {}))
+
     def edited(self) -> list[str]:
         """What is not any more as it was written, one line each: results, scenario, kept files."""
         made = self.directory / MADE_FROM

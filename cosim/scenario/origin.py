@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cosim.scenario.paths import BALISE_PATHS, COMPONENT_PATHS, MODEL_KEYS
+from plant_models.local_files import local_files
 from plant_models.user_file import names_a_file, split_name
 
 if TYPE_CHECKING:
@@ -39,8 +40,10 @@ class ForeignFile:
     @property
     def parts(self) -> list[Path]:
         """The files that belong to it: of results all that tells of the run, whether the folder is named or a table in
-        it.
+        it; of Python what it imports beside it.
         """
+        if self.path.suffix == ".py":
+            return [self.path, *local_files(self.path).values()]
         folder = self.path if self.path.is_dir() else self.path.parent
         if self.path.is_dir():
             return sorted(p for p in folder.iterdir() if p.is_file() and _tells_of_results(p))

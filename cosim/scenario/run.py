@@ -30,7 +30,7 @@ from cosim.expectations.check import check_expectations
 from cosim.expectations.judge import judge
 from cosim.master.algorithms.choose import AlgorithmChoice, choose_algorithm
 from cosim.master.axis import TimeAxis
-from cosim.master.interpolation.draw import draw_lines
+from cosim.master.interpolation.attach import attach_interpolators
 from cosim.master.master import Master, close
 from cosim.process.interruption import Interruption
 from cosim.process.sentinel import limited_calls
@@ -42,7 +42,7 @@ from cosim.scenario.after_run import warnings_after
 from cosim.scenario.balise_service import Choice, choose_method, find_receivers, make_service, watched_plant
 from cosim.scenario.certificates import check_certificates, expected_gap
 from cosim.scenario.connections import parse_connections
-from cosim.scenario.coupling_warnings import coupling_warnings, late_telegram_warnings, lines_note
+from cosim.scenario.coupling_warnings import coupling_warnings, interpolation_note, late_telegram_warnings
 from cosim.scenario.instances import check_instances
 from cosim.scenario.layouts import Layout, make_layout
 from cosim.scenario.master import idle_settings, make_master, stepping_groups
@@ -137,7 +137,7 @@ class _Setup:
         self.algorithm = AlgorithmChoice()
         self.service: BaliseService | None = None
         self.master: Master | None = None
-        self.lines: Mapping[str, str] = {}
+        self.interpolators: Mapping[str, str] = {}
         self.setup_seconds = 0.0
         self.call_log: CallLog | None = None
         self.name = "script"
@@ -181,8 +181,8 @@ class _Setup:
         self.notes += notes
         self.notes += self.algorithm.notes
         if table.master.inputs != "hold":
-            self.lines = draw_lines(self.plan, table.master.inputs)
-            self.notes.append(lines_note(self.lines, table.master.inputs))
+            self.interpolators = attach_interpolators(self.plan, table.master.inputs)
+            self.notes.append(interpolation_note(self.interpolators, table.master.inputs))
         if layout is not None:
             self._add_balises(layout, plant, receivers, starts[plant])
         told = None if progress is None else lambda t: progress(t, self.axis.stop)

@@ -20,7 +20,7 @@ from cosim.coupling.connection import connect
 from cosim.coupling.graph import execution_order
 from cosim.coupling.plan import Plan, make_plan
 from cosim.master.axis import TimeAxis
-from cosim.master.interpolation.draw import draw_lines
+from cosim.master.interpolation.attach import attach_interpolators
 from cosim.master.master import Master, close
 from cosim.results.result import BaliseRecord
 from fmu_observer.observers.train.high_gain_observer import HighGainTrainObserver
@@ -190,7 +190,7 @@ def prepare(
             component.set_start(name, value)
     plan = make_plan(by_name, pairs, order, extra)
     if inputs != "hold":
-        draw_lines(plan, inputs)
+        attach_interpolators(plan, inputs)
     service = None if balises is None else _service(plan, balises)
     return Master(plan, TimeAxis(start, h, count), service, **how)
 

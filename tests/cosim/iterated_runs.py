@@ -15,7 +15,7 @@ from cosim.coupling.graph import execution_groups
 from cosim.coupling.plan import make_plan
 from cosim.master.algorithms.choose import choose_algorithm
 from cosim.master.axis import TimeAxis
-from cosim.master.interpolation.draw import draw_lines
+from cosim.master.interpolation.attach import attach_interpolators
 from cosim.master.master import Master, close
 from cosim.scenario.master import make_algorithm
 from cosim.scenario.tables import MasterTable
@@ -37,7 +37,7 @@ def prepare(
         component.instantiate()
     plan = make_plan(components, pairs, [name for group in groups for name in group.names])
     if wanted.inputs != "hold":
-        draw_lines(plan, wanted.inputs)
+        attach_interpolators(plan, wanted.inputs)
     return Master(plan, TimeAxis(0.0, h, count), algorithm=lambda plan: make_algorithm(wanted, plan, choice))
 
 

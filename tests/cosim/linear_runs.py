@@ -20,7 +20,7 @@ from cosim.master.algorithms.gauss_seidel import GaussSeidel
 from cosim.master.axis import TimeAxis
 from cosim.master.control.fixed import FixedStep
 from cosim.master.control.multirate import set_rates
-from cosim.master.interpolation.draw import draw_lines
+from cosim.master.interpolation.attach import attach_interpolators
 from cosim.master.master import Master, close
 
 
@@ -84,7 +84,7 @@ def prepare(
             component.request_intermediate_updates([c.target[1] for c in pairs if c.target[0] == name])
         component.instantiate()
     plan = make_plan(components, pairs, order)
-    interpolators = {} if inputs == "hold" else draw_lines(plan, inputs)
+    interpolators = {} if inputs == "hold" else attach_interpolators(plan, inputs)
     axis = TimeAxis(start, h, count)
     master = Master(plan, axis, algorithm=algorithm, control=control)
     set_rates(plan, axis, every or {}, substeps or {}, {})

@@ -191,7 +191,7 @@ class EventCoordinator:
         self.iteration.run(t)
         changed = ~((before == plan.values) | (np.isnan(before) & np.isnan(plan.values)))
         if changed[plan.continuous].any():
-            self._system.begin_lines(t, changed, np.ones_like(changed))
+            self._system.restart_interpolation(t, changed, np.ones_like(changed))
         first = [] if row_before else [(t, before)]
         if until - t > TIME_TOLERANCE:
             return [*first, (t, plan.values.copy())]

@@ -1,1 +1,1 @@
-"""Lines: what an input does between communication points."""
+"""Interpolation and extrapolation of inputs between communication points."""

@@ -18,20 +18,20 @@ from cosim.components.component import Component
 from cosim.components.fmi3 import FMI3Component
 from cosim.coupling.graph import declared_feedthrough
 from cosim.coupling.inputs import Inputs
-from cosim.master.interpolation.line import Line
+from cosim.master.interpolation.first_order_hold import FirstOrderHold
 
 
 class InputInterpolator(ABC):
     """Tells one component of the line of its inputs.
 
     Args:
-        line: the line. inputs: the connected inputs it belongs to.
+        hold: the course of the inputs. inputs: the connected inputs it belongs to.
     """
 
     name: ClassVar[str]
 
-    def __init__(self, line: Line, inputs: Inputs) -> None:
-        self.line, self._inputs = line, inputs
+    def __init__(self, hold: FirstOrderHold, inputs: Inputs) -> None:
+        self.hold, self._inputs = hold, inputs
 
     @abstractmethod
     def send(self, t: float, until: float) -> None:
@@ -39,24 +39,24 @@ class InputInterpolator(ABC):
 
     def begin(self) -> None:
         """A step begins: what is held over it was true where its source stands now."""
-        self.line.begin()
+        self.hold.begin()
 
     def prepare(self, until: float, *, ends_known: bool | np.ndarray = False) -> None:
-        """Gather the inputs and bend the line for a step to `until` [s]; arguments as for `Line.bend`.
+        """Gather the inputs and update the line for a step to `until` [s]; arguments as for `FirstOrderHold.update`.
 
         Args:
             ends_known: for which inputs the value at the end of the step is known.
         """
         self._inputs.gather()
-        self.line.bend(self._inputs.buffer, until, held=self._inputs.held, ends_known=ends_known)
+        self.hold.update(self._inputs.buffer, until, held=self._inputs.held, ends_known=ends_known)
 
     def forget(self, jumped: np.ndarray) -> None:
         """Values of the plan that jumped, as a mask of shape (n,): no line of an input leads over it."""
-        self.line.forget(jumped[self._inputs.sources])
+        self.hold.forget(jumped[self._inputs.sources])
 
     def save(self) -> Any:
         """What a step changes here."""
-        return self.line.save()
+        return self.hold.save()
 
     def restore(self, state: Any) -> None:
         """Return to what was saved.
@@ -64,7 +64,7 @@ class InputInterpolator(ABC):
         Args:
             state: as `save` gave it.
         """
-        self.line.restore(state)
+        self.hold.restore(state)
 
 
 class MeanInterpolator(InputInterpolator):
@@ -76,14 +76,14 @@ class MeanInterpolator(InputInterpolator):
 
     name = "mean"
 
-    def __init__(self, line: Line, inputs: Inputs, component: Component) -> None:
-        super().__init__(line, inputs)
+    def __init__(self, hold: FirstOrderHold, inputs: Inputs, component: Component) -> None:
+        super().__init__(hold, inputs)
         direct = {name for names in declared_feedthrough(component).values() for name in names}
         self._direct = np.array([name in direct for name in inputs.names], dtype=bool)
 
     def send(self, t: float, until: float) -> None:  # noqa: D102 - see InputInterpolator
-        line = self.line
-        self._inputs.buffer[:] = np.where(self._direct, line.at(until), line.at(0.5 * (t + until)))
+        hold = self.hold
+        self._inputs.buffer[:] = np.where(self._direct, hold.at(until), hold.at(0.5 * (t + until)))
         self._inputs.send()
 
 
@@ -91,21 +91,21 @@ class DerivativeInterpolator(InputInterpolator):
     """Sets value and first derivative at the start of the step (setRealInputDerivatives).
 
     Args:
-        line: of the inputs. inputs: the connected inputs of the component. component: that receives them.
+        hold: of the inputs. inputs: the connected inputs of the component. component: that receives them.
     """
 
     name = "derivatives"
 
-    def __init__(self, line: Line, inputs: Inputs, component: Component) -> None:
-        super().__init__(line, inputs)
-        self._moving = np.flatnonzero(line.continuous)
+    def __init__(self, hold: FirstOrderHold, inputs: Inputs, component: Component) -> None:
+        super().__init__(hold, inputs)
+        self._moving = np.flatnonzero(hold.continuous)
         names = [inputs.names[i] for i in self._moving]
         self._write_slopes, self._slopes = component.make_derivative_writer(names)
 
     def send(self, t: float, until: float) -> None:  # noqa: D102 - see InputInterpolator
-        self._inputs.buffer[:] = self.line.at(t)
+        self._inputs.buffer[:] = self.hold.at(t)
         self._inputs.send()
-        self._slopes[:] = self.line.slope[self._moving]
+        self._slopes[:] = self.hold.slope[self._moving]
         self._write_slopes()
 
 
@@ -118,32 +118,32 @@ class IntermediateInterpolator(InputInterpolator):
 
     name = "intermediate"
 
-    def __init__(self, line: Line, inputs: Inputs, component: FMI3Component) -> None:
-        super().__init__(line, inputs)
-        self._moving = np.flatnonzero(line.continuous)
+    def __init__(self, hold: FirstOrderHold, inputs: Inputs, component: FMI3Component) -> None:
+        super().__init__(hold, inputs)
+        self._moving = np.flatnonzero(hold.continuous)
         names = [inputs.names[i] for i in self._moving]
         self._set_moving, self._now = component.writer(names)
         self.taken = component.follow_within_step(names, self._set)
 
     def send(self, t: float, until: float) -> None:  # noqa: D102 - see InputInterpolator
-        self._inputs.buffer[:] = self.line.at(t)
+        self._inputs.buffer[:] = self.hold.at(t)
         self._inputs.send()
 
     def _set(self, time: float) -> None:
-        self._now[:] = self.line.at(time)[self._moving]
+        self._now[:] = self.hold.at(time)[self._moving]
         self._set_moving()
 
 
-def make_interpolator(line: Line, inputs: Inputs, component: Component) -> InputInterpolator:
+def make_interpolator(hold: FirstOrderHold, inputs: Inputs, component: Component) -> InputInterpolator:
     """The best interpolator that a component takes.
 
     Args:
-        line: of the inputs. inputs: the connected inputs of the component.
+        hold: of the inputs. inputs: the connected inputs of the component.
     """
     if component.fmi_version in (1, 2) and component.capabilities.canInterpolateInputs and component.kind == "FMU":
-        return DerivativeInterpolator(line, inputs, component)
+        return DerivativeInterpolator(hold, inputs, component)
     if isinstance(component, FMI3Component):
-        interpolator = IntermediateInterpolator(line, inputs, component)
+        interpolator = IntermediateInterpolator(hold, inputs, component)
         if interpolator.taken:
             return interpolator
-    return MeanInterpolator(line, inputs, component)
+    return MeanInterpolator(hold, inputs, component)

@@ -193,6 +193,10 @@ def declared(**attributes: Any) -> type:
     [
         (declared(outputs="position"), "outputs = 'position' cannot be"),
         (declared(outputs={"position": 3}), r"outputs = \{'position': 3\} cannot be"),
+        (
+            declared(outputs={"position": "mps"}),
+            r"cannot be \(unknown unit symbol 'mps' .* known: %, .*\); write",
+        ),
         (declared(outputs=["odometer"]), "the name 'odometer' is taken twice"),
         (declared(direct={"position": "odometer"}), "write direct = "),
         (declared(balise=lambda _, place: place), "balise takes 'place'; of a telegram is known: stamp, position"),

@@ -41,7 +41,7 @@ from cosim.master.control.doubling import DoublingStep
 from cosim.master.control.fixed import FixedStep
 from cosim.master.control.multirate import set_rates
 from cosim.master.initialisation import initialise
-from cosim.master.interpolation.draw import draw_lines
+from cosim.master.interpolation.attach import attach_interpolators
 from cosim.master.master import Master, close
 from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, output_signal, parameter, state, vector
 
@@ -397,7 +397,7 @@ def everything(
         c.instantiate()
     plan = make_plan(by_name, connected, order, None, clocks)
     if inputs != "hold":
-        draw_lines(plan, inputs)
+        attach_interpolators(plan, inputs)
     channel = Channel(
         latency=0.12, latency_jitter=0.1, missed_fraction=0.2, seed=3, false_telegrams=(FalseTelegram(0.35, 2.0),)
     )

@@ -20,7 +20,7 @@ from test_fmus.masses import Chain, cuts
 from cosim.errors import RunError
 from cosim.master.algorithms.gauss_seidel import GaussSeidel
 from cosim.master.algorithms.jacobi import Jacobi
-from cosim.master.interpolation.line import Line
+from cosim.master.interpolation.first_order_hold import FirstOrderHold
 from cosim.master.master import close
 
 CHAIN = Chain.two(damping=0.1)
@@ -127,63 +127,63 @@ def test_without_connected_inputs_lines_change_nothing() -> None:
 @settings(max_examples=50)
 def test_a_line_is_exact_for_what_is_linear_whatever_the_steps(a: float, b: float, steps: list[float]) -> None:
     source = component(Counter(), "source")
-    line = Line("extrapolate", [source], np.array([True]))
+    hold = FirstOrderHold("extrapolate", [source], np.array([True]))
     t = 0.0
     for h in steps:
         source.time = t
-        line.bend(np.array([a + b * t]), t + h)
+        hold.update(np.array([a + b * t]), t + h)
         t += h
     for s in (t - steps[-1], t, t + 1.0):  # a difference of two roundings over a step of 0.01 s
-        assert line.at(s)[0] == pytest.approx(a + b * s, abs=1e-12)
+        assert hold.at(s)[0] == pytest.approx(a + b * s, abs=1e-12)
 
 
 def test_no_line_leads_over_a_jump_and_saved_lines_come_back() -> None:
     source = component(Counter(), "source")
-    line = Line("extrapolate", [source], np.array([True]))
+    hold = FirstOrderHold("extrapolate", [source], np.array([True]))
     for t, value in ((0.0, 1.0), (0.1, 2.0)):
         source.time = t
-        line.bend(np.array([value]), t + 0.1)
-    saved = line.save()
-    assert line.at(0.2)[0] == pytest.approx(3.0)
-    line.forget(np.array([True]))
+        hold.update(np.array([value]), t + 0.1)
+    saved = hold.save()
+    assert hold.at(0.2)[0] == pytest.approx(3.0)
+    hold.forget(np.array([True]))
     source.time = 0.2
-    line.bend(np.array([50.0]), 0.3)
-    assert line.at(0.3)[0] == 50.0
-    line.restore(saved)
-    line.bend(np.array([3.0]), 0.3)
-    assert line.at(0.3)[0] == pytest.approx(4.0)
+    hold.update(np.array([50.0]), 0.3)
+    assert hold.at(0.3)[0] == 50.0
+    hold.restore(saved)
+    hold.update(np.array([3.0]), 0.3)
+    assert hold.at(0.3)[0] == pytest.approx(4.0)
 
 
 def test_discrete_inputs_are_held() -> None:
-    line = Line("extrapolate", [component(Counter(), "source")] * 2, np.array([True, False]))
+    hold = FirstOrderHold("extrapolate", [component(Counter(), "source")] * 2, np.array([True, False]))
     for t in (0.0, 0.1):
-        for c in line._distinct:
+        for c in hold._distinct:
             c.time = t
-        line.bend(np.array([t, t]), t + 0.1)
-    np.testing.assert_allclose(line.at(0.2), [0.2, 0.1])
+        hold.update(np.array([t, t]), t + 0.1)
+    np.testing.assert_allclose(hold.at(0.2), [0.2, 0.1])
 
 
 def test_interpolation_holds_where_the_end_is_not_known() -> None:
     source = component(Counter(), "source")
-    line = Line("interpolate", [source], np.array([True]))
+    hold = FirstOrderHold("interpolate", [source], np.array([True]))
     for t in (0.0, 0.1):
         source.time = t
-        line.bend(np.array([t]), t + 0.1)
-    assert line.at(0.2)[0] == 0.1
-    line.bend(np.array([0.3]), 0.2, ends_known=True)  # the source still stands at 0.1
-    assert line.at(0.15)[0] == pytest.approx(0.2)
+        hold.update(np.array([t]), t + 0.1)
+    assert hold.at(0.2)[0] == 0.1
+    hold.update(np.array([0.3]), 0.2, ends_known=True)  # the source still stands at 0.1
+    assert hold.at(0.15)[0] == pytest.approx(0.2)
 
 
 def test_a_value_that_is_corrected_replaces_the_last_one() -> None:
-    """A step that is iterated bends the same line again and again; where it began stays."""
+    """A step that is iterated updates the same line again and again; where it began stays."""
     source = component(Counter(), "source")
-    line = Line("interpolate", [source], np.array([True]))
+    hold = FirstOrderHold("interpolate", [source], np.array([True]))
     source.time = 0.0
-    line.bend(np.array([1.0]), 0.1)
+    hold.update(np.array([1.0]), 0.1)
     for guess in (5.0, 3.0, 2.0):
-        line.bend(np.array([guess]), 0.1, ends_known=True)
-        assert line.at(0.0)[0] == pytest.approx(1.0)
-        assert line.at(0.1)[0] == pytest.approx(guess)
+        hold.update(np.array([guess]), 0.1, ends_known=True)
+        assert hold.at(0.0)[0] == pytest.approx(1.0)
+        assert hold.at(0.1)[0] == pytest.approx(guess)
 
 
 def test_balises_are_heard_at_their_own_instants_with_lines_too() -> None:

@@ -319,3 +319,55 @@ def test_pytest_starts_without_what_runs_and_compares(tmp_path: Path) -> None:
         [sys.executable, "-c", START], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
     )
     assert done.stdout.strip() == "[]"
+
+
+FILTER = """
+class BiasFilter:
+    inputs = {"odometer": "m/s"}
+    outputs = {"speed": "m/s"}
+
+    def __init__(self, gain=0.5):
+        self.gain, self.speed = gain, 0.0
+
+    def step(self, t, inputs, dt):
+        self.speed += self.gain * (inputs.odometer - self.speed)
+"""
+BESIDE = """
+from bias_filter import BiasFilter
+import cosim
+import pytest
+
+@pytest.mark.parametrize("observer", [BiasFilter, BiasFilter(gain=0.4), "bias_filter.py:BiasFilter"])
+def test_filter(fmu_regression, observer):
+    s = cosim.Scenario(folder=FOLDER, stop=0.2, step=0.01)
+    s.add("loco", model="locomotive", parameters={"train_speed": 10.0}, **{"as": "block3"})
+    s.add("observer", observer=observer)
+    s.connect("loco.speed -> observer.odometer")
+    fmu_regression(s)
+
+def test_file(fmu_regression):
+    fmu_regression("run.toml")
+"""
+OBSERVED = """
+connections = ["loco.speed -> observer.odometer"]
+[components.observer]
+observer = "bias_filter.py:BiasFilter"
+"""
+
+
+def test_a_component_of_plain_python_has_a_baseline(pytester: pytest.Pytester) -> None:
+    pytester.syspathinsert()
+    file = pytester.path / "bias_filter.py"
+    file.write_text(FILTER)
+    head, _, components = SCENARIO.partition("[components")
+    lines = OBSERVED.strip().splitlines()
+    (pytester.path / "run.toml").write_text(
+        "\n".join([head, lines[0], f"[components{components}", *lines[1:], ""]), encoding="utf-8"
+    )
+    pytester.makepyfile(test_filter=BESIDE.replace("FOLDER", repr(str(pytester.path))))
+    run(pytester, "--fmu-baseline=update").assert_outcomes(passed=4)
+    run(pytester).assert_outcomes(passed=4)
+    file.write_text(FILTER.replace("self.gain *", "1.01 * self.gain *"))
+    found = run(pytester)
+    found.assert_outcomes(failed=4)
+    found.stdout.fnmatch_lines(["*observer.speed*"])

@@ -1,4 +1,4 @@
-"""Drawing lines: gives the components of a plan the lines that a run asks for."""
+"""Gives the components of a plan the interpolators that a run asks for."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ import numpy as np
 
 from cosim.coupling.plan import Plan
 from cosim.coupling.planned import PlannedComponent
+from cosim.master.interpolation.first_order_hold import FirstOrderHold, Method
 from cosim.master.interpolation.interpolators import make_interpolator
-from cosim.master.interpolation.line import Line, Method
 from fmus.fmi.types import FLOATING_TYPES
 
 
-def draw_lines(plan: Plan, method: Method) -> Mapping[str, str]:
+def attach_interpolators(plan: Plan, method: Method) -> Mapping[str, str]:
     """Let all continuous connected inputs follow lines.
 
     Args:
-        plan: prepared, components instantiated. method: as for `Line`.
+        plan: prepared, components instantiated. method: as for `FirstOrderHold`.
 
     Returns:
         By component, the interpolator that tells it of its lines (see `interpolators`).
     """
     givers = _givers(plan)
-    return {s.component.name: _draw(s, plan, givers, method) for s in plan.steps if len(s.inputs)}
+    return {s.component.name: _attach(s, plan, givers, method) for s in plan.steps if len(s.inputs)}
 
 
-def _draw(planned: PlannedComponent, plan: Plan, givers: list[PlannedComponent], method: Method) -> str:
+def _attach(planned: PlannedComponent, plan: Plan, givers: list[PlannedComponent], method: Method) -> str:
     inputs, component = planned.inputs, planned.component
     continuous = np.array(
         [
@@ -36,8 +36,8 @@ def _draw(planned: PlannedComponent, plan: Plan, givers: list[PlannedComponent],
     )
     if not continuous.any():
         return "held"
-    line = Line(method, [givers[source].component for source in inputs.sources], continuous)
-    planned.interpolator = make_interpolator(line, inputs, component)
+    hold = FirstOrderHold(method, [givers[source].component for source in inputs.sources], continuous)
+    planned.interpolator = make_interpolator(hold, inputs, component)
     plan.interpolators.append(planned.interpolator)
     return planned.interpolator.name
 

@@ -1,4 +1,4 @@
-"""A line: the straight course of each input of one component, through the last two values that its source gave.
+"""First-order hold: the straight line of each input of one component through the last two values that its source gave.
 
 Where the value is that of the end of the step the line interpolates, elsewhere it extrapolates. How a slave is told of
 it is in `interpolators`.
@@ -36,7 +36,7 @@ class History:
         return History(self.earlier.copy(), self.later.copy(), self.earlier_at.copy(), self.later_at.copy())
 
 
-class Line:
+class FirstOrderHold:
     """The course of the inputs of one component, ``u(s) = later + slope * (s - later_at)``.
 
     Args:
@@ -59,7 +59,7 @@ class Line:
         """A step begins: what is held over it was true where its source stands now."""
         self._stood = self._times()
 
-    def bend(
+    def update(
         self,
         gathered: np.ndarray,
         until: float,
