@@ -52,7 +52,7 @@ def _paragraphs(docstring: str) -> Iterator[list[str]]:
 
 def _block(lines: list[str]) -> Block:
     if lines[0].strip() == "Args:":
-        return "options", _items(dedent("\n".join(lines[1:])).splitlines(), r"(?=\w+: )")
+        return "options", _items(dedent("\n".join(lines[1:])).splitlines(), r"(?=\w+(?:, \w+)*: )")
     if re.match(r"- ", lines[0]):
         return "ul", _items(lines, r"- ")
     if re.match(r"\d+\. ", lines[0]):

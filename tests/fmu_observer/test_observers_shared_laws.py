@@ -146,9 +146,11 @@ def test_the_registry_names_every_observer() -> None:
     assert OBSERVERS["slip_indicator"] is SlipIndicator
 
 
-def test_importing_the_package_does_not_import_casadi() -> None:
-    code = (
-        "import fmu_observer, sys; assert 'casadi' not in sys.modules; fmu_observer.OBSERVERS; assert 'casadi' in "
-        "sys.modules"
-    )
+def test_casadi_is_loaded_with_the_first_block() -> None:
+    code = """import sys, fmu_observer
+cls = fmu_observer.OBSERVERS["differentiator_cdo"]
+assert "casadi" not in sys.modules
+from fmu_observer.block import make_block
+make_block(cls()).instantiate()
+assert "casadi" in sys.modules"""
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -29,7 +29,8 @@ def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def run(**master: Any) -> Outcome:
-    return small(master=master).run(overrides={"certificates": "ignore"}, warn=lambda _text: None)
+    given = {"certificates": "ignore", "report.tables": ["csv", "mat"]}
+    return small(master=master).run(overrides=given, warn=lambda _text: None)
 
 
 def test_a_run_that_outgrows_its_memory_is_the_same_run(tmp_path: Path) -> None:
