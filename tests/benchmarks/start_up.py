@@ -63,21 +63,36 @@ s = Scenario(stop=1.0, step=0.01)
 s.add("a", fmu="lag.fmu").add("b", fmu="lag.fmu").connect("a.y1 -> b.u1", "b.y1 -> a.u1")
 s.run(warn=lambda _: None)
 """
+LONG = """
+step = 0.01
+connections = ["a.y1 -> b.u1", "b.y1 -> a.u1"]
+components.a.fmu = "lag.fmu"
+components.b.fmu = "lag.fmu"
+"""
 BY_HAND = """
 from fmpy import simulate_fmu
 simulate_fmu("lag.fmu", stop_time=1.0, output_interval=0.01)
 """
 
 
+def environment(folder: Path) -> dict[str, str]:
+    """The environment of what is measured, with bytecode kept in a folder."""
+    kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    return kept | {"PYTHONPYCACHEPREFIX": str(folder / "bytecode")}
+
+
 def least_cpu(command: list[str], folder: Path, repeat: int) -> float:
     """The least CPU seconds of several runs of a command [s]."""
-    environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
-    environment["PYTHONPYCACHEPREFIX"] = str(folder / "bytecode")
     found = []
     for _ in range(repeat + 1):  # the first one writes bytecode
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         subprocess.run(
-            command, cwd=folder, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=True
+            command,
+            cwd=folder,
+            env=environment(folder),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            check=True,
         )
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         found.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
@@ -89,7 +104,12 @@ def split(folder: Path, repeat: int) -> dict[str, float]:
     least: dict[str, float] = {}
     for _ in range(repeat):
         done = subprocess.run(
-            [sys.executable, "-c", SPLIT], cwd=folder, stdout=subprocess.PIPE, text=True, check=True
+            [sys.executable, "-c", SPLIT],
+            cwd=folder,
+            env=environment(folder),
+            stdout=subprocess.PIPE,
+            text=True,
+            check=True,
         ).stdout
         for line in done.splitlines():
             name, _, seconds = line.partition("=")
@@ -105,6 +125,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         linear_fmu(folder, "lag", [[-1.0]], [[1.0]], [[1.0]], [[0.0]], version=2, x0=[1.0])
+        for exponent in (5, 6):
+            (folder / f"steps_{exponent}.toml").write_text(f"stop = {10.0 ** (exponent - 2)}{LONG}")
         cosim, fmus = ([sys.executable, "-m", f"{name}.cli"] for name in ("cosim", "fmus"))
         commands = {
             "cosim --help": [*cosim, "--help"],
@@ -116,6 +138,8 @@ def main() -> None:
             "fmus list": [*fmus, "list"],
             "script that couples two FMUs": [sys.executable, "-c", COUPLED],
             "fmpy by hand, one FMU": [sys.executable, "-c", BY_HAND],
+            "10^5 steps of two FMUs to a CSV": [*cosim, "run", "steps_5.toml", "--no-report", "--quiet"],
+            "10^6 steps of two FMUs to a CSV": [*cosim, "run", "steps_6.toml", "--no-report", "--quiet"],
             f"cosim run {SCENARIO} --no-report": [*cosim, "run", SCENARIO, "--no-report", "--quiet"],
             f"cosim run {SCENARIO}": [*cosim, "run", SCENARIO, "--quiet"],
         }

@@ -10,10 +10,19 @@ from pathlib import Path
 
 import pytest
 from pages import ROOT
+from test_fmus.build import linear_fmu
 
 HEAVY = ("casadi", "scipy.linalg", "scipy.optimize", "scipy.signal", "scipy.io", "scipy.sparse", "scipy.stats")
 OPTIONAL = ("matplotlib", "pandas", "xarray", "control", "cvxpy", "clarabel", "pyarrow", "h5py", "jinja2")
 FOR_NUMBERS = ("numpy", "fmpy", "pydantic", "lxml", "scipy")
+
+SELDOM = ("cosim.studies.sweep", "cosim.comparison.compare", "cosim.ssp.load")
+SMALL = """
+stop = 1.0
+step = 0.1
+[components.odometer]
+model = "odometer"
+"""
 
 SCRIPT = "from cosim import Scenario; Scenario.load('own_fmu')"
 NOTHING = (*HEAVY, *OPTIONAL, *FOR_NUMBERS)
@@ -26,7 +35,9 @@ BARRED = {
     "fmus list": NOTHING,
     "cosim run --help": (*HEAVY, *OPTIONAL, "lxml"),
     "cosim show --help": (*HEAVY, *OPTIONAL, "lxml"),
-    SCRIPT: (*HEAVY, *OPTIONAL, "lxml"),
+    "cosim info lag.fmu": (*HEAVY, *OPTIONAL, *SELDOM, "pydantic", "scipy", "cosim.scenario.schema"),
+    "cosim show small.toml": (*HEAVY, *OPTIONAL, *SELDOM, "lxml"),
+    SCRIPT: (*HEAVY, *OPTIONAL, *SELDOM, "lxml"),
 }
 """What must not be loaded, by command; all else a command may load."""
 
@@ -55,8 +66,11 @@ def loaded(command: str, folder: Path) -> set[str]:
 
 @pytest.mark.parametrize("command", BARRED)
 def test_a_command_loads_nothing_that_it_does_not_use(command: str, tmp_path: Path) -> None:
-    if command.endswith("list"):
-        loaded(command, tmp_path)  # the first time the models are read, once for each version of their files
+    (tmp_path / "small.toml").write_text(SMALL)
+    if command.endswith(".fmu"):
+        linear_fmu(tmp_path, "lag", [[-1.0]], [[1.0]], [[1.0]], [[0.0]], version=2, x0=[1.0])
+    if command.endswith(("list", ".toml")):
+        loaded(command, tmp_path)  # the first time the models are read, or traced, once for each version of their files
     assert loaded(command, tmp_path) & set(BARRED[command]) == set()
 
 

@@ -68,7 +68,8 @@ def interface(links: Sequence[Link], members: range | None = None) -> np.ndarray
     Args:
         links: between the components of the loop. members: of the loop, by number; None for all.
     """
-    return np.unique(np.array([link.column for link in fed_back(links, members)], dtype=np.intp))
+    # a set, since `np.unique` loads the masked arrays of NumPy
+    return np.array(sorted({link.column for link in fed_back(links, members)}), dtype=np.intp)
 
 
 def downstream(plan: Plan, names: Collection[str]) -> np.ndarray:
