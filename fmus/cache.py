@@ -8,6 +8,7 @@ need not be traced to find its FMU; code that changed without changing the equat
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from fmu_observer.description import FmiVersion
     from fmus.build import Draft
 
+LOG = logging.getLogger("fmus")
 _known: WeakKeyDictionary[HybridSystem, dict[str, str]] = WeakKeyDictionary()
 _keys: WeakKeyDictionary[HybridSystem, dict[str, str | None]] = WeakKeyDictionary()
 
@@ -111,7 +113,15 @@ def cache_entry(
     content = content_key(plan, targets)
     _keep_content(system, key, repr(request), content)
     path = _place(system, content)
-    return CacheEntry(path, None if is_sealed(path) else Draft.of(plan, targets))
+    return CacheEntry(path, None if _is_whole(path) else Draft.of(plan, targets))
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether an FMU is there and the one that was put there; another one is told in the log."""
+    whole = is_sealed(path)
+    if not whole and path.is_file():
+        LOG.warning("The cached FMU %s is not the one that was put there; it is built again.", path)
+    return whole
 
 
 def _key(system: HybridSystem, request: tuple[Any, ...]) -> str | None:

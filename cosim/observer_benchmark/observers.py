@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +33,7 @@ from cosim.results.result import Result
 from cosim.scenario.balise_service import BALISE_EVENT
 from cosim.scenario.certificates import check_certificates, expected_gap
 from cosim.scenario.layouts import make_layout
-from cosim.scenario.model_name import ModelName
+from cosim.scenario.model_name import ModelName, settings_of
 from cosim.scenario.models import make_declared
 from cosim.scenario.outcome import INTERRUPTED, Outcome
 from cosim.scenario.paths import absolute, move_file
@@ -249,7 +249,8 @@ def find_candidates(scenario: Scenario, sides: Sides, names: Sequence[Any] | Non
         ScenarioError: a name is neither an observer of the scenario nor a shipped one.
     """
     if names is not None:
-        found = [_named(scenario, sides, name) for name in dict.fromkeys(names)]
+        asked = {name if isinstance(name, str) else id(name): name for name in names}
+        found = _told_apart([_named(scenario, sides, name) for name in asked.values()])
         return found, [f"{c.name}: {text}" for c in found for text in c.settings]
     own = [_own(sides, name) for name in sides.observers]
     used = {sides.table.components[name].observer for name in sides.observers}
@@ -258,6 +259,13 @@ def find_candidates(scenario: Scenario, sides: Sides, names: Sequence[Any] | Non
     left_out = [f"left out, as {why}: {', '.join(c.model for c in others if c.misfit == why)}" for why in reasons]
     found = [*own, *(c for c in others if not c.misfit)]
     return found, [*(f"{c.name}: {text}" for c in found for text in c.settings), *left_out]
+
+
+def _told_apart(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Candidates of which no two have one name: two instances of a class, say."""
+    names = [candidate.name for candidate in candidates]
+    earlier = [names[:place].count(name) for place, name in enumerate(names)]
+    return [replace(c, name=f"{c.name}_{n + 1}") if n else c for c, n in zip(candidates, earlier, strict=True)]
 
 
 def _named(scenario: Scenario, sides: Sides, given: Any) -> Candidate:
@@ -271,7 +279,9 @@ def _named(scenario: Scenario, sides: Sides, given: Any) -> Candidate:
     if name.given is None and not names_code(name) and name not in fmu_observer.OBSERVERS:
         known = [*sides.observers, *(n for n in train_observers() if n not in sides.observers)]
         raise ScenarioError(f"{scenario.where}: unknown observer {name!r}; {nearest(name, known)}")
-    return _shipped(sides, ModelName.of(move_file(name, lambda path: absolute(path, "."))))
+    if name.given is None:
+        name = ModelName.of(move_file(name, lambda path: absolute(path, ".")))
+    return _shipped(sides, name)
 
 
 def _own(sides: Sides, name: str) -> Candidate:
@@ -280,12 +290,15 @@ def _own(sides: Sides, name: str) -> Candidate:
 
 def _shipped(sides: Sides, model: str) -> Candidate:
     """An observer with its own defaults and what the scenario says of the train."""
-    table = ComponentTable.model_validate({"observer": model})
+    said = settings_of(getattr(model, "given", None))  # what an instance says of the train stands
+    table = ComponentTable.model_validate({"observer": model, **said})
     system = make_declared(table, model)
     name = model.rpartition(":")[2].replace(".", "_")
     parameters = {s.name for s in system.parameter_signals}
-    facts = {fact: known for fact, known in known_facts(sides).items() if fact in parameters}
-    table = table.model_copy(update={"parameters": {fact: value for fact, (value, _) in facts.items()}})
+    untold = parameters - table.parameters.keys()
+    facts = {fact: known for fact, known in known_facts(sides).items() if fact in untold}
+    told = {fact: value for fact, (value, _) in facts.items()}
+    table = table.model_copy(update={"parameters": {**table.parameters, **told}})
     template = sides.template()
     sources = {s.name: template[s.name] for s in system.inputs if s.name in template}
     unique = name if name not in sides.table.components else f"{name}_with_defaults"

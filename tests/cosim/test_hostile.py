@@ -325,7 +325,7 @@ def test_parts_of_steps_below_the_resolution_of_time_are_refused() -> None:
 
 @pytest.mark.parametrize("damage", [b"", b"PK\x03\x04", None])
 def test_a_damaged_fmu_in_the_cache_is_built_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damage: bytes | None
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, damage: bytes | None
 ) -> None:
     monkeypatch.setattr("fmus.build.Draft", FakeDraft)
     monkeypatch.setenv("FMU_OBSERVER_CACHE", str(tmp_path))
@@ -342,6 +342,8 @@ def test_a_damaged_fmu_in_the_cache_is_built_again(
     entry.path.write_bytes(whole[:first_byte] + b"\xff" + whole[first_byte + 1 :] if damage is None else damage)
     assert cache.cache_entry(system, 2).draft is not None
     assert cache.cache_entry(PLANTS["odometer"](), 2).draft is not None
+    told = f"The cached FMU {entry.path} is not the one that was put there; it is built again."
+    assert [record.getMessage() for record in caplog.records] == [told] * 3
 
 
 class FakeDraft:

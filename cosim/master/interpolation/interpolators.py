@@ -71,7 +71,7 @@ class MeanInterpolator(InputInterpolator):
     """Holds the mean of the line: exact for its integral, so of second order where states integrate the input.
 
     Args:
-        inputs: the connected inputs of the component. component: that receives them.
+        hold: of the inputs. inputs: the connected inputs of the component. component: that receives them.
     """
 
     name = "mean"
@@ -113,7 +113,7 @@ class IntermediateInterpolator(InputInterpolator):
     """Sets the value of the line whenever the slave asks for it within its step (intermediateUpdate).
 
     Args:
-        inputs: the connected inputs of the component. component: that receives them.
+        hold: of the inputs. inputs: the connected inputs of the component. component: that receives them.
     """
 
     name = "intermediate"

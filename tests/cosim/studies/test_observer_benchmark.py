@@ -42,6 +42,33 @@ def benchmark() -> ObserverBenchmark:
     return benchmark_observers(two(), ["observer", "uio"], repeat=2)
 
 
+class Constant:
+    """A plain observer that believes in one speed."""
+
+    inputs = ("odometer",)
+    outputs = ("speed",)
+
+    def __init__(self, mass: float = 1.0, believed: float = 0.0) -> None:
+        self.mass, self.believed = mass, believed
+        self.hidden = 0.0  # no argument: an attribute of this very instance
+
+    @property
+    def speed(self) -> float:
+        return self.believed + self.hidden
+
+    def step(self, t: float, inputs: Any, dt: float) -> None:
+        """Nothing to learn."""
+
+
+def test_an_instance_takes_part_as_it_is() -> None:
+    given = Constant(believed=3.0)
+    given.hidden = 0.5
+    found = benchmark_observers(two(), [given, Constant])
+    assert found.failed == []
+    first, second = found.outcomes.values()
+    assert (first.result.table[-1][-1], second.result.table[-1][-1]) == (3.5, 0.0)
+
+
 # -- the numbers of the run
 # -------------------------------------------------------------------------------------------------
 
