@@ -13,6 +13,7 @@ import sys
 import time
 from functools import cache
 from importlib.util import find_spec
+from io import FileIO
 from pathlib import Path
 from typing import Any
 
@@ -73,7 +74,7 @@ def folder_digest(name: str) -> str:
     root = Path(next(iter(spec.submodule_search_locations)), rest)
     digest = hashlib.sha256()
     for path in [str(root)] if root.is_file() else _files(str(root)):
-        with Path(path).open("rb") as file:
+        with FileIO(path) as file:
             if os.fstat(file.fileno()).st_mtime > LOADED_AT:
                 raise NoIdentityError(f"{path} was changed after it was loaded.")
             content = file.read()

@@ -5,9 +5,11 @@ bytes.
 from __future__ import annotations
 
 import re
+from io import BytesIO
 from pathlib import Path
 
 import matplotlib as mpl
+from matplotlib.figure import Figure
 
 import cosim
 from cosim.drawing.style import OBSERVER_LINES, new_figure, png, styled
@@ -43,3 +45,20 @@ def test_equal_figures_are_equal_bytes_and_the_settings_of_the_caller_stay() -> 
     before = dict(mpl.rcParams)
     assert draw() == draw()
     assert dict(mpl.rcParams) == before
+
+
+def test_a_picture_drawn_once_is_that_of_savefig_and_the_figure_stays_as_it_was() -> None:
+    def figure() -> Figure:
+        made = new_figure((3.0, 2.0))
+        made.set_facecolor("yellow")
+        axes = made.add_subplot()
+        axes.plot([0.0, 1.0], [0.0, 1e5], label="a")
+        axes.legend()
+        axes.set_xlabel("time [s]")
+        return made
+
+    twice, once, file = figure(), figure(), BytesIO()
+    twice.savefig(file, format="png", dpi=90, metadata={"Software": None}, facecolor="white")
+    before = once.canvas, once.dpi, once.get_facecolor()
+    assert png(once, 90) == file.getvalue()
+    assert (once.canvas, once.dpi, once.get_facecolor()) == before
