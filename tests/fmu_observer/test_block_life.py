@@ -327,6 +327,15 @@ def test_fmi2_status_calls() -> None:
         block.getBooleanStatus(2)
 
 
+def test_fmi2_says_of_a_discarded_step_that_the_run_should_end() -> None:
+    driven = Driven(SWING, 2).start()
+    with pytest.raises(BlockCallError, match=r"holds more than .* internal steps or periods"):
+        driven.step(0.0, 1e12)
+    assert driven.block.getBooleanStatus(3) is True  # fmi2Terminated
+    driven.step(0.0)
+    assert driven.block.getBooleanStatus(3) is False
+
+
 def test_an_error_survives_a_trip_between_processes() -> None:
     with pytest.raises(BlockCallError) as caught:
         Driven(SWING, 3).step(0.0)

@@ -61,6 +61,9 @@ def test_the_maps_give_the_printed_table(speed: int) -> None:
         assert found.speeds[at] == pytest.approx(speed * KMH, rel=1e-12)
         assert found.peaks[at] == pytest.approx(peak, rel=0.006)
         assert 100.0 * found.slips[at] == pytest.approx(slip, abs=1.8)
+    for printed, peak, slip in ((published_map(False), high, nominal), (published_map(True), low, degraded)):
+        at = int(np.argmin(np.abs(np.array(printed.speeds) - speed * KMH)))
+        assert (printed.peaks[at], 100.0 * printed.slips[at]) == pytest.approx((peak, slip), rel=1e-12)
 
 
 @settings(max_examples=40, deadline=None)

@@ -73,6 +73,12 @@ def test_starts_and_presets_are_those_of_the_model() -> None:
     for parameter_name, value in system.preset_values(names[1]).items():
         # 12 digits are printed
         assert float(rows[parameter_name][1 + names.index(names[1])]) == pytest.approx(value, rel=1e-11)
+    with_range = tables.xpath("//table[thead//th[4] = 'range']/tbody/tr")
+    ranges = {row[0].text_content(): row[3].text_content() for row in with_range}
+    for signal in (*system.inputs, *system.parameters):
+        low, high = ("…" if bound is None else f"{bound:.12g}" for bound in (signal.min, signal.max))
+        expected = f"{low} to {high}" if (low, high) != ("…", "…") else ""
+        assert [ranges[name] for name in signal.scalar_names] == [expected] * len(signal.scalar_names)
     titles = [cell.text_content() for cell in tables.xpath("//th")]
     assert f"{system.default_preset} (this FMU)" in titles
 

@@ -20,6 +20,7 @@ from cosim.errors import ScenarioError
 from fmu_observer.block import make_block
 from fmus import build_fmu, cached_fmu
 from fmus.content.generate import GenerationError
+from fmus.content.resources import resource_files
 from plant_models import BaliseReader
 
 pytestmark = pytest.mark.compiler
@@ -174,6 +175,13 @@ def test_a_folder_in_place_of_the_file_is_refused(loop: Path, readers: dict[int,
     assert "balises.csv: cannot be read after line 0" in refusal(loop, readers[3], tmp_path, str(tmp_path))
 
 
+def test_a_file_that_is_there_and_cannot_be_opened_is_refused(
+    loop: Path, readers: dict[int, Unpacked], tmp_path: Path
+) -> None:
+    (tmp_path / "balises.csv").symlink_to("balises.csv")
+    assert "balises.csv: cannot be opened: " in refusal(loop, readers[3], tmp_path, str(tmp_path))
+
+
 @given(text=st.one_of(st.binary(max_size=80), st.text('position,"\n\r .1e+-9', max_size=80).map(str.encode)))
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_any_bytes_are_read_or_refused(text: bytes, loop: Path, readers: dict[int, Unpacked], tmp_path: Path) -> None:
@@ -208,6 +216,14 @@ def test_the_block_has_the_values_of_the_file() -> None:
 def test_only_a_list_has_a_file(tmp_path: Path) -> None:
     with zipfile.ZipFile(build_fmu(BaliseReader(), tmp_path / "a.fmu")) as archive:
         assert not [name for name in archive.namelist() if name.startswith("resources/")]
+
+
+@pytest.mark.parametrize("second", [1.0, 2.0])
+def test_start_values_increase_each_listed_once(second: float) -> None:
+    reader = BaliseReader(layout="positions", balise_capacity=ROOM)
+    reader.presets = {"muddled": {"positions": (2.0, second, UNUSED, UNUSED)}}
+    with pytest.raises(GenerationError, match=r"start values of positions must increase; balises\.csv lists them so"):
+        resource_files(reader, "muddled")
 
 
 def test_start_values_that_do_not_increase_cannot_go_into_a_file(tmp_path: Path) -> None:

@@ -109,7 +109,9 @@ def test_a_linear_system_follows_the_matrix_exponential() -> None:
 
 
 def test_a_transfer_function_is_accepted() -> None:
-    _, y = run(from_state_space(control.tf([1.0], [0.5, 1.0], name="first_order")), 1.0, u0=1.0)
+    system = from_state_space(control.tf([1.0], [0.5, 1.0], name="first_order"))
+    assert system.options == {}
+    _, y = run(system, 1.0, u0=1.0)
     assert y[0] == pytest.approx(1.0 - np.exp(-2.0), rel=1e-9)
 
 

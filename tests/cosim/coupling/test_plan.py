@@ -12,6 +12,7 @@ from mock_slaves import Counter, Mock, component, started, variable
 from cosim.coupling.connection import connect
 from cosim.coupling.plan import Plan, make_plan
 from cosim.errors import CouplingError
+from cosim.master.algorithms.links import downstream
 from cosim.results.recorder import Recorder
 from cosim.results.result import SignalInfo
 
@@ -36,6 +37,14 @@ def test_outputs_lie_in_one_array_in_the_order_of_stepping() -> None:
     np.testing.assert_array_equal(made.continuous, [True, True, True, False, False, False, True])
     np.testing.assert_array_equal(listener.continuous, made.continuous[2:])
     assert made.signals[1].unit == "m/s"
+
+
+def test_what_takes_of_a_component_is_told_from_what_it_takes() -> None:
+    made = plan()
+    listener = np.zeros(len(made.values), dtype=bool)
+    listener[made.find("listener").columns] = True
+    np.testing.assert_array_equal(downstream(made, ["plant"]), listener)
+    assert not downstream(made, ["listener"]).any()
 
 
 @pytest.mark.parametrize(

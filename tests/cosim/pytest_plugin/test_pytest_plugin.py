@@ -156,6 +156,21 @@ def test_check_fails_with_the_worst_and_writes_no_baseline(pytester: pytest.Pyte
     assert not list((pytester.path / ".pytest_fmu").rglob("*.png"))  # the pictures of a difference go with it
 
 
+def test_a_difference_is_told_where_its_picture_fails(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: object) -> None:
+        raise ValueError("no font")
+
+    write(pytester, ONE)
+    run(pytester, "--fmu-baseline=update")
+    write(pytester, ONE, 1.5)
+    monkeypatch.setattr(cosim.report.page.comparison, "write_comparison", fails)
+    checked = run(pytester)
+    checked.assert_outcomes(failed=1)
+    checked.stdout.fnmatch_lines(["*at worst 0.5 m/s too high at 1 s*", "*picture: could not be made: no font*"])
+
+
 BESIDE = ONE + "def test_other():\n    assert SLOPE == 1.0\n"
 
 

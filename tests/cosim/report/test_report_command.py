@@ -11,6 +11,7 @@ import pytest
 from small_scenarios import small
 
 from cosim.cli import main
+from cosim.cli.report import _guess
 from cosim.cli.report import _labels as default_labels
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.stored_spec import spec_of
@@ -61,6 +62,18 @@ def test_folders_of_one_name_are_told_apart() -> None:
     assert default_labels(None, [Path("/a/one"), Path("/b/two")]) == ["one", "two"]
     assert default_labels(None, [Path("/a/one"), Path("/b/one"), Path("/b/two")]) == ["a/one", "b/one", "b/two"]
     assert len(set(default_labels(None, [Path("/a/one"), Path("/a/one")]))) == 2
+
+
+@pytest.mark.parametrize(
+    ("roles", "text"),
+    [
+        ({}, "their names give no hint."),
+        ({"true_speed": "train.speed"}, "guessed from their names: true_speed = train.speed."),
+        ({"observers": ["a", "b"]}, "guessed from their names: observers = a, b."),
+    ],
+)
+def test_what_was_guessed_is_told_in_words(roles: dict[str, Any], text: str) -> None:
+    assert _guess(ReportSpec(**{"observers": [], **roles})) == text
 
 
 def test_an_older_folder_is_read_and_the_guess_is_told(

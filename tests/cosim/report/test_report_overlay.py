@@ -176,6 +176,8 @@ def test_difference_in_words(value: float, first: float, text: str) -> None:
 
 def test_the_page_names_the_largest_change() -> None:
     text = overlay_page(two(), [])
+    first, *others = (run.label for run in two())
+    assert f"{first} is what the others are compared with: {', '.join(others)}." in text
     assert "Largest rise of rms speed error" in text
     assert '<dd class="value">+100 %</dd>' in text  # the error was doubled
     assert "Largest fall" not in text  # nothing fell

@@ -240,6 +240,14 @@ def test_an_interrupt_while_rows_are_written_loses_nothing(monkeypatch: pytest.M
     assert count == 90
 
 
+def test_a_disk_that_takes_no_rows_though_it_promised_is_explained(tmp_path: Path) -> None:
+    rows = np.zeros(10, [("x", float), ("y", float), ("z", float)])
+    file = RowFile(tmp_path, ROW, 10)
+    with disk_of(0), pytest.raises(OutputError, match=r"cannot continue on disk, in .*: File too large"):
+        file.write(0, rows)
+    assert file.count == 0
+
+
 def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:
     recorder = Recorder(SIGNALS, 0, memory=1.0, folder=tmp_path / "gone")
     with pytest.raises(OutputError, match=r"in .*gone: No such file or directory"):

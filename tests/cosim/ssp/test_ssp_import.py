@@ -138,6 +138,8 @@ def test_a_signal_dictionary_is_a_bus(load: Load) -> None:
     assert load(structure).table().connections == ["ramp.speed -> sum.u"]
     with pytest.raises(ValueError, match=r"dictionary 'bus' has no entry 'velocity'; did you mean 'velocities'"):
         load(structure.replace('DictionaryEntry name="velocity"', 'DictionaryEntry name="velocities"'))
+    with pytest.raises(ValueError, match="no system around 'here' has a signal dictionary 'bahn'"):
+        load(structure.replace('dictionary="bus"', 'dictionary="bahn"'))
 
 
 def test_structures_within_structures(tmp_path: Path, fmus_of: dict[str, Path]) -> None:

@@ -220,6 +220,13 @@ def test_the_step_is_the_fmus_own(tmp_path: Path) -> None:
     assert table.stop == pytest.approx(60.0, abs=0.07)
 
 
+def test_an_fmu_that_names_no_end_runs_for_ten_seconds(tmp_path: Path) -> None:
+    made = write_starter(described(tmp_path, out("level", 1), edit=(' stopTime="1.0"', "")), tmp_path / "mine.toml")
+    assert (made.kind, "names no end of a run" in made.text) == ("alone", True)
+    table = valid(tmp_path / "mine.toml").table()
+    assert (table.stop, table.step) == (10.0, 0.01)
+
+
 def test_texts_of_a_vendor_cannot_leave_their_line(tmp_path: Path) -> None:
     wild = 'a\nstop = 1\n"] # \\ " \t \x7f é → b'
     parts = [
