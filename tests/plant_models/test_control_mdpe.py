@@ -136,6 +136,20 @@ def test_a_minute_in_the_limit_winds_nothing_up() -> None:
     assert out["effort"] <= 0.0  # half a second after the error turned round
 
 
+@pytest.mark.parametrize(("mode", "error", "inputs", "changes"), MODES[:2], ids=["traction", "electric"])
+def test_the_rate_of_effort_limits_no_regulator_while_the_coupler_is_unloaded(
+    mode: int, error: float, inputs: dict[str, float], changes: dict[str, float]
+) -> None:
+    targets = []
+    for rate in (1e3, 1e9):
+        names = {"odometer": 10.0, "speed": 10.0, "speed_reference": 10.0 + error, **inputs}
+        controller = Controller(MDPE, start=names, **changes, effort_rate=rate)
+        assert controller.at(0.0)["mode"] == mode
+        targets.append(controller.memory("target_force"))
+    assert targets[0] == targets[1]
+    assert abs(targets[0]) > 1e3 * T
+
+
 SAMPLE = st.fixed_dictionaries(
     {
         "odometer": st.floats(0.0, 50.0),

@@ -123,6 +123,7 @@ def test_update_check_and_unchanged_files(pytester: pytest.Pytester) -> None:
     write(pytester, ONE)
     updated = run(pytester, "--fmu-baseline=update")
     updated.assert_outcomes(passed=1)
+    assert updated.ret == pytest.ExitCode.OK
     updated.stdout.fnmatch_lines(["*fmu baselines*", "1 checked: 1 new", "*test_line.json new", "1 written."])
     before = tree(pytester)
     again = run(pytester, "--fmu-baseline=update")

@@ -125,7 +125,7 @@ def test_a_signal_dictionary_is_a_bus(load: Load) -> None:
         f'<ssd:SignalDictionaryReference name="{name}" '
         f'dictionary="bus"><ssd:Connectors>{connector("velocity", "inout")}'
         "</ssd:Connectors></ssd:SignalDictionaryReference>"
-        for name in ("here", "there")
+        for name in ("here", "there", "third")
     )
     entry = '<ssb:DictionaryEntry name="velocity"><ssc:Real/></ssb:DictionaryEntry>'
     dictionary = f'<ssb:SignalDictionary version="1.0">{entry}</ssb:SignalDictionary>'
@@ -138,6 +138,9 @@ def test_a_signal_dictionary_is_a_bus(load: Load) -> None:
     assert load(structure).table().connections == ["ramp.speed -> sum.u"]
     with pytest.raises(ValueError, match=r"dictionary 'bus' has no entry 'velocity'; did you mean 'velocities'"):
         load(structure.replace('DictionaryEntry name="velocity"', 'DictionaryEntry name="velocities"'))
+    both = wire("ramp.speed", "there.velocity") + wire("third.velocity", "sum.u")
+    with pytest.raises(ValueError, match=r"the signal 'velocity' of 'bus' has two sources, at here.* and there"):
+        load(structure.replace(wire("there.velocity", "sum.u"), both))
     with pytest.raises(ValueError, match="no system around 'here' has a signal dictionary 'bahn'"):
         load(structure.replace('dictionary="bus"', 'dictionary="bahn"'))
 

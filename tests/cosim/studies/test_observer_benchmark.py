@@ -19,7 +19,13 @@ from cosim.errors import RunError, ScenarioError
 from cosim.evaluation.metrics import phase_metrics
 from cosim.evaluation.spec import ReportSpec
 from cosim.master.master import Master
-from cosim.observer_benchmark.observer_scores import CertifiedGap, error_at_balises, false_alarms, longest_gap
+from cosim.observer_benchmark.observer_scores import (
+    CertifiedGap,
+    error_at_balises,
+    false_alarms,
+    longest_gap,
+    telegram_outcomes,
+)
 from cosim.observer_benchmark.observers import ObserverBenchmark, benchmark_observers
 from cosim.observer_benchmark.playback import find_sides, known_facts
 from cosim.results.load import load_result
@@ -170,6 +176,7 @@ def test_telegrams_that_were_not_used_do_not_count() -> None:
     assert found is not None
     assert (found.count, found.mean, found.max_abs) == (2, 3.0, 4.0)
     assert longest_gap(events, 0.0) == 1.0
+    assert telegram_outcomes([*events, events[1]], "o") == {"accepted": 1, "rejected": 2, "replayed": 1}
 
 
 def test_a_certificate_is_held_against_both_gaps() -> None:
