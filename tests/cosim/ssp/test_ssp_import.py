@@ -106,6 +106,21 @@ def test_suppressed_units_pass_the_number(load: Load) -> None:
     assert np.abs(y - 2.0 * speed).max() < EXACT * 100
 
 
+def test_a_table_of_values_stands_alone(load: Load) -> None:
+    linear = '<ssc:LinearTransformation factor="2"/>'
+    table = '<ssc:IntegerMappingTransformation><ssc:MapEntry source="1" target="2"/></ssc:IntegerMappingTransformation>'
+    for outer, inner, says in (
+        (table, linear, "a linear transformation behind a table of values cannot be carried out"),
+        (linear, table, "a table of values behind a unit conversion or a linear transformation cannot be carried out"),
+    ):
+        wires = (
+            wire("v", "sum.u", inner, suppressUnitConversion="true"),
+            wire("ramp.speed", "onboard.v", outer, suppressUnitConversion="true"),
+        )
+        with pytest.raises(ValueError, match=says):
+            load(ssd(nested(*wires)))
+
+
 def test_a_connector_in_another_unit_than_the_variable_is_converted(load: Load) -> None:
     shown = RAMP.replace('unit="m/s"', 'unit="km/h"')
     direct = f"<ssd:Elements>{shown}{ADDER}</ssd:Elements>"
