@@ -111,7 +111,10 @@ FAULTS = {
     "leaves.py:Bias": ("import sys\nsys.exit('bye')\n", r"cannot be run: SystemExit: bye \(.*leaves.py:2\)"),
     "number.py:Bias": ("Bias = 3.0\n", r"named 'Bias' \(Bias is of type float\)"),
     "bare.py:Bias": ("class Bias:\n    pass\n", r"named 'Bias' \(Bias is a class\)"),
-    "two.py": ("class A:\n    step = print\nclass B:\n    step = print\n", "it has: A, B. Write [^ ]*two.py:Class"),
+    "two.py": (
+        "class One:\n    step = print\nclass Two:\n    step = print\n",
+        "it has: One, Two. Write [^ ]*two.py:Class",
+    ),
     "no.such.module:Bias": (None, "no module named 'no'"),
     "math:Bias": (None, "module 'math' has no attribute 'Bias'"),
     "needs.py:Bias": (

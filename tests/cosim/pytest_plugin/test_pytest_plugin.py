@@ -348,7 +348,7 @@ class BiasFilter:
     def step(self, t, inputs, dt):
         self.speed += self.gain * (inputs.odometer - self.speed)
 """
-BESIDE = """
+BASELINE_OF_FILTER = """
 from bias_filter import BiasFilter
 import cosim
 import pytest
@@ -380,7 +380,7 @@ def test_a_component_of_plain_python_has_a_baseline(pytester: pytest.Pytester) -
     (pytester.path / "run.toml").write_text(
         "\n".join([head, lines[0], f"[components{components}", *lines[1:], ""]), encoding="utf-8"
     )
-    pytester.makepyfile(test_filter=BESIDE.replace("FOLDER", repr(str(pytester.path))))
+    pytester.makepyfile(test_filter=BASELINE_OF_FILTER.replace("FOLDER", repr(str(pytester.path))))
     run(pytester, "--fmu-baseline=update").assert_outcomes(passed=4)
     run(pytester).assert_outcomes(passed=4)
     file.write_text(FILTER.replace("self.gain *", "1.01 * self.gain *"))
