@@ -7,8 +7,8 @@ The command is cut before the slip is excessive: docs/multi_vehicle_train.md say
 
 from __future__ import annotations
 
-from sheet import Sheet
-from shipped import run
+from shared.sheet import Sheet
+from shared.shipped import run
 from train_scenarios import (
     NOT_PRINTED,
     SOURCE,

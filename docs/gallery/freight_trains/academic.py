@@ -7,7 +7,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from bench import Together, errors, sampling
+from shared.bench import Together, errors, sampling
 
 from fmu_observer.observers.sampled import GeneralTakagiSugenoCdo
 from plant_models.benchmarks import NonTriangularisablePlant, TriangularisablePlant

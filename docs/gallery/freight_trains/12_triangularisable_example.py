@@ -7,8 +7,8 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 from academic import EXAMPLES, STOP, final_quarter, followed
-from bench import Together, errors, sampling, unless_rounding
-from sheet import Sheet
+from shared.bench import Together, errors, sampling, unless_rounding
+from shared.sheet import Sheet
 
 from fmu_observer.models.triangularisable_example import triangularisable_chain
 from fmu_observer.observers.sampled import ExponentialGain

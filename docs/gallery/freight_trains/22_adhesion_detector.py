@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
-from bench import Bench
-from sheet import Sheet
+from shared.bench import Bench
+from shared.sheet import Sheet
 
 from fmu_observer.detection import AdhesionDetector, degraded_map, nominal_map, published_map
 

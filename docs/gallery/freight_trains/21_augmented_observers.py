@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
-from bench import Bench
-from sheet import Sheet
+from shared.bench import Bench
+from shared.sheet import Sheet
 
 from fmu_observer.observers.train import AugmentedHighGainCdo, AugmentedTakagiSugenoCdo
 from plant_models.railway.control.driver import Driver

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
-from sheet import Sheet
-from shipped import run
+from shared.sheet import Sheet
+from shared.shipped import run
 from train_profile import OBSERVERS, add_largest_errors
 
 REPEATS = dict.fromkeys(OBSERVERS, 0.02) | {"differentiator_cdo": 0.1}  # S1 chatters, and its largest value with it

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
-from sheet import Sheet
+from shared.sheet import Sheet
 
 from fmu_observer.models import find_model
 from fmu_observer.observers.continuous import Thau

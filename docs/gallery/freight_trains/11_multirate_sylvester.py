@@ -6,9 +6,9 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
-from bench import ModelPlant, Together, errors, unless_rounding
 from scipy.linalg import solve_continuous_are
-from sheet import Sheet
+from shared.bench import ModelPlant, Together, errors, unless_rounding
+from shared.sheet import Sheet
 
 from fmu_observer.observers.sampled import MultirateSylvester
 

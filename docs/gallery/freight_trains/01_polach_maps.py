@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
-from sheet import Sheet
+from shared.sheet import Sheet
 
 from plant_models.railway.adhesion import POLACH_DRY, POLACH_WET
 

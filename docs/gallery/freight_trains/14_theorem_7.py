@@ -8,7 +8,7 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
-from sheet import Sheet
+from shared.sheet import Sheet
 
 from fmu_observer.design.theorem7 import InfeasibleDesign, Theorem7Design, design_theorem7
 from fmu_observer.models import find_takagi_sugeno_model

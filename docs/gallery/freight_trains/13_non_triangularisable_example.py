@@ -5,7 +5,7 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 import numpy as np
 from academic import final_quarter, followed
-from sheet import Sheet
+from shared.sheet import Sheet
 
 NAME = "non_triangularisable_example"
 NO_NOISE = (

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 
 import matplotlib.pyplot as plt
 import numpy as np
-from sheet import SAME, Sheet
-from shipped import run
+from shared.line import SAME
+from shared.sheet import Sheet
+from shared.shipped import run
 
 from cosim import Outcome
 

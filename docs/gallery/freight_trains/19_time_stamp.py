@@ -8,7 +8,7 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
-from sheet import Sheet
+from shared.sheet import Sheet
 
 from cosim import Outcome, Scenario
 

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import numpy as np
-from sheet import Sheet
+from shared.sheet import Sheet
 
 from fmu_observer.design.uio_design import discretise, uio_matrices
 

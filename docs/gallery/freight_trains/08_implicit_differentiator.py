@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
-from sheet import Sheet
+from shared.sheet import Sheet
 
 from fmu_observer.observers.continuous import FilteringDifferentiator
 from fmu_observer.observers.discrete import ImplicitDifferentiator

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
-from bench import Bench
-from sheet import Sheet
+from shared.bench import Bench
+from shared.sheet import Sheet
 
 from plant_models.interop import to_state_space
 from plant_models.railway.vehicle.locomotive import Locomotive

@@ -8,8 +8,8 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
-from bench import Together, errors, sampling, unless_rounding
-from sheet import Sheet
+from shared.bench import Together, errors, sampling, unless_rounding
+from shared.sheet import Sheet
 
 from fmu_observer.observers.continuous import HighGain, TakagiSugenoLuenberger, Thau
 from fmu_observer.observers.sampled import (

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from sheet import Sheet
-from shipped import run
+from shared.sheet import Sheet
+from shared.shipped import run
 from train_scenarios import SOURCE, connections_with, figure, sanding_time, slide, stopped
 
 COMPARED = (

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
-from sheet import Sheet
+from shared.sheet import Sheet
 
 from fmu_observer.certificates import first_unstable_gap
 from fmu_observer.observers.sampled import GeneralTakagiSugenoCdo

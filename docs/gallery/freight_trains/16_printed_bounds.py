@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
-from sheet import Sheet
+from shared.sheet import Sheet
 
 from fmu_observer.design.bounds import bound_table, lipschitz_constant, smallest_theta_1_51, smallest_theta_3_31
 

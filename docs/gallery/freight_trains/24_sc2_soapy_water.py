@@ -4,8 +4,8 @@ of it.
 
 from __future__ import annotations
 
-from sheet import Sheet
-from shipped import run
+from shared.sheet import Sheet
+from shared.shipped import run
 from train_scenarios import (
     DEPARTURE,
     NOT_PRINTED,

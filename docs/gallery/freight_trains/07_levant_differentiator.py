@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
-from sheet import Sheet
+from shared.sheet import Sheet
 
 from fmu_observer.observers.continuous import LevantDifferentiator
 from fmu_observer.observers.continuous.differentiator_gains import LEVANT_GAINS

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
-from sheet import Sheet
+from shared.sheet import Sheet
 
 from cosim import Outcome, Scenario
 
