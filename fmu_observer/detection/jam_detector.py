@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
-from fmu_observer.design.quasi_lpv_published import SECTION_3_3_4, SECTION_5_3_1
 from fmu_observer.detection.jam_rules import SHARED_PARAMETERS, Reading, RepairedRules, Rules
 from fmu_observer.detection.printed_jam_rules import PrintedRules
 from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, output_signal, vector
@@ -69,8 +68,8 @@ class JamDetector(HybridSystem):
     outputs = FAULT_OUTPUTS
     events = (ODOMETER_SAMPLE,)
     presets: Mapping[str, Mapping[str, Any]] = {
-        name: {"threshold": design.threshold, "residual_gain": design.residual_gain}
-        for name, design in (("as_published", SECTION_3_3_4), ("as_published_5_3_1", SECTION_5_3_1))
+        "as_published": {"threshold": 0.9, "residual_gain": 2.3},
+        "as_published_5_3_1": {"threshold": 0.65, "residual_gain": 3.36},
     }
     default_preset = "as_published"
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"rules": tuple(RULES)}
