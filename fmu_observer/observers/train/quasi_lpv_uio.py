@@ -183,8 +183,8 @@ class QuasiLpvUio(GatedObserver, GapCertified):
         model = (
             f"error of speed, disturbance and its rate at both vertices ({float(p.schedule_min):g} and "
             f"{float(p.schedule_max):g} m/s), changing between them at any time; a balise ends the position error. "
-            f"What the speed changes while a reading is held, {float(p.odometer_period):g} s, is an input to it, whatever "
-            "the period; times at which the odometer is not believed, and standstill, are left out"
+            f"What the speed changes while a reading is held, {float(p.odometer_period):g} s, is an input to it, "
+            "whatever the period; times at which the odometer is not believed, and standstill, are left out"
         )
         limit = inf if found.holds else 0.0
         return Certificate(
