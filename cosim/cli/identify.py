@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from cosim.cli.scenarios import parse_setting
-from cosim.errors import CosimError, ScenarioError, nearest
+from cosim.errors import CosimError, OutputError, ScenarioError, nearest
 from cosim.evaluation.numbers import number
 from cosim.results.load import load_result
 from cosim.results.result import Result
@@ -85,9 +85,7 @@ def execute(options: argparse.Namespace) -> int:
     except IdentificationError as error:
         raise CosimError(f"{options.source}: {error}") from error
     if options.plot is not None:
-        from cosim.drawing.residuals import save_residuals  # noqa: PLC0415 - matplotlib only for those who draw
-
-        save_residuals(options.plot, estimate.time, estimate.measured, estimate.residuals)
+        _draw(options.plot, estimate)
     if options.toml is not None:
         _write(options.toml, estimate.toml())
     print(json.dumps(jsonable(estimate_data(estimate)), indent=2) if options.json else estimate_text(estimate))
@@ -213,8 +211,17 @@ def estimate_data(estimate: DavisEstimate) -> dict[str, Any]:
     return {"coefficients": coefficients, "remarks": list(estimate.remarks)} | {k: getattr(estimate, k) for k in keys}
 
 
+def _draw(path: Path, estimate: DavisEstimate) -> None:
+    from cosim.drawing.residuals import residual_figure  # noqa: PLC0415 - matplotlib only for those who draw
+
+    try:
+        residual_figure(estimate.time, estimate.measured, estimate.residuals).savefig(path)
+    except (OSError, ValueError) as error:  # matplotlib refuses endings that it does not know by a ValueError
+        raise OutputError(f"{path} cannot be written: {error}.") from error
+
+
 def _write(path: Path, text: str) -> None:
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise CosimError(f"{path} cannot be written: {error.strerror or error}.") from error
+        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error

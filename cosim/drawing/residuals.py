@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from cosim.drawing.style import BAND, BLACK, BLUE, DPI, TIME, VERMILION, new_figure, styled
-from cosim.errors import OutputError
+from cosim.drawing.style import BAND, BLACK, BLUE, TIME, VERMILION, new_figure, styled
 
 Array = NDArray[np.float64]
 BINS = 20
@@ -42,18 +39,3 @@ def residual_figure(time: Array, measured: Array, residuals: Array) -> Figure:
     below.set(xlabel="Speed [m/s]", ylabel="Residual [m/s]")
     below.legend()
     return figure
-
-
-def save_residuals(path: Path, time: Array, measured: Array, residuals: Array) -> None:
-    """Write the figure as a file.
-
-    Args:
-        path: of the picture. time, measured, residuals: as for `residual_figure`.
-
-    Raises:
-        OutputError: it cannot be written.
-    """
-    try:
-        residual_figure(time, measured, residuals).savefig(path, dpi=DPI)
-    except (OSError, ValueError) as error:  # matplotlib refuses endings that it does not know by a ValueError
-        raise OutputError(f"{path} cannot be written: {error}.") from error
