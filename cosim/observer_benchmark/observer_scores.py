@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from cosim.evaluation.balise_gaps import rows_before
 from cosim.evaluation.event_counts import USED
 from cosim.evaluation.indicators import IndicatorStatistics, indicator_statistics, on_intervals
 from cosim.evaluation.metrics import PhaseMetrics, phase_metrics
@@ -20,7 +21,6 @@ from cosim.evaluation.roles import Quantity, estimate, estimation_error
 from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.results.result import BaliseRecord, Result
 from cosim.results.summary_file import jsonable
-from fmus.fmi.standard import TIME_TOLERANCE
 
 WHOLE = "whole run"
 DIVERGED = 1000.0
@@ -167,9 +167,7 @@ def error_at_balises(result: Result, spec: ReportSpec, name: str, quantity: Quan
     ]
     if error is None or not times:
         return None
-    rows = np.searchsorted(result.time, np.array(times) - TIME_TOLERANCE)
-    rows = np.where(result.time[np.minimum(rows, len(error) - 1)] > np.array(times) + TIME_TOLERANCE, rows - 1, rows)
-    errors = error[np.clip(rows, 0, len(error) - 1)]
+    errors = error[rows_before(result.time, np.array(times))]
     if not np.all(np.isfinite(errors)):
         return ErrorAtBalises(len(errors), inf, inf, inf)
     largest = float(np.max(np.abs(errors)))

@@ -24,6 +24,7 @@ from cosim.coupling.plan import Plan, make_plan
 from cosim.diagnostics.call_log import CallLog
 from cosim.diagnostics.messages import in_order
 from cosim.errors import CosimError
+from cosim.evaluation.balise_gaps import gap_errors
 from cosim.evaluation.result_warnings import result_warnings
 from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.expectations.check import check_expectations
@@ -257,6 +258,8 @@ class _Setup:
         messages = in_order(component.messages for component in self.components.values())
         result = Result(table, signals, events, summary, failure, messages)
         outcome = Outcome(result, spec, tuple(self.table.report.tables))
+        gaps = gap_errors(result, spec)
+        outcome = outcome.with_summary(balise_gaps=gaps.to_data()) if gaps.errors else outcome
         return outcome.with_summary(expectations=[judged.to_data() for judged in judge(self.table, outcome)])
 
     def close(self) -> None:
