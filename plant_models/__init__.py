@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 ROOMS = (
     "plant_models.railway.vehicle",
     "plant_models.railway.sensors",
+    "plant_models.railway.faults",
     "plant_models.railway.control",
     "plant_models.benchmarks",
 )

@@ -1,21 +1,22 @@
-"""A sheet of the gallery: what was published beside what is measured here, with a reason where they differ, and a
-figure.
+"""A sheet of the gallery: what was published and what an independent implementation gave beside what is measured here,
+with a reason where they differ, and a figure.
 
-Used by the numbered scripts of this folder. A script makes one sheet and ends with ``sheet.finish()``, which prints the
-table and leaves ``NN_name.json`` and ``NN_name.png`` in the folder given by ``--out``, or in ``results/gallery``.
+Used by the numbered scripts of the folders here, one folder a thesis. A script makes one sheet and ends with
+``sheet.finish()``, which prints the table and leaves ``NN_name.json`` and ``NN_name.png`` in the folder given by
+``--out``, or in ``results/gallery/FOLDER``.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-from dataclasses import asdict, dataclass
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
 from PIL import Image
+from shared.line import SAME, Line, table
 
 from cosim.drawing.style import RC
 from fmus.text_table import text_table
@@ -23,34 +24,7 @@ from fmus.text_table import text_table
 mpl.use("Agg")
 mpl.rcParams.update(RC)
 
-SAME = 1e-2
 COLOURS = 256
-
-
-@dataclass(frozen=True)
-class Line:
-    """One compared quantity.
-
-    Args:
-        quantity: what it is, with its conditions. unit: of both numbers.
-        published: as printed; None where the thesis prints none, a text where it tells a story.
-        measured: what comes out here, a number or a text.
-        why: why the two differ; required unless both are numbers within `SAME` of each other.
-        repeats: relative difference that another machine may show.
-    """
-
-    quantity: str
-    unit: str
-    published: float | str | None
-    measured: float | str
-    why: str = ""
-    repeats: float = SAME
-
-    def differs(self) -> bool:
-        """Whether the reader needs a reason."""
-        if isinstance(self.published, str) or isinstance(self.measured, str):
-            return self.published != self.measured
-        return self.published is None or abs(self.measured - self.published) > SAME * abs(self.published)
 
 
 class Sheet:
@@ -62,13 +36,13 @@ class Sheet:
     """
 
     def __init__(self, script: str, title: str, source: str) -> None:
-        self.name = Path(script).stem
+        place = Path(script).resolve()
+        self.name = place.stem
         self.title, self.source = title, source
         self.lines: list[Line] = []
         parser = argparse.ArgumentParser(description=title)
-        parser.add_argument(
-            "--out", type=Path, default=Path("results/gallery"), help="folder for the table and the figure"
-        )
+        usual = Path("results/gallery") / place.parent.name
+        parser.add_argument("--out", type=Path, default=usual, help="folder for the table and the figure")
         self.out: Path = parser.parse_args().out
 
     def add(
@@ -80,6 +54,7 @@ class Sheet:
         why: str = "",
         *,
         repeats: float = SAME,
+        independent: float | str | None = None,
     ) -> None:
         """Add a line; see `Line`.
 
@@ -87,11 +62,12 @@ class Sheet:
             ValueError: the measured number is not finite, or a reason is missing.
         """
         number = measured if isinstance(measured, str) else float(measured)
-        line = Line(quantity, unit, published, number, why, repeats)
+        line = Line(quantity, unit, published, number, why, repeats, independent)
         if not isinstance(number, str) and not isfinite(number):
             raise ValueError(f"{self.name}: {quantity} is {number}.")
         if line.differs() and not why:
-            raise ValueError(f"{self.name}: {quantity}: measured {number}, published {published}; give the reason.")
+            beside = f"published {published}" + ("" if independent is None else f", independent {independent}")
+            raise ValueError(f"{self.name}: {quantity}: measured {number}, {beside}; give the reason.")
         self.lines.append(line)
 
     def finish(self, figure: Any = None) -> None:
@@ -103,7 +79,7 @@ class Sheet:
         self.out.mkdir(parents=True, exist_ok=True)
         print(f"{self.title} ({self.source})\n\n{sheet_text(self.lines)}")
         content = {"title": self.title, "source": self.source, "figure": figure is not None}
-        content["lines"] = [asdict(line) for line in self.lines]
+        content["lines"] = [line.content() for line in self.lines]
         (self.out / f"{self.name}.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
         if figure is not None:
             path = self.out / f"{self.name}.png"
@@ -115,14 +91,8 @@ class Sheet:
 
 def sheet_text(lines: list[Line]) -> str:
     """The lines as aligned text, reasons below."""
-    rows = [("quantity", "unit", "published", "measured")]
-    rows += [(line.quantity, line.unit, shown(line.published), shown(line.measured)) for line in lines]
+    rows = table([line.content() for line in lines])
     reasons = dict.fromkeys(line.why for line in lines if line.why)
-    return "\n".join([*text_table(rows, left=range(4), heading=True), *(f"- {reason}" for reason in reasons)])
-
-
-def shown(value: float | str | None) -> str:
-    """A number in four digits, a text as it is, a dash for nothing."""
-    if value is None:
-        return "–"
-    return value if isinstance(value, str) else f"{value:.4g}"
+    return "\n".join(
+        [*text_table(rows, left=range(len(rows[0])), heading=True), *(f"- {reason}" for reason in reasons)]
+    )

@@ -21,7 +21,7 @@ import numpy as np
 
 from cosim import Outcome, Scenario
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "gallery"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "gallery" / "freight_trains"))
 from train_scenarios import DEPARTURE, indicated, lowest_limit, mean_speed_error, sanding_time, slide, stopped
 
 SCENARIOS = ("freight_sc1", "freight_sc2", "freight_sc3", "freight_sc4")

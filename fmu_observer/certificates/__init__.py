@@ -6,6 +6,7 @@ from fmu_observer.certificates.aperiodic import certify_sampled_error, with_swit
 from fmu_observer.certificates.certificate import Certificate
 from fmu_observer.certificates.gap_error import GapError, first_unstable_gap
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
+from fmu_observer.certificates.polytope import PolytopeStability, polytope_stability
 from fmu_observer.certificates.quadratic import QuadraticForm, common_quadratic_form, decrease
 from fmu_observer.certificates.riccati_error import RiccatiError
 from fmu_observer.certificates.sample_products import TwoRateError, certify_two_rate_error
@@ -15,6 +16,7 @@ __all__ = [
     "Certificate",
     "GapError",
     "ImpulsiveError",
+    "PolytopeStability",
     "QuadraticForm",
     "RiccatiError",
     "SampledError",
@@ -24,5 +26,6 @@ __all__ = [
     "common_quadratic_form",
     "decrease",
     "first_unstable_gap",
+    "polytope_stability",
     "with_switching_noted",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 
 import numpy as np
@@ -42,7 +43,9 @@ def observer_gain(
         )
     require_observable(MeasuredSystem(A, C, states=states, name=name))
     if len(C) > 1:
-        return np.asarray(scipy.signal.place_poles(A.T, C.T, wanted).gain_matrix.T)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # poles as asked, only their conditioning is not yet the best
+            return np.asarray(scipy.signal.place_poles(A.T, C.T, wanted).gain_matrix.T)
     n = len(A)
     matrix = observability_matrix(A, C)
     polynomial = np.real(np.poly(wanted))

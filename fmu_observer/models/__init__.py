@@ -1,5 +1,7 @@
 """What an observer believes of its plant: equations, signals, constants. No observer and no gain lives here."""
 
+from fmu_observer.models.braked_train import braked_train
+from fmu_observer.models.coupled_vehicles import coupled_vehicles
 from fmu_observer.models.freight_train import freight_train
 from fmu_observer.models.linear_pendulum import linear_pendulum
 from fmu_observer.models.model import ObserverModel
@@ -15,6 +17,8 @@ __all__ = [
     "ObserverModel",
     "Premise",
     "TakagiSugenoModel",
+    "braked_train",
+    "coupled_vehicles",
     "find_model",
     "find_takagi_sugeno_model",
     "freight_train",

@@ -17,6 +17,7 @@ CAUSALITIES = {
     "states": ("local", "state"),
     "inputs": ("input", "input_signal"),
     "measurements": ("input", "input_signal"),
+    "unknown_inputs": ("input", "input_signal"),
 }
 
 
@@ -35,13 +36,13 @@ def check_identifiers(where: str, **names: object) -> None:
 
 
 def check_signals(where: str, **groups: Sequence[Signal]) -> None:
-    """States, inputs and measurements are scalar signals of the right kind, no name twice where it would collide.
+    """States, inputs, measurements and unknown inputs are scalar signals of the right kind, no name where it collides.
 
-    A measurement may have the name of the state it measures; a state and an input may not share one, for the observer's
-    outputs are called like the states.
+    A measurement may have the name of the state it measures; states, inputs and unknown inputs may not share one, for
+    the observer's outputs are called like the states and the unknown inputs.
 
     Args:
-        where: for the message. groups: `states`, `inputs` and `measurements`.
+        where: for the message. groups: `states`, `inputs`, `measurements`, and `unknown_inputs` where a model has them.
 
     Raises:
         ValueError: one is not so; the message says which.
@@ -58,7 +59,9 @@ def check_signals(where: str, **groups: Sequence[Signal]) -> None:
                     f"{where}: {signal.name!r} in {kind} must be a scalar made by {maker}(name, unit, ...)."
                 )
         _check_once(where, kind, [s.name for s in signals])
-    _check_once(where, "states and inputs", [s.name for kind in ("states", "inputs") for s in groups[kind]])
+    unknown = groups.get("unknown_inputs", ())
+    kinds = "states, inputs and unknown inputs" if unknown else "states and inputs"
+    _check_once(where, kinds, [s.name for signals in (groups["states"], groups["inputs"], unknown) for s in signals])
     for kind in ("states", "measurements"):
         if not groups[kind]:
             raise ValueError(f"{where}: it has no {kind}, expected at least one.")

@@ -1,4 +1,4 @@
-"""The observer model: ``dx = A x + B u + phi(x, u)``, ``y = C x``, with the names and units of its signals. A value.
+"""The observer model: ``dx = A x + B u + phi(x, u) + H d``, ``y = C x``, with names and units of its signals. A value.
 
 It knows signals and arrays; it does not move by itself and holds no gain.
 """
@@ -41,6 +41,9 @@ class ObserverModel:
             a nonlinear model need them.
         event: name of the event at which a sampled measurement arrives.
         sample_period: sampling period [s] that observers assume unless told otherwise.
+        unknown_inputs: scalar signals by `input_signal`, the inputs d that nobody measures; unknown-input observers
+            know what to do with them, the others leave them out.
+        H: how the unknown inputs act, shape (n, nd).
 
     Raises:
         ValueError: a shape does not fit the signals, a number is not finite, a name is no identifier or stands twice,
@@ -62,16 +65,25 @@ class ObserverModel:
     slopes: tuple[np.ndarray, ...] = field(default=())
     event: str = "sample"
     sample_period: float = 0.1
+    unknown_inputs: tuple[Signal, ...] = ()
+    H: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         where = f"Observer model {self.name!r}"
         check_identifiers(where, name=self.name, event=self.event)
-        check_signals(where, states=self.states, inputs=self.inputs, measurements=self.measurements)
+        groups = {"states": self.states, "inputs": self.inputs, "measurements": self.measurements}
+        check_signals(where, **groups, unknown_inputs=self.unknown_inputs)
         check_numbers(where, {"sample_period": self.sample_period}, {"lipschitz": self.lipschitz})
         n, m, q = self.order, len(self.inputs), len(self.measurements)
         reason = f"{n} states, {m} inputs and {q} measurements"
         for name, shape in {"A": (n, n), "B": (n, m), "C": (q, n)}.items():
             object.__setattr__(self, name, checked_matrix(where, name, getattr(self, name), shape, reason))
+        if self.unknown_inputs or np.size(self.H if self.H is not None else ()):
+            reason_H = f"{n} states and {len(self.unknown_inputs)} unknown inputs"
+            H = checked_matrix(where, "H", self.H, (n, len(self.unknown_inputs)), reason_H)
+        else:
+            H = np.zeros((n, 0))
+        object.__setattr__(self, "H", H)
         slopes = tuple(checked_matrix(where, "a slope", slope, (n, n), reason) for slope in self.slopes)
         object.__setattr__(self, "slopes", slopes)
         self._check_remainder(where)

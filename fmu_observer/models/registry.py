@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from fmu_observer.models.braked_train import braked_train
+from fmu_observer.models.coupled_vehicles import coupled_vehicles
 from fmu_observer.models.freight_train import freight_train
 from fmu_observer.models.linear_pendulum import linear_pendulum
 from fmu_observer.models.model import ObserverModel
@@ -13,6 +15,8 @@ MODELS: dict[str, Callable[[], ObserverModel]] = {
     "pendulum": pendulum,
     "linear_pendulum": linear_pendulum,
     "freight_train": freight_train,
+    "braked_train": braked_train,
+    "coupled_vehicles": coupled_vehicles,
 }
 
 

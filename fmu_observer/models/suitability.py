@@ -25,6 +25,23 @@ def require_linear(model: ObserverModel, observer: str, instead: str) -> None:
         )
 
 
+def require_unknown_inputs(model: ObserverModel, observer: str) -> None:
+    """The model is linear and declares unknown inputs.
+
+    Args:
+        model: the plant as the observer knows it. observer: name of the observer, for the message.
+
+    Raises:
+        ValueError: one of them is not so; the message says which, and what to do.
+    """
+    require_linear(model, observer, "thau")
+    if not model.unknown_inputs:
+        raise ValueError(
+            f"{observer}: model {model.name!r} declares no unknown inputs. Use 'luenberger', or give an ObserverModel "
+            f"with unknown_inputs and the matrix H by which they act."
+        )
+
+
 def require_single_output(model: ObserverModel, observer: str) -> None:
     """The model has one measurement.
 

@@ -21,6 +21,7 @@ from plant_models.hybrid import (
     vector,
 )
 from plant_models.hybrid.system import Array
+from plant_models.railway.sensors.pulses import counted_pulses, pulse_length, pulses_in_window
 
 
 class Odometer(HybridSystem):
@@ -90,24 +91,17 @@ class Odometer(HybridSystem):
 
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Take a reading: new held reading and pulse count, shape (4,) or (4, members)."""
-        pulse = _pulse_length(p)
-        count = np.floor(x[0] / pulse)
+        pulse = pulse_length(p.teeth, p.wheel_radius)
+        count = counted_pulses(x[0], pulse)
         # The first window is the one that a wheel of the present speed would have left behind.
-        window = np.where(x[3] == 0.0, np.floor(u.wheel_speed * p.sample_period / pulse), count - x[2])
+        window = pulses_in_window(count, x[2], x[3], u.wheel_speed, p.sample_period, pulse)
         speed = np.where(p.teeth > 0.0, window * pulse / p.sample_period, u.wheel_speed)
         return vector(x[0], speed + p.noise_std * u.reading_noise, count, 1.0)
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """The held reading and the counted distance."""
-        pulse = _pulse_length(p)
+        pulse = pulse_length(p.teeth, p.wheel_radius)
         return {
             "reading": x[1],
-            "distance": np.where(p.teeth > 0.0, np.floor(x[0] / pulse) * pulse, x[0]),
+            "distance": np.where(p.teeth > 0.0, counted_pulses(x[0], pulse) * pulse, x[0]),
         }
-
-
-def _pulse_length(p: Any) -> Array:
-    """Rim distance of one pulse [m]; of a whole revolution where there are no teeth, so that nothing divides by
-    zero.
-    """
-    return 2.0 * np.pi * p.wheel_radius / np.maximum(p.teeth, 1.0)

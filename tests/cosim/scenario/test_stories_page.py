@@ -16,7 +16,7 @@ DOCS = Path(__file__).parents[3] / "docs"
 @pytest.mark.parametrize("name", ["freight_sc1", "freight_sc2", "freight_sc3", "freight_sc4"])
 def test_the_shipped_seed_is_within_the_table_of_twenty_seeds(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(DOCS / "studies"))
-    monkeypatch.syspath_prepend(str(DOCS / "gallery"))
+    monkeypatch.syspath_prepend(str(DOCS / "gallery" / "freight_trains"))
     import stories  # type: ignore[import-not-found] # a script of the documentation
 
     outcome = Scenario.load(name).run(warn=lambda _warning: None)

@@ -1,0 +1,36 @@
+"""The speed of a train under an effort and an unknown disturbance: the model of unknown-input observers. Data only."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fmu_observer.models.model import ObserverModel
+from plant_models.hybrid import input_signal, state
+
+DRAG = 0.1  # w1 of set A [1/s]
+EFFORT = 0.1  # b of set A [1/kg]
+START = 30.0  # [m/s]
+
+
+def braked_train() -> ObserverModel:
+    """``dv = -w1 v + b u + d``, the speed is measured: Aguiar Cota 2019, (3.1)-(3.3) and (3.15), set A, per unit mass.
+
+    The disturbance d holds what the model leaves out, ``-w0 - w2 v^2`` and the slope. The position is no state: no
+    odometer shows it, whatever the observer.
+    """
+    return ObserverModel(
+        name="braked_train",
+        description="Speed of a train per unit mass under an effort and an unknown disturbance, its speed measured",
+        source="Aguiar Cota 2019, (3.1)-(3.3), set A",
+        states=(state("speed", "m/s", START, "Speed of the train"),),
+        inputs=(input_signal("effort", "N", 0.0, "Effort: traction > 0, brake < 0"),),
+        measurements=(input_signal("speed", "m/s", START, "Speed by the odometer"),),
+        A=np.array([[-DRAG]]),
+        B=np.array([[EFFORT]]),
+        C=np.eye(1),
+        sample_period=0.2,
+        unknown_inputs=(
+            input_signal("disturbance", "m/s2", 0.0, "Acceleration that the model leaves out: resistance, slope"),
+        ),
+        H=np.eye(1),
+    )

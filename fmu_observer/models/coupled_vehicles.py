@@ -1,0 +1,53 @@
+"""A locomotive and a wagon behind a coupler, the effort not quite known: unknown-input observers of two measurements.
+Data only.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fmu_observer.models.model import ObserverModel
+from plant_models.hybrid import input_signal, state
+
+LOCOMOTIVE, WAGON = 90e3, 60e3  # [kg]
+STIFFNESS, DAMPING = 2.5e6, 5e4  # of the coupler [N/m], [N.s/m]
+DRAG = 2e-3  # slope of the running resistance per mass [1/s]
+
+
+def coupled_vehicles() -> ObserverModel:
+    """``de = v1 - v2``, ``dv1 = (u - F) / m1 - r v1 + d``, ``dv2 = F / m2 - r v2``, ``F = K e + D (v1 - v2)`` [ours].
+
+    Both speeds are measured; the elongation e of the coupler is not, and the effort differs from the command u by an
+    unknown ``m1 d``, a wheel that slides or a brake that fails. The smallest train on which decoupling shows
+    something: the coupler is told from the wagon's speed, whatever the locomotive's wheels do.
+    """
+    A = np.array(
+        [
+            [0.0, 1.0, -1.0],
+            [-STIFFNESS / LOCOMOTIVE, -DAMPING / LOCOMOTIVE - DRAG, DAMPING / LOCOMOTIVE],
+            [STIFFNESS / WAGON, DAMPING / WAGON, -DAMPING / WAGON - DRAG],
+        ]
+    )
+    return ObserverModel(
+        name="coupled_vehicles",
+        description="Locomotive and wagon behind a coupler, both speeds measured, the effort not quite known",
+        source="ours, for Aguiar Cota 2019, (2.11)",
+        states=(
+            state("elongation", "m", 0.0, "Elongation of the coupler"),
+            state("speed", "m/s", 10.0, "Speed of the locomotive"),
+            state("wagon_speed", "m/s", 10.0, "Speed of the wagon"),
+        ),
+        inputs=(input_signal("effort", "N", 0.0, "Effort that the locomotive was told: traction > 0, brake < 0"),),
+        measurements=(
+            input_signal("speed", "m/s", 10.0, "Speed of the locomotive"),
+            input_signal("wagon_speed", "m/s", 10.0, "Speed of the wagon"),
+        ),
+        A=A,
+        B=np.array([[0.0], [1.0 / LOCOMOTIVE], [0.0]]),
+        C=np.eye(3)[1:],
+        sample_period=0.1,
+        unknown_inputs=(
+            input_signal("acceleration_error", "m/s2", 0.0, "Acceleration by effort beyond the one that was told"),
+        ),
+        H=np.array([[0.0], [1.0], [0.0]]),
+    )

@@ -1,0 +1,129 @@
+"""Faults of the wheel drawn from a seed: jams while the train brakes, skids while it pulls.
+
+One of the causes of `wheel_fault`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from plant_models.hybrid.event import PeriodicEvent
+from plant_models.hybrid.signal import Signal, input_signal, memory, parameter, state
+from plant_models.hybrid.system import Array
+from plant_models.railway.faults.fault_cause import Fault, braking_stopped, one_where
+
+_NOISES = tuple(
+    input_signal(f"{what}_noise_{part}", "1", 0.0, f"Standard normal number for {text}", variability="discrete")
+    for what, text in (
+        ("onset", "the onset of a fault"),
+        ("length", "the length of a fault"),
+        ("depth", "its depth"),
+    )
+    for part in ("a", "b")
+)
+_ONSET, _END, _SIGN, _DEPTH = 1, 2, 3, 4  # behind the clock of the release
+
+
+class DrawnFaults:
+    """Faults at the instants of a Poisson process, one at a time.
+
+    Half the sum of two squared standard normal numbers is a number of the exponential distribution with mean 1, and
+    ``exp`` of its negative one of the uniform distribution: the same in Python and in C.
+    """
+
+    def __init__(self) -> None:
+        self.parameters: tuple[Signal, ...] = (
+            parameter("jam_rate", "1/s", 0.1, "Mean number of jams in a second of braking", min=0.0),
+            parameter("skid_rate", "1/s", 0.1, "Mean number of skids in a second of pulling", min=0.0),
+            parameter("mean_length", "s", 0.5, "Mean length of a fault, exponentially distributed", min=0.0),
+            parameter("longest_length", "s", 5.0, "Longer faults are cut to this", min=0.0),
+            parameter("least_depth", "1", 0.2, "Lower end of the uniform distribution of the depth", min=0.0, max=1.0),
+            parameter("most_depth", "1", 1.0, "Upper end of the uniform distribution of the depth", min=0.0, max=1.0),
+            parameter("draw_period", "s", 0.1, "Time between two draws: at most one fault begins in it", min=1e-6),
+        )
+        self.continuous: tuple[Signal, ...] = (
+            state("released_for", "s", 0.0, "For how long there was no effort that keeps the fault up"),
+        )
+        self.remembered: tuple[Signal, ...] = (
+            memory("drawn_onset", "s", -1.0, "Onset of the last fault drawn"),
+            memory("drawn_end", "s", -1.0, "End of the last fault drawn"),
+            memory("drawn_sign", "1", -1.0, "Its kind: -1 jam, 1 skid"),
+            memory("drawn_depth", "1", 0.0, "Its depth"),
+        )
+        self.frictions: tuple[str, ...] = ()
+        self.switchings: tuple[str, ...] = ("fault_from", "fault_to", "fault_freed")
+        self.events: tuple[PeriodicEvent, ...] = (
+            PeriodicEvent("drawing", "draw_period", None, _NOISES, "A fault may be drawn"),
+        )
+
+    def fault(self, t: Array, s: list[Array], passed: Array, u: Any, p: Any) -> Fault:
+        """See `FaultCause.fault`.
+
+        Args:
+            t: time [s]. s: states of the cause. passed: switches, shape (3,). u: inputs. p: parameters.
+        """
+        kept = one_where(s[_SIGN] * u.effort > 0.0)
+        return Fault(_window(passed) * kept * s[_SIGN] * s[_DEPTH], 0.0)
+
+    def rates(self, t: Array, s: list[Array], passed: Array, u: Any, p: Any) -> list[Array]:
+        """See `FaultCause.rates`.
+
+        Args:
+            t: time [s]. s: states of the cause. passed: switches, shape (3,). u: inputs. p: parameters.
+        """
+        let_go = 1.0 - one_where(s[_SIGN] * u.effort > 0.0)
+        released = np.where(s[_SIGN] < 0.0, braking_stopped(u), 0.0)
+        return [_window(passed) * np.maximum(let_go, released)]
+
+    def friction(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
+        """None.
+
+        Args:
+            t: time [s]. s: states of the cause. u: inputs. p: parameters.
+        """
+        return []
+
+    def switching(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
+        """See `FaultCause.switching`.
+
+        Args:
+            t: time [s]. s: states of the cause. u: inputs. p: parameters.
+        """
+        return [t - s[_ONSET], t - s[_END], s[0] - p.release_time]
+
+    def jump(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
+        """See `FaultCause.jump`: the next fault, where none is on and one begins before the next draw.
+
+        Args:
+            t: time [s]. s: states of the cause. u: inputs with the noises. p: parameters.
+        """
+        rate = np.where(u.effort < 0.0, p.jam_rate, np.where(u.effort > 0.0, p.skid_rate, 0.0))
+        chance = _exponential(u.onset_noise_a, u.onset_noise_b)
+        idle = np.maximum(one_where(t >= s[_END]), one_where(s[0] >= p.release_time))
+        drawn = idle * one_where(chance < rate * p.draw_period)
+        onset = t + chance / np.maximum(rate, 1e-300)
+        length = np.minimum(p.mean_length * _exponential(u.length_noise_a, u.length_noise_b), p.longest_length)
+        share = np.exp(-_exponential(u.depth_noise_a, u.depth_noise_b))
+        depth = p.least_depth + (p.most_depth - p.least_depth) * share
+        new = [0.0 * t, onset, onset + length, np.where(u.effort < 0.0, -1.0, 1.0), depth]
+        return [np.where(drawn > 0.0, fresh, old) for fresh, old in zip(new, s, strict=True)]
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """The depths are in order.
+
+        Args:
+            p: parameters.
+        """
+        return {"most_depth must not lie below least_depth": one_where(p.most_depth >= p.least_depth)}
+
+
+def _window(passed: Array) -> Array:
+    """1 between onset and end unless the wheel has been freed, else 0."""
+    return passed[0] * (1.0 - passed[1]) * (1.0 - passed[2])
+
+
+def _exponential(a: Array, b: Array) -> Array:
+    """A number of the exponential distribution with mean 1 from two standard normal ones."""
+    return 0.5 * (a * a + b * b)

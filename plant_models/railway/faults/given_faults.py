@@ -1,0 +1,122 @@
+"""Faults of the wheel by their instants: each with onset, length, depth and kind.
+
+One of the causes of `wheel_fault`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from plant_models.hybrid.event import PeriodicEvent
+from plant_models.hybrid.signal import Signal, parameter, state
+from plant_models.hybrid.system import Array
+from plant_models.railway.faults.fault_cause import Fault, braking_stopped, one_where
+
+
+class GivenFaults:
+    """Up to `count` faults, fault i in ``[fault_onset[i], fault_onset[i] + fault_length[i])``.
+
+    A jam ends earlier where the brake was released for `release_time` in it.
+
+    Args:
+        count: number of faults.
+    """
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        self.parameters: tuple[Signal, ...] = (
+            parameter("fault_onset", "s", 0.0, "Instant at which each fault begins", size=count),
+            parameter("fault_length", "s", 0.0, "Length of each fault; 0 where it is not used", min=0.0, size=count),
+            parameter("fault_depth", "1", 1.0, "Depth of each fault, 0 none to 1 full", min=0.0, max=1.0, size=count),
+            parameter("fault_kind", "1", -1.0, "Kind of each fault: -1 jam, 1 skid", min=-1.0, max=1.0, size=count),
+        )
+        self.continuous: tuple[Signal, ...] = (
+            state("released_for", "s", 0.0, "For how long the brake was released in each jam", size=count),
+        )
+        self.remembered: tuple[Signal, ...] = ()
+        self.frictions: tuple[str, ...] = ()
+        self.switchings: tuple[str, ...] = tuple(
+            f"fault_{edge}[{i + 1}]" for edge in ("from", "to", "freed") for i in range(count)
+        )
+        self.events: tuple[PeriodicEvent, ...] = ()
+
+    def fault(self, t: Array, s: list[Array], passed: Array, u: Any, p: Any) -> Fault:
+        """See `FaultCause.fault`.
+
+        Args:
+            t: time [s]. s: states of the cause. passed: switches, shape (k,). u: inputs. p: parameters.
+        """
+        depth = sum(self._active(i, passed) * self._sign(i, p) * p.fault_depth[i] for i in range(self.count))
+        over = [1.0 - (1.0 - passed[self.count + i]) * (1.0 - passed[2 * self.count + i]) for i in range(self.count)]
+        used = [one_where(p.fault_length[i] > 0.0) for i in range(self.count)]
+        return Fault(depth, sum(used[i] * (1.0 - over[i]) for i in range(self.count)))
+
+    def rates(self, t: Array, s: list[Array], passed: Array, u: Any, p: Any) -> list[Array]:
+        """See `FaultCause.rates`.
+
+        Args:
+            t: time [s]. s: states of the cause. passed: switches, shape (k,). u: inputs. p: parameters.
+        """
+        released = braking_stopped(u)
+        return [released * self._active(i, passed) * one_where(p.fault_kind[i] < 0.0) for i in range(self.count)]
+
+    def friction(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
+        """None.
+
+        Args:
+            t: time [s]. s: states of the cause. u: inputs. p: parameters.
+        """
+        return []
+
+    def switching(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
+        """See `FaultCause.switching`.
+
+        Args:
+            t: time [s]. s: states of the cause. u: inputs. p: parameters.
+        """
+        faults = range(self.count)
+        begun = [t - p.fault_onset[i] for i in faults]
+        ended = [t - (p.fault_onset[i] + p.fault_length[i]) for i in faults]
+        return [*begun, *ended, *(s[i] - p.release_time for i in faults)]
+
+    def jump(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
+        """Nothing jumps.
+
+        Args:
+            t: time [s]. s: states of the cause. u: inputs. p: parameters.
+        """
+        return s
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """Faults are jams or skids, and do not overlap.
+
+        Args:
+            p: parameters.
+        """
+        starts, faults = p.fault_onset, range(self.count)
+        ends = [starts[i] + p.fault_length[i] for i in faults]
+        used = [one_where(p.fault_length[i] > 0.0) for i in faults]
+        needed: dict[str, Array] = {}
+        for i in faults:
+            text = f"fault {i + 1} is neither jam nor skid: fault_kind[{i + 1}] must be -1 (jam) or 1 (skid)"
+            needed[text] = one_where(np.abs(p.fault_kind[i]) == 1.0)
+        for i in faults[1:]:
+            text = (
+                f"fault {i + 1} overlaps one before it in the list: move fault_onset[{i + 1}] or shorten "
+                f"fault_length[{i + 1}]"
+            )
+            overlaps = [
+                used[i] * used[j] * np.where(starts[i] < ends[j], one_where(starts[j] < ends[i]), 0.0) for j in range(i)
+            ]
+            needed[text] = 1.0 - one_where(sum(overlaps) > 0.0)
+        return needed
+
+    def _active(self, i: int, passed: Array) -> Array:
+        n = self.count
+        return passed[i] * (1.0 - passed[n + i]) * (1.0 - passed[2 * n + i])
+
+    @staticmethod
+    def _sign(i: int, p: Any) -> Array:
+        return np.where(p.fault_kind[i] < 0.0, -1.0, 1.0)

@@ -1,0 +1,149 @@
+"""The pulse odometer: a toothed wheel whose pulses are counted, sampled, and handed on in aggregates.
+
+A sensor as a hybrid system of its own; knows the hybrid foundation and the counting of pulses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from plant_models.hybrid import (
+    HybridSystem,
+    PeriodicEvent,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+    state,
+    vector,
+)
+from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid.system import Array
+from plant_models.railway.sensors.pulses import counted_pulses, pulse_length, pulses_in_window
+
+CountFrom = Literal["wheel_speed", "wheel_distance"]
+
+
+class PulseOdometer(HybridSystem):
+    """Speed ``(c_i - c_{i-1}) 2 pi r / (N_p Dt)`` from pulses counted, sampled every 50 ms, aggregated every 200 ms.
+
+    `sampled_reading` is the speed over the last sampling period, `reading` over the last aggregation period: what the
+    layers above the odometer are given. Both are held between their instants, which are ``start + k * period``. The
+    quantisation is that of counting: a reading is a whole number of pulses, one of which is a speed of ``2 pi r /
+    (N_p period)``, 0.145 m/s in the aggregate. Differences of counts telescope: the sum of all readings is the distance
+    counted, within one pulse for ever.
+
+    While the wheel is locked there are no pulses, so a jam of length T in a window of length Dt gives
+    ``v (1 - T / Dt)`` within one pulse; a skid gives more than v. The count goes down where the wheel turns backwards.
+
+    Args:
+        count_from: ``wheel_speed``: the odometer integrates that input, which is held between communication points;
+            ``wheel_distance``: it counts that input, the distance of the rim from `wheel_fault`, in which faults within
+            a communication step are exact. `wheel_speed` then serves the first reading only, which has no window behind
+            it and is that of a wheel that had turned steadily.
+
+    Raises:
+        ValueError: `count_from` is unknown.
+
+    Source: Aguiar Cota 2019, section 2.1.2 and Figs. 2-7, 2-13, 2-14; teeth and radius are ours.
+    """
+
+    name = "pulse_odometer"
+    description = "Toothed wheel odometer: counted pulses, sampled at 50 ms and aggregated at 200 ms"
+    source = "Aguiar Cota 2019, section 2.1.2; teeth and radius are ours"
+    internal_step = 1e-2  # the flow is exact for a held input, whatever the step
+    outputs = (
+        output_signal(
+            "reading", "m/s", "Speed over the last aggregation period", variability="discrete", display_unit="km/h"
+        ),
+        output_signal(
+            "sampled_reading", "m/s", "Speed over the last sampling period", variability="discrete", display_unit="km/h"
+        ),
+        output_signal("distance", "m", "Distance counted up to the last sample", variability="discrete"),
+    )
+    parameters = (
+        parameter("sample_period", "s", 0.05, "Time between two samples", min=1e-6),
+        parameter("aggregation_period", "s", 0.2, "Time between two aggregates, whole samples", min=1e-6),
+        parameter("teeth", "1", 100.0, "Pulses in one revolution", min=1.0),
+        parameter("wheel_radius", "m", 0.46, "Radius of the wheel", min=1e-3),
+        parameter("noise_std", "m/s", 0.0, "Standard deviation of a reading's noise", min=0.0, display_unit="km/h"),
+    )
+    events = (
+        PeriodicEvent(
+            "sampling",
+            "sample_period",
+            None,
+            (input_signal("sample_noise", "1", 0.0, "Standard normal number of a sample", variability="discrete"),),
+            "The pulses are counted",
+        ),
+        PeriodicEvent(
+            "aggregation",
+            "aggregation_period",
+            None,
+            (input_signal("reading_noise", "1", 0.0, "Standard normal number of a reading", variability="discrete"),),
+            "The samples are aggregated",
+        ),
+    )
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"count_from": ("wheel_speed", "wheel_distance")}
+
+    def __init__(self, *, count_from: CountFrom = "wheel_speed") -> None:
+        if count_from not in self.option_choices["count_from"]:
+            raise ValueError(f"Unknown count_from {count_from!r}; choose one of: wheel_speed, wheel_distance.")
+        self.count_from = count_from
+        self.inputs = (_SPEED,) if count_from == "wheel_speed" else (_SPEED, _DISTANCE)
+        self.states = (*((_INTEGRAL,) if count_from == "wheel_speed" else ()), *_MEMORY)
+        super().__init__(count_from=count_from)
+
+    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Derivative of the rim's distance, shape (1,) or (1, members); nothing flows where it is an input."""
+        return vector(u.wheel_speed + 0.0 * x[0]) if self.count_from == "wheel_speed" else super().flow(t, x, u, p)
+
+    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Count the pulses, or hand on what was counted since the last aggregate."""
+        first = self.continuous_count
+        flowing = [x[i] for i in range(first)]
+        held, sampled, count, last, primed_sample, primed = (x[first + i] for i in range(len(_MEMORY)))
+        pulse = pulse_length(p.teeth, p.wheel_radius)
+        if event == "sampling":
+            now = counted_pulses(flowing[0] if first else u.wheel_distance, pulse)
+            window = pulses_in_window(now, count, primed_sample, u.wheel_speed, p.sample_period, pulse)
+            speed = window * pulse / p.sample_period + p.noise_std * u.sample_noise
+            return vector(*flowing, held, speed, now, np.where(primed == 0.0, now, last), 1.0, primed)
+        window = pulses_in_window(count, last, primed, u.wheel_speed, p.aggregation_period, pulse)
+        speed = window * pulse / p.aggregation_period + p.noise_std * u.reading_noise
+        return vector(*flowing, speed, sampled, count, count, primed_sample, 1.0)
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """The held readings and the counted distance."""
+        first = self.continuous_count
+        return {
+            "reading": x[first],
+            "sampled_reading": x[first + 1],
+            "distance": x[first + 2] * pulse_length(p.teeth, p.wheel_radius),
+        }
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """Parameters keep their bounds; an aggregate is made of whole samples."""
+        samples = p.aggregation_period / p.sample_period
+        off = np.abs(samples - np.floor(samples + 0.5))
+        whole = "aggregation_period must be a whole multiple of sample_period"
+        return {
+            **within_bounds(self.parameters, p),
+            whole: np.where(samples > 0.5, np.where(off < 1e-6, 1.0, 0.0), 0.0),
+        }
+
+
+_SPEED = input_signal("wheel_speed", "m/s", 0.0, "Circumferential speed of the wheel", display_unit="km/h")
+_DISTANCE = input_signal("wheel_distance", "m", 0.0, "Distance run by the wheel's rim")
+_INTEGRAL = state("rim_distance", "m", 0.0, "Distance run by the wheel's rim at start")
+_MEMORY = (
+    memory("held_reading", "m/s", 0.0, "Last aggregated reading"),
+    memory("held_sample", "m/s", 0.0, "Last sampled reading"),
+    memory("counted_pulses", "1", 0.0, "Pulses counted up to the last sample"),
+    memory("aggregated_pulses", "1", 0.0, "Pulses counted up to the last aggregate"),
+    memory("sampled_once", "1", 0.0, "1 after the first sample"),
+    memory("aggregated_once", "1", 0.0, "1 after the first aggregate"),
+)

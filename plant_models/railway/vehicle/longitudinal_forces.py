@@ -1,0 +1,209 @@
+"""The forces on a train that is one point: effort, Davis resistance, gradient, adhesion limit.
+
+Declares what the continuous and the discrete train have in common; how time runs is theirs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter
+from plant_models.hybrid.signal import Signal
+from plant_models.hybrid.system import Array
+from plant_models.railway.adhesion.adhesion_table import STANDING_ADHESION, adhesion_coefficient
+from plant_models.railway.track.track import GradientShape, Track, ZoneAxis
+from plant_models.railway.vehicle.davis_sets import ADHESION_LEVELS, DAVIS_SETS, DavisSet
+from plant_models.railway.vehicle.resistance import GRAVITY, gradient_resistance, moving_resistance
+
+
+class Forces(NamedTuple):
+    """Forces on the train [N], each a scalar or shape (members,).
+
+    Args:
+        push: sum of all that flows with the motion: traction, disturbance, moving resistance and gradient.
+        moving: speed-dependent part of the Davis resistance. gradient: downhill pull as a resistance.
+        brake: largest dry friction of the brake.
+    """
+
+    push: Array
+    moving: Array
+    gradient: Array
+    brake: Array
+
+
+class LongitudinalForces(HybridSystem):
+    """Base of the trains that are one point: signals, presets and forces of (2.1), (2.2), (2.7) and (2.26)-(2.28).
+
+    Args:
+        zones: zones of degraded adhesion along ``time`` or ``position``.
+        zone_count: number of zones.
+        gradient_shape: gradient ``constant`` between its points, or ``linear``.
+        gradient_count: number of gradient points.
+        railway: row of Table 2.1 that gives the default of `adhesion_at_rest`.
+
+    Raises:
+        ValueError: an unknown option, or a count below one.
+
+    Source: Aguiar Cota 2019, section 2.1.1 and (2.26)-(2.28).
+    """
+
+    inputs = (
+        input_signal("effort", "N", 0.0, "Effort demanded: traction > 0, brake < 0"),
+        input_signal("effort_loss", "1", 0.0, "Share of the effort that is lost, 0 to 1"),
+        input_signal("disturbance_force", "N", 0.0, "Unknown force along increasing position"),
+    )
+    outputs = (
+        output_signal("position", "m", "Position of the train"),
+        output_signal("speed", "m/s", "Speed of the train", display_unit="km/h"),
+        output_signal("acceleration", "m/s2", "Acceleration of the train"),
+        output_signal("wheel_speed", "m/s", "Circumferential speed of a wheel that rolls", display_unit="km/h"),
+        output_signal("resistance_force", "N", "Davis resistance, against the motion"),
+        output_signal("gradient_force", "N", "Downhill pull as a resistance, uphill > 0"),
+        output_signal("adhesion_limit", "N", "Largest force that the rails can take"),
+        output_signal("outside_fitted_range", "1", "1 where the speed is outside the range of the Davis coefficients"),
+    )
+    presets: Mapping[str, Mapping[str, Any]] = {}
+    default_preset = "set_d"
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "zones": ("position", "time"),
+        "zone_count": range(1, 65),
+        "gradient_shape": ("constant", "linear"),
+        "gradient_count": range(1, 65),
+        "railway": tuple(STANDING_ADHESION),
+    }
+    own_parameters: ClassVar[tuple[Signal, ...]] = ()
+
+    def __init__(
+        self,
+        *,
+        zones: ZoneAxis = "position",
+        zone_count: int = 3,
+        gradient_shape: GradientShape = "constant",
+        gradient_count: int = 4,
+        railway: str = "sncf_multi_motor_bogie",
+    ) -> None:
+        if railway not in STANDING_ADHESION:
+            raise ValueError(f"Unknown railway {railway!r}; choose one of: {', '.join(STANDING_ADHESION)}.")
+        self._track = Track(zones, zone_count, gradient_shape, gradient_count)
+        self.parameters = (*_vehicle(railway), *self.own_parameters, *self._unused_zones())
+        super().__init__(
+            zones=zones,
+            zone_count=zone_count,
+            gradient_shape=gradient_shape,
+            gradient_count=gradient_count,
+            railway=railway,
+        )
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """Zones have a length and do not overlap; the range of the fit is one."""
+        ordered = "fitted_to must not lie below fitted_from"
+        return {**self._track.requirements(p), ordered: np.where(p.fitted_to >= p.fitted_from, 1.0, 0.0)}
+
+    # -- forces -----------------------------------------------------------------------------------------------------
+
+    def _forces(self, t: Array, position: Array, speed: Array, u: Any, p: Any) -> Forces:
+        """All forces at a time [s], a position [m] and a speed [m/s]."""
+        working = 1.0 - np.clip(u.effort_loss, 0.0, 1.0)
+        traction = p.traction_coefficient * working * np.maximum(u.effort, 0.0)
+        brake = p.brake_coefficient * working * np.maximum(-u.effort, 0.0)
+        moving = moving_resistance(speed, p.davis_b, p.davis_c)
+        wave = p.mass * p.grade_amplitude * np.sin(p.grade_rate * t)
+        gradient = gradient_resistance(p.mass, p.gravity, self._track.gradient(position, p)) + wave
+        return Forces(traction + u.disturbance_force - moving - gradient, moving, gradient, brake)
+
+    def _outputs(self, position: Array, speed: Array, forces: Forces, degraded: Array, p: Any) -> dict[str, Array]:
+        """The declared outputs; at rest the forces are those that hold the train."""
+        direction = np.sign(speed)
+        push, at_rest = forces.push, speed == 0.0
+        dry = np.where(at_rest, np.clip(push, -p.davis_a, p.davis_a), direction * p.davis_a)
+        braked = np.where(at_rest, np.clip(push - dry, -forces.brake, forces.brake), direction * forces.brake)
+        size = np.abs(speed)
+        level = p.adhesion_level * (1.0 + degraded * (p.degraded_level - 1.0))
+        weight = p.adhesive_share * p.mass * p.gravity
+        outside = np.where(size < p.fitted_from, 1.0, np.where(size > p.fitted_to, 1.0, 0.0))
+        return {
+            "position": position,
+            "speed": speed,
+            "acceleration": (push - dry - braked) / p.mass,
+            "wheel_speed": speed,
+            "resistance_force": forces.moving + dry,
+            "gradient_force": forces.gradient,
+            "adhesion_limit": weight * level * adhesion_coefficient(size, p.adhesion_at_rest),
+            "outside_fitted_range": np.where(at_rest, 0.0, outside),
+        }
+
+    def _unused_zones(self) -> tuple[Signal, ...]:
+        """Parameters of the track; no zone is laid unless it is asked for, along time neither."""
+        unused = {"zone_from": 0.0, "zone_to": 0.0}
+        return tuple(
+            parameter(s.name, s.unit, unused[s.name], s.description, size=s.size) if s.name in unused else s
+            for s in self._track.parameters
+        )
+
+
+def _vehicle(railway: str) -> tuple[Signal, ...]:
+    return (
+        parameter("mass", "kg", 1.0, "Mass of the train; 1 where forces are per unit mass", min=1e-3),
+        parameter("traction_coefficient", "1", 1.0, "Force of one newton of traction demanded, b_T", min=0.0),
+        parameter("brake_coefficient", "1", 1.0, "Force of one newton of brake demanded, b_B", min=0.0),
+        parameter("davis_a", "N", 0.46, "Running resistance, constant part; dry friction", min=0.0),
+        parameter("davis_b", "N.s/m", 5.7e-3, "Running resistance, viscous part"),
+        parameter("davis_c", "N.s2/m2", -2.4e-4, "Running resistance, aerodynamic part; may be negative in a fit"),
+        parameter(
+            "fitted_from", "m/s", 5.0, "Lowest speed of the fit of the Davis coefficients", min=0.0, display_unit="km/h"
+        ),
+        parameter(
+            "fitted_to", "m/s", 50.0, "Highest speed of the fit of the Davis coefficients", min=0.0, display_unit="km/h"
+        ),
+        parameter("gravity", "m/s2", GRAVITY, "Acceleration of gravity g", min=0.0),
+        parameter("grade_amplitude", "m/s2", 0.0, "Amplitude of a grade term that swings in time, sine, uphill > 0"),
+        parameter("grade_rate", "rad/s", 0.1, "Angular frequency of that term", min=0.0),
+        parameter(
+            "adhesion_at_rest",
+            "1",
+            STANDING_ADHESION[railway],
+            "Adhesion coefficient on dry rails at standstill",
+            min=0.0,
+        ),
+        parameter(
+            "adhesion_level", "1", 1.0, "Share of the dry adhesion: 1 dry, 0.5 LoA, 0.3 BaA, 0.1 EBA", min=0.0, max=1.0
+        ),
+        parameter("degraded_level", "1", 0.3, "Further share within a zone of degraded adhesion", min=0.0, max=1.0),
+        parameter("adhesive_share", "1", 1.0, "Share of the mass on motored and braked axles", min=0.0, max=1.0),
+    )
+
+
+def davis_preset(chosen: DavisSet) -> dict[str, float]:
+    """Parameter values of a published set, per unit mass: newtons are m/s2.
+
+    Args:
+        chosen: the set.
+    """
+    return {
+        "mass": 1.0,
+        "traction_coefficient": chosen.effort_coefficient,
+        "brake_coefficient": chosen.effort_coefficient,
+        "davis_a": chosen.a,
+        "davis_b": chosen.b,
+        "davis_c": chosen.c,
+        "fitted_from": chosen.fitted_from,
+        "fitted_to": chosen.fitted_to,
+        "adhesion_level": chosen.adhesion_level,
+    }
+
+
+TRAIN_PRESETS: dict[str, dict[str, float]] = {
+    **{name: davis_preset(chosen) for name, chosen in DAVIS_SETS.items() if name != "set_b_observer"},
+    "scenario_3_3_4": {
+        **davis_preset(DAVIS_SETS["set_b"]),
+        "grade_amplitude": 0.05,
+        "grade_rate": 0.1,
+        "train_speed": 45.0,
+    },
+}
+"""Presets of the trains: Davis sets A to F, and set B on the grade ``0.05 sin(0.1 t)`` of section 3.3.4 at 45 m/s."""
+
+__all__ = ["ADHESION_LEVELS", "TRAIN_PRESETS", "Forces", "LongitudinalForces", "davis_preset"]

@@ -1,0 +1,98 @@
+"""The longitudinal train: one point with Davis resistance, brake and gradient, per unit mass or not.
+
+Declares the continuous system; the forces stand in `longitudinal_forces`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from plant_models.hybrid import state, vector
+from plant_models.hybrid.system import Array
+from plant_models.railway.track.track import GradientShape, ZoneAxis
+from plant_models.railway.vehicle.longitudinal_forces import TRAIN_PRESETS, LongitudinalForces
+
+
+class LongitudinalTrain(LongitudinalForces):
+    """Train as one point: ``m dv = b_T u_T - b_B u_B - w(v) - m g i(p)``, ``dp = v``, ``w = a + b v + c v |v|``.
+
+    `effort` is ``u_T`` where it is positive and ``-u_B`` where it is negative. The wheel rolls: `wheel_speed` is the
+    speed; wheels that lock or spin are `wheel_fault` behind this train.
+
+    The brake and the constant part of the resistance are dry friction: they stop the train and hold it, and never push
+    it. The published equations, which are about a moving train, would drive it backwards.
+
+    The fault models of the train (2.26)-(2.28): in case 1 the effort acts no more and a force ``F f`` does,
+    `effort_loss` = 1 and `disturbance_force` = ``F f``; in case 2 a share f of the effort is lost and a force ``xi f``
+    remains, `effort_loss` = f and `disturbance_force` = ``xi f``. Case 3 is a fault of the sensor, `wheel_fault`.
+
+    The published Davis sets are per unit mass. With `mass` = 1 a newton is 1 m/s2. Sets with a negative `davis_c` are
+    fits: above a speed they pull the train. `outside_fitted_range` says where the speed is outside `fitted_from` to
+    `fitted_to`, while the train moves.
+
+    `adhesion_limit` is what the rails can take, ``N delta0 / (1 + 0.01 v)`` (2.7), times the level of adhesion. It does
+    not bound the effort here: what follows from too much effort is the matter of `wheel_fault`.
+
+    Presets: `set_a` (section 3.2.3), `set_b` (3.3.4), `set_c` (4.3.4), `set_d` (default; Table 5.1, low adhesion LoA),
+    `set_e` (bad adhesion BaA), `set_f` (extremely bad adhesion EBA), `scenario_3_3_4` (set B with its grade, at
+    45 m/s). The levels of adhesion of D, E, F (0.5, 0.3, 0.1) are ours.
+
+    Args:
+        zones: zones of degraded adhesion along ``position`` or ``time``.
+        zone_count: number of zones.
+        gradient_shape: gradient ``constant`` between its points, or ``linear``.
+        gradient_count: number of gradient points.
+        railway: row of Table 2.1 that gives the default of `adhesion_at_rest`.
+
+    Raises:
+        ValueError: an unknown option, or a count below one.
+
+    Source: Aguiar Cota 2019, (2.1), (2.2), (2.7), (2.8), (2.26)-(2.28) and Table 5.1; dry friction is ours.
+    """
+
+    name = "longitudinal_train"
+    description = "Train as one point per unit mass: effort in, position, speed and adhesion limit out"
+    source = "Aguiar Cota 2019, (2.1)-(2.8), (2.26)-(2.28), Tables 2.1 and 5.1"
+    internal_step = 1e-2  # the fastest time constant, 1 / davis_b, is 10 s
+    states = (
+        state("train_position", "m", 0.0, "Position of the train at start"),
+        state("train_speed", "m/s", 0.0, "Speed of the train at start"),
+    )
+    frictions = ("train_speed",)
+    presets: Mapping[str, Mapping[str, Any]] = TRAIN_PRESETS
+
+    def __init__(
+        self,
+        *,
+        zones: ZoneAxis = "position",
+        zone_count: int = 3,
+        gradient_shape: GradientShape = "constant",
+        gradient_count: int = 4,
+        railway: str = "sncf_multi_motor_bogie",
+    ) -> None:
+        super().__init__(
+            zones=zones,
+            zone_count=zone_count,
+            gradient_shape=gradient_shape,
+            gradient_count=gradient_count,
+            railway=railway,
+        )
+        self.switchings = self._track.edges
+
+    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Derivatives of position and speed without dry friction, shape (2,) or (2, members)."""
+        return vector(x[1], self._forces(t, x[0], x[1], u, p).push / p.mass)
+
+    def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Dry friction on the speed [m/s2], shape (1,) or (1, members)."""
+        return vector((p.davis_a + self._forces(t, x[0], x[1], u, p).brake) / p.mass)
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """The declared outputs."""
+        degraded = self._track.degraded(self.switches(t, x, u, p))
+        return self._outputs(x[0], x[1], self._forces(t, x[0], x[1], u, p), degraded, p)
+
+    def switching(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """How far beyond the edges of the zones."""
+        return vector(*self._track.beyond_edges(t, x[0], p))

@@ -1,0 +1,65 @@
+"""The longitudinal train in discrete time: the explicit Euler form of the same forces.
+
+Declares the periodic update; the forces stand in `longitudinal_forces`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from plant_models.hybrid import PeriodicEvent, memory, parameter, vector
+from plant_models.hybrid.system import Array
+from plant_models.railway.vehicle.longitudinal_forces import TRAIN_PRESETS, LongitudinalForces
+
+
+class LongitudinalTrainEuler(LongitudinalForces):
+    """Train as one point in discrete time: ``x(k+1) = (I + A(x(k)) Dt) x(k) - Dt B_B u_B + Dt B_T u_T + Dt G(x(k))``.
+
+    The update occurs at ``start + k * update_period``, k = 1, 2, ..., with the inputs held since; between updates the
+    state stands. Forces, inputs, outputs, parameters and presets are those of `longitudinal_train`, of which this is
+    the Euler form: its error is of order 1 in the period. The printed (2.9) has a plus sign in the difference quotient;
+    (2.10) follows from the minus.
+
+    Brake and constant resistance are dry friction here too: a train that would change its direction within an update
+    under them alone stands.
+
+    Args:
+        zones: zones of degraded adhesion along ``position`` or ``time``.
+        zone_count: number of zones.
+        gradient_shape: gradient ``constant`` between its points, or ``linear``.
+        gradient_count: number of gradient points.
+        railway: row of Table 2.1 that gives the default of `adhesion_at_rest`.
+
+    Raises:
+        ValueError: an unknown option, or a count below one.
+
+    Source: Aguiar Cota 2019, (2.9)-(2.10); dry friction is ours.
+    """
+
+    name = "longitudinal_train_euler"
+    description = "Train as one point in discrete time: the Euler form of longitudinal_train"
+    source = "Aguiar Cota 2019, (2.9)-(2.10)"
+    internal_step = 1e-2  # nothing flows
+    states = (
+        memory("train_position", "m", 0.0, "Position of the train at start"),
+        memory("train_speed", "m/s", 0.0, "Speed of the train at start"),
+    )
+    own_parameters = (parameter("update_period", "s", 0.05, "Time between two updates Dt", min=1e-6),)
+    events = (PeriodicEvent("update", "update_period", "update_period", description="The state is updated"),)
+    presets: Mapping[str, Mapping[str, Any]] = TRAIN_PRESETS
+
+    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Position and speed one period later, shape (2,) or (2, members)."""
+        before = t - p.update_period
+        forces = self._forces(before, x[0], x[1], u, p)
+        pushed = x[1] + p.update_period * forces.push / p.mass
+        dry = p.update_period * (p.davis_a + forces.brake) / p.mass
+        return vector(x[0] + p.update_period * x[1], np.sign(pushed) * np.maximum(np.abs(pushed) - dry, 0.0))
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """The declared outputs."""
+        passed = [np.where(beyond >= 0.0, 1.0, 0.0) for beyond in self._track.beyond_edges(t, x[0], p)]
+        return self._outputs(x[0], x[1], self._forces(t, x[0], x[1], u, p), self._track.degraded(passed), p)
