@@ -10,8 +10,8 @@ KMH = 3.6
 
 
 def gaps_table(found: GapErrors) -> Table:
-    """Position errors at the end of the longest gaps, in metres and in seconds of running time; last row: the largest of
-    all gaps, and how many of them ended within the envelope.
+    """Position errors at the end of the longest gaps, in metres and in seconds of running time; last row: the largest
+    of all gaps, and how many of them ended within the envelope.
 
     Args:
         found: from `gap_errors`.
@@ -27,7 +27,9 @@ def gaps_table(found: GapErrors) -> Table:
         gap = found.gaps[i]
         row = [f"{gap.origin} to {gap.target}", number(gap.length), number(gap.seconds), number(KMH * gap.speed)]
         row += [number(gap.envelope)]
-        row += [f"{error_number(float(found.errors[n][i]))} / {error_number(float(seconds[n][i]))}" for n in found.errors]
+        row += [
+            f"{error_number(float(found.errors[n][i]))} / {error_number(float(seconds[n][i]))}" for n in found.errors
+        ]
         rows.append(row)
     if rows:
         row = [f"all {len(found.gaps)}: largest\nand share within SUBSET-041", "", "", "", ""]

@@ -42,9 +42,7 @@ def _profile(count: int) -> tuple[Signal, ...]:
     times, speeds = (_padded(points, count) for points in _PROFILE_D)
     return (
         parameter("profile_time", "s", times, "Times of the speed profile, ascending", size=count),
-        parameter(
-            "profile_speed", "m/s", speeds, "Speeds of the profile", min=0.0, size=count, display_unit="km/h"
-        ),
+        parameter("profile_speed", "m/s", speeds, "Speeds of the profile", min=0.0, size=count, display_unit="km/h"),
     )
 
 
