@@ -137,7 +137,7 @@ def gap_errors(result: Result, spec: ReportSpec) -> GapErrors:
     """Errors at the end of the gaps between balises that were read; gaps that end before `evaluate_after` are left out.
 
     The plain odometer is set to the place of each balise and then counts: by its output ``distance`` where that was
-    recorded, else by its reading, held from row to row.
+    recorded (on straight lines between its samples), else by its reading, held from row to row.
 
     Args:
         result: the run, with its telegrams.
@@ -227,7 +227,16 @@ def _odometer_way(result: Result, spec: ReportSpec) -> np.ndarray | None:
     reading = recorded(result, spec.odometer)
     if spec.odometer is None or reading is None:
         return None
-    counted = recorded(result, f"{spec.odometer.rpartition('.')[0]}.{DISTANCE}")
+    name = f"{spec.odometer.rpartition('.')[0]}.{DISTANCE}"
+    counted = recorded(result, name)
     if counted is not None:
-        return counted
+        sampled = any(info.name == name and info.variability == "discrete" for info in result.signals)
+        return _between_samples(result.time, counted) if sampled else counted
     return np.concatenate(([0.0], np.cumsum(reading[:-1] * np.diff(result.time))))
+
+
+def _between_samples(time: np.ndarray, counted: np.ndarray) -> np.ndarray:
+    """A count that is held from sample to sample, on a straight line between them: a row between two samples would
+    else lack the way since the last one."""
+    new = np.flatnonzero(np.diff(counted, prepend=np.nan) != 0.0)
+    return np.asarray(np.interp(time, time[new], counted[new]))
