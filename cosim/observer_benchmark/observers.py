@@ -6,6 +6,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -422,7 +423,9 @@ class _Judge:
             return None  # parameters that cannot be: the run of this observer says so
         if candidate.name not in found:
             return None
-        return CertifiedGap(found[candidate.name]["aperiodic_limit"], self._expected.seconds, self._seen)
+        limit = found[candidate.name]["aperiodic_limit"]
+        # plain data have None for an infinite limit
+        return CertifiedGap(inf if limit is None else limit, self._expected.seconds, self._seen)
 
 
 def _silent(_text: str) -> None:
