@@ -32,7 +32,7 @@ from plant_models.hybrid import (
 )
 from plant_models.hybrid.system import Array
 
-SPEED, DISTURBANCE, RATE, POSITION = range(4)  # indices of the continuous states
+POSITION, SPEED, DISTURBANCE, RATE = range(4)  # indices of the continuous states
 INNOVATION, DETECTOR, READING, UNCHANGED, HELD = 4, 5, 9, 10, 11
 PRINTED_GAIN = (101.4, 2650.0, 3750.0)
 _PRINTED_START = {"estimated_speed": 30.0, "disturbance_estimate": -0.91, "disturbance_rate": 0.13}
@@ -68,12 +68,11 @@ class StoppingUio(GatedObserver):
     )
     source = "Aguiar Cota 2019, (3.15)-(3.18) and 3.2.3"
     internal_step = 1e-3
-    position_state = POSITION
     states = (
+        state("estimated_position", "m", 0.0, "Estimate of the train position"),
         state("estimated_speed", "m/s", 30.0, "Estimate of the train speed"),
         state("disturbance_estimate", "m/s2", -0.91, "Estimate of all accelerations that the model does not know"),
         state("disturbance_rate", "m/s3", 0.337, "Estimate of the rate of the disturbance"),
-        state("estimated_position", "m", 0.0, "Estimate of the train position"),
         memory("held_innovation", "m/s", 0.0, "Odometer minus estimate at the last sample"),
         *THRESHOLD_MEMORY,
         memory("last_reading", "m/s", 0.0, "Odometer at the last sample"),
@@ -132,21 +131,21 @@ class StoppingUio(GatedObserver):
         return super().requirements(p) | threshold_requirements(p)
 
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of speed, disturbance, its rate and position, shape (4,)."""
+        """Derivatives of position, speed, disturbance and its rate, shape (4,)."""
         innovation, fault = x[INNOVATION], x[DETECTOR + 1]
         effort = u.effort * (1.0 - fault * p.switches_effort)
         acceleration = (p.brake_coefficient * effort - p.davis_b * x[SPEED]) / p.mass + x[DISTURBANCE]
         return vector(
+            x[SPEED],
             acceleration + p.observer_gain[0] * innovation,
             x[RATE] + p.observer_gain[1] * innovation,
             p.observer_gain[2] * innovation,
-            x[SPEED],
         )
 
     def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """A sample: innovation, verdict, and whether the odometer is held; a balise: its position, shape (12,)."""
         if event == "balise":
-            return vector(x[SPEED], x[DISTURBANCE], x[RATE], u.balise_position, *(x[i] for i in range(4, 12)))
+            return vector(u.balise_position, *(x[i] for i in range(1, 12)))
         innovation = u.odometer - x[SPEED]
         before = ThresholdMemory(*(x[i] for i in range(DETECTOR, READING)))
         judged = judge(before, innovation, p.sample_period, p)
@@ -165,15 +164,15 @@ class StoppingUio(GatedObserver):
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """The estimate, the residual and the verdict."""
-        memory_ = ThresholdMemory(*(x[i] for i in range(DETECTOR, READING)))
+        detector = ThresholdMemory(*(x[i] for i in range(DETECTOR, READING)))
         return {
             "position": x[POSITION],
             "speed": x[SPEED],
             "disturbance": x[DISTURBANCE],
             "innovation": x[INNOVATION],
-            "residual": memory_.residual,
-            "odometer_fault": memory_.fault,
-            "recovering": memory_.fault * memory_.armed,
+            "residual": detector.residual,
+            "odometer_fault": detector.fault,
+            "recovering": detector.fault * detector.armed,
             "held_odometer": x[HELD],
         }
 
