@@ -242,7 +242,7 @@ class _Setup:
         spec, (table, signals) = self._report_spec(), self._in_si()
         for warning in result_warnings(Result(table, signals, failure=failure), spec):
             self._warn(warning)
-        for warning in warnings_after(self.components, events, changed_in_steps):
+        for warning in warnings_after(self.components, events, changed_in_steps, self._as_recorded()):
             self._warn(warning)
         if self.call_log is not None and self.call_log.broken is not None:
             self._warn(self.call_log.broken)

@@ -34,9 +34,9 @@ class LongitudinalTrain(LongitudinalForces):
     `adhesion_limit` is what the rails can take, ``N delta0 / (1 + 0.01 v)`` (2.7), times the level of adhesion. It does
     not bound the effort here: what follows from too much effort is the matter of `wheel_fault`.
 
-    Presets: `set_a` (section 3.2.3), `set_b` (3.3.4), `set_c` (4.3.4), `set_d` (default; Table 5.1, low adhesion LoA),
-    `set_e` (bad adhesion BaA), `set_f` (extremely bad adhesion EBA), `scenario_3_3_4` (set B with its grade, at
-    45 m/s). The levels of adhesion of D, E, F (0.5, 0.3, 0.1) are ours.
+    Presets: `set_a` (default; section 3.2.3, where ``b_T = b_B = 0.1``), `set_b` (3.3.4), `set_c` (4.3.4), `set_d`
+    (Table 5.1, low adhesion LoA), `set_e` (bad adhesion BaA), `set_f` (extremely bad adhesion EBA), `scenario_3_3_4`
+    (set B with its grade, at 45 m/s). The levels of adhesion of D, E, F (0.5, 0.3, 0.1) are ours.
 
     Args:
         zones: zones of degraded adhesion along ``position`` or ``time``.

@@ -1,0 +1,108 @@
+"""The jam detector as a block of its own: whether an odometer lies, from the residual of any observer. Uses the rules
+and nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Literal
+
+from fmu_observer.detection.jam_rules import SHARED_PARAMETERS, Reading, RepairedRules, Rules
+from fmu_observer.detection.printed_jam_rules import PrintedRules
+from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, output_signal, vector
+from plant_models.hybrid.system import Array
+
+RuleChoice = Literal["repaired", "printed"]
+RULES: Mapping[str, Rules] = {"repaired": RepairedRules(), "printed": PrintedRules()}
+FAULT_OUTPUTS = (
+    output_signal("odometer_fault", "1", "1 while the odometer is judged to lie, else 0", variability="discrete"),
+    output_signal("recovering", "1", "1 while it begins to be believed again, else 0", variability="discrete"),
+    output_signal("residual_limit", "m/s", "Size of the residual at which the verdict changes", variability="discrete"),
+)
+ODOMETER_SAMPLE = PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read")
+
+
+def find_rules(name: str, rules: str) -> Rules:
+    """The rules of a name.
+
+    Args:
+        name: of the system that asks, for the message. rules: ``repaired`` or ``printed``.
+
+    Raises:
+        ValueError: there are no such rules.
+    """
+    if rules not in RULES:
+        raise ValueError(f"{name}: unknown rules {rules!r}; use 'repaired' or 'printed'.")
+    return RULES[rules]
+
+
+def verdict(rules: Rules, memory: tuple[Array, ...], p: Any) -> dict[str, Array]:
+    """Values of `FAULT_OUTPUTS`.
+
+    Args:
+        rules: that judge. memory: in the order of their signals. p: parameters, as in `HybridSystem.flow`.
+    """
+    return {
+        "odometer_fault": rules.fault(memory),
+        "recovering": rules.recovering(memory),
+        "residual_limit": rules.limit(memory, p),
+    }
+
+
+class JamDetector(HybridSystem):
+    """Jams and skids of the wheel that the odometer counts, from an observer's residual: Aguiar Cota 2019, Algorithm
+    3-3.
+
+    The inputs are read every `odometer_period`: the `residual` ``M (y - vh)`` of an observer, the `odometer` y and the
+    `estimated_speed` vh, and the `effort`, of which the sign alone counts (zero where it is not connected: jams and
+    skids are then possible at all times). With the repaired rules (`RepairedRules`) a fault is told at the sample that
+    shows it, with the printed ones (`PrintedRules`) at the next.
+
+    The detector says that the odometer lies; it does not keep it from the observer. While it says so the repaired rules
+    take it that the observer runs on its model alone, and that its speed is set to the odometer when the fault ends.
+    `quasi_lpv_uio` has the rules built in and does both. Beside an observer that goes on following a lying odometer the
+    residual fades, and the end of the fault is told too early.
+
+    Args:
+        rules: ``repaired`` or ``printed``.
+
+    Presets: `as_published` (default): eps = 0.9 and M = 2.3 of section 3.3.4; `as_published_5_3_1`: 0.65 and 3.36.
+    """
+
+    name = "jam_detector"
+    description = "Jams and skids of the odometer's wheel from the residual of an observer"
+    source = "Aguiar Cota 2019, Algorithm 3-3; the repaired rules ours"
+    internal_step = 1e-2
+    inputs = (
+        input_signal("residual", "m/s", 0.0, "Residual of the observer, M (y - vh)"),
+        input_signal("odometer", "m/s", 0.0, "Odometer speed"),
+        input_signal("estimated_speed", "m/s", 0.0, "Train speed that the observer estimates"),
+        input_signal("effort", "N", 0.0, "Effort at the wheel rim: traction positive, brake negative"),
+    )
+    outputs = FAULT_OUTPUTS
+    events = (ODOMETER_SAMPLE,)
+    presets: Mapping[str, Mapping[str, Any]] = {
+        "as_published": {"threshold": 0.9, "residual_gain": 2.3},
+        "as_published_5_3_1": {"threshold": 0.65, "residual_gain": 3.36},
+    }
+    default_preset = "as_published"
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"rules": tuple(RULES)}
+
+    def __init__(self, rules: RuleChoice = "repaired") -> None:
+        self.rules = find_rules(self.name, rules)
+        self.states = self.rules.memory
+        self.parameters = (*SHARED_PARAMETERS, *self.rules.parameters)
+        super().__init__(rules=rules)
+
+    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """A sample is judged."""
+        told = Reading(u.odometer, u.estimated_speed, u.residual, u.effort)
+        return vector(*self.rules.at_sample(self._memory(x), told, p).memory)
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """Verdict and recovery."""
+        memory = self._memory(x)
+        return verdict(self.rules, memory, p)
+
+    def _memory(self, x: Array) -> tuple[Array, ...]:
+        return tuple(x[i] for i in range(self.state_count))

@@ -1,0 +1,320 @@
+"""When an odometer is judged to lie, and when it is believed again: the rules of the jam detector. Pure functions.
+
+`RepairedRules` [ours] recover from every state; docs/jam_detection.md states the theorem and proves it. What all rules
+have in common stands here; the printed ones are in `printed_jam_rules`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from plant_models.hybrid import Signal, memory, parameter
+from plant_models.hybrid.system import Array
+
+TRUSTED, HELD, UNCONFIRMED = 0.0, 1.0, 2.0
+"""Modes: the odometer is believed; it is not, and the model alone runs on; the model alone has run too long, and the
+odometer is followed again although nothing has confirmed it.
+"""
+UNSETTLED = 1000.0  # faults since the residual was last small: so many that none is judged before it is
+ROUNDING = 1e-9  # of times that are sums of periods
+
+PERIOD = parameter("odometer_period", "s", 0.2, "Time between two readings of the odometer", min=1e-3)
+THRESHOLD = parameter("threshold", "m/s", 0.9, "Residual beyond which the odometer is doubted, eps", min=1e-6)
+RESIDUAL_GAIN = parameter("residual_gain", "1", 2.3, "Residual over speed difference, M", min=1e-6)
+ARMING_DELAY = parameter("arming_delay", "s", 6.0, "Time after the start before any fault is judged", min=0.0)
+SHARED_PARAMETERS = (PERIOD, THRESHOLD, RESIDUAL_GAIN, ARMING_DELAY)
+
+
+class Reading(NamedTuple):
+    """What is known at an odometer sample.
+
+    Args:
+        odometer: the new reading y [m/s].
+        speed: estimate of the train speed before the reading is used [m/s].
+        residual: ``M (y - speed)`` [m/s].
+        effort: traction positive, brake negative [N]; only its sign counts, zero where it is not known.
+    """
+
+    odometer: Array
+    speed: Array
+    residual: Array
+    effort: Array
+
+
+class Passing(NamedTuple):
+    """What is known at a balise, of the way since the balise before.
+
+    Args:
+        duration: time since that balise [s]. distance: between the two [m]. way: integral of the odometer [m].
+        believed: integral of the estimated speed [m]. speed_change: of the odometer from one to the other [m/s].
+        accuracy: of the distance [m]. known: 1 where there was a balise before.
+    """
+
+    duration: Array
+    distance: Array
+    way: Array
+    believed: Array
+    speed_change: Array
+    accuracy: Array
+    known: Array
+
+
+class Judgement(NamedTuple):
+    """What follows from a sample or a balise.
+
+    Args:
+        memory: of the rules, shape (count,) as a tuple of scalars.
+        restart: 1 where the estimated speed is to be set to the odometer.
+        onset: 1 where a fault begins with this sample.
+        shift: to be added to the estimated speed [m/s].
+    """
+
+    memory: tuple[Array, ...]
+    restart: Array
+    onset: Array
+    shift: Array
+
+
+class Rules(Protocol):
+    """Rules of a detector.
+
+    Attributes:
+        memory: what they remember. parameters: their own, behind `SHARED_PARAMETERS`.
+    """
+
+    memory: tuple[Signal, ...]
+    parameters: tuple[Signal, ...]
+
+    def at_sample(self, before: tuple[Array, ...], told: Reading, p: Any) -> Judgement:
+        """Judge an odometer sample."""
+
+    def at_balise(self, before: tuple[Array, ...], told: Passing, p: Any) -> Judgement:
+        """Judge the way between two balises."""
+
+    def fault(self, memory: tuple[Array, ...]) -> Array:
+        """1 while the odometer is judged to lie or is not confirmed."""
+
+    def discarded(self, memory: tuple[Array, ...]) -> Array:
+        """1 while the estimate must not follow the odometer."""
+
+    def recovering(self, memory: tuple[Array, ...]) -> Array:
+        """1 while it begins to be believed again."""
+
+    def limit(self, memory: tuple[Array, ...], p: Any) -> Array:
+        """Residual at which the verdict changes [m/s]."""
+
+
+class RuleMemory(NamedTuple):
+    """Memory of `RepairedRules`, in the order of their signals."""
+
+    mode: Array
+    hold_time: Array
+    agreeing: Array
+    settled: Array
+    faults: Array
+    last_odometer: Array
+    unchanged_time: Array
+    samples: Array
+
+
+class RepairedRules:
+    """Recovery by agreement within a widening threshold, by the sign of the effort, by balises, and in bounded time
+    [ours].
+
+    While the odometer is *held* to lie (mode 1) the model runs alone and its error grows by `disturbance_bound` at
+    most. The odometer is believed again, and the speed set to it,
+
+    1. where ``|r| <= eps + M delta T`` at `recover_samples` samples in a row, T the time held, and the wheel rolled
+       between them: ``|y_k - y_{k-1}| <= a_max period + 2 noise``;
+    2. where a braked wheel is faster than the estimate by more than eps / M, or a driven one slower: a jam cannot be
+       the reason;
+    3. where, from one balise to the next, the way of the odometer is the distance.
+
+    If none of them has happened within `hold_limit` the speed is set to the odometer, which is followed again but stays
+    *unconfirmed* (mode 2): `odometer_fault` stays 1. That ends when the wheel has rolled with a small residual for
+    `trust_time`, or when a balise confirms the way.
+
+    A fault begins where ``|r| > eps`` with the sign that the effort allows (a jam while braking, a skid while driving,
+    either while coasting), in time to keep the very sample out; or where a balise refutes the way of an odometer that
+    was believed. None is judged before `arming_delay` has passed and the residual has been below eps / 2 for
+    `settle_samples`, nor after `fault_limit` faults between which it was not.
+
+    Source: the three states of Aguiar Cota 2019, Algorithm 3-3; the rules are ours.
+    """
+
+    memory = (
+        memory("odometer_mode", "1", TRUSTED, "0 believed, 1 held to lie, 2 followed without being confirmed"),
+        memory("hold_time", "s", 0.0, "Time for which the model has run alone, as its error counts"),
+        memory("agreeing", "1", 0.0, "Samples in a row that speak for the odometer"),
+        memory("settled", "1", 0.0, "Samples in a row with a small residual while the odometer was followed"),
+        memory("faults", "1", UNSETTLED, "Faults since the residual was last small; 1000 after the start"),
+        memory("last_odometer", "m/s", 0.0, "Reading before"),
+        memory("unchanged_time", "s", 0.0, "Time since mode or rolling last changed"),
+        memory("samples", "1", 0.0, "Readings since the start"),
+    )
+    parameters = (
+        parameter(
+            "disturbance_bound", "m/s2", 0.1, "Growth of the speed error while the model runs alone, delta", min=0.0
+        ),
+        parameter("odometer_noise", "m/s", 0.15, "Bound of the odometer's noise and quantisation", min=0.0),
+        parameter("acceleration_limit", "m/s2", 1.5, "Largest acceleration of a train whose wheels roll", min=0.0),
+        parameter("recover_samples", "1", 2.0, "Samples in a row that agree before the odometer is believed", min=1.0),
+        parameter("hold_limit", "s", 15.0, "Longest time for which the model runs alone", min=0.0),
+        parameter("trust_time", "s", 20.0, "Time of rolling after which an unconfirmed odometer is believed", min=0.0),
+        parameter("settle_samples", "1", 5.0, "Samples with a small residual before faults are judged", min=1.0),
+        parameter("fault_limit", "1", 3.0, "Faults in a row without a small residual between them", min=1.0),
+        parameter("sign_rule", "1", 1.0, "1: jams only while braking, skids only while driving", min=0.0, max=1.0),
+        parameter("way_share", "1", 0.01, "Error of the odometer's way that a balise allows, a share of it", min=0.0),
+        parameter("way_floor", "m", 1.0, "Error of the odometer's way that a balise always allows", min=0.0),
+        parameter("way_time", "s", 1.0, "Shortest time between balises for the odometer's way to be judged", min=1e-3),
+    )
+
+    def at_sample(self, before: tuple[Array, ...], told: Reading, p: Any) -> Judgement:
+        """Judge an odometer sample; it takes effect at once.
+
+        Args:
+            before: memory, in the order of `memory`. told: the sample. p: parameters, as in `HybridSystem.flow`.
+        """
+        m = RuleMemory(*before)
+        rolls = _is(np.abs(told.odometer - m.last_odometer) <= rolling_limit(p)) * _is(m.samples > 0.0)
+        held, open_ = _is(m.mode == HELD), _is(m.mode == UNCONFIRMED)
+        size = np.abs(told.residual)
+        small = _is(size <= 0.5 * p.threshold)
+        impossible = _is(size > p.threshold) * _impossible(told, p)
+        # followed: when are faults judged, and does one begin
+        settled = np.where(held > 0.0, 0.0, np.where(small > 0.0, m.settled + 1.0, 0.0))
+        passed = _is((m.samples + ROUNDING) * p.odometer_period >= p.arming_delay)
+        faults = np.where(_is(settled >= p.settle_samples) * passed > 0.0, 0.0, m.faults)
+        armed = _is(m.mode == TRUSTED) * _is(faults < p.fault_limit) * passed
+        onset = armed * _is(size > p.threshold) * (1.0 - impossible)
+        # held: is the odometer believed again
+        hold = np.where(held > 0.0, m.hold_time + p.odometer_period, 0.0)
+        agrees = held * _is(size <= agreement_limit(hold, p))
+        row = np.where(agrees > 0.0, np.where(rolls > 0.0, m.agreeing + 1.0, 1.0), 0.0)
+        believed = held * np.maximum(_is(row >= p.recover_samples), impossible)
+        expired = held * (1.0 - believed) * _is(hold + ROUNDING >= p.hold_limit)
+        # unconfirmed: has the wheel rolled for long
+        quiet = np.where(open_ * rolls * small > 0.0, m.agreeing + 1.0, 0.0)
+        trusted = open_ * _is((quiet + ROUNDING) * p.odometer_period >= p.trust_time) * _is(settled >= p.settle_samples)
+        jumped = open_ * (1.0 - rolls)
+        mode = np.where(
+            onset > 0.0, HELD, np.where(expired > 0.0, UNCONFIRMED, np.where(believed + trusted > 0.0, TRUSTED, m.mode))
+        )
+        changed = np.maximum(_is(mode != m.mode), jumped)
+        after = RuleMemory(
+            mode,
+            np.where(mode == HELD, hold, 0.0),
+            np.where(changed > 0.0, 0.0, np.where(held > 0.0, row, quiet)),
+            np.where(onset > 0.0, 0.0, settled),
+            np.where(trusted > 0.0, 0.0, np.where(expired > 0.0, UNSETTLED, faults + onset)),
+            told.odometer,
+            np.where(changed > 0.0, 0.0, m.unchanged_time + p.odometer_period),
+            m.samples + 1.0,
+        )
+        return Judgement(tuple(after), np.maximum(np.maximum(believed, expired), jumped), onset, 0.0 * size)
+
+    def at_balise(self, before: tuple[Array, ...], told: Passing, p: Any) -> Judgement:
+        """Judge the way between two balises, where nothing changed on it.
+
+        Args:
+            before: memory, in the order of `memory`. told: the way. p: parameters, as in `HybridSystem.flow`.
+        """
+        m = RuleMemory(*before)
+        clean = told.known * _is(told.duration >= p.way_time) * _is(m.unchanged_time >= told.duration)
+        right = _is(np.abs(told.way - np.abs(told.distance)) <= way_limit(told, p))
+        confirmed, refuted = clean * right, clean * (1.0 - right)
+        held, open_ = _is(m.mode == HELD), _is(m.mode == UNCONFIRMED)
+        mode = np.where(refuted > 0.0, HELD, np.where(confirmed * (held + open_) > 0.0, TRUSTED, m.mode))
+        changed = _is(mode != m.mode)
+        begun = refuted * (1.0 - held)
+        # Mean error of the speed over the way; what is left of it grew within the way, half as long as that at most.
+        shift = np.where(
+            refuted > 0.0, (np.abs(told.distance) - told.believed) / np.maximum(told.duration, p.way_time), 0.0
+        )
+        after = RuleMemory(
+            mode,
+            np.where(refuted > 0.0, 0.5 * told.duration, np.where(changed > 0.0, 0.0, m.hold_time)),
+            np.where(changed > 0.0, 0.0, m.agreeing),
+            np.where(changed > 0.0, 0.0, m.settled),
+            np.where(confirmed * changed > 0.0, UNSETTLED, m.faults + begun),
+            m.last_odometer,
+            np.where(changed > 0.0, 0.0, m.unchanged_time),
+            m.samples,
+        )
+        return Judgement(tuple(after), confirmed * held, begun, shift)
+
+    def fault(self, memory: tuple[Array, ...]) -> Array:
+        """1 while the odometer is judged to lie or is not confirmed.
+
+        Args:
+            memory: in the order of the signals.
+        """
+        return _is(RuleMemory(*memory).mode > TRUSTED)
+
+    def discarded(self, memory: tuple[Array, ...]) -> Array:
+        """1 while the estimate must not follow the odometer.
+
+        Args:
+            memory: in the order of the signals.
+        """
+        return _is(RuleMemory(*memory).mode == HELD)
+
+    def recovering(self, memory: tuple[Array, ...]) -> Array:
+        """1 while samples agree, and while the odometer is followed without being confirmed.
+
+        Args:
+            memory: in the order of the signals.
+        """
+        m = RuleMemory(*memory)
+        return np.maximum(_is(m.mode == UNCONFIRMED), _is(m.mode == HELD) * _is(m.agreeing > 0.0))
+
+    def limit(self, memory: tuple[Array, ...], p: Any) -> Array:
+        """Residual beyond which the odometer is doubted, or, while it is held to lie, within which it agrees [m/s].
+
+        Args:
+            memory: in the order of the signals. p: parameters.
+        """
+        return agreement_limit(RuleMemory(*memory).hold_time, p)
+
+
+def agreement_limit(hold_time: Array, p: Any) -> Array:
+    """Residual within which a held odometer agrees [m/s]: ``eps + M delta T``.
+
+    Args:
+        hold_time: for which the model has run alone, T [s]. p: parameters.
+    """
+    return p.threshold + p.residual_gain * p.disturbance_bound * hold_time
+
+
+def rolling_limit(p: Any) -> Array:
+    """Largest change between two readings of a rolling wheel [m/s]: ``a_max period + 2 noise``.
+
+    Args:
+        p: parameters.
+    """
+    return p.acceleration_limit * p.odometer_period + 2.0 * p.odometer_noise
+
+
+def way_limit(told: Passing, p: Any) -> Array:
+    """Difference between the odometer's way and the distance that a balise allows [m].
+
+    A held reading is late by a period at most, which costs the period times the change of speed.
+
+    Args:
+        told: the way. p: parameters.
+    """
+    late = p.odometer_period * np.abs(told.speed_change)
+    return p.way_floor + told.accuracy + p.way_share * np.abs(told.distance) + late
+
+
+def _impossible(told: Reading, p: Any) -> Array:
+    """1 where neither a jam nor a skid can be the reason: a braked wheel too fast, a driven one too slow."""
+    too_fast = _is(told.odometer > told.speed)
+    braked, driven = _is(told.effort < 0.0), _is(told.effort > 0.0)
+    return _is(p.sign_rule > 0.5) * (braked * too_fast + driven * (1.0 - too_fast))
+
+
+def _is(condition: Array) -> Array:
+    return np.where(condition, 1.0, 0.0)

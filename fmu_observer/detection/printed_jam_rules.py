@@ -1,0 +1,121 @@
+"""The jam rules as printed: Aguiar Cota 2019, Algorithm 3-3. Pure functions.
+
+They can stay on for ever: while the odometer is discarded nothing corrects the estimate, and where the reading only
+falls, as in a braking, no rule fires that believes it again.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fmu_observer.detection.jam_rules import ROUNDING, Judgement, Passing, Reading
+from plant_models.hybrid import memory, parameter
+from plant_models.hybrid.system import Array
+
+
+class PrintedMemory(NamedTuple):
+    """Memory of `PrintedRules`, in the order of their signals."""
+
+    fault: Array
+    recovering: Array
+    next_fault: Array
+    next_recovering: Array
+    last_odometer: Array
+    samples: Array
+
+
+class PrintedRules:
+    """Algorithm 3-3 with ``|r|`` for r: (3.59) is negative in a jam.
+
+    States N, F (measurement diverging), R (converging again); with the sample ``v_k`` and the estimate ``vh``
+
+    1. ``|r| > eps`` and ``vh > v_k``: F = 1, N = 0
+    2. F = 1 and ``v_{k-1} < v_k``: R = 1
+    3. R = 1 and ``v_{k-1} > v_k``: R = F = 0, N = 1
+    4. N = 1 and ``v_{k-1} < v_k``: R = F = 1, N = 0 (parameter `rule_4`)
+    5. N = 0 and ``v_k = 0``: F = 1, N = 0
+
+    New values take effect at the next sample. Rule 4 calls a noisy reading a fault: with a deceleration of 0.9 m/s2
+    samples 0.2 s apart fall by 0.18 m/s, and noise of 0.05 m/s makes some of them rise. No rule is applied before
+    `arming_delay` [ours; the print has none].
+    """
+
+    memory = (
+        memory("fault_state", "1", 0.0, "F of Algorithm 3-3, in force"),
+        memory("recovering_state", "1", 0.0, "R of Algorithm 3-3, in force"),
+        memory("next_fault_state", "1", 0.0, "F from the next sample on"),
+        memory("next_recovering_state", "1", 0.0, "R from the next sample on"),
+        memory("last_odometer", "m/s", 0.0, "Reading before"),
+        memory("samples", "1", 0.0, "Readings since the start"),
+    )
+    parameters = (parameter("rule_4", "1", 1.0, "1 where rule 4 is applied", min=0.0, max=1.0),)
+
+    def at_sample(self, before: tuple[Array, ...], told: Reading, p: Any) -> Judgement:
+        """Judge an odometer sample; it takes effect at the next one.
+
+        Args:
+            before: memory, in the order of `memory`. told: the sample. p: parameters, as in `HybridSystem.flow`.
+        """
+        m = PrintedMemory(*before)
+        fault, recovering = m.next_fault, m.next_recovering  # in force from this sample on
+        y, last = told.odometer, m.last_odometer
+        known = _is(m.samples > 0.0)
+        rises, falls = known * _is(last < y), known * _is(last > y)
+        first = _is(np.abs(told.residual) > p.threshold) * _is(told.speed > y)
+        fourth = (1.0 - fault) * rises * _is(p.rule_4 > 0.5)
+        new_fault, new_recovering = np.where(first > 0.0, 1.0, fault), np.where(fault * rises > 0.0, 1.0, recovering)
+        done = recovering * falls
+        new_fault, new_recovering = np.where(done > 0.0, 0.0, new_fault), np.where(done > 0.0, 0.0, new_recovering)
+        new_fault = np.where(fourth > 0.0, 1.0, new_fault)
+        new_recovering = np.where(fourth > 0.0, 1.0, new_recovering)
+        new_fault = np.where(fault * _is(y == 0.0) > 0.0, 1.0, new_fault)
+        armed = _is((m.samples + ROUNDING) * p.odometer_period >= p.arming_delay)
+        after = PrintedMemory(fault, recovering, armed * new_fault, armed * new_recovering, y, m.samples + 1.0)
+        return Judgement(tuple(after), 0.0 * y, 0.0 * y, 0.0 * y)
+
+    def at_balise(self, before: tuple[Array, ...], told: Passing, p: Any) -> Judgement:
+        """Nothing: the printed rules know no balises.
+
+        Args:
+            before: memory. told: the way. p: parameters.
+        """
+        none = 0.0 * told.duration
+        return Judgement(tuple(before), none, none, none)
+
+    def fault(self, memory: tuple[Array, ...]) -> Array:
+        """1 while F is in force.
+
+        Args:
+            memory: in the order of the signals.
+        """
+        return PrintedMemory(*memory).fault
+
+    def discarded(self, memory: tuple[Array, ...]) -> Array:
+        """The same: the odometer is discarded while F is in force.
+
+        Args:
+            memory: in the order of the signals.
+        """
+        return PrintedMemory(*memory).fault
+
+    def recovering(self, memory: tuple[Array, ...]) -> Array:
+        """1 while R is in force.
+
+        Args:
+            memory: in the order of the signals.
+        """
+        return PrintedMemory(*memory).recovering
+
+    def limit(self, memory: tuple[Array, ...], p: Any) -> Array:
+        """eps [m/s], always.
+
+        Args:
+            memory: in the order of the signals. p: parameters.
+        """
+        return p.threshold + 0.0 * memory[0]
+
+
+def _is(condition: Array) -> Array:
+    return np.where(condition, 1.0, 0.0)

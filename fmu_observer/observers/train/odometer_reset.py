@@ -1,0 +1,50 @@
+"""The plainest train observer: the odometer, integrated, and reset at balises. What all others are compared with."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fmu_observer.observers.gated_observer import GatedObserver
+from fmu_observer.observers.innovation_gate import WARN
+from fmu_observer.observers.train.train_observer import BALISE, POSITION
+from plant_models.hybrid import input_signal, memory, output_signal, vector
+from plant_models.hybrid.system import Array
+
+
+class OdometerReset(GatedObserver):
+    """Sensor only: ``dp = y``, and ``p = p_B`` at a balise: Aguiar Cota 2019, section 3.3.2.
+
+    The speed is the odometer's. A jam makes the position lag until the next balise, a skid makes it lead. It believes
+    every balise (its `gate` starts as 1: doubted ones are used and counted), for whoever has only an odometer cannot
+    say which of the two lies.
+    """
+
+    name = "odometer_reset"
+    description = "Integrated odometer, reset at balises"
+    source = "Aguiar Cota 2019, section 3.3.2"
+    internal_step = 1e-2  # the flow is exact for a held input, whatever the step
+    gate_start = WARN
+    states = (POSITION, memory("last_innovation", "m", 0.0, "Position error seen at the last balise"))
+    inputs = (input_signal("odometer", "m/s", 0.0, "Odometer speed"),)
+    outputs = (
+        output_signal("position", "m", "Position of the odometer"),
+        output_signal("speed", "m/s", "Speed of the odometer", display_unit="km/h"),
+        output_signal("innovation", "m", "Estimated minus true position at the last balise", variability="discrete"),
+    )
+    events = (BALISE,)
+
+    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """The odometer's speed, shape (1,)."""
+        return vector(u.odometer + 0.0 * x[0])
+
+    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """The position is that of the balise."""
+        return vector(u.balise_position + 0.0 * x[0], x[0] - u.balise_position)
+
+    def odometer_of(self, u: Any) -> Array:
+        """The odometer [m/s]."""
+        return u.odometer
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """Position, speed and innovation."""
+        return {"position": x[0], "speed": u.odometer, "innovation": x[1]}

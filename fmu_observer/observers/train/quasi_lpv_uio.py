@@ -1,0 +1,255 @@
+"""The quasi-LPV proportional-integral unknown-input observer, which stops following an odometer that lies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import inf
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fmu_observer.certificates import Certificate
+from fmu_observer.certificates.polytope import polytope_stability
+from fmu_observer.design.quasi_lpv_published import SECTION_3_3_4, SECTION_5_3_1, QuasiLpvDesign, quasi_lpv_vertices
+from fmu_observer.detection.jam_detector import FAULT_OUTPUTS, ODOMETER_SAMPLE, RULES, RuleChoice, find_rules, verdict
+from fmu_observer.detection.jam_rules import SHARED_PARAMETERS, Passing, Reading
+from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.gated_observer import GatedObserver
+from fmu_observer.observers.train.train_observer import BALISE, POSITION
+from plant_models.hybrid import Signal, input_signal, memory, output_signal, parameter, state, vector
+from plant_models.hybrid.system import Array
+
+P, V, D, RATE, WAY = range(5)  # continuous states
+HELD, LAST_D, LAST_RATE, INNOVATION, BALISE_TIME, BALISE_PLACE, BALISE_ODOMETER, BALISES = range(5, 13)
+HORIZON = 20.0  # [s], of the certificate, as of the others; what holds, holds for every gap
+OPEN_BOUND = 1e3  # [m]: where the odometer is followed unconfirmed, no balise is doubted
+
+SPEED = state("estimated_speed", "m/s", 0.0, "Estimate of the train speed")
+OWN_MEMORY = (
+    memory("held_odometer", "m/s", 0.0, "Last reading of the odometer"),
+    memory("last_disturbance", "m/s2", 0.0, "Disturbance at the sample before"),
+    memory("last_disturbance_rate", "m/s3", 0.0, "Its rate then"),
+    memory("last_innovation", "m", 0.0, "Position error seen at the last balise"),
+    memory("balise_stamp", "s", 0.0, "When the last balise was passed"),
+    memory("balise_place", "m", 0.0, "Where it was"),
+    memory("balise_reading", "m/s", 0.0, "Odometer then"),
+    memory("balises_used", "1", 0.0, "Balises used so far"),
+)
+
+
+def _preset(design: QuasiLpvDesign) -> dict[str, Any]:
+    return {
+        "davis_a": design.davis_a,
+        "davis_b": design.davis_b,
+        "davis_c": design.davis_c,
+        "gain_low": design.gain_low,
+        "gain_high": design.gain_high,
+        "schedule_min": design.low,
+        "schedule_max": design.high,
+        "residual_gain": design.residual_gain,
+        "threshold": design.threshold,
+    }
+
+
+class QuasiLpvUio(GatedObserver, GapCertified):
+    """Speed, position and unknown resistance from an odometer that may lie: Aguiar Cota 2019, (3.36)-(3.45), section
+    3.3.2.
+
+    ``dp = v``, ``dv = F/M - a/M - (b + c z) v / M - d + K_1 i``, ``dd = d' + K_2 i``, ``dd' = K_3 i`` with the
+    innovation ``i = y_k - v``, y_k the odometer held since its last sample and z the speed of the scheduling: y_k. The
+    gain is ``h_1 K(low) + h_2 K(high)``, ``h_1 = (high - z) / (high - low)``, within [0, 1]. d is a deceleration by all
+    that the model does not know: gradient, missing brake effort, wrong coefficients. At a balise ``p = p_B``.
+
+    The residual ``M (y_k - v)`` is judged at each odometer sample by the rules of the jam detector. While they say that
+    the odometer lies, i = 0.
+
+    * ``rules="printed"``: Algorithm 3-3, with its latch-up (`PrintedRules`); d goes on with its rate d'.
+    * ``rules="repaired"`` [ours]: recovery from every state (`RepairedRules`). With the onset of a fault d and d' are
+      set back to the sample before, which may have been spoilt already; then d is held, and z is the estimate. When the
+      odometer is believed again the speed is set to it, and d is kept. From one balise to the next the ways of odometer
+      and estimate are compared with the distance.
+
+    The resistance and a brake are dry friction on the estimated speed: they stop the train and never push it back.
+
+    Args:
+        rules: ``repaired`` or ``printed``.
+
+    Presets, per unit mass, so that efforts are m/s2: `as_published` (default), the gains of section 3.3.4, whose
+    coefficients are 20 % below those of the train; `as_published_5_3_1`, those of the validation. Nothing printed is
+    unstable; what is repaired are the rules, which are an option. The arming delay of 6 s is ours.
+    """
+
+    name = "quasi_lpv_uio"
+    description = "Quasi-LPV unknown-input observer with jam detection and balise reset"
+    source = "Aguiar Cota 2019, (3.36)-(3.45), Algorithm 3-3, section 3.3.2; the repaired rules ours"
+    internal_step = 1e-2
+    frictions = (SPEED.name,)
+    events = (BALISE, ODOMETER_SAMPLE)
+    inputs: tuple[Signal, ...] = (
+        input_signal("effort", "N", 0.0, "Effort as commanded: traction positive, brake negative"),
+        input_signal("odometer", "m/s", 0.0, "Odometer speed"),
+    )
+    outputs = (
+        output_signal("position", "m", "Estimated position"),
+        output_signal("speed", "m/s", "Estimated speed", display_unit="km/h"),
+        output_signal("innovation", "m", "Estimated minus true position at the last balise", variability="discrete"),
+        output_signal("disturbance", "m/s2", "Estimated deceleration by what the model does not know"),
+        output_signal("residual", "m/s", "M times odometer minus estimated speed"),
+        *FAULT_OUTPUTS,
+    )
+    presets: Mapping[str, Mapping[str, Any]] = {
+        "as_published": _preset(SECTION_3_3_4),
+        "as_published_5_3_1": _preset(SECTION_5_3_1),
+    }
+    default_preset = "as_published"
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"rules": tuple(RULES)}
+
+    def __init__(self, rules: RuleChoice = "repaired") -> None:
+        self.rules = find_rules(self.name, rules)
+        self.repaired = rules == "repaired"
+        self.states = (
+            POSITION,
+            SPEED,
+            state("unknown_deceleration", "m/s2", 0.0, "Deceleration by what the model does not know, d"),
+            state("unknown_deceleration_rate", "m/s3", 0.0, "Its rate d'"),
+            state("odometer_way", "m", 0.0, "Way of the odometer since the last balise"),
+            *OWN_MEMORY,
+            *self.rules.memory,
+        )
+        low, high = SECTION_3_3_4.gain_low, SECTION_3_3_4.gain_high
+        self.parameters = (
+            parameter("mass", "kg", 1.0, "Train mass; 1 for efforts per unit mass", min=1e-6),
+            parameter("davis_a", "N", SECTION_3_3_4.davis_a, "Running resistance, constant term", min=0.0),
+            parameter("davis_b", "N.s/m", SECTION_3_3_4.davis_b, "Running resistance, linear term"),
+            parameter("davis_c", "N.s2/m2", SECTION_3_3_4.davis_c, "Running resistance, quadratic term"),
+            parameter("gain_low", "1", low, "Gain at schedule_min, in 1/s, 1/s2 and 1/s3", size=3),
+            parameter("gain_high", "1", high, "Gain at schedule_max, in 1/s, 1/s2 and 1/s3", size=3),
+            parameter("schedule_min", "m/s", 0.0, "Speed of the lower vertex"),
+            parameter("schedule_max", "m/s", 50.0, "Speed of the upper vertex"),
+            *SHARED_PARAMETERS,
+            *self.rules.parameters,
+        )
+        super().__init__(rules=rules)
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """The vertices are apart."""
+        apart = {"schedule_max must be above schedule_min": np.where(p.schedule_max > p.schedule_min, 1.0, 0.0)}
+        return super().requirements(p) | apart
+
+    # -- equations --------------------------------------------------------------------------------------------------
+
+    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Derivatives of position, speed, disturbance, its rate and the odometer's way, shape (5,)."""
+        lies = self.rules.discarded(self._rule_memory(x))
+        z = np.where(lies > 0.0, x[V], x[HELD]) if self.repaired else x[HELD]
+        h = np.clip((p.schedule_max - z) / (p.schedule_max - p.schedule_min), 0.0, 1.0)
+        gain = [h * p.gain_low[i] + (1.0 - h) * p.gain_high[i] for i in range(3)]
+        innovation = (1.0 - lies) * (x[HELD] - x[V])
+        drag = (p.davis_b + p.davis_c * z) * x[V]
+        acceleration = (np.maximum(u.effort, 0.0) - drag) / p.mass - x[D] + gain[0] * innovation
+        runs_on = 1.0 - lies if self.repaired else 1.0
+        return vector(x[V], acceleration, runs_on * x[RATE] + gain[1] * innovation, gain[2] * innovation, x[HELD])
+
+    def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Constant resistance and brake [m/s2], shape (1,)."""
+        return vector((p.davis_a + np.maximum(-u.effort, 0.0)) / p.mass)
+
+    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """An odometer sample is judged and held; a balise gives the position and a judgement of the way."""
+        return self._at_balise(t, x, u, p) if event == BALISE.name else self._at_sample(x, u, p)
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """The estimate, the residual and the verdict."""
+        return {
+            "position": x[P],
+            "speed": x[V],
+            "innovation": x[INNOVATION],
+            "disturbance": x[D],
+            "residual": p.residual_gain * (x[HELD] - x[V]),
+        } | verdict(self.rules, self._rule_memory(x), p)
+
+    def own_bound(self, x: Array, p: Any) -> Array:
+        """While the odometer is not believed no balise is to be doubted: it is what the speed is corrected by."""
+        return OPEN_BOUND * self.rules.fault(self._rule_memory(x))
+
+    def odometer_of(self, u: Any) -> Array:
+        """The odometer [m/s]."""
+        return u.odometer
+
+    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+        """Certificate of the error ``[p, v, d, d']`` at both vertices, changing between them at any time."""
+        found = polytope_stability(speed_errors(p))
+        radius = float(np.abs(np.exp(found.abscissa * max_gap)))
+        model = (
+            f"error of speed, disturbance and its rate at both vertices ({float(p.schedule_min):g} and "
+            f"{float(p.schedule_max):g} m/s), changing between them at any time; a balise ends the position error. "
+            f"What the speed changes while a reading is held, {float(p.odometer_period):g} s, is an input to it, "
+            "whatever the period; times at which the odometer is not believed, and standstill, are left out"
+        )
+        limit = inf if found.holds else 0.0
+        return Certificate(
+            max_gap=max_gap,
+            horizon=max(HORIZON, max_gap),
+            constant_limit=inf if found.abscissa < 0.0 else 0.0,
+            aperiodic_limit=limit,
+            spectral_radius=radius,
+            quadratic_margin=found.margin,
+            holds=found.holds,
+            error_model=model,
+            notes=(f"the speed error falls at least as exp(-{found.decay:.3g} t)",) if found.holds else (),
+            lyapunov_matrix=tuple(tuple(map(float, row)) for row in found.lyapunov_matrix),
+        )
+
+    def deciding_parameters(self) -> tuple[Signal, ...]:
+        """Gains, vertices and coefficients."""
+        deciding = ("gain_low", "gain_high", "schedule_min", "schedule_max", "davis_b", "davis_c", "mass")
+        return tuple(s for s in self.parameter_signals if s.name in deciding)
+
+    # -- internals --------------------------------------------------------------------------------------------------
+
+    def _at_sample(self, x: Array, u: Any, p: Any) -> Array:
+        own = [x[i] for i in range(BALISES + 1)]
+        told = Reading(u.odometer, x[V], p.residual_gain * (u.odometer - x[V]), u.effort)
+        judged = self.rules.at_sample(self._rule_memory(x), told, p)
+        own[V] = np.where(judged.restart > 0.0, u.odometer, x[V])
+        own[D] = np.where(judged.onset > 0.0, x[LAST_D], x[D])
+        own[RATE] = np.where(judged.onset > 0.0, x[LAST_RATE], x[RATE])
+        own[HELD], own[LAST_D], own[LAST_RATE] = u.odometer, own[D], own[RATE]
+        return vector(*own, *judged.memory)
+
+    def _at_balise(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        own = [x[i] for i in range(BALISES + 1)]
+        told = Passing(
+            t - x[BALISE_TIME],
+            u.balise_position - x[BALISE_PLACE],
+            x[WAY],
+            x[P] - x[BALISE_PLACE],
+            x[HELD] - x[BALISE_ODOMETER],
+            2.0 * np.maximum(u.balise_location_accuracy, 0.0),
+            # Exactly on the balise: the gate has restarted the position there, and the way before it says nothing.
+            np.where(x[BALISES] > 0.0, np.where(x[P] == u.balise_position, 0.0, 1.0), 0.0),
+        )
+        judged = self.rules.at_balise(self._rule_memory(x), told, p)
+        own[V] = np.maximum(np.where(judged.restart > 0.0, x[HELD], x[V]) + judged.shift, 0.0)
+        own[P], own[WAY], own[INNOVATION] = u.balise_position, 0.0 * x[WAY], x[P] - u.balise_position
+        own[BALISE_TIME], own[BALISE_PLACE], own[BALISE_ODOMETER] = t, u.balise_position, x[HELD]
+        own[BALISES] = x[BALISES] + 1.0
+        return vector(*own, *judged.memory)
+
+    def _rule_memory(self, x: Array) -> tuple[Array, ...]:
+        return tuple(x[BALISES + 1 + i] for i in range(len(self.rules.memory)))
+
+
+def speed_errors(p: Any) -> np.ndarray:
+    """``A_i - K_i C`` of speed, disturbance and its rate at both vertices, shape (2, 3, 3): (3.45).
+
+    Args:
+        p: parameters, as in `HybridSystem.flow`.
+    """
+    mass = float(p.mass)
+    drifts = quasi_lpv_vertices(
+        float(p.davis_b) / mass, float(p.davis_c) / mass, float(p.schedule_min), float(p.schedule_max)
+    )
+    gains = np.stack([np.asarray(p.gain_low, float), np.asarray(p.gain_high, float)])
+    drifts[:, :, 0] -= gains
+    return drifts
