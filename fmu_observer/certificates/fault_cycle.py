@@ -70,8 +70,9 @@ class FaultCycle:
 
     @property
     def steady_error(self) -> np.ndarray:
-        """``inv(A) B u*``, shape (n,): the error at which v10 ends up; in a PI observer all of it is in the disturbance,
-        so the residual shows a fault only for a while.
+        """``inv(A) B u*``, shape (n,): the error at which v10 ends up.
+
+        In a PI observer all of it is in the disturbance, so the residual shows a fault only for a while.
         """
         return np.asarray(np.linalg.solve(self.error_matrix, self.effort_column * self.effort))
 
@@ -143,8 +144,8 @@ class FaultCycle:
     def printed_next_start(self, start_error: np.ndarray, decay: float) -> float:
         """The dwell time (3.32) as printed [s], for comparison: it follows the fault backwards to t_k.
 
-        ``t_k + (1/m) ln(beta |e(t_k) + phi(t_k) u*| / |e(t_k)|)``: phi holds exponentials of negative times, which for a
-        pole at -50 grow as e^{50 t}. A cycle of half a second makes ``|phi u*|`` 1e15, and the dwell time tens of
+        ``t_k + (1/m) ln(beta |e(t_k) + phi(t_k) u*| / |e(t_k)|)``: phi holds exponentials of negative times, which for
+        a pole at -50 grow as e^{50 t}. A cycle of half a second makes ``|phi u*|`` 1e15, and the dwell time tens of
         seconds.
 
         Args:
