@@ -42,6 +42,7 @@ class FaultDetection:
         end_delays: from its end to the end of the detection [s]; infinite where that was still on when the run ended.
         time_outside: time for which it was on without a fault, false alarms and late ends together [s].
         position_errors: estimate minus true position at the last row before each balise [m].
+        tells: whether it says anything of faults; where it does not, the position errors alone mean something.
     """
 
     observer: str
@@ -54,6 +55,7 @@ class FaultDetection:
     end_delays: tuple[float, ...]
     time_outside: float
     position_errors: tuple[float, ...]
+    tells: bool = True
 
     @property
     def missed(self) -> int:
@@ -100,7 +102,9 @@ class FaultDetection:
 
 
 def fault_detection(result: Result, spec: ReportSpec) -> list[FaultDetection]:
-    """What every observer with the output `odometer_fault` said of the faults, from the start of the evaluation on.
+    """What every observer said of the faults by its output `odometer_fault`, from the start of the evaluation on.
+
+    Observers without that output are compared by their position.
 
     Args:
         result: the run.
@@ -114,8 +118,9 @@ def fault_detection(result: Result, spec: ReportSpec) -> list[FaultDetection]:
         return []
     start = max(float(result.time[0]), spec.evaluate_after)
     faults = [f for f in intervals(result.time, true) if f[0] >= start]
-    told = ((observer, estimate(result, observer, DETECTION)) for observer in spec.observers)
-    return [_judged(result, spec, observer, values, faults, start) for observer, values in told if values is not None]
+    told = {observer: estimate(result, observer, DETECTION) for observer in spec.observers}
+    seen = [o for o in told if told[o] is not None or estimate(result, o, "position") is not None]
+    return [_judged(result, spec, observer, told[observer], faults, start) for observer in seen]
 
 
 def judged_detections(
@@ -216,10 +221,10 @@ def clopper_pearson(count: int, trials: int, level: float = LEVEL) -> Interval:
 
 
 def _judged(
-    result: Result, spec: ReportSpec, observer: str, told: np.ndarray, faults: list[Interval], start: float
+    result: Result, spec: ReportSpec, observer: str, told: np.ndarray | None, faults: list[Interval], start: float
 ) -> FaultDetection:
     end = float(result.time[-1])
-    detections = [d for d in intervals(result.time, told) if d[1] > start]
+    detections = [] if told is None else [d for d in intervals(result.time, told) if d[1] > start]
     begun = [d for d in detections if d[0] >= start or any(d[1] > a for a, _ in faults)]
     starts, ends, false = judged_detections(faults, begun, end)
     inside = sum(max(0.0, min(b, d) - max(a, c)) for a, b in faults for c, d in begun)
@@ -235,6 +240,7 @@ def _judged(
         tuple(ends),
         max(outside, 0.0),
         tuple(position_errors(result, spec, observer)),
+        told is not None,
     )
 
 

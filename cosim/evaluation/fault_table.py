@@ -45,6 +45,9 @@ def cells(found: FaultDetection) -> list[str]:
     """
     share = found.missed_interval
     sizes = [abs(error) for error in found.position_errors]
+    positions = [error_number(fmean(sizes)) if sizes else DASH, error_number(max(sizes)) if sizes else DASH]
+    if not found.tells:
+        return [str(found.faults), *[DASH] * (len(HEADINGS) - 3), *positions]
     return [
         str(found.faults),
         str(found.missed),
@@ -54,8 +57,7 @@ def cells(found: FaultDetection) -> list[str]:
         number(fmean(found.start_delays)) if found.start_delays else DASH,
         _end(found.end_delays),
         number(found.time_outside),
-        error_number(fmean(sizes)) if sizes else DASH,
-        error_number(max(sizes)) if sizes else DASH,
+        *positions,
     ]
 
 

@@ -76,7 +76,7 @@ def detection_measures(outcome: Outcome) -> dict[str, float]:
     measures: dict[str, float] = {}
     for found in fault_detection(outcome.result, outcome.spec):
         sizes = np.abs(found.position_errors)
-        numbers = {
+        told = {
             "faults": found.faults,
             "missed_faults": found.missed,
             "detections": found.detections,
@@ -85,9 +85,9 @@ def detection_measures(outcome: Outcome) -> dict[str, float]:
             "detection_delay": _mean(found.start_delays),
             "recovery_delay": _mean(found.end_delays),
             "false_alarm_time": found.time_outside,
-            "balise_error": _mean(sizes),
-            "balise_error_max": float(sizes.max()) if sizes.size else nan,
         }
+        largest = float(sizes.max()) if sizes.size else nan
+        numbers = (told if found.tells else {}) | {"balise_error": _mean(sizes), "balise_error_max": largest}
         failed = outcome.failure is not None
         measures |= {f"{found.observer}.{name}": nan if failed else float(v) for name, v in numbers.items()}
     return measures
