@@ -23,15 +23,6 @@ class WarningVariable(ModelVariable):
         super().__init__(**attributes)
         self.warning = warning
 
-    # A copy would hold the attributes that the base declares, and no other.
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**super().__getstate__(), "warning": self.warning}
-
-    def __setstate__(self, values: dict[str, Any]) -> None:
-        super().__setstate__(values)
-        self.warning = values["warning"]
-
     @classmethod
     def of(cls, variable: ModelVariable, warning: OutputWarning) -> WarningVariable:
         """A variable with the attributes of another one.
