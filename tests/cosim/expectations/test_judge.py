@@ -48,7 +48,7 @@ BOUNDS = [
     (0.25, {"from": 6.0}, True, 0.4, 6.0, "at most 40 % of the bound"),
     (0.25, {"from": 5.0}, False, 2.0, 5.0, "broken at 1 of 7 rows, 0.5000 m/s of 0.2500 m/s (worst at 5 s)"),
     (0.0, {}, False, np.finfo(float).max, 0.0, "broken at 12 of 12 rows"),
-    (-1.0, {"from": 9.0}, False, np.finfo(float).max, 9.0, "broken at 2 of 2 rows"),
+    (-1.0, {"from": 6.0}, False, np.finfo(float).max, 6.0, "broken at 5 of 5 rows"),
     (math.inf, {}, True, 0.0, 0.0, "at most 0 % of the bound"),
     (math.nan, {}, False, math.inf, 0.0, "not a number"),
 ]
