@@ -1,13 +1,17 @@
-"""Warnings after a run: what became of telegrams, what components logged and changed for the whole program. Changes
-nothing.
+"""Warnings after a run: what became of telegrams, what components logged and changed for the whole program, what their
+outputs warn of. Changes nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence, Set
 
+import numpy as np
+
 from cosim.components.component import Component
 from cosim.results.result import BaliseRecord
+from fmu_observer.warning_variable import declared_warnings
+from plant_models.hybrid.output_warning import OutputWarning
 
 DOUBTS = {"doubted": "used what it doubted", "ignored": "ignored what it doubted"}
 NAMED_DOUBTS = 5
@@ -15,14 +19,20 @@ LOGGED_FAULTS = frozenset({"discard", "error", "fatal"})
 
 
 def warnings_after(
-    components: Mapping[str, Component], telegrams: Sequence[BaliseRecord], changed_in_steps: Set[str]
+    components: Mapping[str, Component],
+    telegrams: Sequence[BaliseRecord],
+    changed_in_steps: Set[str],
+    table: np.ndarray,
 ) -> Iterator[str]:
     """Texts that warn of what happened on the way.
 
     Args:
         components: by name. telegrams: everything that was passed. changed_in_steps: what FMUs changed for the whole
-            program.
+            program. table: rows of the run, fields `component.signal`, in the components' own units.
     """
+    for name, component in components.items():
+        for signal, warning in declared_warnings(component.description).items():
+            yield from _declared(table, name, signal, warning)
     yield from _trespasses(components, changed_in_steps)
     for name, component in components.items():
         rejected = (component.outcomes() or {}).get("rejected", 0)
@@ -35,6 +45,28 @@ def warnings_after(
         if wrong:
             counts = ", ".join(f"{count} of status {status}" for status, count in wrong.items())
             yield f"{name} logged {counts}; the last says: {component.messages.reason}"
+
+
+def _declared(table: np.ndarray, name: str, signal: str, warning: OutputWarning) -> Iterator[str]:
+    """What an output warns of, with the instant of the first row that is not zero and the values there."""
+    column = f"{name}.{signal}"
+    if column not in (table.dtype.names or ()) or not len(table):
+        return
+    values = np.asarray(table[column], dtype=float)
+    raised = np.flatnonzero(values != 0.0)
+    if warning.at_end:
+        raised = raised[raised == len(values) - 1]
+    if not len(raised):
+        return
+    time, first = np.asarray(table["time"], dtype=float), raised[0]
+    shown = [other for other in warning.shows if f"{name}.{other}" in table.dtype.names]
+    told = ", ".join(f"{other} = {float(table[f'{name}.{other}'][first]):.6g}" for other in shown)
+    beside = f" ({told})" if told else ""
+    if warning.at_end:
+        yield f"{name}: {warning.text}; seen at the end, {time[-1]:.6g} s{beside}."
+        return
+    seconds = float(np.diff(time)[values[:-1] != 0.0].sum())
+    yield f"{name}: {warning.text}; first at {time[first]:.6g} s{beside}, for {seconds:.3g} s in all."
 
 
 def _trespasses(components: Mapping[str, Component], in_steps: Set[str]) -> Iterator[str]:

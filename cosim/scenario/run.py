@@ -25,6 +25,7 @@ from cosim.diagnostics.call_log import CallLog
 from cosim.diagnostics.messages import in_order
 from cosim.errors import CosimError
 from cosim.evaluation.balise_gaps import gap_errors
+from cosim.evaluation.fault_detection import fault_detection
 from cosim.evaluation.result_warnings import result_warnings
 from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.expectations.check import check_expectations
@@ -243,7 +244,7 @@ class _Setup:
         spec, (table, signals) = self._report_spec(), self._in_si()
         for warning in result_warnings(Result(table, signals, failure=failure), spec):
             self._warn(warning)
-        for warning in warnings_after(self.components, events, changed_in_steps):
+        for warning in warnings_after(self.components, events, changed_in_steps, self._as_recorded()):
             self._warn(warning)
         if self.call_log is not None and self.call_log.broken is not None:
             self._warn(self.call_log.broken)
@@ -252,14 +253,16 @@ class _Setup:
             "warnings": self.warnings,
             "notes": self.notes,
         }
+        if faults := fault_detection(Result(table, signals, events, failure=failure), spec):
+            summary["fault_detection"] = [found.to_data() for found in faults]
+        if (gaps := gap_errors(Result(table, signals, events, failure=failure), spec)).errors:
+            summary["balise_gaps"] = gaps.to_data()
         summary["report"] = asdict(spec)  # so that the folder tells which signal plays which role
         if interruption.came:
             failure = failure or INTERRUPTED
         messages = in_order(component.messages for component in self.components.values())
         result = Result(table, signals, events, summary, failure, messages)
         outcome = Outcome(result, spec, tuple(self.table.report.tables))
-        gaps = gap_errors(result, spec)
-        outcome = outcome.with_summary(balise_gaps=gaps.to_data()) if gaps.errors else outcome
         return outcome.with_summary(expectations=[judged.to_data() for judged in judge(self.table, outcome)])
 
     def close(self) -> None:

@@ -17,6 +17,7 @@ RULES: Mapping[str, Rules] = {"repaired": RepairedRules(), "printed": PrintedRul
 FAULT_OUTPUTS = (
     output_signal("odometer_fault", "1", "1 while the odometer is judged to lie, else 0", variability="discrete"),
     output_signal("recovering", "1", "1 while it begins to be believed again, else 0", variability="discrete"),
+    output_signal("residual_limit", "m/s", "Size of the residual at which the verdict changes", variability="discrete"),
 )
 ODOMETER_SAMPLE = PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read")
 
@@ -33,6 +34,19 @@ def find_rules(name: str, rules: str) -> Rules:
     if rules not in RULES:
         raise ValueError(f"{name}: unknown rules {rules!r}; use 'repaired' or 'printed'.")
     return RULES[rules]
+
+
+def verdict(rules: Rules, memory: tuple[Array, ...], p: Any) -> dict[str, Array]:
+    """Values of `FAULT_OUTPUTS`.
+
+    Args:
+        rules: that judge. memory: in the order of their signals. p: parameters, as in `HybridSystem.flow`.
+    """
+    return {
+        "odometer_fault": rules.fault(memory),
+        "recovering": rules.recovering(memory),
+        "residual_limit": rules.limit(memory, p),
+    }
 
 
 class JamDetector(HybridSystem):
@@ -88,7 +102,7 @@ class JamDetector(HybridSystem):
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """Verdict and recovery."""
         memory = self._memory(x)
-        return {"odometer_fault": self.rules.fault(memory), "recovering": self.rules.recovering(memory)}
+        return verdict(self.rules, memory, p)
 
     def _memory(self, x: Array) -> tuple[Array, ...]:
         return tuple(x[i] for i in range(self.state_count))

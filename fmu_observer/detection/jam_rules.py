@@ -49,7 +49,7 @@ class Passing(NamedTuple):
     Args:
         duration: time since that balise [s]. distance: between the two [m]. way: integral of the odometer [m].
         believed: integral of the estimated speed [m]. speed_change: of the odometer from one to the other [m/s].
-        known: 1 where there was a balise before.
+        accuracy: of the distance [m]. known: 1 where there was a balise before.
     """
 
     duration: Array
@@ -57,6 +57,7 @@ class Passing(NamedTuple):
     way: Array
     believed: Array
     speed_change: Array
+    accuracy: Array
     known: Array
 
 
@@ -100,6 +101,9 @@ class Rules(Protocol):
 
     def recovering(self, memory: tuple[Array, ...]) -> Array:
         """1 while it begins to be believed again."""
+
+    def limit(self, memory: tuple[Array, ...], p: Any) -> Array:
+        """Residual at which the verdict changes [m/s]."""
 
 
 class RuleMemory(NamedTuple):
@@ -164,6 +168,7 @@ class RepairedRules:
         parameter("sign_rule", "1", 1.0, "1: jams only while braking, skids only while driving", min=0.0, max=1.0),
         parameter("way_share", "1", 0.01, "Error of the odometer's way that a balise allows, a share of it", min=0.0),
         parameter("way_floor", "m", 1.0, "Error of the odometer's way that a balise always allows", min=0.0),
+        parameter("way_time", "s", 1.0, "Shortest time between balises for the odometer's way to be judged", min=1e-3),
     )
 
     def at_sample(self, before: tuple[Array, ...], told: Reading, p: Any) -> Judgement:
@@ -217,7 +222,7 @@ class RepairedRules:
             before: memory, in the order of `memory`. told: the way. p: parameters, as in `HybridSystem.flow`.
         """
         m = RuleMemory(*before)
-        clean = told.known * _is(told.duration > 0.0) * _is(m.unchanged_time >= told.duration)
+        clean = told.known * _is(told.duration >= p.way_time) * _is(m.unchanged_time >= told.duration)
         right = _is(np.abs(told.way - np.abs(told.distance)) <= way_limit(told, p))
         confirmed, refuted = clean * right, clean * (1.0 - right)
         held, open_ = _is(m.mode == HELD), _is(m.mode == UNCONFIRMED)
@@ -225,7 +230,9 @@ class RepairedRules:
         changed = _is(mode != m.mode)
         begun = refuted * (1.0 - held)
         # Mean error of the speed over the way; what is left of it grew within the way, half as long as that at most.
-        shift = np.where(refuted > 0.0, (np.abs(told.distance) - told.believed) / _positive(told.duration), 0.0)
+        shift = np.where(
+            refuted > 0.0, (np.abs(told.distance) - told.believed) / np.maximum(told.duration, p.way_time), 0.0
+        )
         after = RuleMemory(
             mode,
             np.where(refuted > 0.0, 0.5 * told.duration, np.where(changed > 0.0, 0.0, m.hold_time)),
@@ -263,6 +270,14 @@ class RepairedRules:
         m = RuleMemory(*memory)
         return np.maximum(_is(m.mode == UNCONFIRMED), _is(m.mode == HELD) * _is(m.agreeing > 0.0))
 
+    def limit(self, memory: tuple[Array, ...], p: Any) -> Array:
+        """Residual beyond which the odometer is doubted, or, while it is held to lie, within which it agrees [m/s].
+
+        Args:
+            memory: in the order of the signals. p: parameters.
+        """
+        return agreement_limit(RuleMemory(*memory).hold_time, p)
+
 
 def agreement_limit(hold_time: Array, p: Any) -> Array:
     """Residual within which a held odometer agrees [m/s]: ``eps + M delta T``.
@@ -290,7 +305,8 @@ def way_limit(told: Passing, p: Any) -> Array:
     Args:
         told: the way. p: parameters.
     """
-    return p.way_floor + p.way_share * np.abs(told.distance) + p.odometer_period * np.abs(told.speed_change)
+    late = p.odometer_period * np.abs(told.speed_change)
+    return p.way_floor + told.accuracy + p.way_share * np.abs(told.distance) + late
 
 
 def _impossible(told: Reading, p: Any) -> Array:
@@ -298,10 +314,6 @@ def _impossible(told: Reading, p: Any) -> Array:
     too_fast = _is(told.odometer > told.speed)
     braked, driven = _is(told.effort < 0.0), _is(told.effort > 0.0)
     return _is(p.sign_rule > 0.5) * (braked * too_fast + driven * (1.0 - too_fast))
-
-
-def _positive(value: Array) -> Array:
-    return np.where(value > 0.0, value, 1.0)
 
 
 def _is(condition: Array) -> Array:

@@ -11,7 +11,9 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from fmpy.model_description import BaseUnit, ModelDescription, ModelVariable, Unit, Unknown
 
+from fmu_observer.warning_variable import WarningVariable
 from fmus.content.characters import check_text, number_text
+from plant_models.hybrid.output_warning import ANNOTATION, ELEMENT
 
 _CAPABILITIES_2 = {
     "canHandleVariableCommunicationStepSize": "canHandleVariableCommunicationStepSize",
@@ -177,6 +179,8 @@ def _variable_2(parent: Element, variable: ModelVariable, exchanged: bool) -> No
     # its index, see FIRST_REFERENCE
     derivative = None if variable.derivative is None else variable.derivative.valueReference
     _element(element, variable.type, _values(variable, exchanged) | {"derivative": derivative})
+    if isinstance(variable, WarningVariable):
+        _warning(SubElement(SubElement(element, "Annotations"), "Tool", name=ANNOTATION), variable)
 
 
 def _variable_3(parent: Element, variable: ModelVariable, exchanged: bool) -> None:
@@ -189,7 +193,17 @@ def _variable_3(parent: Element, variable: ModelVariable, exchanged: bool) -> No
     else:
         derivative = None if variable.derivative is None else variable.derivative.valueReference
         attributes |= {"initial": variable.initial, **_values(variable, exchanged), "derivative": derivative}
-    _element(parent, variable.type, attributes)
+    element = _element(parent, variable.type, attributes)
+    if isinstance(variable, WarningVariable):
+        _warning(SubElement(SubElement(element, "Annotations"), "Annotation", type=ANNOTATION), variable)
+
+
+def _warning(parent: Element, variable: WarningVariable) -> None:
+    """What an output warns of, see `plant_models.hybrid.output_warning`."""
+    warning = variable.warning
+    check_text(warning.text, f"modelDescription.xml: the warning of {variable.name!r}")
+    attributes = {"shows": " ".join(warning.shows) or None, "atEnd": "true" if warning.at_end else None}
+    _element(parent, ELEMENT, attributes).text = warning.text
 
 
 def _values(variable: ModelVariable, exchanged: bool) -> dict[str, object]:

@@ -11,6 +11,10 @@ from xml.etree import ElementTree
 from fmpy import read_model_description
 from fmpy.model_description import ModelDescription, ModelVariable, Unknown, ValidationError
 
+from fmu_observer.warning_variable import WarningVariable
+from fmus.fmi.standard import OWN_TOOL
+from plant_models.hybrid.output_warning import ANNOTATION, ELEMENT, OutputWarning
+
 FILE = "modelDescription.xml"
 LEFT_OUT = {
     "providesDirectionalDerivatives": "providesDirectionalDerivative",
@@ -65,6 +69,8 @@ def read_description(source: Path) -> ModelDescription:
             variables[entry.get("name")].intermediateUpdate = entry.get("intermediateUpdate") in TRUE
         for entry in root.iterfind("ModelVariables/Clock"):
             _complete_clock(variables[entry.get("name")], entry)
+    if description.generationTool == OWN_TOOL:
+        _complete_warnings(description, ElementTree.fromstring(_text(source)))
     return description
 
 
@@ -94,6 +100,23 @@ def _complete_clock(clock: ModelVariable, entry: ElementTree.Element) -> None:
         text = entry.get(name)
         if text is not None:
             setattr(clock, name, convert(text))
+
+
+def _complete_warnings(description: ModelDescription, root: ElementTree.Element) -> None:
+    """What outputs warn of, which the FMUs of this package say in annotations."""
+    warnings = {}
+    for entry in root.iterfind("ModelVariables/*"):
+        for place in (f"Tool[@name='{ANNOTATION}']", f"Annotation[@type='{ANNOTATION}']"):
+            found = entry.find(f"Annotations/{place}/{ELEMENT}")
+            if found is not None and found.text:
+                shows, at_end = tuple(found.get("shows", "").split()), found.get("atEnd") in TRUE
+                warnings[entry.get("name")] = OutputWarning(found.text, shows, at_end)
+    for i, variable in enumerate(description.modelVariables):
+        if variable.name in warnings:
+            description.modelVariables[i] = made = WarningVariable.of(variable, warnings[variable.name])
+            for unknown in (*description.outputs, *description.initialUnknowns):
+                if unknown.variable is variable:
+                    unknown.variable = made
 
 
 def declared_tolerance(description: ModelDescription) -> float | None:

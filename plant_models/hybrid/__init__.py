@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from plant_models.hybrid.event import CommunicationEvent, Event, PeriodicEvent, TriggeredEvent
+from plant_models.hybrid.output_warning import OutputWarning
 from plant_models.hybrid.resource import Resource
 from plant_models.hybrid.signal import (
     Signal,
@@ -32,6 +33,7 @@ __all__ = [
     "Event",
     "HybridSystem",
     "NumpyKernel",
+    "OutputWarning",
     "PeriodicEvent",
     "Resource",
     "Runtime",

@@ -1,7 +1,7 @@
 """Signals: the names, units and attributes of everything that crosses a boundary.
 
 A `Signal` uses FMI's own words, so that a model description is a transcription and not a translation.
-This file imports nothing but the standard library.
+This file imports nothing but the warning that an output may carry.
 """
 
 from __future__ import annotations
@@ -10,6 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from keyword import iskeyword
 from typing import Literal
+
+from plant_models.hybrid.output_warning import OutputWarning
 
 Causality = Literal["input", "output", "parameter", "local"]
 Variability = Literal["fixed", "tunable", "discrete", "continuous"]
@@ -32,11 +34,12 @@ class Signal:
         size: None for a scalar, else the number of elements of a vector, named ``name[1]`` ... ``name[size]``.
         display_unit: unit to show at the user's edge, e.g. ``km/h``.
         integer: a whole number to the outside; only a discrete output can be one.
+        warning: what is told after a run in which the value was not zero; of scalar outputs only.
 
     Raises:
-        ValueError: the name is not an identifier or is a keyword, the start does not fit the size, or an integer is no
+        ValueError: the name is not an identifier or is a keyword, the start does not fit the size, an integer is no
         discrete
-            output.
+            output, or something else than a scalar output warns.
     """
 
     name: str
@@ -50,10 +53,13 @@ class Signal:
     size: int | None = None
     display_unit: str | None = None
     integer: bool = False
+    warning: OutputWarning | None = None
 
     def __post_init__(self) -> None:
         if self.integer and (self.causality, self.variability) != ("output", "discrete"):
             raise ValueError(f"Signal {self.name!r} is an integer; only a discrete output can be one.")
+        if self.warning is not None and (self.causality != "output" or self.size is not None):
+            raise ValueError(f"Signal {self.name!r} has a warning; only a scalar output can have one.")
         if not self.name.isidentifier():
             raise ValueError(f"Signal name {self.name!r} is not a legal identifier: use letters, digits and '_'.")
         if iskeyword(self.name) or self.name.startswith("_"):  # it becomes a field of the named tuples `u` and `p`
@@ -141,6 +147,7 @@ def output_signal(
     display_unit: str | None = None,
     size: int | None = None,
     integer: bool = False,
+    warning: OutputWarning | None = None,
 ) -> Signal:
     """An output, computed from time, state, input and parameters.
 
@@ -148,8 +155,9 @@ def output_signal(
         name: of the signal. unit: SI, as FMI writes units (``m/s2``). description: one line.
         variability: FMI's word. display_unit: for the user's edge. size: number of elements, None for a scalar.
         integer: whether the FMU shows it as an integer variable.
+        warning: what is told after a run in which the value was not zero; None for nothing.
     """
-    return Signal(name, unit, "output", variability, 0.0, None, None, description, size, display_unit, integer)
+    return Signal(name, unit, "output", variability, 0.0, None, None, description, size, display_unit, integer, warning)
 
 
 def parameter(

@@ -337,6 +337,7 @@ class HybridSystem:
         variabilities = [s.variability for s in self.states]
         if variabilities != sorted(variabilities):  # "continuous" sorts before "discrete"
             raise ValueError(f"{where}: list continuous states before memory.")
+        self._check_warnings(where)
         scalars = {s.name for s in self.parameters if s.size is None}
         for event in self.periodic_events:
             for reference in filter(None, (event.period, event.offset)):
@@ -366,6 +367,15 @@ class HybridSystem:
                         f"{where}: {signal.name!r} is listed in {attribute} but has causality {signal.causality!r}, "
                         f"expected {causality!r}."
                     )
+
+    def _check_warnings(self, where: str) -> None:
+        outputs = {s.name for s in self.outputs if s.size is None}
+        for signal in self.outputs:
+            unknown = [] if signal.warning is None else sorted(set(signal.warning.shows) - outputs)
+            if unknown:
+                raise ValueError(
+                    f"{where}: the warning of {signal.name!r} is to show {', '.join(unknown)}; expected scalar outputs."
+                )
 
     def _check_event_prefixes(self, where: str) -> None:
         """A master finds the payload of an event by its prefix; nothing else that it sees may begin so."""

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from observer_bench import Bench, SteadyMotion
+from observer_bench import MASS, Bench, SteadyMotion
 
 from fmu_observer import OBSERVERS
 from fmu_observer.observers.gated_observer import GatedObserver
@@ -45,7 +45,7 @@ def bench_of(make: Callable[[], GatedObserver], gate: float = REJECT, **paramete
     exact |= {"adhesion_deceleration": -(0.575**2) / 225.0 * MOTION.effort(0.0)}
     bench.set("x", {name: value for name, value in exact.items() if name in names})
     fed = {
-        "effort": MOTION.effort(0.0),
+        "effort": effort_for(system),
         "odometer": v,
         "measured_odometer": v,
         "net_effort": MOTION.effort(0.0) - 900.0,
@@ -54,6 +54,12 @@ def bench_of(make: Callable[[], GatedObserver], gate: float = REJECT, **paramete
     bench.runtime.start(0.0)
     run(bench, 5)
     return bench
+
+
+def effort_for(system: GatedObserver) -> float:
+    """Effort of the steady motion [N], for the mass that the observer believes in."""
+    masses = [s.start_values[0] for s in system.parameters if s.name == "mass"]
+    return MOTION.effort(0.0) * (masses[0] / MASS if masses else 1.0)
 
 
 def run(bench: Bench, count: int, offsets: dict[int, float] | None = None) -> list[int]:
@@ -203,8 +209,10 @@ def test_a_false_telegram_told_twice_is_one(make: Callable[[], GatedObserver]) -
 def test_a_start_50_m_off_is_no_reason_to_doubt(name: str) -> None:
     ends = []
     for gate in (OFF, REJECT):
-        bench = Bench(MAKERS[name](), preset=PRESETS.get(name), gate=gate)
-        bench.set("u", {"effort": MOTION.effort(0.0), "odometer": MOTION.speed})
+        system = MAKERS[name]()
+        bench = Bench(system, preset=PRESETS.get(name), gate=gate)
+        fed = {"effort": effort_for(system), "odometer": MOTION.speed}
+        bench.set("u", {n: value for n, value in fed.items() if n in scalar_names(system.input_signals)})
         bench.runtime.x[:2] = -50.0, MOTION.speed
         bench.runtime.start(0.0)
         assert run(bench, 30) == [USED] * 30

@@ -118,6 +118,7 @@ def report_page(
         counts=counts,
         telegrams=run_tables.telegrams_table(counts.outcomes, spec.labels),
         indicators=run_tables.indicators_table(result, spec),
+        faults=run_tables.faults_table(result, spec),
         components=run_tables.components_table(result),
         compiled=was_compiled(result),
         calls=run_tables.calls_table(result),

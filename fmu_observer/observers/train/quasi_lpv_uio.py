@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import inf
 from typing import Any, ClassVar
 
 import numpy as np
 
-from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampled_error
+from fmu_observer.certificates import Certificate
+from fmu_observer.certificates.polytope import polytope_stability
 from fmu_observer.design.quasi_lpv_published import SECTION_3_3_4, SECTION_5_3_1, QuasiLpvDesign, quasi_lpv_vertices
-from fmu_observer.detection.jam_detector import FAULT_OUTPUTS, ODOMETER_SAMPLE, RULES, RuleChoice, find_rules
+from fmu_observer.detection.jam_detector import FAULT_OUTPUTS, ODOMETER_SAMPLE, RULES, RuleChoice, find_rules, verdict
 from fmu_observer.detection.jam_rules import SHARED_PARAMETERS, Passing, Reading
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
@@ -19,6 +21,7 @@ from plant_models.hybrid.system import Array
 
 P, V, D, RATE, WAY = range(5)  # continuous states
 HELD, LAST_D, LAST_RATE, INNOVATION, BALISE_TIME, BALISE_PLACE, BALISE_ODOMETER, BALISES = range(5, 13)
+HORIZON = 20.0  # [s], of the certificate, as of the others; what holds, holds for every gap
 OPEN_BOUND = 1e3  # [m]: where the odometer is followed unconfirmed, no balise is doubted
 
 SPEED = state("estimated_speed", "m/s", 0.0, "Estimate of the train speed")
@@ -157,16 +160,13 @@ class QuasiLpvUio(GatedObserver, GapCertified):
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """The estimate, the residual and the verdict."""
-        rules = self._rule_memory(x)
         return {
             "position": x[P],
             "speed": x[V],
             "innovation": x[INNOVATION],
             "disturbance": x[D],
             "residual": p.residual_gain * (x[HELD] - x[V]),
-            "odometer_fault": self.rules.fault(rules),
-            "recovering": self.rules.recovering(rules),
-        }
+        } | verdict(self.rules, self._rule_memory(x), p)
 
     def own_bound(self, x: Array, p: Any) -> Array:
         """While the odometer is not believed no balise is to be doubted: it is what the speed is corrected by."""
@@ -178,19 +178,27 @@ class QuasiLpvUio(GatedObserver, GapCertified):
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate of the error ``[p, v, d, d']`` at both vertices, changing between them at any time."""
-        davis_b, davis_c = float(p.davis_b) / float(p.mass), float(p.davis_c) / float(p.mass)
-        drifts = quasi_lpv_vertices(davis_b, davis_c, float(p.schedule_min), float(p.schedule_max))
-        vertices = tuple(
-            _error(A, np.asarray(K, float)) for A, K in zip(drifts, (p.gain_low, p.gain_high), strict=True)
-        )
+        found = polytope_stability(speed_errors(p))
+        radius = float(np.abs(np.exp(found.abscissa * max_gap)))
         model = (
-            f"error of position, speed, disturbance and its rate at both vertices ({float(p.schedule_min):g} and "
-            f"{float(p.schedule_max):g} m/s), changing between them at any time; a balise ends the position error; "
-            f"what the speed changes while a reading is held, {float(p.odometer_period):g} s, is an input to it, "
-            "whatever the "
-            "period; times at which the odometer is not believed, and standstill, are left out"
+            f"error of speed, disturbance and its rate at both vertices ({float(p.schedule_min):g} and "
+            f"{float(p.schedule_max):g} m/s), changing between them at any time; a balise ends the position error. "
+            f"What the speed changes while a reading is held, {float(p.odometer_period):g} s, is an input to it, "
+            "whatever the period; times at which the odometer is not believed, and standstill, are left out"
         )
-        return certify_sampled_error(vertices, max_gap, model, switching=True)
+        limit = inf if found.holds else 0.0
+        return Certificate(
+            max_gap=max_gap,
+            horizon=max(HORIZON, max_gap),
+            constant_limit=inf if found.abscissa < 0.0 else 0.0,
+            aperiodic_limit=limit,
+            spectral_radius=radius,
+            quadratic_margin=found.margin,
+            holds=found.holds,
+            error_model=model,
+            notes=(f"the speed error falls at least as exp(-{found.decay:.3g} t)",) if found.holds else (),
+            lyapunov_matrix=tuple(tuple(map(float, row)) for row in found.lyapunov_matrix),
+        )
 
     def deciding_parameters(self) -> tuple[Signal, ...]:
         """Gains, vertices and coefficients."""
@@ -217,7 +225,9 @@ class QuasiLpvUio(GatedObserver, GapCertified):
             x[WAY],
             x[P] - x[BALISE_PLACE],
             x[HELD] - x[BALISE_ODOMETER],
-            np.where(x[BALISES] > 0.0, 1.0, 0.0),
+            2.0 * np.maximum(u.balise_location_accuracy, 0.0),
+            # Exactly on the balise: the gate has restarted the position there, and the way before it says nothing.
+            np.where(x[BALISES] > 0.0, np.where(x[P] == u.balise_position, 0.0, 1.0), 0.0),
         )
         judged = self.rules.at_balise(self._rule_memory(x), told, p)
         own[V] = np.maximum(np.where(judged.restart > 0.0, x[HELD], x[V]) + judged.shift, 0.0)
@@ -230,8 +240,16 @@ class QuasiLpvUio(GatedObserver, GapCertified):
         return tuple(x[BALISES + 1 + i] for i in range(len(self.rules.memory)))
 
 
-def _error(drift: np.ndarray, gain: np.ndarray) -> ImpulsiveError:
-    generator = np.zeros((4, 4))
-    generator[0, 1], generator[1:, 1:] = 1.0, drift
-    generator[1:, 1] -= gain
-    return ImpulsiveError.of(generator, np.diag([0.0, 1.0, 1.0, 1.0]), (0, 1, 2, 3))
+def speed_errors(p: Any) -> np.ndarray:
+    """``A_i - K_i C`` of speed, disturbance and its rate at both vertices, shape (2, 3, 3): (3.45).
+
+    Args:
+        p: parameters, as in `HybridSystem.flow`.
+    """
+    mass = float(p.mass)
+    drifts = quasi_lpv_vertices(
+        float(p.davis_b) / mass, float(p.davis_c) / mass, float(p.schedule_min), float(p.schedule_max)
+    )
+    gains = np.stack([np.asarray(p.gain_low, float), np.asarray(p.gain_high, float)])
+    drifts[:, :, 0] -= gains
+    return drifts

@@ -30,13 +30,12 @@ class GivenFaults:
             parameter("fault_onset", "s", 0.0, "Instant at which each fault begins", size=count),
             parameter("fault_length", "s", 0.0, "Length of each fault; 0 where it is not used", min=0.0, size=count),
             parameter("fault_depth", "1", 1.0, "Depth of each fault, 0 none to 1 full", min=0.0, max=1.0, size=count),
-            parameter("fault_kind", "1", -1.0, "Kind of each fault: -1 jam, 1 skid", min=-1.0, max=1.0, size=count),
+            parameter("fault_kind", "1", -1.0, "Kind of each fault: -1 jam, 1 skid", size=count),
         )
         self.continuous: tuple[Signal, ...] = (
             state("released_for", "s", 0.0, "For how long the brake was released in each jam", size=count),
         )
         self.remembered: tuple[Signal, ...] = ()
-        self.frictions: tuple[str, ...] = ()
         self.switchings: tuple[str, ...] = tuple(
             f"fault_{edge}[{i + 1}]" for edge in ("from", "to", "freed") for i in range(count)
         )
@@ -61,14 +60,6 @@ class GivenFaults:
         """
         released = braking_stopped(u)
         return [released * self._active(i, passed) * one_where(p.fault_kind[i] < 0.0) for i in range(self.count)]
-
-    def friction(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
-        """None.
-
-        Args:
-            t: time [s]. s: states of the cause. u: inputs. p: parameters.
-        """
-        return []
 
     def switching(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
         """See `FaultCause.switching`.
@@ -101,7 +92,7 @@ class GivenFaults:
         needed: dict[str, Array] = {}
         for i in faults:
             text = f"fault {i + 1} is neither jam nor skid: fault_kind[{i + 1}] must be -1 (jam) or 1 (skid)"
-            needed[text] = one_where(np.abs(p.fault_kind[i]) == 1.0)
+            needed[text] = one_where(np.abs(np.abs(p.fault_kind[i]) - 1.0) < 1e-3)
         for i in faults[1:]:
             text = (
                 f"fault {i + 1} overlaps one before it in the list: move fault_onset[{i + 1}] or shorten "

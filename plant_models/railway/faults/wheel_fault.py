@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid import HybridSystem, OutputWarning, input_signal, output_signal, parameter, state, vector
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
@@ -74,7 +74,17 @@ class WheelFault(HybridSystem):
         output_signal("active", "1", "1 while the wheel jams or skids"),
         output_signal("depth", "1", "Share of the speed that is missing (jam < 0) or too much (skid > 0)"),
         output_signal("effort_loss", "1", "Share of the effort that does not reach the rail"),
-        output_signal("faults_unfinished", "1", "Number of given faults that are not over yet"),
+        output_signal(
+            "faults_unfinished",
+            "1",
+            "Number of given faults that are not over yet",
+            warning=OutputWarning(
+                "a given fault is not over when the run ends: a fault_length goes beyond the end, or a fault_onset "
+                "lies there; shorten the fault, or let the run go on",
+                ("faults_unfinished",),
+                at_end=True,
+            ),
+        ),
     )
     presets: Mapping[str, Mapping[str, Any]] = {}
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
@@ -91,8 +101,7 @@ class WheelFault(HybridSystem):
         )
         self.parameters = (*_SHARED, *self._cause.parameters)
         self.states = (_DISTANCE, *self._cause.continuous, *self._cause.remembered)
-        self.frictions, self.switchings = self._cause.frictions, self._cause.switchings
-        self.events = self._cause.events
+        self.switchings, self.events = self._cause.switchings, self._cause.events
         super().__init__(cause=cause, fault_count=fault_count)
 
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
@@ -101,10 +110,6 @@ class WheelFault(HybridSystem):
         return vector(
             u.speed * (1.0 + self._cause.fault(t, s, passed, u, p).depth), *self._cause.rates(t, s, passed, u, p)
         )
-
-    def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Dry friction on the states of the cause, shape (len(frictions),)."""
-        return vector(*self._cause.friction(t, self._states(x), u, p))
 
     def switching(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Switching functions of the cause."""

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter
+from plant_models.hybrid import HybridSystem, OutputWarning, input_signal, output_signal, parameter
 from plant_models.hybrid.signal import Signal
 from plant_models.hybrid.system import Array
 from plant_models.railway.adhesion.adhesion_table import STANDING_ADHESION, adhesion_coefficient
@@ -63,10 +63,19 @@ class LongitudinalForces(HybridSystem):
         output_signal("resistance_force", "N", "Davis resistance, against the motion"),
         output_signal("gradient_force", "N", "Downhill pull as a resistance, uphill > 0"),
         output_signal("adhesion_limit", "N", "Largest force that the rails can take"),
-        output_signal("outside_fitted_range", "1", "1 where the speed is outside the range of the Davis coefficients"),
+        output_signal(
+            "outside_fitted_range",
+            "1",
+            "1 where the speed is outside the range of the Davis coefficients",
+            warning=OutputWarning(
+                "the train left the speeds from fitted_from to fitted_to in which its Davis coefficients hold, and a "
+                "set with davis_c < 0 pulls it at high speed: take another set, or set the range that you accept",
+                ("speed", "resistance_force"),
+            ),
+        ),
     )
     presets: Mapping[str, Mapping[str, Any]] = {}
-    default_preset = "set_d"
+    default_preset = "set_a"
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
         "zones": ("position", "time"),
         "zone_count": range(1, 65),
@@ -147,13 +156,13 @@ class LongitudinalForces(HybridSystem):
 def _vehicle(railway: str) -> tuple[Signal, ...]:
     return (
         parameter("mass", "kg", 1.0, "Mass of the train; 1 where forces are per unit mass", min=1e-3),
-        parameter("traction_coefficient", "1", 1.0, "Force of one newton of traction demanded, b_T", min=0.0),
-        parameter("brake_coefficient", "1", 1.0, "Force of one newton of brake demanded, b_B", min=0.0),
-        parameter("davis_a", "N", 0.46, "Running resistance, constant part; dry friction", min=0.0),
-        parameter("davis_b", "N.s/m", 5.7e-3, "Running resistance, viscous part"),
-        parameter("davis_c", "N.s2/m2", -2.4e-4, "Running resistance, aerodynamic part; may be negative in a fit"),
+        parameter("traction_coefficient", "1", 0.1, "Force of one newton of traction demanded, b_T", min=0.0),
+        parameter("brake_coefficient", "1", 0.1, "Force of one newton of brake demanded, b_B", min=0.0),
+        parameter("davis_a", "N", 0.01, "Running resistance, constant part; dry friction", min=0.0),
+        parameter("davis_b", "N.s/m", 0.1, "Running resistance, viscous part"),
+        parameter("davis_c", "N.s2/m2", 0.001, "Running resistance, aerodynamic part; may be negative in a fit"),
         parameter(
-            "fitted_from", "m/s", 5.0, "Lowest speed of the fit of the Davis coefficients", min=0.0, display_unit="km/h"
+            "fitted_from", "m/s", 0.0, "Lowest speed of the fit of the Davis coefficients", min=0.0, display_unit="km/h"
         ),
         parameter(
             "fitted_to", "m/s", 50.0, "Highest speed of the fit of the Davis coefficients", min=0.0, display_unit="km/h"

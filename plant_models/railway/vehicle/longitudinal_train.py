@@ -34,9 +34,9 @@ class LongitudinalTrain(LongitudinalForces):
     `adhesion_limit` is what the rails can take, ``N delta0 / (1 + 0.01 v)`` (2.7), times the level of adhesion. It does
     not bound the effort here: what follows from too much effort is the matter of `wheel_fault`.
 
-    Presets: `set_a` (section 3.2.3), `set_b` (3.3.4), `set_c` (4.3.4), `set_d` (default; Table 5.1, low adhesion LoA),
-    `set_e` (bad adhesion BaA), `set_f` (extremely bad adhesion EBA), `scenario_3_3_4` (set B with its grade, at
-    45 m/s). The levels of adhesion of D, E, F (0.5, 0.3, 0.1) are ours.
+    Presets: `set_a` (default; section 3.2.3, where ``b_T = b_B = 0.1``), `set_b` (3.3.4), `set_c` (4.3.4), `set_d`
+    (Table 5.1, low adhesion LoA), `set_e` (bad adhesion BaA), `set_f` (extremely bad adhesion EBA), `scenario_3_3_4`
+    (set B with its grade, at 45 m/s). The levels of adhesion of D, E, F (0.5, 0.3, 0.1) are ours.
 
     Args:
         zones: zones of degraded adhesion along ``position`` or ``time``.
@@ -54,7 +54,7 @@ class LongitudinalTrain(LongitudinalForces):
     name = "longitudinal_train"
     description = "Train as one point per unit mass: effort in, position, speed and adhesion limit out"
     source = "Aguiar Cota 2019, (2.1)-(2.8), (2.26)-(2.28), Tables 2.1 and 5.1"
-    internal_step = 1e-2  # the fastest time constant, 1 / davis_b, is 10 s
+    internal_step = 2e-3  # a stop is placed within 2e-6 m per m/s2 of braking; the motion would allow 10 ms
     states = (
         state("train_position", "m", 0.0, "Position of the train at start"),
         state("train_speed", "m/s", 0.0, "Speed of the train at start"),

@@ -46,18 +46,20 @@ class LongitudinalTrainEuler(LongitudinalForces):
     states = (
         memory("train_position", "m", 0.0, "Position of the train at start"),
         memory("train_speed", "m/s", 0.0, "Speed of the train at start"),
+        memory("updating", "1", 0.0, "1 from the start on, where nothing is updated yet"),
     )
     own_parameters = (parameter("update_period", "s", 0.05, "Time between two updates Dt", min=1e-6),)
-    events = (PeriodicEvent("update", "update_period", "update_period", description="The state is updated"),)
+    events = (PeriodicEvent("update", "update_period", description="The state is updated"),)
     presets: Mapping[str, Mapping[str, Any]] = TRAIN_PRESETS
 
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Position and speed one period later, shape (2,) or (2, members)."""
+        """Position and speed one period later, shape (3,) or (3, members)."""
         before = t - p.update_period
         forces = self._forces(before, x[0], x[1], u, p)
-        pushed = x[1] + p.update_period * forces.push / p.mass
-        dry = p.update_period * (p.davis_a + forces.brake) / p.mass
-        return vector(x[0] + p.update_period * x[1], np.sign(pushed) * np.maximum(np.abs(pushed) - dry, 0.0))
+        h = p.update_period * x[2]
+        pushed = x[1] + h * forces.push / p.mass
+        dry = h * (p.davis_a + forces.brake) / p.mass
+        return vector(x[0] + h * x[1], np.sign(pushed) * np.maximum(np.abs(pushed) - dry, 0.0), 1.0)
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """The declared outputs."""

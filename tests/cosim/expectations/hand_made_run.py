@@ -18,7 +18,7 @@ TIME = np.array([0.0, 1, 2, 3, 4, 5, 5, 6, 7, 8, 9, 10])
 """Every second [s], with an event at 5 s."""
 AFTER = np.arange(12) >= 6
 """Rows from the one after the event on."""
-UNITS = {"speed": "m/s", "position": "m", "slip": "1", "adhesion_force": "N", "indicator": "1"}
+UNITS = {"speed": "m/s", "position": "m", "slip": "1", "adhesion_force": "N", "indicator": "1", "bound": "m/s"}
 
 
 def columns() -> dict[str, np.ndarray]:

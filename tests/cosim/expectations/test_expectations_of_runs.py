@@ -57,6 +57,14 @@ WRONG = [
         {"check": "difference", "signal": "locomotive.speed", "reference": "locomotive.position", "max": 1.0},
         "dimensions",
     ),
+    (
+        {"check": "bound", "signal": "observer.speed", "reference": "locomotive.speed", "bound": "observer.position"},
+        "dimensions",
+    ),
+    (
+        {"check": "bound", "signal": "observer.speed", "reference": "locomotive.speed", "bound": "observer.speeed"},
+        "did you mean 'speed'",
+    ),
     ({"check": "telegrams", "missed": 0, "of": "driver"}, "is told of no telegrams"),
     ({"check": "certificate", "of": "locomotive"}, "is told of no telegrams"),
     ({"check": "certificate", "of": "lok"}, "no observer 'lok'"),

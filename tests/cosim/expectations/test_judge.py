@@ -38,6 +38,42 @@ ERRORS = [
 ]
 
 
+BOUND = {"check": "bound", "signal": "observer.speed", "reference": "train.speed", "bound": "observer.bound"}
+# the bound, the window, whether it is kept, its largest share, when, and what is said; the error is 0.5 m/s up to the
+# event at 5 s and 0.1 m/s after it
+BOUNDS = [
+    (1.0, {}, True, 0.5, 0.0, "at most 50 % of the bound, 0.5000 m/s of 1.000 m/s (at 0 s)"),
+    (0.5, {}, True, 1.0, 0.0, "at most 100 % of the bound"),
+    (np.nextafter(0.5, 0.0), {}, False, 1.0, 0.0, "broken at 6 of 12 rows"),
+    (0.25, {"from": 6.0}, True, 0.4, 6.0, "at most 40 % of the bound"),
+    (0.25, {"from": 5.0}, False, 2.0, 5.0, "broken at 1 of 7 rows, 0.5000 m/s of 0.2500 m/s (worst at 5 s)"),
+    (0.0, {}, False, np.finfo(float).max, 0.0, "broken at 12 of 12 rows"),
+    (-1.0, {"from": 6.0}, False, np.finfo(float).max, 6.0, "broken at 5 of 5 rows"),
+    (math.inf, {}, True, 0.0, 0.0, "at most 0 % of the bound"),
+    (math.nan, {}, False, math.inf, 0.0, "not a number"),
+]
+
+
+@pytest.mark.parametrize(("bound", "window", "kept", "share", "when", "text"), BOUNDS)
+def test_an_error_and_its_bound(
+    bound: float, window: dict[str, float], kept: bool, share: float, when: float, text: str
+) -> None:
+    (found,) = judged(hand_made(changes={"observer.bound": np.full(12, bound)}), BOUND | window)
+    assert found.passed is kept
+    assert found.measured == pytest.approx(share, rel=1e-12)  # rounding of a quotient
+    assert found.when == when
+    assert text in found.line
+
+
+def test_a_bound_that_was_kept_until_the_run_failed_is_not_met() -> None:
+    bound = {"observer.bound": np.full(12, 1.0)}
+    (found,) = judged(hand_made(7.0, "derailed", bound), BOUND)
+    assert not found.passed
+    assert "not reached" in found.line
+    (found,) = judged(hand_made(7.0, "derailed", {"observer.bound": np.full(12, 0.2)}), BOUND)
+    assert "broken at 6 of 9 rows" in found.line
+
+
 @pytest.mark.parametrize(("item", "what", "measured", "when", "limits"), ERRORS)
 def test_sizes_of_errors(
     item: dict[str, Any], what: str, measured: float, when: float, limits: tuple[float, float]

@@ -1,0 +1,227 @@
+"""``cosim identify``: parameters of a train from a measured run. One action a kind of parameter: ``davis``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim.cli.scenarios import parse_setting
+from cosim.errors import CosimError, OutputError, ScenarioError, nearest
+from cosim.evaluation.numbers import number
+from cosim.results.load import load_result
+from cosim.results.result import Result
+from cosim.results.summary_file import jsonable
+from cosim.simulation.scenario import Scenario
+from fmu_observer.identification.davis import (
+    LEVEL,
+    MINIMUM_SPEED,
+    RESOLUTION,
+    identify_davis,
+)
+from fmu_observer.identification.davis_estimate import DavisEstimate, IdentificationError
+from fmus.text_table import text_table
+
+DONE, NOT_IDENTIFIED = 0, 1
+RUN_SECONDS, RUN_STEP = 60.0, 0.05
+
+
+def register(commands: Any) -> None:
+    """Add the command and its actions to the parser.
+
+    Args:
+        commands: subparsers of the program.
+    """
+    parser = commands.add_parser("identify", description="Identify parameters of a train from a measured run.")
+    actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
+    text = (
+        "Davis coefficients w0 + w1 v + w2 v^2 from a run with constant or recorded effort, with confidence intervals, "
+        "and what of them cannot be identified."
+    )
+    epilog = "Exit codes: 0 all identified, 1 something is not, 2 error."
+    davis = actions.add_parser("davis", help="running resistance", description=text, epilog=epilog)
+    davis.add_argument("source", metavar="SOURCE", help="results folder, table of any tool, or an FMU, which is driven")
+    davis.add_argument("--speed", metavar="NAME", help="signal of the speed (default: the only one in m/s)")
+    davis.add_argument("--effort", metavar="N_OR_NAME", help="constant effort [N], or the signal of a recorded one")
+    davis.add_argument("--mass", type=float, metavar="KG", help="mass with rotating parts; 1 for efforts by mass")
+    davis.add_argument("--from", type=float, dest="begin", metavar="SECONDS", help="begin of the part to use [s]")
+    davis.add_argument("--to", type=float, dest="end", metavar="SECONDS", help="end of the part to use [s]")
+    davis.add_argument(
+        "--minimum-speed", type=float, default=MINIMUM_SPEED, metavar="M_S", help="leave out slower samples [m/s]"
+    )
+    davis.add_argument("--level", type=float, default=LEVEL, help="of the intervals (default: 0.95)")
+    davis.add_argument(
+        "--resolution",
+        type=float,
+        default=RESOLUTION,
+        metavar="M_S2",
+        help="widest half of an interval that counts as identified, as acceleration at top speed (default: 0.05)",
+    )
+    davis.add_argument("--input", metavar="NAME", help="of an FMU: the input that takes the effort")
+    davis.add_argument("--stop", type=float, default=RUN_SECONDS, help="of an FMU: length of the run [s] (default: 60)")
+    davis.add_argument("--step", type=float, default=RUN_STEP, help="of an FMU: sampling [s] (default: 0.05)")
+    davis.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="settings", help="of an FMU")
+    davis.add_argument("--plot", type=Path, metavar="FILE", help="write speed and residuals as a picture")
+    davis.add_argument("--toml", type=Path, metavar="FILE", help="write the parameters for a scenario")
+    davis.add_argument("--json", action="store_true", help="print the data as JSON instead of the table")
+    davis.set_defaults(execute=execute)
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Identify, print and write.
+
+    Args:
+        options: of the command line.
+
+    Raises:
+        CosimError: nothing can be identified from this source.
+    """
+    try:
+        estimate = _identified(options)
+    except IdentificationError as error:
+        raise CosimError(f"{options.source}: {error}") from error
+    if options.plot is not None:
+        _draw(options.plot, estimate)
+    if options.toml is not None:
+        _write(options.toml, estimate.toml())
+    print(json.dumps(jsonable(estimate_data(estimate)), indent=2) if options.json else estimate_text(estimate))
+    return DONE if estimate.identified else NOT_IDENTIFIED
+
+
+def _identified(options: argparse.Namespace) -> DavisEstimate:
+    driven = str(options.source).lower().endswith(".fmu")
+    result = _driven(options) if driven else _loaded(options)
+    effort, series = _effort(options, result, driven)
+    instants, rows = np.unique(result.time, return_index=True)  # an event has two rows
+    chosen = (instants >= (options.begin if options.begin is not None else -np.inf)) & (
+        instants <= (options.end if options.end is not None else np.inf)
+    )
+    if not chosen.any():
+        raise IdentificationError(
+            f"no sample between --from and --to; there are some from {instants[0]:g} to {instants[-1]:g} s."
+        )
+    rows = rows[chosen]
+    return identify_davis(
+        instants[chosen],
+        np.asarray(result[_signal(result, options.speed, "speed", "--speed")])[rows],
+        effort=effort if series is None else series[rows],
+        mass=options.mass,
+        minimum_speed=options.minimum_speed,
+        level=options.level,
+        resolution=options.resolution,
+    )
+
+
+def _loaded(options: argparse.Namespace) -> Result:
+    given = [f"--{name}" for name in ("input", "settings") if getattr(options, name)]
+    if given:
+        raise ScenarioError(f"{given[0].replace('settings', 'set')} belongs to an FMU; {options.source} is a result.")
+    return load_result(options.source)
+
+
+def _driven(options: argparse.Namespace) -> Result:
+    """The run of an FMU under a constant effort."""
+    effort = _number(options.effort)
+    if options.input is None or effort is None:
+        raise ScenarioError(
+            f"{options.source}: an FMU is driven; say by which input and how hard: --input effort --effort 60e3 [N]."
+        )
+    scenario = Scenario.fmu(
+        options.source,
+        stop=options.stop,
+        step=options.step,
+        inputs={options.input: effort},
+        parameters=dict(parse_setting(text) for text in options.settings),
+    )
+    outcome = scenario.run(warn=lambda _text: None)
+    if outcome.failure is not None:
+        raise CosimError(f"{options.source}: {outcome.failure}")
+    return outcome.result
+
+
+def _number(text: str | None) -> float | None:
+    try:
+        value = float(text) if text is not None else None
+    except ValueError:
+        return None
+    return value if value is not None and isfinite(value) else None
+
+
+def _effort(options: argparse.Namespace, result: Result, driven: bool) -> tuple[float | None, Any]:
+    """The effort as a number, or as a recorded series; an FMU without a mass is left with the effort unknown."""
+    if options.effort is None:
+        return None, None
+    constant = _number(options.effort)
+    if constant is not None:
+        return (None if driven and options.mass is None else constant), None
+    return None, np.asarray(result[_signal(result, options.effort, "effort", "--effort")])
+
+
+def _signal(result: Result, asked: str | None, what: str, option: str) -> str:
+    """Name of a signal: the one asked for, with or without its component, or the only one in m/s."""
+    names = [signal.name for signal in result.signals]
+    if asked is not None:
+        fitting = [name for name in names if name == asked or name.partition(".")[2] == asked]
+        if len(fitting) != 1:
+            raise ScenarioError(f"{option} {asked}: no signal of that name; {nearest(asked, names)}")
+        return fitting[0]
+    speeds = [signal.name for signal in result.signals if signal.unit == "m/s"]
+    found = speeds or names
+    if len(found) != 1:
+        raise ScenarioError(f"which signal is the {what}? Say {option} NAME; there are: {', '.join(found) or 'none'}.")
+    return found[0]
+
+
+def estimate_text(estimate: DavisEstimate) -> str:
+    """The estimate as a table with remarks below.
+
+    Args:
+        estimate: of a run.
+    """
+    top = estimate.speeds[1]
+    percent = f"{100.0 * estimate.level:g} % interval"
+    rows = [["coefficient", "estimate", percent, "unit", f"± at {top:.3g} m/s [m/s2]", "identified"]]
+    for c in estimate.coefficients:
+        interval = f"{number(c.low, 4)} to {number(c.high, 4)}"
+        sure = "yes" if c.identified else "no"
+        rows.append([c.name, number(c.value, 4), interval, c.unit, number(c.uncertainty, 2), sure])
+    head = (
+        f"{estimate.points} samples from {estimate.speeds[0]:.3g} to {top:.3g} m/s in {estimate.duration:.4g} s, noise "
+        f"{number(estimate.noise, 2)} m/s, condition number {number(estimate.condition, 2)}"
+    )
+    lines = [head, "", *text_table(rows, left=(0, 3, 5), heading=True), ""]
+    return "\n".join([*lines, *(f"- {remark}" for remark in estimate.remarks), "", estimate.toml().rstrip()])
+
+
+def estimate_data(estimate: DavisEstimate) -> dict[str, Any]:
+    """The estimate as plain data.
+
+    Args:
+        estimate: of a run.
+    """
+    keys = ("mass", "level", "resolution", "noise", "points", "speeds", "duration", "condition", "confusion")
+    coefficients = {
+        c.name: {"value": c.value, "low": c.low, "high": c.high, "unit": c.unit, "identified": c.identified}
+        for c in estimate.coefficients
+    }
+    return {"coefficients": coefficients, "remarks": list(estimate.remarks)} | {k: getattr(estimate, k) for k in keys}
+
+
+def _draw(path: Path, estimate: DavisEstimate) -> None:
+    from cosim.drawing.residuals import residual_figure  # noqa: PLC0415 - matplotlib only for those who draw
+
+    try:
+        residual_figure(estimate.time, estimate.measured, estimate.residuals).savefig(path)
+    except (OSError, ValueError) as error:  # matplotlib refuses endings that it does not know by a ValueError
+        raise OutputError(f"{path} cannot be written: {error}.") from error
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error

@@ -1,0 +1,68 @@
+"""The error of an estimate stays within the bound that is told beside it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf
+from typing import TYPE_CHECKING, Literal, Self
+
+import numpy as np
+
+from cosim.expectations.expectation import WindowExpectation
+from cosim.expectations.judged import Judged, at, with_unit
+from cosim.expectations.run import Run, span
+from cosim.expectations.sizes import bounded, difference
+
+if TYPE_CHECKING:
+    from cosim.expectations.before import Before
+
+
+class BoundExpectation(WindowExpectation):
+    """The error of a signal never exceeds a bound that another signal tells."""
+
+    check: Literal["bound"]
+    signal: str
+    reference: str
+    bound: str
+
+    def prepare(self, before: Before) -> Self:
+        """The three signals exist, and have one dimension.
+
+        Args:
+            before: what is known before the run.
+        """
+        super().prepare(before)
+        before.demand_same_dimension(self.signal, self.reference)
+        before.demand_same_dimension(self.signal, self.bound)
+        return self
+
+    def judge(self, run: Run) -> list[Judged]:
+        """The largest share of the bound that the error takes; it is broken where that exceeds 1."""
+        error = np.abs(difference(run.recorded(self.signal), run.recorded(self.reference)))
+        bound, window, unit = run.recorded(self.bound), run.window(self.start, self.end), run.unit(self.signal)
+        name = f"{self.bound} of {self.signal} beside {self.reference}{span(self.start, self.end)}"
+        share = _share(error, bound)[window.rows]
+        found = bounded(name, {"check": self.check, "unit": "1"}, window, window.time, share, -inf, 1.0)
+        if not np.isfinite(found.measured):
+            return [found]
+        row = int(np.argmax(share))
+        worst = f"{with_unit(error[window.rows][row], unit)} of {with_unit(bound[window.rows][row], unit)}"
+        broken = int(np.count_nonzero(share > 1.0))
+        text = f"at most {100.0 * found.measured:.3g} % of the bound, {worst}{at(found.when)}"
+        if broken:
+            text = f"broken at {broken} of {len(share)} rows, {worst}{at(found.when, 'worst at')}"
+        elif window.broken:
+            text += f"; {window.unreached}"
+        return [replace(found, text=text)]
+
+
+def _share(error: np.ndarray, bound: np.ndarray) -> np.ndarray:
+    """Error in parts of the bound, above 1 exactly where it exceeds it, shape (rows,)."""
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        share = np.where(bound > 0.0, error / np.where(bound > 0.0, bound, 1.0), np.finfo(float).max)
+    share = np.where((error == 0.0) & (bound == 0.0), 0.0, share)
+    just_above = np.nextafter(1.0, 2.0)
+    share = np.where(
+        error > bound, np.maximum(share, just_above), np.where(error <= bound, np.minimum(share, 1.0), share)
+    )
+    return np.where(np.isnan(error) | np.isnan(bound), np.nan, share)

@@ -1,0 +1,62 @@
+"""What a bound over time says of gaps: the largest one that keeps a limit, and the growth over missing samples."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf, isfinite
+
+Bound = Callable[[float], float]
+
+HORIZON = 1e4  # [s]: a bound that keeps its limit so long keeps it for ever
+FIRST = 1e-3  # [s]
+BISECTIONS = 60
+
+
+def largest_gap(bound: Bound, limit: float, horizon: float = HORIZON) -> float:
+    """Largest gap up to which a bound stays at or below a limit: the use that Aguiar Cota 2019, 4.2 makes of tau_M.
+
+    The bounds of this room start at the error of the sample and cross a limit above that once: they are convex, or rise
+    or fall to a last value. The crossing is enclosed by doubling and found by bisection.
+
+    Args:
+        bound: of the time since the sample [s]. limit: that it may not exceed, in its unit, positive.
+        horizon: longest gap of interest [s].
+
+    Returns:
+        The gap [s]; 0 where the limit is exceeded at the sample already, inf where it is kept up to the horizon.
+
+    Raises:
+        ValueError: the limit is not a positive number.
+    """
+    if not (isfinite(limit) and limit > 0.0):
+        raise ValueError(f"Largest gap: the limit must be a positive number, got {limit!r}.")
+    if bound(0.0) > limit:
+        return 0.0
+    low, high = 0.0, FIRST
+    while bound(high) <= limit:
+        if high >= horizon:
+            return inf
+        low, high = high, min(2.0 * high, horizon)
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if bound(middle) <= limit else (low, middle)
+    return low
+
+
+def growth_over_missing_samples(bound: Bound, period: float, missing: int) -> tuple[tuple[int, float, float], ...]:
+    """The bound just before the next sample where samples in between are missing or discarded.
+
+    Args:
+        bound: of the time since the sample [s]. period: between samples [s]. missing: most samples missing in a row.
+
+    Returns:
+        A row for each number of missing samples from 0: number, time since the last sample [s], bound.
+
+    Raises:
+        ValueError: the period is not positive, or the number is negative.
+    """
+    if not (isfinite(period) and period > 0.0):
+        raise ValueError(f"Missing samples: the period must be positive [s], got {period!r}.")
+    if missing < 0:
+        raise ValueError(f"Missing samples: their number must not be negative, got {missing}.")
+    return tuple((k, (k + 1) * period, bound((k + 1) * period)) for k in range(missing + 1))

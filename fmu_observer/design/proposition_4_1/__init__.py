@@ -1,0 +1,25 @@
+"""Proposition 4-1: gains of an observer with a held measurement, and the matrices that its bounds rest on, by linear
+matrix inequalities. Solving needs the extra `lmi`.
+"""
+
+from fmu_observer.design.proposition_4_1.design import (
+    InfeasibleDesign,
+    Proposition41Design,
+    design_proposition_4_1,
+    largest_decay,
+    smallest_alpha,
+)
+from fmu_observer.design.proposition_4_1.inequalities import Proposition41Problem, train_vertices
+from fmu_observer.design.proposition_4_1.sharpest import BoundMatrix, bound_matrix
+
+__all__ = [
+    "BoundMatrix",
+    "InfeasibleDesign",
+    "Proposition41Design",
+    "Proposition41Problem",
+    "bound_matrix",
+    "design_proposition_4_1",
+    "largest_decay",
+    "smallest_alpha",
+    "train_vertices",
+]

@@ -1,0 +1,28 @@
+"""Residual generators that stand disturbances and show faults, by linear matrix inequalities. Solving needs the extra
+`lmi`.
+
+Aguiar Cota 2019, 3.3.1.3, Algorithm 3-2, repaired: a decay rate in the first step, M fixed, the inequality of the
+second step with its signs.
+"""
+
+from fmu_observer.design.robust_residual.design import (
+    InfeasibleResidualDesign,
+    RobustResidualDesign,
+    design_robust_residual,
+    gain_size,
+    proven_attenuation,
+)
+from fmu_observer.design.robust_residual.problem import ResidualProblem
+from fmu_observer.design.robust_residual.sensitivity import Sensitivity, common_bands, proven_sensitivity
+
+__all__ = [
+    "InfeasibleResidualDesign",
+    "ResidualProblem",
+    "RobustResidualDesign",
+    "Sensitivity",
+    "common_bands",
+    "design_robust_residual",
+    "gain_size",
+    "proven_attenuation",
+    "proven_sensitivity",
+]

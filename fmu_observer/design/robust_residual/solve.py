@@ -1,0 +1,140 @@
+"""The inequalities handed to a cone solver. What comes back is only a candidate; `check` decides.
+
+The only file of this folder that uses cvxpy, the extra `lmi`.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from math import sqrt
+from typing import Any, Literal
+
+import numpy as np
+
+from fmu_observer.design.robust_residual.inequalities import robustness, sensitivity
+from fmu_observer.design.robust_residual.problem import ResidualProblem
+
+Least = Literal["attenuation", "alpha"]
+
+STRICT = (1e-7, 1e-6, 1e-5, 1e-4)  # asked of every inequality in the scaled problem, one attempt after the other
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """What the solver returned, in the units of the problem.
+
+    Attributes:
+        P: shape (n, n). gains: K_i, shape (N, n, q). attenuation: lambda. alpha: bound of the gains. status: the
+            solver's word for it.
+    """
+
+    P: np.ndarray
+    gains: np.ndarray
+    attenuation: float
+    alpha: float
+    status: str
+
+
+def candidates(
+    problem: ResidualProblem,
+    least: Least = "attenuation",
+    gains: np.ndarray | None = None,
+    attenuation: float | None = None,
+    sized: bool = True,
+) -> Iterator[Candidate]:
+    """Seek values for the unknowns of (3.56) and (3.58).
+
+    In the scaled problem M and the size of D are 1: P, L and alpha are divided by M^2, lambda by M and that size.
+
+    Args:
+        problem: the question.
+        least: what is minimised, lambda or the bound alpha, which then is no condition.
+        gains: K_i of shape (N, n, q) to keep; None to seek them.
+        attenuation: lambda at most; None for no limit. sized: with (3.58); False leaves the size of the gains free.
+
+    Yields:
+        What the solver returned, where it is usable, once with each strictness.
+
+    Raises:
+        ImportError: cvxpy is not installed.
+    """
+    cp = cvxpy_or_refusal()
+    M, size = problem.residual_gain, float(np.linalg.norm(problem.disturbance, 2))
+    scaled = replace(problem, disturbance=problem.disturbance / size, residual_gain=1.0)
+    n, q = problem.order, len(problem.C)
+    P, lambda2, alpha = cp.Variable((n, n), symmetric=True), cp.Variable(), cp.Variable()
+    L = [cp.Variable((n, q)) for _ in problem.vertices] if gains is None else [P @ K for K in gains]
+    strict = cp.Parameter(nonneg=True)
+    matrices = [cp.bmat(rows) for rows in robustness(scaled, P, L, lambda2, alpha, sized).values()]
+    constraints = [matrix + matrix.T << -2.0 * strict * np.eye(matrix.shape[0]) for matrix in matrices]
+    constraints.append(P >> strict * np.eye(n))
+    if least != "alpha":
+        constraints.append(alpha == problem.alpha / M**2)
+    if attenuation is not None:
+        constraints.append(lambda2 <= (attenuation / (M * size)) ** 2)
+    question = cp.Problem(cp.Minimize(lambda2 if least == "attenuation" else alpha), constraints)
+    for strict.value in STRICT:
+        if not solved(cp, question):
+            continue
+        value = 0.5 * (P.value + P.value.T)
+        if not np.all(np.isfinite(value)) or np.linalg.eigvalsh(value)[0] <= 0.0:
+            continue
+        found = np.stack([np.linalg.solve(value, part.value) for part in L]) if gains is None else gains
+        yield Candidate(
+            value * M**2, found, M * size * sqrt(float(lambda2.value)), float(alpha.value) * M**2, str(question.status)
+        )
+
+
+def sensitivity_candidates(problem: ResidualProblem, gains: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
+    """Seek P_f of (3.57) with the largest gamma, for gains that are given.
+
+    Args:
+        problem: the question. gains: K_i, shape (N, n, q).
+
+    Yields:
+        P_f of shape (n, n) and gamma squared, in the units of the problem.
+
+    Raises:
+        ImportError: cvxpy is not installed.
+    """
+    cp = cvxpy_or_refusal()
+    scaled = replace(problem, residual_gain=1.0)
+    P, gamma2 = cp.Variable((problem.order, problem.order), symmetric=True), cp.Variable()
+    strict = cp.Parameter(nonneg=True)
+    matrices = [cp.bmat(rows) for rows in sensitivity(scaled, gains, P, gamma2).values()]
+    constraints = [matrix + matrix.T << -2.0 * strict * np.eye(matrix.shape[0]) for matrix in matrices]
+    question = cp.Problem(cp.Maximize(gamma2), constraints)
+    weight = problem.residual_gain**2
+    for strict.value in (0.0, *STRICT):
+        if solved(cp, question) and np.all(np.isfinite(P.value)):
+            yield 0.5 * weight * (P.value + P.value.T), float(gamma2.value) * weight
+
+
+def solved(cp: Any, question: Any) -> bool:
+    """Whether the solver left numbers behind.
+
+    Args:
+        cp: the module cvxpy. question: a problem of it.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # "may be inaccurate": every number is checked anyway
+        try:
+            question.solve(solver="CLARABEL")
+        except cp.error.SolverError:
+            return False
+    return question.status in ("optimal", "optimal_inaccurate")
+
+
+def cvxpy_or_refusal() -> Any:
+    """The module cvxpy.
+
+    Raises:
+        ImportError: it is not installed.
+    """
+    try:
+        import cvxpy  # noqa: PLC0415 - only who designs pays for it
+    except ImportError as error:
+        raise ImportError("Design of a robust residual needs cvxpy: pip install 'fmu-observer[lmi]'.") from error
+    return cvxpy

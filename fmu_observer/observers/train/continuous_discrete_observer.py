@@ -1,0 +1,36 @@
+"""Continuous-discrete observer: the gain follows the estimated speed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fmu_observer.observers.train.held_odometer_observer import HeldOdometerObserver, gain_level, gain_norm
+from plant_models.hybrid.system import Array
+
+
+class ContinuousDiscreteObserver(HeldOdometerObserver):
+    """CDO: ``K = K(v_estimated(t))``, which runs between samples: Aguiar Cota 2019, (4.22)-(4.40).
+
+    What it observes, and the bounds it tells, stand at `HeldOdometerObserver`; they use the largest gain of all speeds
+    from 0 to `speed_max`, in which the estimate must stay. With a gain that follows no speed (`davis_c` or
+    `gain_schedule` zero, as in 4.3.4) it is the same observer as `DiscreteMeasurementObserver`.
+
+    Presets: those of `DiscreteMeasurementObserver`.
+    """
+
+    name = "continuous_discrete_observer"
+    description = "Continuous-discrete observer (CDO): held odometer reading, gain by the estimate, error bound"
+
+    def scheduling_speed(self, x: Array) -> Array:
+        """The estimated speed [m/s]."""
+        return x[1]
+
+    def largest_gain_level(self, x: Array, p: Any) -> Array:
+        """Largest level at both ends of the speeds, between which it is convex [1/s]."""
+        return np.maximum(gain_level(0.0, p), gain_level(p.speed_max, p))
+
+    def largest_gain_norm(self, x: Array, p: Any) -> Array:
+        """Largest norm at both ends of the speeds [1/s]."""
+        return np.maximum(gain_norm(0.0, p), gain_norm(p.speed_max, p))

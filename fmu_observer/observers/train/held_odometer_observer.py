@@ -1,0 +1,340 @@
+"""Observers of speed and acceleration disturbance whose odometer reading is held between samples, with bounds of their
+speed error that run between them: what the two of them share.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import replace
+from math import sqrt
+from typing import Any
+
+import numpy as np
+
+from fmu_observer.bounds import ErrorBounds
+from fmu_observer.bounds.carried import PACKED, decay_proven, first_component, level, level_of_box, unpacked
+from fmu_observer.bounds.formulas import improved_dmo_bound
+from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampled_error, with_switching_noted
+from fmu_observer.observers.parameter_values import Value, parameter_values
+from fmu_observer.observers.train.held_odometer_presets import HELD_ODOMETER_PRESETS
+from fmu_observer.observers.train.train_observer import POSITION, SPEED, Estimate, TrainObserver
+from fmu_observer.observers.train.train_resistance import rolling_drag
+from plant_models.hybrid import PeriodicEvent, input_signal, memory, output_signal, parameter, state, vector
+from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid.system import Array
+
+# own states: estimates and bounds, filtered slip, memory
+LEVEL, POSITION_BOUND = 4, 5
+HELD_SPEED, HELD_TIME, HELD_ERROR, STARTED, LAST_INNOVATION = 7, 8, 9, 10, 11
+
+REPAIRED = HELD_ODOMETER_PRESETS["repaired"]
+PROOF = (
+    "the error must decay with bound_decay under gain, as lyapunov_matrix proves; see "
+    "fmu_observer.design.proposition_4_1.bound_matrix"
+)
+
+
+class HeldOdometerObserver(TrainObserver):
+    """Base of the observers with a held odometer reading: Aguiar Cota 2019, (4.1)-(4.3).
+
+    ``dv = effort/m - w(v) - d + k1 r``, ``d d = d' + k2 r``, ``d d' = k3 r``, ``r = y_k - v`` with the odometer reading
+    ``y_k`` of the last sample, held, and ``w`` the Davis resistance, ``k1 = gain[1] + gain_schedule (b + c z) / m`` and
+    z the speed that a subclass gives. The position is the integral of the speed; at a balise it is set to that of the
+    balise. A sample at which the input `odometer_fault` is 1 is not used: the reading before it stays.
+
+    The error obeys ``de = (A - K C) e + K (v(t) - y_k) + w``: the motion since the sample drives it, so it does not
+    vanish while the train accelerates, and three bounds of it run as outputs.
+
+    1. `published_bound`: i-DMO or i-CDO, from each sample on, with the error there stated by `published_sample_error`.
+    2. `carried_bound` [ours]: the level ``W = sqrt(e' P e)``, carried over samples, no sample needs a statement of its
+       own. It covers accelerations up to `acceleration_max`, readings wrong by `odometer_error`, unknown parts of the
+       acceleration up to `unknown_acceleration`, of its rate and of the rate of that.
+    3. `error_bound` [ours]: the lesser of the carried bound and of the reading itself, which is
+       ``|y_k - v_estimated| + odometer_error + acceleration_max (t - t_k)`` and needs neither model nor gain. Where the
+       train may stand still only the latter counts, for there the disturbance jumps by the brake's effort.
+
+    `position_bound` is the integral of `error_bound` since the last balise, from its location accuracy on.
+    """
+
+    source = "Aguiar Cota 2019, (4.1)-(4.19), (4.40), 4.3.4, 5.4"
+    frictions = (SPEED.name,)
+    inputs = (
+        *TrainObserver.inputs,
+        input_signal(
+            "odometer_fault", "1", 0.0, "1 where a detector says that the odometer lies: its sample is not used"
+        ),
+    )
+    outputs = (
+        *TrainObserver.outputs,
+        output_signal("disturbance", "m/s2", "Estimated deceleration that is not in the model"),
+        output_signal("residual", "m/s", "Odometer reading of the last sample minus estimated speed"),
+        output_signal("error_bound", "m/s", "Bound of the speed error now: the lesser of carried bound and reading"),
+        output_signal("carried_bound", "m/s", "Bound of the speed error carried over samples"),
+        output_signal("published_bound", "m/s", "Published bound, from the last sample on with its stated error"),
+        output_signal("position_bound", "m", "Bound of the position error, from the last balise on"),
+        output_signal("sample_age", "s", "Time since the last odometer sample that was used"),
+    )
+    train_parameters = tuple(
+        replace(s, min=None) if s.name in ("davis_b", "davis_c") else s for s in TrainObserver.train_parameters
+    )
+    estimator_states = (
+        POSITION,
+        SPEED,
+        state("estimated_disturbance", "m/s2", 0.0, "Estimate of the deceleration that is not in the model"),
+        state("estimated_disturbance_rate", "m/s3", 0.0, "Estimate of its rate"),
+        state("bound_level", "1", 0.0, "Level W of the error in the norm of lyapunov_matrix, at most"),
+        state("integrated_bound", "m", 0.0, "Bound of the position error"),
+    )
+    estimator_memory = (
+        memory("held_speed", "m/s", 1.0, "Odometer reading that is held"),
+        memory("held_time", "s", 0.0, "Time of that reading"),
+        memory("held_error", "m/s", 0.0, "Largest error of that reading"),
+        memory("sampled_once", "1", 0.0, "1 after the first sample"),
+        memory("last_innovation", "m", 0.0, "Position error seen at the last balise"),
+    )
+    estimator_parameters = (
+        parameter("odometer_period", "s", 0.2, "Sampling period of the odometer", min=1e-4),
+        parameter("gain", "1", REPAIRED["gain"], "Gain K on speed, disturbance and its rate", size=3),
+        parameter("gain_schedule", "1", REPAIRED["gain_schedule"], "Share of the drag slope added to the first gain"),
+        parameter("acceleration_max", "m/s2", 1.7, "Largest acceleration or deceleration of the train", min=0.0),
+        parameter("odometer_error", "m/s", 0.05, "Largest error of a reading that is no fault", min=0.0),
+        parameter("unknown_acceleration", "m/s2", 0.05, "Largest unknown part of the acceleration", min=0.0),
+        parameter("unknown_jerk", "m/s3", 0.0, "Largest unknown part of the disturbance's rate", min=0.0),
+        parameter("unknown_jerk_rate", "m/s4", 0.05, "Largest second derivative of the disturbance", min=0.0),
+        parameter("disturbance_max", "m/s2", 2.0, "Largest disturbance, for the level at the start", min=0.0),
+        parameter("disturbance_rate_max", "m/s3", 1.0, "Largest rate of it, for the level at the start", min=0.0),
+        parameter("start_speed_error", "m/s", 50.0, "Largest speed error before the first sample", min=0.0),
+        parameter("start_position_error", "m", 0.0, "Largest position error at the start", min=0.0),
+        parameter("lyapunov_matrix", "1", REPAIRED["lyapunov_matrix"], "P: 11, 12, 13, 22, 23, 33", size=PACKED),
+        parameter("bound_decay", "1/s", REPAIRED["bound_decay"], "Decay rate of the error that P proves", min=1e-6),
+        parameter("speed_max", "m/s", 50.0, "Speed up to which the carried bound holds", min=1e-3),
+        parameter("bound_min_speed", "m/s", 0.5, "Speed below which the train may stand still", min=0.0),
+        parameter("published_beta", "1", REPAIRED["published_beta"], "Overshoot beta of the published bound", min=1.0),
+        parameter("published_decay", "1/s", REPAIRED["published_decay"], "Decay m of the published bound", min=1e-6),
+        parameter("published_sample_error", "m/s", 0.1, "Error norm stated for each sample", min=0.0),
+    )
+    estimator_events = (PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read"),)
+    stability_parameters = ("gain", "gain_schedule", "speed_max")
+    presets: Mapping[str, Mapping[str, Any]] = HELD_ODOMETER_PRESETS
+    default_preset = "repaired"
+
+    # -- what a subclass writes -------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def scheduling_speed(self, x: Array) -> Array:
+        """Speed z that the first gain is scheduled with [m/s]."""
+
+    @abstractmethod
+    def largest_gain_level(self, x: Array, p: Any) -> Array:
+        """Level of the gain K in the norm of `lyapunov_matrix`, at most [1/s]."""
+
+    @abstractmethod
+    def largest_gain_norm(self, x: Array, p: Any) -> Array:
+        """Euclidean norm of the gain K, at most [1/s]."""
+
+    # -- what follows -----------------------------------------------------------------------------------------------
+
+    def estimator_flow(self, t: Array, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
+        """Derivatives of the estimates, of the carried level, and of the position bound."""
+        speed, residual, age = x[1], x[HELD_SPEED] - x[1], self._age(t, x)
+        traction = np.maximum(u.effort, 0.0)  # a negative effort is a brake: see friction
+        acceleration = (traction - rolling_drag(speed, p)) / p.mass - x[2]
+        reading = self.largest_gain_level(x, p) * (p.acceleration_max * age + x[HELD_ERROR])
+        return (
+            speed,
+            acceleration + first_gain(self.scheduling_speed(x), p) * residual,
+            x[3] + p.gain[1] * residual,
+            p.gain[2] * residual,
+            reading + _unknown_level(p) - p.bound_decay * x[LEVEL],
+            self.error_bound(t, x, p),
+        )
+
+    def estimate(self, x: Array, u: Any, p: Any) -> Estimate:
+        """Position, speed, the effort in place of the adhesion force, and the innovation of the last balise."""
+        return Estimate(x[0], x[1], u.effort, x[LAST_INNOVATION])
+
+    def carried_bound(self, x: Array, p: Any) -> Array:
+        """The level as a bound of the speed error [m/s]."""
+        return first_component(p.lyapunov_matrix) * x[LEVEL]
+
+    def error_bound(self, t: Array, x: Array, p: Any) -> Array:
+        """The lesser of the carried bound, where the train surely moves, and of the bound by the reading [m/s]."""
+        by_reading = np.abs(x[HELD_SPEED] - x[1]) + self._since_reading(t, x, p)
+        return np.where(self._moves(t, x, p) > 0.0, np.minimum(self.carried_bound(x, p), by_reading), by_reading)
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """The estimate with its slip, disturbance, residual and bounds."""
+        age, norm = self._age(t, x), self.largest_gain_norm(x, p)
+        published = improved_dmo_bound(
+            age, p.published_sample_error, p.published_beta, p.published_decay, norm, p.acceleration_max
+        )
+        return super().output(t, x, u, p) | {
+            "disturbance": x[2],
+            "residual": x[HELD_SPEED] - x[1],
+            "error_bound": self.error_bound(t, x, p),
+            "carried_bound": self.carried_bound(x, p),
+            "published_bound": published,
+            "position_bound": x[POSITION_BOUND],
+            "sample_age": age,
+        }
+
+    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """A balise sets the position; a sample of the odometer that is no fault is held from now on."""
+        if event == "balise":
+            kept = (x[i] for i in range(1, POSITION_BOUND))
+            rest = (x[i] for i in range(POSITION_BOUND + 1, LAST_INNOVATION))
+            accuracy = np.maximum(u.balise_location_accuracy, 0.0)
+            return vector(u.balise_position, *kept, accuracy, *rest, x[0] - u.balise_position)
+        first = 1.0 - x[STARTED]
+        usable = np.where(u.odometer_fault > 0.5, 0.0, 1.0)
+        taken = np.maximum(usable, first)
+        # Without any reading the estimate stands for it, wrong by as much as is stated for the start.
+        reading = np.where(usable > 0.0, u.odometer, x[1])
+        wrong = np.where(usable > 0.0, p.odometer_error, p.start_speed_error)
+        disturbance, rate = np.abs(x[2]) + p.disturbance_max, np.abs(x[3]) + p.disturbance_rate_max
+        assumed = level_of_box(p.lyapunov_matrix, np.abs(reading - x[1]) + wrong, disturbance, rate)
+        carries = (1.0 - first) * self._moves(t, x, p)
+        known = np.where(carries > 0.0, np.minimum(x[LEVEL], assumed), assumed)
+        held = (reading, t, wrong, 1.0)
+        return vector(
+            *(x[i] for i in range(LEVEL)),
+            np.where(taken > 0.0, known, x[LEVEL]),
+            np.where(first > 0.0, p.start_position_error, x[POSITION_BOUND]),
+            x[POSITION_BOUND + 1],
+            *(np.where(taken > 0.0, new, x[HELD_SPEED + i]) for i, new in enumerate(held)),
+            x[LAST_INNOVATION],
+        )
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """Bounds of the numbers that the bounds rest on, and the proof of the decay at both ends of the drag slopes."""
+        slowest, fastest = error_slopes(p)
+        proven = [
+            decay_proven(p.lyapunov_matrix, a11, (p.gain[1], p.gain[2]), p.bound_decay) for a11 in (slowest, fastest)
+        ]
+        limited = tuple(s for s in self.estimator_parameters if s.min is not None)
+        return super().requirements(p) | within_bounds(limited, p) | {PROOF: proven[0] * proven[1]}
+
+    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+        """Certificate of ``de = (A - K C) e`` with the position behind it, for all drag slopes up to `speed_max`."""
+        vertices = tuple(_position_error(a11, p) for a11 in dict.fromkeys(map(float, error_slopes(p))))
+        model = (
+            f"error of position, speed, disturbance and its rate over gaps between balises, drag slopes up to "
+            f"{float(p.speed_max):g} m/s, constant over a gap; the motion since an odometer sample is an input to it, "
+            f"so that its period ({float(p.odometer_period):g} s) decides the size of the error and not whether it is "
+            "forgotten: see error_bound; standstill is left out"
+        )
+        return with_switching_noted(certify_sampled_error(vertices, max_gap, model), vertices, "drag slopes")
+
+    def error_bounds(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> ErrorBounds:
+        """What the bounds say with given parameters: at the period, over missing samples, largest gaps.
+
+        Args:
+            parameters: values by name that replace those of the preset, scalars or whole vectors.
+            preset: preset to start from; None for the observer's default.
+
+        Returns:
+            The bounds with their numbers.
+
+        Raises:
+            ValueError: a parameter or the preset is unknown or not legal, or P does not prove the decay.
+        """
+        p = self.unpack_parameters(parameter_values(self, parameters, preset, "of the bounds"))
+        slopes = tuple(map(float, error_slopes(p)))
+        if not all(decay_proven(p.lyapunov_matrix, a11, (p.gain[1], p.gain[2]), p.bound_decay) for a11 in slopes):
+            raise ValueError(
+                f"{self.name}: {PROOF} (bound_decay = {float(p.bound_decay):g} 1/s, gain = {list(p.gain)})."
+            )
+        gains = [np.array([float(first_gain(z, p)), *map(float, p.gain[1:])]) for z in (0.0, float(p.speed_max))]
+        unknown = (p.unknown_acceleration, p.unknown_jerk, p.unknown_jerk_rate)
+        return ErrorBounds(
+            observer=self.name,
+            preset=preset or self.default_preset or "",
+            period=float(p.odometer_period),
+            rate=float(p.acceleration_max),
+            beta=float(p.published_beta),
+            m=float(p.published_decay),
+            gain=max(sqrt(float(K @ K)) for K in gains),
+            sample_error=float(p.published_sample_error),
+            noise=float(p.odometer_error),
+            disturbances=tuple(map(float, unknown)),  # type: ignore[arg-type]
+            P=unpacked(p.lyapunov_matrix),
+            decay=float(p.bound_decay),
+            drifts=[error_matrix(a11, p) for a11 in slopes],
+            gains=gains,
+        )
+
+    # -- internals --------------------------------------------------------------------------------------------------
+
+    @staticmethod
+    def _age(t: Array, x: Array) -> Array:
+        return np.maximum(t - x[HELD_TIME], 0.0)
+
+    def _since_reading(self, t: Array, x: Array, p: Any) -> Array:
+        """By how much the speed may differ from the held reading [m/s]."""
+        return x[HELD_ERROR] + p.acceleration_max * self._age(t, x)
+
+    def _moves(self, t: Array, x: Array, p: Any) -> Array:
+        """1 where the train cannot have stopped since the held reading."""
+        return np.where(x[HELD_SPEED] > p.bound_min_speed + self._since_reading(t, x, p), 1.0, 0.0)
+
+
+def first_gain(z: Array, p: Any) -> Array:
+    """``gain[1] + gain_schedule (b + c z) / m`` [1/s].
+
+    Args:
+        z: speed that schedules it [m/s]. p: parameters, as in `HybridSystem.flow`.
+    """
+    return p.gain[0] + p.gain_schedule * (p.davis_b + p.davis_c * z) / p.mass
+
+
+def error_slopes(p: Any) -> tuple[Array, Array]:
+    """Smallest and largest entry 11 of the error matrix [1/s], over true, estimated and scheduling speeds from 0 to
+    `speed_max`: ``-(b + c (v + v_estimated)) / m - first_gain(z)``.
+
+    Args:
+        p: parameters, as in `HybridSystem.flow`.
+    """
+    fixed = -p.gain[0] - (1.0 + p.gain_schedule) * p.davis_b / p.mass
+    drag, schedule = p.davis_c / p.mass * 2.0 * p.speed_max, p.gain_schedule * p.davis_c / p.mass * p.speed_max
+    smallest = fixed - np.maximum(drag, 0.0) - np.maximum(schedule, 0.0)
+    return smallest, fixed - np.minimum(drag, 0.0) - np.minimum(schedule, 0.0)
+
+
+def error_matrix(a11: float, p: Any) -> np.ndarray:
+    """``A - K C`` of speed, disturbance and its rate, shape (3, 3).
+
+    Args:
+        a11: entry 11 [1/s], see `error_slopes`. p: parameters, as in `HybridSystem.flow`.
+    """
+    return np.array([[a11, -1.0, 0.0], [-float(p.gain[1]), 0.0, 1.0], [-float(p.gain[2]), 0.0, 0.0]])
+
+
+def gain_level(z: Array, p: Any) -> Array:
+    """Level of the gain at a scheduling speed [1/s].
+
+    Args:
+        z: that speed [m/s]. p: parameters, as in `HybridSystem.flow`.
+    """
+    return level(p.lyapunov_matrix, first_gain(z, p), p.gain[1], p.gain[2])
+
+
+def gain_norm(z: Array, p: Any) -> Array:
+    """Euclidean norm of the gain at a scheduling speed [1/s].
+
+    Args:
+        z: that speed [m/s]. p: parameters, as in `HybridSystem.flow`.
+    """
+    return np.sqrt(first_gain(z, p) ** 2 + p.gain[1] ** 2 + p.gain[2] ** 2)
+
+
+def _unknown_level(p: Any) -> Array:
+    P = p.lyapunov_matrix
+    return np.sqrt(P[0]) * p.unknown_acceleration + np.sqrt(P[3]) * p.unknown_jerk + np.sqrt(P[5]) * p.unknown_jerk_rate
+
+
+def _position_error(a11: float, p: Any) -> ImpulsiveError:
+    generator = np.zeros((4, 4))
+    generator[0, 1] = 1.0
+    generator[1:, 1:] = error_matrix(a11, p)
+    return ImpulsiveError.of(generator, np.diag([0.0, 1.0, 1.0, 1.0]), (0, 1, 2, 3))

@@ -1,0 +1,34 @@
+"""What an output warns of: a number other than zero in it is told after the run.
+
+Declared beside the output, carried by block and FMU alike. Standard library only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+ANNOTATION, ELEMENT = "fmu-observer.output-warning", "OutputWarning"
+"""Names under which the description of an exported model carries it."""
+
+
+@dataclass(frozen=True, slots=True)
+class OutputWarning:
+    """Warn where an output is not zero.
+
+    Args:
+        text: what that means and what to do, in words that follow the name of the component and begin with a verb or a
+            noun, without a full stop.
+        shows: outputs of the same system whose values are told beside it.
+        at_end: only the last row of a run counts; otherwise every row does.
+
+    Raises:
+        ValueError: there is no text.
+    """
+
+    text: str
+    shows: tuple[str, ...] = ()
+    at_end: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.text.strip():
+            raise ValueError("The warning of an output has no text; say what it means that it is not zero.")
