@@ -35,6 +35,13 @@ class WarningVariable(ModelVariable):
             setattr(made, attribute.name, getattr(variable, attribute.name))
         return made
 
+    def __getstate__(self) -> tuple[Any, OutputWarning]:
+        return super().__getstate__(), self.warning  # type: ignore[misc]  # that of attrs keeps its own fields only
+
+    def __setstate__(self, state: tuple[Any, OutputWarning]) -> None:
+        super().__setstate__(state[0])  # type: ignore[misc]
+        self.warning = state[1]
+
 
 def declared_warnings(description: ModelDescription) -> dict[str, OutputWarning]:
     """What outputs warn of where they are not zero, by name.

@@ -7,10 +7,13 @@ the detector, and no controller.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import inf, log
 from typing import Any
 
 import numpy as np
+import scipy
 
+from fmu_observer.certificates import Certificate
 from fmu_observer.detection.threshold_detector import (
     NEVER,
     THRESHOLD_MEMORY,
@@ -19,10 +22,13 @@ from fmu_observer.detection.threshold_detector import (
     judge,
     threshold_requirements,
 )
+from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
+from fmu_observer.observers.train.train_observer import BALISE
+from fmu_observer.observers.train.train_observer import POSITION as POSITION_STATE
 from plant_models.hybrid import (
     PeriodicEvent,
-    TriggeredEvent,
+    Signal,
     input_signal,
     memory,
     output_signal,
@@ -32,13 +38,14 @@ from plant_models.hybrid import (
 )
 from plant_models.hybrid.system import Array
 
-SPEED, DISTURBANCE, RATE, POSITION = range(4)  # indices of the continuous states
-INNOVATION, DETECTOR, READING, UNCHANGED, HELD = 4, 5, 9, 10, 11
+POSITION, SPEED, DISTURBANCE, RATE = range(4)  # indices of the continuous states
+HELD_INNOVATION, AT_BALISE, DETECTOR, READING, UNCHANGED, HELD = 4, 5, 6, 10, 11, 12  # indices of the memory
+HORIZON = 20.0  # [s], of the certificate, as of the others; what holds, holds for every gap
 PRINTED_GAIN = (101.4, 2650.0, 3750.0)
 _PRINTED_START = {"estimated_speed": 30.0, "disturbance_estimate": -0.91, "disturbance_rate": 0.13}
 
 
-class StoppingUio(GatedObserver):
+class StoppingUio(GatedObserver, GapCertified):
     """Proportional-integral observer of ``v' = -w1 v + b u + d``, ``d'' = 0``, that detects a lost brake.
 
     ``z' = A_o z + B_o u + K (v - vhat)`` for ``z = (v, d, d')``, and the position integrates vhat. The disturbance
@@ -68,13 +75,13 @@ class StoppingUio(GatedObserver):
     )
     source = "Aguiar Cota 2019, (3.15)-(3.18) and 3.2.3"
     internal_step = 1e-3
-    position_state = POSITION
     states = (
+        POSITION_STATE,
         state("estimated_speed", "m/s", 30.0, "Estimate of the train speed"),
         state("disturbance_estimate", "m/s2", -0.91, "Estimate of all accelerations that the model does not know"),
         state("disturbance_rate", "m/s3", 0.337, "Estimate of the rate of the disturbance"),
-        state("estimated_position", "m", 0.0, "Estimate of the train position"),
         memory("held_innovation", "m/s", 0.0, "Odometer minus estimate at the last sample"),
+        memory("last_innovation", "m", 0.0, "Position error seen at the last balise"),
         *THRESHOLD_MEMORY,
         memory("last_reading", "m/s", 0.0, "Odometer at the last sample"),
         memory("unchanged_time", "s", 0.0, "Time for which the odometer has not changed"),
@@ -88,10 +95,9 @@ class StoppingUio(GatedObserver):
         output_signal("position", "m", "Estimated position"),
         output_signal("speed", "m/s", "Estimated speed", display_unit="km/h"),
         output_signal("disturbance", "m/s2", "Estimated acceleration that the model does not know, forward > 0"),
-        output_signal("innovation", "m/s", "Odometer minus estimate at the last sample", variability="discrete"),
-        output_signal(
-            "residual", "m/s", "Magnitude of the innovation as the detector judges it", variability="discrete"
-        ),
+        output_signal("innovation", "m", "Estimated minus true position at the last balise", variability="discrete"),
+        output_signal("residual", "m/s", "Odometer minus estimate at the last sample", variability="discrete"),
+        output_signal("residual_level", "m/s", "Its magnitude as the detector judges it", variability="discrete"),
         output_signal("odometer_fault", "1", "1 while a jam is detected", variability="discrete"),
         output_signal("recovering", "1", "1 while the end of a jam is awaited", variability="discrete"),
         output_signal(
@@ -115,11 +121,7 @@ class StoppingUio(GatedObserver):
     )
     events = (
         PeriodicEvent("odometer_sample", "sample_period", description="The odometer is compared with the estimate"),
-        TriggeredEvent(
-            "balise",
-            (input_signal("balise_position", "m", 0.0, "Position of the balise just passed", variability="discrete"),),
-            "A balise is passed, at its own time stamp",
-        ),
+        BALISE,
     )
     presets: Mapping[str, Mapping[str, Any]] = {
         "repaired": {**_PRINTED_START, "disturbance_rate": 0.337},
@@ -132,21 +134,23 @@ class StoppingUio(GatedObserver):
         return super().requirements(p) | threshold_requirements(p)
 
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Derivatives of speed, disturbance, its rate and position, shape (4,)."""
-        innovation, fault = x[INNOVATION], x[DETECTOR + 1]
+        """Derivatives of position, speed, disturbance and its rate, shape (4,)."""
+        innovation, fault = x[HELD_INNOVATION], x[DETECTOR + 1]
         effort = u.effort * (1.0 - fault * p.switches_effort)
         acceleration = (p.brake_coefficient * effort - p.davis_b * x[SPEED]) / p.mass + x[DISTURBANCE]
         return vector(
+            x[SPEED],
             acceleration + p.observer_gain[0] * innovation,
             x[RATE] + p.observer_gain[1] * innovation,
             p.observer_gain[2] * innovation,
-            x[SPEED],
         )
 
     def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """A sample: innovation, verdict, and whether the odometer is held; a balise: its position, shape (12,)."""
-        if event == "balise":
-            return vector(x[SPEED], x[DISTURBANCE], x[RATE], u.balise_position, *(x[i] for i in range(4, 12)))
+        """A sample: innovation, verdict, and whether the odometer is held; a balise: its position, shape (13,)."""
+        if event == BALISE.name:
+            own = [x[i] for i in range(self.own_count)]
+            own[POSITION], own[AT_BALISE] = u.balise_position, x[POSITION] - u.balise_position
+            return vector(*own)
         innovation = u.odometer - x[SPEED]
         before = ThresholdMemory(*(x[i] for i in range(DETECTOR, READING)))
         judged = judge(before, innovation, p.sample_period, p)
@@ -157,6 +161,7 @@ class StoppingUio(GatedObserver):
         return vector(
             *(x[i] for i in range(4)),
             innovation,
+            x[AT_BALISE],
             *kept,
             u.odometer,
             np.where(jump > 0.0, 0.0, x[UNCHANGED] + p.sample_period),
@@ -165,18 +170,81 @@ class StoppingUio(GatedObserver):
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """The estimate, the residual and the verdict."""
-        memory_ = ThresholdMemory(*(x[i] for i in range(DETECTOR, READING)))
+        detector = ThresholdMemory(*(x[i] for i in range(DETECTOR, READING)))
         return {
             "position": x[POSITION],
             "speed": x[SPEED],
             "disturbance": x[DISTURBANCE],
-            "innovation": x[INNOVATION],
-            "residual": memory_.residual,
-            "odometer_fault": memory_.fault,
-            "recovering": memory_.fault * memory_.armed,
+            "innovation": x[AT_BALISE],
+            "residual": x[HELD_INNOVATION],
+            "residual_level": detector.residual,
+            "odometer_fault": detector.fault,
+            "recovering": detector.fault * detector.armed,
             "held_odometer": x[HELD],
         }
 
     def odometer_of(self, u: Any) -> Array:
         """The odometer [m/s]."""
         return u.odometer
+
+    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+        """Certificate of the error of speed, disturbance and its rate, exact for an innovation held between samples.
+
+        Args:
+            max_gap: longest gap between two balises [s]; they end the position error and act on nothing else. p:
+                parameters, as in `HybridSystem.flow`.
+        """
+        period = float(p.sample_period)
+        transition = sampled_error(float(p.davis_b) / float(p.mass), np.asarray(p.observer_gain, dtype=float), period)
+        radius = float(np.abs(np.linalg.eigvals(transition)).max())
+        stable = radius < 1.0
+        margin, rows = -inf, ()
+        if stable:
+            rate = np.diag([1.0, 1.0 / 50.0, 1.0 / 2500.0])  # the disturbances in units of the speed
+            scaled = rate @ transition @ np.linalg.inv(rate)
+            form = scipy.linalg.solve_discrete_lyapunov(scaled.T, np.eye(3))
+            margin = float(np.linalg.eigvalsh(form - scaled.T @ form @ scaled).min() / np.linalg.eigvalsh(form).max())
+            rows = tuple(tuple(map(float, row)) for row in rate @ form @ rate)
+        return Certificate(
+            max_gap=max_gap,
+            horizon=max(HORIZON, max_gap),
+            constant_limit=inf if stable else 0.0,
+            aperiodic_limit=inf if margin > 0.0 else 0.0,
+            spectral_radius=radius ** (max_gap / period),
+            quadratic_margin=margin,
+            holds=margin > 0.0,
+            error_model=(
+                f"error of speed, disturbance and its rate with the innovation held for {period:g} s; a balise ends "
+                f"the position error and acts on nothing else. Detected jams and standstill are left out"
+            ),
+            notes=(f"in the long run the error falls as exp(-{-log(radius) / period:.4g} t)",) if stable else (),
+            lyapunov_matrix=rows,
+        )
+
+    def deciding_parameters(self) -> tuple[Signal, ...]:
+        """Gain, drag, mass and sampling."""
+        deciding = ("observer_gain", "davis_b", "mass", "sample_period")
+        return tuple(s for s in self.parameter_signals if s.name in deciding)
+
+
+def observer_matrix(drag_rate: float) -> np.ndarray:
+    """A_o of (3.15), ``z = (v, d, d')``, shape (3, 3).
+
+    Args:
+        drag_rate: w_1 [1/s].
+    """
+    return np.array([[-drag_rate, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]])
+
+
+def sampled_error(drag_rate: float, gain: np.ndarray, period: float) -> np.ndarray:
+    """Error of ``(v, d, d')`` from sample to sample with a held innovation, shape (3, 3).
+
+    ``exp(A_o T) - (integral of exp(A_o s) ds from 0 to T) K C``.
+
+    Args:
+        drag_rate: w_1 [1/s]. gain: K, shape (3,). period: T [s].
+    """
+    generator = np.zeros((4, 4))
+    generator[:3, :3], generator[:3, 3] = observer_matrix(drag_rate), gain
+    moved = np.asarray(scipy.linalg.expm(generator * period))
+    return moved[:3, :3] - np.outer(moved[:3, 3], [1.0, 0.0, 0.0])
