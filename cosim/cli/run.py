@@ -16,6 +16,8 @@ from cosim.cli.scenarios import add_scenario, load_scenario, positive, simulated
 from cosim.errors import OutputError
 from cosim.evaluation.cost import cost_text
 from cosim.evaluation.error_table import error_text
+from cosim.evaluation.fault_detection import fault_detection
+from cosim.evaluation.fault_table import fault_text
 from cosim.evaluation.metrics import phase_metrics
 from cosim.process.last_call import LAST_CALL
 from cosim.results.folder import check_writable
@@ -191,6 +193,9 @@ def _tell(outcome: Outcome, study: Any, paths: dict[str, Path], options: argpars
         metrics = phase_metrics(outcome.result, outcome.spec)
         if metrics:
             print(error_text(metrics, outcome.spec))
+        faults = fault_text(fault_detection(outcome.result, outcome.spec), outcome.spec)
+        if faults:
+            print("\n" + faults)
     print(cost_text(outcome.result), end="\n\n")
     if study is not None:
         print(study.text())

@@ -21,9 +21,10 @@ class ReportSpec:
 
     Args:
         title: heading of the report.
-        true_position, true_speed, true_slip, true_adhesion_force, odometer, speed_reference: names of recorded signals.
+        true_position, true_speed, true_slip, true_adhesion_force, true_fault, odometer, speed_reference: names of
+            recorded signals; `true_fault` is not zero while the odometer lies.
         observers: component names of the observers; signals are ``<name>.position``, ``.speed``, ``.slip``,
-            ``.adhesion_force``, ``.slip_indicator``, each used where it was recorded.
+            ``.adhesion_force``, ``.slip_indicator``, ``.odometer_fault``, each used where it was recorded.
         labels: text to show for an observer.
         phases: parts of the run for the table.
         zones: low-adhesion zones in time [s].
@@ -38,6 +39,7 @@ class ReportSpec:
     true_speed: str | None = None
     true_slip: str | None = None
     true_adhesion_force: str | None = None
+    true_fault: str | None = None
     odometer: str | None = None
     speed_reference: str | None = None
     observers: Sequence[str] = ()

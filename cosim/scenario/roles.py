@@ -18,6 +18,7 @@ ROLES = {
     "true_speed": "m/s",
     "true_slip": "1",
     "true_adhesion_force": "N",
+    "true_fault": "1",
     "odometer": "m/s",
     "speed_reference": "m/s",
 }

@@ -229,6 +229,7 @@ class ReportTable(Table):
     true_speed: str | None = None
     true_slip: str | None = None
     true_adhesion_force: str | None = None
+    true_fault: str | None = None
     odometer: str | None = None
     speed_reference: str | None = None
     observers: list[Name] | None = None

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from math import nan
 from typing import Any
 
 import numpy as np
 
+from cosim.evaluation.balise_gaps import PLAIN_ODOMETER, gap_errors, largest
+from cosim.evaluation.fault_detection import fault_detection
 from cosim.evaluation.metrics import judged_size, within
 from cosim.evaluation.roles import Quantity, estimation_error
 from cosim.evaluation.spec import Phase
@@ -15,10 +17,24 @@ from cosim.scenario.outcome import Outcome
 
 Measure = Callable[[Outcome], float]
 ERROR_UNITS: Mapping[Quantity, str] = {"speed": "m/s", "position": "m"}
+GAP_UNITS = {"gap_error_max": "m", "gap_error_time_max": "s"}
+DETECTION_UNITS = {
+    "faults": "1",
+    "missed_faults": "1",
+    "detections": "1",
+    "false_alarms": "1",
+    "judged_time": "s",
+    "detection_delay": "s",
+    "recovery_delay": "s",
+    "false_alarm_time": "s",
+    "balise_error": "m",
+    "balise_error_max": "m",
+}
 
 
 def error_measures(outcome: Outcome) -> dict[str, float]:
-    """Largest and root-mean-square errors of every observer over the evaluated part of the run.
+    """Largest and root-mean-square errors of every observer over the evaluated part of the run, and what it made of
+    the odometer's faults (`detection_measures`).
 
     Args:
         outcome: the run.
@@ -26,7 +42,9 @@ def error_measures(outcome: Outcome) -> dict[str, float]:
     Returns:
         ``observer.speed_error_max``, ``observer.speed_error_rms`` [m/s] and the same of the position [m], where
         recorded; NaN for a run that failed, whose errors are those of another interval of time, and where too few rows
-        are judged.
+        are judged. Where balises were read also ``observer.gap_error_max`` [m] and ``observer.gap_error_time_max`` [s],
+        the largest position error at the end of a gap between two of them and the longest running time of one, and the
+        same of the plain odometer, under the name of its component.
     """
     result, spec = outcome.result, outcome.spec
     measures: dict[str, float] = {}
@@ -43,7 +61,56 @@ def error_measures(outcome: Outcome) -> dict[str, float]:
             failed = outcome.failure is not None
             measures[f"{observer}.{quantity}_error_max"] = nan if failed else size.max_abs
             measures[f"{observer}.{quantity}_error_rms"] = nan if failed else size.rms
+    return measures | detection_measures(outcome) | _gap_measures(outcome)
+
+
+def detection_measures(outcome: Outcome) -> dict[str, float]:
+    """What every observer made of the faults of the odometer, where the report has the role `true_fault`.
+
+    Args:
+        outcome: the run.
+
+    Returns:
+        ``observer.faults``, ``observer.missed_faults``, ``observer.detections`` and ``observer.false_alarms`` as
+        counts, ``observer.judged_time`` [s], the means ``observer.detection_delay`` and ``observer.recovery_delay``
+        [s], ``observer.false_alarm_time`` [s], the mean ``observer.balise_error`` [m] and the largest
+        ``observer.balise_error_max`` [m] of the position before each balise; NaN where there is none, and for a run
+        that failed.
+    """
+    measures: dict[str, float] = {}
+    for found in fault_detection(outcome.result, outcome.spec):
+        sizes = np.abs(found.position_errors)
+        told = {
+            "faults": found.faults,
+            "missed_faults": found.missed,
+            "detections": found.detections,
+            "false_alarms": found.false,
+            "judged_time": found.duration,
+            "detection_delay": _mean(found.start_delays),
+            "recovery_delay": _mean(found.end_delays),
+            "false_alarm_time": found.time_outside,
+        }
+        largest = float(sizes.max()) if sizes.size else nan
+        numbers = (told if found.tells else {}) | {"balise_error": _mean(sizes), "balise_error_max": largest}
+        failed = outcome.failure is not None
+        measures |= {f"{found.observer}.{name}": nan if failed else float(v) for name, v in numbers.items()}
     return measures
+
+
+def _gap_measures(outcome: Outcome) -> dict[str, float]:
+    """Position errors at the end of the gaps between balises, see `error_measures`."""
+    found, spec = gap_errors(outcome.result, outcome.spec), outcome.spec
+    measures: dict[str, float] = {}
+    for name, errors in found.errors.items():
+        component = str(spec.odometer).rpartition(".")[0] if name == PLAIN_ODOMETER else name
+        times = found.running_time(name)
+        for key, values in zip(GAP_UNITS, (errors, times[~np.isnan(times)]), strict=True):
+            measures[f"{component}.{key}"] = nan if outcome.failure is not None else largest(values)
+    return measures
+
+
+def _mean(values: Sequence[float] | np.ndarray) -> float:
+    return float(np.mean(values)) if len(values) else nan
 
 
 def own_measures(outcome: Outcome, measure: Mapping[str, Measure]) -> tuple[dict[str, float], list[str]]:
@@ -84,7 +151,7 @@ def with_unit(name: str, unit: str | None) -> str:
 
 
 def measure_unit(name: str) -> str | None:
-    """SI unit of a measure of `error_measures`; None for the user's own.
+    """SI unit of a measure of `error_measures` or `detection_measures`; None for the user's own.
 
     Args:
         name: of the measure.
@@ -92,4 +159,4 @@ def measure_unit(name: str) -> str | None:
     for quantity, unit in ERROR_UNITS.items():
         if name.endswith((f".{quantity}_error_max", f".{quantity}_error_rms")):
             return unit
-    return None
+    return (GAP_UNITS | DETECTION_UNITS).get(name.rpartition(".")[2])

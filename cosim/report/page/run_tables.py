@@ -8,6 +8,8 @@ from typing import Any
 from cosim.evaluation.cost import KINDS, cost_rows
 from cosim.evaluation.event_counts import outcome_columns
 from cosim.evaluation.facts import list_entry, mapping_entry
+from cosim.evaluation.fault_detection import fault_detection
+from cosim.evaluation.fault_table import HEADINGS, cells
 from cosim.evaluation.indicators import indicator_statistics
 from cosim.evaluation.numbers import DASH, number
 from cosim.evaluation.roles import label
@@ -107,6 +109,17 @@ def indicators_table(result: Result, spec: ReportSpec) -> Table:
         ]
         rows.append([label(spec, s.observer), number(100 * s.on), number(100 * s.on_outside), *delays])
     return simple_table(headings, rows, range(1, len(headings)))
+
+
+def faults_table(result: Result, spec: ReportSpec) -> Table:
+    """Faults of the odometer: which were found, how late, and what was no fault.
+
+    Args:
+        result: the run.
+        spec: roles and labels.
+    """
+    rows = [[label(spec, found.observer), *cells(found)] for found in fault_detection(result, spec)]
+    return simple_table(["Observer", *HEADINGS], rows, range(1, len(HEADINGS) + 1))
 
 
 def components_table(result: Result) -> Table:
