@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from fmu_observer.detection.threshold_detector import ThresholdDetector
-from plant_models.hybrid import NumpyKernel, Runtime, scalar_names
+from plant_models.hybrid import Runtime, scalar_names
 
 SYSTEM = ThresholdDetector()
 
 
 def verdicts(residuals: list[float], preset: str | None = None, **parameters: float) -> list[tuple[float, float]]:
     """Fault and recovering after each sample of 1 ms."""
-    runtime = Runtime(SYSTEM, NumpyKernel(SYSTEM))
+    runtime = Runtime(SYSTEM)
     runtime.p[:] = SYSTEM.start_parameters(preset)
     for name, value in parameters.items():
         runtime.p[scalar_names(SYSTEM.parameter_signals).index(name)] = value
@@ -27,7 +27,7 @@ def verdicts(residuals: list[float], preset: str | None = None, **parameters: fl
 
 
 def test_begin_quiet_end() -> None:
-    """A peak at the onset, quiet, a peak of the other sign at the end; what lies between the thresholds changes nothing."""
+    """A peak at the onset, quiet, a peak of the other sign at the end; between the thresholds nothing changes."""
     residuals = [0.0, 0.004, 0.006, 0.02, 0.006, 0.004, 0.0009, 0.004, -0.004, -0.006, -0.02, -0.003, 0.0, 0.006]
     faults = [0, 0, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 1]
     awaited = [0, 0, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0, 0]
@@ -51,7 +51,7 @@ def test_a_false_alarm_ends_after_its_time_and_as_published_never() -> None:
 
 
 def test_the_filter_is_the_exact_lag_of_first_order() -> None:
-    runtime = Runtime(SYSTEM, NumpyKernel(SYSTEM))
+    runtime = Runtime(SYSTEM)
     runtime.p[:] = SYSTEM.start_parameters("filtered")
     runtime.u[0] = -0.004
     runtime.start(0.0)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from plant_models.hybrid import NumpyKernel, Runtime, scalar_names
+from plant_models.hybrid import Runtime, scalar_names
 from plant_models.railway.control.stopping_controller import StoppingController
 from plant_models.railway.control.stopping_planner import plan_stop
 
@@ -20,7 +20,7 @@ class Controlled:
     """The controller at the instants of its period, and a train that is moved by hand."""
 
     def __init__(self, preset: str | None = None, **parameters: float) -> None:
-        self.runtime = Runtime(SYSTEM, NumpyKernel(SYSTEM))
+        self.runtime = Runtime(SYSTEM)
         self.runtime.p[:] = SYSTEM.start_parameters(preset)
         self.set("p", {"control_period": PERIOD, "effort_limit": 1000.0} | parameters)
 
@@ -124,10 +124,10 @@ def test_no_braking_solution_rolls() -> None:
 
 @pytest.mark.parametrize("position", [99.0, 100.0, 130.0])
 def test_a_mark_too_near_or_behind_brakes_with_all_there_is(position: float) -> None:
-    c = Controlled(effort_limit=20.0)
+    c = Controlled(effort_limit=200.0)
     told = c.start(estimated_position=position, estimated_speed=30.0)
-    assert (told.limited_plan, told.no_braking_solution, told.effort) == (1.0, 0.0, -20.0)
-    assert c.follow(1000).speed_reference == pytest.approx(0.0, abs=1e-12)
+    assert (told.limited_plan, told.no_braking_solution, told.effort) == (1.0, 0.0, -200.0)
+    assert c.follow(200).speed_reference == pytest.approx(0.0, abs=1e-12)
 
 
 def test_limits_are_kept_and_what_they_cut_is_not_integrated() -> None:

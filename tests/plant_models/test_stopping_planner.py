@@ -29,8 +29,8 @@ def test_the_example_of_the_thesis() -> None:
 
 
 def test_all_of_c_by_lamberts_function() -> None:
-    """``s = -W_{-1}(-c e^-c)/c - 1``. SciPy's function loses half its digits at the branch point, where c is near 1, and
-    the argument 1 - c loses them where c is small: its condition number bounds both.
+    """``s = -W_{-1}(-c e^-c)/c - 1``. SciPy's function loses half its digits at the branch point, where c is near 1,
+    and the argument 1 - c loses them where c is small.
     """
     c = np.concatenate([np.geomspace(1e-6, 0.5, 400), 1.0 - np.geomspace(0.5, 1e-9, 400)])
     s = np.expm1(constant_brake(1.0, 1.0 - c, 1.0).duration)

@@ -39,7 +39,7 @@ from plant_models.hybrid import (
 from plant_models.hybrid.output_warning import OutputWarning
 from plant_models.hybrid.system import Array
 
-POSITION, SPEED, DISTURBANCE, RATE = range(4)  # indices of the continuous states
+POSITION, SPEED, DISTURBANCE, RATE = range(4)  # indices of the continuous states, and then of the memory
 HELD_INNOVATION, AT_BALISE, BALISES, DETECTOR, READING, UNCHANGED, HELD = (
     4,
     5,

@@ -49,9 +49,9 @@ class StoppingController(HybridSystem):
     """Stops a train at a mark: ``u = u* - (L1 (v - v_r) + L2 p_i + dhat) m / b`` with ``p_i' = v - v_r``.
 
     **Plan**: the constant brake u* that ends at `stop_position`, from the position and speed of the instant at which it
-    is made (`stopping_planner`). It is made when `enabled` and moving, again when a detected fault is over, and whenever
-    `plan_request` changes: connect what counts the balises that the observer has used. The reference ``v_r' = -w1 v_r +
-    b u*`` is a closed form, so no step decides where it stops.
+    is made (`stopping_planner`). It is made when `enabled` and moving, again when a detected fault is over, and
+    whenever `plan_request` changes: connect what counts the balises that the observer has used. The reference
+    ``v_r' = -w1 v_r + b u*`` is a closed form, so no step decides where it stops.
 
     **Tracking**: PI with the estimated disturbance compensated. The minus sign is the one of the closed loop (3.14),
     whose poles are -L1 .. as designed (-1 and -0.5 for the printed gains); with the plus sign of the printed (3.12)
