@@ -31,13 +31,12 @@ class FaultCause(Protocol):
 
     Attributes:
         parameters: beyond those that all causes share. continuous: states that flow. remembered: memory.
-        frictions: names of states with dry friction. switchings: names of the switching functions. events: periodic.
+        switchings: names of the switching functions. events: periodic.
     """
 
     parameters: tuple[Signal, ...]
     continuous: tuple[Signal, ...]
     remembered: tuple[Signal, ...]
-    frictions: tuple[str, ...]
     switchings: tuple[str, ...]
     events: tuple[PeriodicEvent, ...]
 
@@ -51,9 +50,6 @@ class FaultCause(Protocol):
 
     def rates(self, t: Array, s: list[Array], passed: Array, u: Any, p: Any) -> list[Array]:
         """Derivatives of the continuous states; arguments as in `fault`."""
-
-    def friction(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
-        """Dry frictions of the states in `frictions`; arguments as in `fault`."""
 
     def switching(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
         """Switching functions; arguments as in `fault`."""

@@ -36,7 +36,6 @@ class GivenFaults:
             state("released_for", "s", 0.0, "For how long the brake was released in each jam", size=count),
         )
         self.remembered: tuple[Signal, ...] = ()
-        self.frictions: tuple[str, ...] = ()
         self.switchings: tuple[str, ...] = tuple(
             f"fault_{edge}[{i + 1}]" for edge in ("from", "to", "freed") for i in range(count)
         )
@@ -61,14 +60,6 @@ class GivenFaults:
         """
         released = braking_stopped(u)
         return [released * self._active(i, passed) * one_where(p.fault_kind[i] < 0.0) for i in range(self.count)]
-
-    def friction(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
-        """None.
-
-        Args:
-            t: time [s]. s: states of the cause. u: inputs. p: parameters.
-        """
-        return []
 
     def switching(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
         """See `FaultCause.switching`.

@@ -101,8 +101,7 @@ class WheelFault(HybridSystem):
         )
         self.parameters = (*_SHARED, *self._cause.parameters)
         self.states = (_DISTANCE, *self._cause.continuous, *self._cause.remembered)
-        self.frictions, self.switchings = self._cause.frictions, self._cause.switchings
-        self.events = self._cause.events
+        self.switchings, self.events = self._cause.switchings, self._cause.events
         super().__init__(cause=cause, fault_count=fault_count)
 
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
@@ -111,10 +110,6 @@ class WheelFault(HybridSystem):
         return vector(
             u.speed * (1.0 + self._cause.fault(t, s, passed, u, p).depth), *self._cause.rates(t, s, passed, u, p)
         )
-
-    def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Dry friction on the states of the cause, shape (len(frictions),)."""
-        return vector(*self._cause.friction(t, self._states(x), u, p))
 
     def switching(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Switching functions of the cause."""
