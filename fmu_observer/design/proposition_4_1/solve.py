@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from fmu_observer.design.cvxpy_module import load_cvxpy
 from fmu_observer.design.proposition_4_1.inequalities import Proposition41Problem, inequalities
 
 STRICTNESS = (1e-8, 1e-7, 1e-6)  # asked of every inequality, the least first: what is recomputed must be positive
@@ -43,7 +44,7 @@ def least_condition(problem: Proposition41Problem, gains: np.ndarray | None) -> 
     Raises:
         ImportError: cvxpy is not installed.
     """
-    cp = _cvxpy()
+    cp = load_cvxpy("Design by Proposition 4-1")
     question = _Question.of(cp, problem, gains, problem.alpha)
     largest = cp.Variable()
     yield from question.candidates(cp, largest, [question.P << largest * np.eye(problem.order)])
@@ -62,7 +63,7 @@ def least_alphas(problem: Proposition41Problem, gains: np.ndarray | None) -> Cal
     Raises:
         ImportError: cvxpy is not installed.
     """
-    cp = _cvxpy()
+    cp = load_cvxpy("Design by Proposition 4-1")
     m, alpha = cp.Parameter(nonneg=True), cp.Variable()
     question = _Question.of(cp, replace(problem, m=m, alpha=None), gains, alpha)
     solve = question.candidates_of(cp, alpha, [])
@@ -86,7 +87,7 @@ def sharpest(drifts: np.ndarray, gain: np.ndarray, m: float) -> Iterator[tuple[n
     Raises:
         ImportError: cvxpy is not installed.
     """
-    cp = _cvxpy()
+    cp = load_cvxpy("Design by Proposition 4-1")
     n = len(gain)
     P, strict = cp.Variable((n, n), symmetric=True), cp.Parameter()
     constraints = [cp.sum(cp.multiply(np.outer(gain, gain), P)) <= 1.0, P >> strict * np.eye(n)]
@@ -149,11 +150,3 @@ def _run(cp: Any, question: Any) -> bool:
         except cp.error.SolverError:
             return False
     return question.status in ("optimal", "optimal_inaccurate")
-
-
-def _cvxpy() -> Any:
-    try:
-        import cvxpy  # noqa: PLC0415 - only who designs pays for it
-    except ImportError as error:
-        raise ImportError("Design by Proposition 4-1 needs cvxpy: pip install 'fmu-observer[lmi]'.") from error
-    return cvxpy
