@@ -5,9 +5,10 @@ keeps a limit. NumPy.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from math import exp, inf, sqrt
+from typing import Any
 
 import numpy as np
 
@@ -152,8 +153,7 @@ class ErrorBounds:
         }
 
     def _at_period(self, period: float) -> ErrorBounds:
-        values = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        return ErrorBounds(**(values | {"period": max(period, FIRST)}))
+        return replace(self, period=max(period, FIRST))
 
     def _forced(self, gap: float) -> float:
         """What a gap adds to the level, from zero."""
@@ -165,6 +165,31 @@ class ErrorBounds:
 
     def _level(self, z: np.ndarray) -> float:
         return sqrt(float(z @ self.P @ z))
+
+
+def bound_data(bounds: ErrorBounds, limit: float | None, missing: int) -> dict[str, Any]:
+    """The bounds as plain data.
+
+    Args:
+        bounds: of an observer. limit: of the error, for the largest gaps [m/s]; None for none.
+        missing: most samples missing in a row.
+
+    Returns:
+        Observer, numbers, `rows` and, with a limit, `largest_gaps` and `largest_periods` [s].
+
+    Raises:
+        ValueError: the limit is not positive, or `missing` is negative.
+    """
+    shared = ("observer", "preset", "period", "rate", "beta", "m", "gain", "sample_error", "noise", "disturbances")
+    data: dict[str, Any] = {name: getattr(bounds, name) for name in (*shared, "decay")}
+    data["rows"] = [asdict(row) for row in bounds.growth(missing)]
+    if limit is not None:
+        data |= {
+            "limit": limit,
+            "largest_gaps": bounds.largest_gaps(limit),
+            "largest_periods": bounds.largest_periods(limit),
+        }
+    return data
 
 
 def bound_text(bounds: ErrorBounds, limit: float | None, missing: int) -> str:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from fmu_observer.design.cvxpy_module import load_cvxpy
 from fmu_observer.design.proposition_4_1.inequalities import Proposition41Problem, inequalities
 
 STRICTNESS = (1e-8, 1e-7, 1e-6)  # asked of every inequality, the least first: what is recomputed must be positive
@@ -78,7 +79,7 @@ def sharpest(drifts: np.ndarray, gain: np.ndarray, m: float) -> Iterator[tuple[n
     Raises:
         ImportError: cvxpy is not installed.
     """
-    cp = _cvxpy()
+    cp = load_cvxpy("Design by Proposition 4-1")
     n = len(gain)
     P, strict = cp.Variable((n, n), symmetric=True), cp.Parameter()
     constraints = [cp.sum(cp.multiply(np.outer(gain, gain), P)) <= 1.0, P >> strict * np.eye(n)]
@@ -97,7 +98,7 @@ def _candidates(
     objective: Callable[[Any, Any, Any], tuple[Any, list[Any]]],
     alpha: float | None,
 ) -> Iterator[Candidate]:
-    cp = _cvxpy()
+    cp = load_cvxpy("Design by Proposition 4-1")
     n = problem.order
     P, strict = cp.Variable((n, n), symmetric=True), cp.Parameter()
     if gains is None:
@@ -127,11 +128,3 @@ def _run(cp: Any, question: Any) -> bool:
         except cp.error.SolverError:
             return False
     return question.status in ("optimal", "optimal_inaccurate")
-
-
-def _cvxpy() -> Any:
-    try:
-        import cvxpy  # noqa: PLC0415 - only who designs pays for it
-    except ImportError as error:
-        raise ImportError("Design by Proposition 4-1 needs cvxpy: pip install 'fmu-observer[lmi]'.") from error
-    return cvxpy
