@@ -249,8 +249,8 @@ class QuasiLpvUio(GatedObserver, GapCertified):
 
     def _at_sample(self, x: Array, u: Any, p: Any) -> Array:
         own = [x[i] for i in range(BALISES + 1)]
-        friction = np.sign(x[V]) * self.friction(0.0, x, u, p)[0]
-        now = u.odometer + p.reading_age * (self._free_acceleration(x, u, p) - friction)
+        acceleration = self._free_acceleration(x, u, p) - self.friction(0.0, x, u, p)[0]
+        now = np.maximum(u.odometer + p.reading_age * np.where(x[V] > 0.0, acceleration, 0.0), 0.0)
         told = Reading(u.odometer, x[V], p.residual_gain * (now - x[V]), u.effort)
         judged = self.rules.at_sample(self._rule_memory(x), told, p)
         own[V] = np.maximum(np.where(judged.restart > 0.0, now, x[V]), 0.0)

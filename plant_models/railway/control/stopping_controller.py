@@ -244,6 +244,6 @@ def _planned(m: _Memory, due: Array, recovered: Array, t: Array, u: Any, p: Any)
 
 
 def _feedforward(m: _Memory, t: Array, p: Any) -> Array:
-    """Effort of the plan [N]; after its end what keeps the final speed."""
-    over = holds(t - m.plan_start >= m.plan_duration)
+    """Effort of the plan [N]; after its end what keeps the final speed. A stop is braked for until the train stands."""
+    over = every(holds(t - m.plan_start >= m.plan_duration), holds(p.final_speed > 0.0))
     return either(over, p.davis_b * p.final_speed, -m.plan_deceleration * p.mass) / p.brake_coefficient
