@@ -58,7 +58,7 @@ def main() -> None:
         axes[0].semilogy(way, np.where(found.possible > 0.0, found.deceleration, np.nan), label=f"{speed:g} m/s")
         axes[0].axvline(speed / DRAG, color="grey", lw=0.5, ls=":")
     axes[0].set(xlabel="distance to the mark [m]", ylabel="deceleration by the brake [m/s2]")
-    axes[0].legend(title="speed; dotted: drag alone", fontsize=8)
+    axes[0].legend(title="dotted: drag alone", fontsize=8, loc="upper right")
     times = np.linspace(0.0, plan.duration, 200)
     axes[1].plot(times, plan.speed(times), label="speed [m/s]")
     axes[1].plot(times, plan.position(times), label="position [m]")

@@ -26,7 +26,7 @@ SAMPLED = (
     "sample. The table says 1 or 2 ms, the text 4 ms"
 )
 HELD = (
-    "both keep the old reference; ours goes on integrating the error during a fault, which wins back a part, and how the "
+    "both keep the old reference; ours goes on integrating the error during a fault, which wins back a part; how the "
     "independent run treats the integral is not known"
 )
 

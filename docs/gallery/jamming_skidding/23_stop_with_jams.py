@@ -55,7 +55,7 @@ def main() -> None:
     inset.grid(alpha=0.3)
     axes[0, 1].plot(t[shown], outcome["controller.effort"][shown], lw=0.8, label="fault-tolerant")
     axes[0, 1].plot(t[shown], outcome["classical.effort"][shown], "--", lw=0.8, label="classical")
-    axes[0, 1].set(ylabel="effort [N/kg]", ylim=(-60, 2))
+    axes[0, 1].set(ylabel="effort [N/kg]", ylim=(-40, 2))
     axes[1, 0].plot(t[shown], outcome["observer.disturbance"][shown], lw=0.8, label="estimated")
     axes[1, 0].plot(t[shown], -0.01 - 0.001 * outcome["train.speed"][shown] ** 2, "--", lw=0.8, label="true, no jam")
     axes[1, 0].set(ylabel="disturbance [m/s2]", xlabel="time [s]")
