@@ -239,4 +239,5 @@ class ReportTable(Table):
     published: dict[str, dict[str, float]] = {}
     independent: dict[str, dict[str, float]] = {}
     notes: list[str] = []
+    measures: list[str] = []
     tables: list[Annotated[str, AfterValidator(_format)]] = ["csv"]

@@ -15,6 +15,8 @@ from cosim.evaluation.spec import Phase
 from cosim.scenario.outcome import Outcome
 
 Measure = Callable[[Outcome], float]
+SHARES: Mapping[str, tuple[str, str]] = {}
+"""Measures that are shares of counted things: name to those of the count and of the number in all."""
 ERROR_UNITS: Mapping[Quantity, str] = {"speed": "m/s", "position": "m"}
 DETECTION_UNITS = {
     "faults": "1",

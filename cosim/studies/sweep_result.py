@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cosim.comparison.compare import compare
-from cosim.errors import ComparisonError, OutputError
+from cosim.errors import ComparisonError, OutputError, ScenarioError, nearest
 from cosim.evaluation.numbers import number as number_text
 from cosim.results.load import load_result
 from cosim.results.result import Result
@@ -84,6 +84,19 @@ class SweepResult:
         """Names of all measures, in order of appearance."""
         return list(dict.fromkeys(name for run in self.runs for name in run.measures))
 
+    @property
+    def shown_measures(self) -> list[str]:
+        """Names of the measures that printed tables show: those the scenario chooses under ``report.measures``.
+
+        Raises:
+            ScenarioError: one that is chosen is none.
+        """
+        chosen = self.scenario.table().report.measures
+        unknown = [name for name in chosen if name not in self.measures]
+        if unknown and self.measures:
+            raise ScenarioError(f"report.measures: {unknown[0]!r} is none; {nearest(unknown[0], self.measures)}")
+        return [name for name in chosen or self.measures if name in self.measures]
+
     def unit(self, measure: str) -> str | None:
         """Unit of a measure; None where nobody has said it.
 
@@ -117,14 +130,18 @@ class SweepResult:
     def text(self) -> str:
         """The table as plain text, failures in words below it."""
         rows = self.table()
-        names = ["run", *self.names, *self.measures]
-        shown = [setting_text] * (1 + len(self.names)) + [partial(number_text, digits=4)] * len(self.measures)
-        heads = ["run", *self.names, *(with_unit(name, self.unit(name)) for name in self.measures)]
+        measures = self.shown_measures
+        names = ["run", *self.names, *measures]
+        shown = [setting_text] * (1 + len(self.names)) + [partial(number_text, digits=4)] * len(measures)
+        heads = ["run", *self.names, *(with_unit(name, self.unit(name)) for name in measures)]
         cells = [heads, *([show(row[name]) for name, show in zip(names, shown, strict=True)] for row in rows)]
         lines = text_table(cells, left=())
-        lines += [f"run {run.number} failed: {run.failure}" for run in self.failed]
-        lines += [f"run {run.number}: {fault}" for run in self.runs for fault in run.faults]
-        return "\n".join(lines)
+        return "\n".join([*lines, *self.troubles()])
+
+    def troubles(self) -> list[str]:
+        """What failed, in words, a line each."""
+        lines = [f"run {run.number} failed: {run.failure}" for run in self.failed]
+        return [*lines, *(f"run {run.number}: {fault}" for run in self.runs for fault in run.faults)]
 
     def compare(self, reference: int = 0, tolerance: Any = None, **options: Any) -> dict[int, Comparison]:
         """Compare every other run with one of them.
