@@ -15,9 +15,10 @@ import numpy as np
 import scipy
 
 from cosim.errors import OutputError
+from cosim.evaluation.fault_detection import HOUR, clopper_pearson, garwood
 from cosim.evaluation.numbers import DASH
 from cosim.evaluation.numbers import number as number_text
-from cosim.studies.measures import SHARES, setting_text, with_unit
+from cosim.studies.measures import RATES, SHARES, setting_text
 from fmus.text_table import text_table
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ class Spread:
     Args:
         mean: of the runs, or a share of things counted over all runs; NaN where there is none.
         low, high: ends of its 95 % confidence interval; NaN where there are too few runs.
-        count: runs that have the measure, or things counted.
+        count: runs that have the measure, or what was counted.
     """
 
     mean: float
@@ -42,13 +43,16 @@ class Spread:
     high: float = nan
     count: int = 0
 
-    def text(self) -> str:
-        """The mean, and the interval where there is one."""
+    def text(self, factor: float = 1.0) -> str:
+        """The mean, and the interval where there is one.
+
+        Args:
+            factor: what the numbers are multiplied by.
+        """
         if not isfinite(self.mean):
             return DASH
-        if not isfinite(self.low):
-            return number_text(self.mean)
-        return f"{number_text(self.mean)} ({number_text(self.low)} to {number_text(self.high)})"
+        mean, low, high = (number_text(factor * value) for value in (self.mean, self.low, self.high))
+        return f"{mean} ({low} to {high})" if isfinite(self.low) else mean
 
 
 def mean_of(values: Sequence[float]) -> Spread:
@@ -69,24 +73,11 @@ def mean_of(values: Sequence[float]) -> Spread:
     return Spread(mean, mean - half, mean + half, len(numbers))
 
 
-def share_of(hits: float, trials: float) -> Spread:
-    """A share of counted things with its exact interval (Clopper and Pearson 1934).
-
-    Args:
-        hits: how many of them. trials: how many in all.
-    """
-    if not trials > 0.0:
-        return Spread(nan)
-    tail = 0.5 - 0.5 * LEVEL
-    low = float(scipy.stats.beta.ppf(tail, hits, trials - hits + 1.0)) if hits > 0.0 else 0.0
-    high = float(scipy.stats.beta.ppf(1.0 - tail, hits + 1.0, trials - hits)) if hits < trials else 1.0
-    return Spread(hits / trials, low, high, int(trials))
-
-
 def groups(result: SweepResult, by: str) -> dict[Any, dict[str, Spread]]:
     """For each value of a setting the measures over the runs that have it, in order of appearance.
 
-    Shares (`cosim.studies.measures.SHARES`) are of what was counted in all runs together; other measures are means.
+    Shares and rates (`cosim.studies.measures.SHARES`, `RATES`) are of what was counted in all runs together, with exact
+    intervals; other measures are means.
 
     Args:
         result: of a sweep. by: what was varied.
@@ -99,9 +90,12 @@ def groups(result: SweepResult, by: str) -> dict[Any, dict[str, Spread]]:
 
 def _spread(name: str, runs: Sequence[SweepRun]) -> Spread:
     head, _, kind = name.rpartition(".")
-    if kind in SHARES:
-        hits, trials = (_total(runs, f"{head}.{counted}") for counted in SHARES[kind])
-        return share_of(hits, trials)
+    counted = SHARES.get(kind) or RATES.get(kind)
+    if counted is not None:
+        hits, whole = (_total(runs, f"{head}.{part}") for part in counted)
+        unit = 1.0 if kind in SHARES else HOUR
+        interval = clopper_pearson(int(hits), int(whole)) if kind in SHARES else garwood(int(hits), whole / unit)
+        return Spread(hits * unit / whole if whole > 0.0 else nan, *interval, int(hits))
     return mean_of([run.measures.get(name, nan) for run in runs])
 
 
@@ -116,12 +110,12 @@ def groups_text(result: SweepResult, by: str) -> str:
     Args:
         result: of a sweep. by: what was varied.
     """
-    names = result.shown_measures
-    rows = [[by, "runs", *(with_unit(name, result.unit(name)) for name in names)]]
+    columns = result.columns
+    rows = [[by, "runs", *(column.heading for column in columns)]]
     counts = _runs(result, by)
     for key, measures in groups(result, by).items():
-        rows.append([key, str(counts[key]), *(measures[name].text() for name in names)])
-    note = "Means of the runs, and shares of what was counted in all of them, with 95 % intervals."
+        rows.append([key, str(counts[key]), *(measures[c.measure].text(c.factor) for c in columns)])
+    note = "Means of the runs, and shares and rates of what was counted in all of them, with 95 % intervals."
     return "\n".join([*text_table(rows, left=(0,), heading=True), "", note, *result.troubles()])
 
 
