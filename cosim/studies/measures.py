@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from cosim.evaluation.balise_gaps import PLAIN_ODOMETER, gap_errors, largest
 from cosim.evaluation.fault_detection import fault_detection
 from cosim.evaluation.metrics import judged_size, within
 from cosim.evaluation.roles import Quantity, estimation_error
@@ -23,6 +24,7 @@ SHARES: Mapping[str, tuple[str, str]] = {
 RATES: Mapping[str, tuple[str, str]] = {"false_alarms_per_hour": ("false_alarms", "judged_time")}
 """Measures that are counts in an hour: name to those of the count and of the time [s]."""
 ERROR_UNITS: Mapping[Quantity, str] = {"speed": "m/s", "position": "m"}
+GAP_UNITS = {"gap_error_max": "m", "gap_error_time_max": "s"}
 DETECTION_UNITS = {
     "faults": "1",
     "missed_faults": "1",
@@ -50,7 +52,9 @@ def error_measures(outcome: Outcome) -> dict[str, float]:
     Returns:
         ``observer.speed_error_max``, ``observer.speed_error_rms`` [m/s] and the same of the position [m], where
         recorded; NaN for a run that failed, whose errors are those of another interval of time, and where too few rows
-        are judged.
+        are judged. Where balises were read also ``observer.gap_error_max`` [m] and ``observer.gap_error_time_max`` [s],
+        the largest position error at the end of a gap between two of them and the longest running time of one, and the
+        same of the plain odometer, under the name of its component.
     """
     result, spec = outcome.result, outcome.spec
     measures: dict[str, float] = {}
@@ -67,7 +71,7 @@ def error_measures(outcome: Outcome) -> dict[str, float]:
             failed = outcome.failure is not None
             measures[f"{observer}.{quantity}_error_max"] = nan if failed else size.max_abs
             measures[f"{observer}.{quantity}_error_rms"] = nan if failed else size.rms
-    return measures | detection_measures(outcome)
+    return measures | detection_measures(outcome) | _gap_measures(outcome)
 
 
 def detection_measures(outcome: Outcome) -> dict[str, float]:
@@ -104,6 +108,18 @@ def detection_measures(outcome: Outcome) -> dict[str, float]:
         numbers = (told if found.tells else {}) | {"balise_error": _mean(sizes), "balise_error_max": largest}
         failed = outcome.failure is not None
         measures |= {f"{found.observer}.{name}": nan if failed else float(v) for name, v in numbers.items()}
+    return measures
+
+
+def _gap_measures(outcome: Outcome) -> dict[str, float]:
+    """Position errors at the end of the gaps between balises, see `error_measures`."""
+    found, spec = gap_errors(outcome.result, outcome.spec), outcome.spec
+    measures: dict[str, float] = {}
+    for name, errors in found.errors.items():
+        component = str(spec.odometer).rpartition(".")[0] if name == PLAIN_ODOMETER else name
+        times = found.running_time(name)
+        for key, values in zip(GAP_UNITS, (errors, times[~np.isnan(times)]), strict=True):
+            measures[f"{component}.{key}"] = nan if outcome.failure is not None else largest(values)
     return measures
 
 
@@ -157,4 +173,4 @@ def measure_unit(name: str) -> str | None:
     for quantity, unit in ERROR_UNITS.items():
         if name.endswith((f".{quantity}_error_max", f".{quantity}_error_rms")):
             return unit
-    return DETECTION_UNITS.get(name.rpartition(".")[2])
+    return (GAP_UNITS | DETECTION_UNITS).get(name.rpartition(".")[2])
