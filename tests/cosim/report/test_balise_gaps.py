@@ -72,9 +72,9 @@ def test_errors_just_before_the_next_balise(distance: bool) -> None:
 
 
 def test_a_distance_that_is_sampled_is_read_between_its_samples() -> None:
-    """A count of every half second at 20 m/s would be up to 10 m behind."""
+    """A count of every 0.7 s at 20 m/s would be up to 14 m behind."""
     result = run()
-    held = np.floor(result.time / 0.5 + 1e-9) * 0.5
+    held = np.floor(result.time / 0.7 + 1e-9) * 0.7
     result.table["odo.distance"] = LIES * SPEED * held
     sampled = Result(result.table, [SignalInfo("odo.distance", "m", variability="discrete")], result.events)
     found = gap_errors(sampled, SPEC).errors[PLAIN_ODOMETER]
