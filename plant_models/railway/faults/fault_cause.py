@@ -52,7 +52,7 @@ class FaultCause(Protocol):
         """Derivatives of the continuous states.
 
         Args:
-            t: time [s]. s: states of the cause, continuous ones first. passed: switches, shape (k,). u: inputs. p: parameters.
+            t: time [s]. s: states of the cause. passed: switches, shape (k,). u: inputs. p: parameters.
         """
 
     def switching(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
