@@ -203,7 +203,8 @@ def _grid(channel: ResidualChannel) -> np.ndarray:
     if not len(sizes):
         return np.array([0.0, inf])
     resonances = np.abs(channel.poles.imag)
-    return np.r_[0.0, np.sort(np.r_[np.geomspace(sizes.min() / SPAN, sizes.max() * SPAN, GRID), resonances]), inf]
+    about = np.geomspace(sizes.min() / SPAN, sizes.max() * SPAN, GRID)
+    return np.asarray(np.r_[0.0, np.sort(np.r_[about, resonances]), inf])
 
 
 def _between(edges: np.ndarray) -> np.ndarray:
@@ -214,7 +215,7 @@ def _between(edges: np.ndarray) -> np.ndarray:
 
 def _energy(A: np.ndarray, C: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray]:
     """``int exp(A' t) C' C exp(A t) dt`` over [0, length] and ``exp(A length)``, by doubling a short interval."""
-    doublings = max(0, int(np.ceil(np.log2(max(np.linalg.norm(A, 2) * length / LONGEST, 1.0)))))
+    doublings = max(0, int(np.ceil(np.log2(max(float(np.linalg.norm(A, 2)) * length / LONGEST, 1.0)))))
     n, short = len(A), length / 2**doublings
     block = np.block([[-A.T, C.T @ C], [np.zeros((n, n)), A]])
     exponential = scipy.linalg.expm(block * short)
