@@ -7,6 +7,7 @@ docs/images/jam_detection.png. The trains and their jams are synthetic; they are
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -171,10 +172,9 @@ def main() -> None:
         ("stuck", stuck_table()),
         ("micro", micro_table()),
     ):
-        begin, end = f"<!-- study: {name} -->\n\n", f"\n\n<!-- end: {name} -->"
-        head, _, rest = text.partition(begin)
-        _, _, tail = rest.partition(end)
-        text = head + begin + table + end + tail
+        part = re.compile(rf"(<!-- study: {name} -->\n).*?(<!-- end -->)", re.DOTALL)
+        assert part.search(text), name
+        text = part.sub(lambda m, table=table: f"{m[1]}\n{table}\n\n{m[2]}", text)
         print(table, end="\n\n")
     PAGE.write_text(text, encoding="utf-8", newline="\n")
     draw(shares)
