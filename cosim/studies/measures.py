@@ -16,6 +16,13 @@ from cosim.evaluation.spec import Phase
 from cosim.scenario.outcome import Outcome
 
 Measure = Callable[[Outcome], float]
+SHARES: Mapping[str, tuple[str, str]] = {
+    "missed_share": ("missed_faults", "faults"),
+    "false_share": ("false_alarms", "detections"),
+}
+"""Measures that are shares of counted things: name to those of the count and of the number in all."""
+RATES: Mapping[str, tuple[str, str]] = {"false_alarms_per_hour": ("false_alarms", "judged_time")}
+"""Measures that are counts in an hour: name to those of the count and of the time [s]."""
 ERROR_UNITS: Mapping[Quantity, str] = {"speed": "m/s", "position": "m"}
 GAP_UNITS = {"gap_error_max": "m", "gap_error_time_max": "s"}
 DETECTION_UNITS = {
@@ -27,6 +34,9 @@ DETECTION_UNITS = {
     "detection_delay": "s",
     "recovery_delay": "s",
     "false_alarm_time": "s",
+    "missed_share": "1",
+    "false_share": "1",
+    "false_alarms_per_hour": "1/h",
     "balise_error": "m",
     "balise_error_max": "m",
 }
@@ -73,7 +83,8 @@ def detection_measures(outcome: Outcome) -> dict[str, float]:
     Returns:
         ``observer.faults``, ``observer.missed_faults``, ``observer.detections`` and ``observer.false_alarms`` as
         counts, ``observer.judged_time`` [s], the means ``observer.detection_delay`` and ``observer.recovery_delay``
-        [s], ``observer.false_alarm_time`` [s], the mean ``observer.balise_error`` [m] and the largest
+        [s], ``observer.false_alarm_time`` [s], ``observer.missed_share`` of the faults, ``observer.false_share`` of the
+        detections, ``observer.false_alarms_per_hour`` [1/h], the mean ``observer.balise_error`` [m] and the largest
         ``observer.balise_error_max`` [m] of the position before each balise; NaN where there is none, and for a run
         that failed.
     """
@@ -89,6 +100,9 @@ def detection_measures(outcome: Outcome) -> dict[str, float]:
             "detection_delay": _mean(found.start_delays),
             "recovery_delay": _mean(found.end_delays),
             "false_alarm_time": found.time_outside,
+            "missed_share": found.missed_rate,
+            "false_share": found.false_rate,
+            "false_alarms_per_hour": found.false_per_hour,
         }
         largest = float(sizes.max()) if sizes.size else nan
         numbers = (told if found.tells else {}) | {"balise_error": _mean(sizes), "balise_error_max": largest}

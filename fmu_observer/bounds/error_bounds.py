@@ -16,6 +16,8 @@ from fmu_observer.bounds.formulas import improved_dmo_bound
 from fmu_observer.bounds.gaps import FIRST, growth_over_missing_samples, largest_gap
 from fmu_observer.bounds.worst_case import worst_case
 
+COARSE = 18  # halvings where each value is a worst case: to 1e-5 of the gap
+
 
 @dataclass(frozen=True)
 class BoundRow:
@@ -35,7 +37,8 @@ class BoundRow:
 
 @dataclass(frozen=True, eq=False)
 class ErrorBounds:
-    """Bounds of the speed error of an observer whose odometer reading is held between samples.
+    """Bounds of the speed error of an observer whose odometer reading is held between samples, and held on where
+    samples are missing.
 
     Attributes:
         observer: name. preset: that the numbers come from.
@@ -131,7 +134,7 @@ class ErrorBounds:
             "carried": self.carried,
         }
         found = {name: largest_gap(bound, limit) for name, bound in bounds.items()}
-        found["exact"] = largest_gap(exact, limit, horizon=1e3)
+        found["exact"] = largest_gap(exact, limit, 1e3, COARSE)
         return found
 
     def largest_periods(self, limit: float) -> dict[str, float]:
@@ -149,7 +152,7 @@ class ErrorBounds:
         return {
             "published": largest_gap(self.published, limit),
             "carried": largest_gap(lambda period: self._at_period(period).carried(max(period, FIRST)), limit),
-            "exact": largest_gap(lambda period: self._at_period(period).exact(max(period, FIRST)), limit, 1e3),
+            "exact": largest_gap(lambda period: self._at_period(period).exact(max(period, FIRST)), limit, 1e3, COARSE),
         }
 
     def _at_period(self, period: float) -> ErrorBounds:

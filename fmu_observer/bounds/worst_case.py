@@ -16,7 +16,7 @@ from fmu_observer.certificates.exponential import small_exponential
 from fmu_observer.certificates.gap_error import matrix_powers
 
 POINTS, FEWEST = 400, 8  # a period: errors of the trapezium rule are of the order 1e-6 of the result
-TOTAL = 200_000  # points altogether: for short periods fewer a period, which are closer then
+TOTAL = 50_000  # points altogether: for short periods fewer a period, which are closer then
 FORGOTTEN = 30.0  # time constants of the slowest pole that are looked back
 
 

@@ -24,6 +24,7 @@ from fmu_observer.design.robust_residual import (
     proven_sensitivity,
 )
 from fmu_observer.observability import UnobservableError
+from fmu_observer.tuning.robust_train import design_quasi_lpv_gains
 
 SOLVER = 2e-3  # relative: what the strictness asked of the solver costs
 
@@ -198,3 +199,20 @@ def test_scaled_coordinates_and_refusals() -> None:
         polytope_stability([])
     with pytest.raises(ValueError, match=r"scaling \[1.0\], expected 2 positive numbers"):
         polytope_stability([A], scaling=[1.0])
+
+
+# -- the train observer -----------------------------------------------------------------------------------------------
+
+
+def test_gains_for_the_train_observer() -> None:
+    """The same question as `chapter_5`, in the units of M = 3.36. The page on these observers certifies the gains."""
+    davis = {"davis_b": 5.7e-3, "davis_c": -2.4e-4, "residual_gain": 3.36}
+    values, design = design_quasi_lpv_gains(0.2, alpha=0.2 * (3.36 / 0.3) ** 2, parameters=davis)
+    same = design_robust_residual(chapter_5(0.2))
+    np.testing.assert_allclose(design.gains, same.gains, rtol=1e-6)
+    assert design.attenuation == pytest.approx(same.attenuation * 3.36 / 0.3, rel=1e-6)
+    assert values["gain_high"] == tuple(design.gains[1, :, 0])
+    heavy = {"mass": 1e5, "davis_b": 570.0, "davis_c": -24.0, "residual_gain": 3.36}
+    np.testing.assert_allclose(
+        design_quasi_lpv_gains(0.2, parameters=heavy)[0]["gain_low"], values["gain_low"], rtol=0.02
+    )

@@ -68,6 +68,20 @@ def test_a_jam_and_a_skid_are_what_the_outputs_say() -> None:
     assert seen[2.5] == (*rolling, 0.0)
 
 
+def test_from_the_position_only_faults_feel_the_held_speed() -> None:
+    wheel = PLANTS["wheel_fault"](distance_from="position")
+    runtime = started(wheel, None, None, [0.0, 0.0, 1e9, 0.0, 5.0], **_fault(1, 1.0, 0.5, 1.0))
+    for k in range(1, 41):  # the train: position 5 + t^2, speed 2 t
+        runtime.u[0] = 2.0 * 0.05 * (k - 1)
+        runtime.advance(0.05 * k)
+        runtime.u[4] = 5.0 + (0.05 * k) ** 2
+        lost = sum(0.05 * 2.0 * 0.05 * (j - 1) for j in range(21, 31) if j <= k)
+        # the jam is missing, by ten held speeds; the train's own distance is exact
+        assert outputs(runtime)["wheel_distance"] == pytest.approx(runtime.u[4] - lost, abs=1e-12)
+    with pytest.raises(ValueError, match=r"Unknown distance_from 'rail'; choose one of: speed, position"):
+        PLANTS["wheel_fault"](distance_from="rail")
+
+
 def test_a_micro_jam_is_in_the_distance_and_in_no_sample() -> None:
     runtime = _driven(GIVEN, [30.0, 0.0, 1e9, 0.0], **_fault(1, 0.101, 0.003))
     speeds = []
