@@ -200,7 +200,7 @@ def _newton_step(w: Array, share: Array, left: Array, ratio: Array) -> Array:
     series = w < SERIES_BELOW
     near, far = np.where(series, w, 0.0), np.where(series, 1.0, w)
     square = near * near
-    tail = 0.0
+    tail: Array = 0.0
     for coefficient in reversed(BERNOULLI):
         tail = tail * square + coefficient
     bend = near * (0.5 - near * tail)  # 1 - w/(e^w - 1) near zero
