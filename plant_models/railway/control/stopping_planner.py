@@ -15,7 +15,7 @@ from plant_models.hybrid.system import Array
 
 NEWTON_STEPS = 7  # an eighth changes nothing but the last bit, for c from 1e-6 to 1 - 1e-9
 SERIES_BELOW = 0.3
-BERNOULLI = (1 / 12, -1 / 720, 1 / 30240, -1 / 1209600, 1 / 47900160, -691 / 1307674368000, 1 / 74724249600)
+BERNOULLI = (1 / 12, -1 / 720, 1 / 30240, -1 / 1209600, 1 / 47900160, -691 / 1307674368000)
 NEVER = 1e9  # [s]
 SMALLEST = 1e-300
 
