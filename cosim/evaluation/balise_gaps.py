@@ -173,10 +173,8 @@ def gap_errors(result: Result, spec: ReportSpec) -> GapErrors:
     counted = _odometer_way(result, spec)
     if counted is not None:
         with np.errstate(invalid="ignore"):
-            drift = (counted[rows[judged]] - counted[rows[judged - 1]]) - (
-                place[rows[judged]] - place[rows[judged - 1]]
-            )
-        errors[PLAIN_ODOMETER] = drift
+            ahead = counted[rows] - place[rows]
+            errors[PLAIN_ODOMETER] = ahead[judged] - ahead[judged - 1]
     labels = {name: PLAIN_ODOMETER if name == PLAIN_ODOMETER else label(spec, name) for name in errors}
     return GapErrors(gaps, errors, labels)
 

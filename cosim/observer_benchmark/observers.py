@@ -220,8 +220,8 @@ def _record(scenario: Scenario, folder: Path, warn: Callable[[str], None] | None
 def _loop_notes(sides: Sides, recording: Result) -> list[str]:
     """What to know of the recording: who acted on the train in it, and whether every step is there."""
     notes = []
-    if sides.in_loop:
-        names = ", ".join(sides.in_loop)
+    if sides.acting:
+        names = ", ".join(sides.acting)
         notes.append(
             f"{names} acts on the train in this scenario: the run was recorded with it in the loop, and every observer "
             f"only "
@@ -374,7 +374,7 @@ class _Judge:
         }
         known: dict[str, Any] = labelled | {
             "settings": candidate.settings,
-            "in_loop": candidate.name in self.sides.in_loop,
+            "in_loop": candidate.name in self.sides.acting,
             "certificate": self._certificate(candidate),
         }
         if candidate.misfit:

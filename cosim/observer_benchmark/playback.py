@@ -48,8 +48,19 @@ class Sides:
 
     @property
     def in_loop(self) -> tuple[str, ...]:
-        """Observers that act on the train."""
+        """Observers that something on the plant side, or another observer, listens to."""
         return tuple(name for name in self.observers if name in self.plant)
+
+    @property
+    def acting(self) -> tuple[str, ...]:
+        """Observers that act on the train; all that are listened to where nobody says which component the train is."""
+        balises, report = self.table.balises, self.table.report
+        told = (None if balises is None else balises.position) or report.true_position or report.true_speed or ""
+        train = told.partition(".")[0]
+        if train not in self.table.components:
+            return self.in_loop
+        before = _ancestors([train], self.links, self.table.components)
+        return tuple(name for name in self.in_loop if name in before)
 
     def sources(self, name: str) -> dict[str, Link]:
         """Where the inputs of a component come from.

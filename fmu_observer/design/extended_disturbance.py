@@ -71,7 +71,7 @@ def extended_gain(
             where (A, C) has one, or where (A, H, C) has an invariant zero at the origin.
         ValueError: a shape does not fit, rho is not legal, the number of poles is wrong, or one is repeated too often.
     """
-    extended, seen = extended_matrices(*(np.asarray(matrix, dtype=float) for matrix in (A, H, C)), rho)
+    extended, seen = extended_matrices(np.asarray(A, dtype=float), np.asarray(H), np.asarray(C), rho)
     return observer_gain(extended, seen, poles, states, name)
 
 

@@ -54,7 +54,7 @@ class QuasiLpvDesign:
     @property
     def errors(self) -> np.ndarray:
         """``A_i - K_i C``, shape (2, 3, 3)."""
-        return self.vertices - self.gains @ SEEN
+        return np.asarray(self.vertices - self.gains @ SEEN)
 
 
 SEEN = np.array([[1.0, 0.0, 0.0]])

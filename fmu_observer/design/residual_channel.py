@@ -61,7 +61,7 @@ class ResidualChannel:
         finite = np.where(np.isfinite(omega), omega, 0.0)
         shifted = 1j * finite[:, None, None] * np.eye(len(self.A)) - self.A
         inner = np.linalg.solve(shifted, np.broadcast_to(self.B.astype(complex), (len(omega), *self.B.shape)))
-        return np.where(np.isfinite(omega)[:, None, None], self.C @ inner, 0.0) + self.D
+        return np.asarray(np.where(np.isfinite(omega)[:, None, None], self.C @ inner, 0.0) + self.D)
 
 
 def residual_channel(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
+from functools import reduce
 from typing import Any, ClassVar
 
 import numpy as np
@@ -62,7 +64,7 @@ class ProportionalIntegralUio(ModelObserver):
         self.rho = int(rho)
         ways = [(s, f"{s.name}{_suffix(k)}", k) for k in range(self.rho) for s in chosen.unknown_inputs]
         text = [f"{'Derivative of: ' * k}{s.description}" for s, _, k in ways]
-        units = [s.unit + f"{'/s' * k}" for s, _, k in ways]
+        units = [reduce(lambda unit, _: _per_second(unit), range(k), s.unit) for s, _, k in ways]
         self._disturbances = tuple(name for _, name, _ in ways)
         self.extra_states = tuple(
             state(f"estimated_{name}", unit, s.start if k == 0 else 0.0, f"Estimate: {words}")
@@ -131,6 +133,12 @@ class ProportionalIntegralUio(ModelObserver):
 
     def _gain(self, p: Any) -> Array:
         return as_matrix(p.gain, len(self.A_e), len(self.model.measurements))
+
+
+def _per_second(unit: str) -> str:
+    """Unit of the derivative: ``m/s3`` of ``m/s2``."""
+    found = re.fullmatch(r"(.+)/s(\d*)", unit)
+    return f"{unit}/s" if found is None else f"{found[1]}/s{int(found[2] or 1) + 1}"
 
 
 def _suffix(derivative: int) -> str:

@@ -8,7 +8,7 @@ import pytest
 from cosim.evaluation.balise_gaps import ENVELOPE, PLAIN_ODOMETER, gap_errors, rows_before
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.page.gaps import gaps_table
-from cosim.results.result import BaliseRecord, Result
+from cosim.results.result import BaliseRecord, Result, SignalInfo
 from cosim.scenario.outcome import Outcome
 from cosim.studies.measures import error_measures, measure_unit
 
@@ -69,6 +69,16 @@ def test_errors_just_before_the_next_balise(distance: bool) -> None:
     assert found.longest() == [1, 0, 2]
     assert found.longest(1) == [1]
     assert found.within_envelope("a") == 1.0
+
+
+def test_a_distance_that_is_sampled_is_read_between_its_samples() -> None:
+    """A count of every 0.7 s at 20 m/s would be up to 14 m behind."""
+    result = run()
+    held = np.floor(result.time / 0.7 + 1e-9) * 0.7
+    result.table["odo.distance"] = LIES * SPEED * held
+    sampled = Result(result.table, [SignalInfo("odo.distance", "m", variability="discrete")], result.events)
+    found = gap_errors(sampled, SPEC).errors[PLAIN_ODOMETER]
+    np.testing.assert_allclose(found, (LIES - 1.0) * np.diff(PLACES), atol=1e-9)
 
 
 def test_a_balise_that_was_not_read_ends_no_gap() -> None:
