@@ -24,7 +24,7 @@ LONGEST = 0.5  # of a step times the norm of A, from which intervals are doubled
 def h_infinity_norm(channel: ResidualChannel, tolerance: float = 1e-7) -> float:
     """Largest gain from finite energy to finite energy: the peak of the largest singular value over all frequencies.
 
-    ``||r|| <= lambda ||s||`` of Aguiar Cota 2019, (2.25) and (3.46), holds for each lambda that is larger. By level
+    ``||r|| <= lambda ||s||`` of Aguiar Cota 2019, (2.25) and (3.48), holds for each lambda that is larger. By level
     sets of the Hamiltonian (Bruinsma, Steinbuch 1990).
 
     Args:

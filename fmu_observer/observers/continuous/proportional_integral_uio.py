@@ -31,8 +31,8 @@ class ProportionalIntegralUio(ModelObserver):
     The unknown inputs d and their derivatives up to the (rho - 1)-th are states, ``d^(rho) = 0``: rho = 1 believes in a
     constant disturbance, rho = 2 in a ramp. The error obeys ``de = (A_e - L C_e) e`` but for ``d^(rho)``, which moves
     it. It needs an observable extended pair: (A, C) observable, and no invariant zero of (A, H, C) at the origin; of
-    rank(C H) nothing is asked. The residuals ``r = L_r (y - C xh)`` of (2.22) are outputs; a fault that persists is
-    taken for a disturbance, so they show how it begins.
+    rank(C H) nothing is asked. The residuals ``r = L_r (y - C xh)`` of (2.21)-(2.25) are outputs; a fault that persists
+    is taken for a disturbance, so they show how it begins.
 
     Defaults [ours]: poles from -2 1/s on; L_r the identity. The preset ``as_published``, of the model ``braked_train``
     with rho = 2, has gain and starts of 3.2.3: poles -50, -50 and -1.5 1/s, so it asks for internal steps of 1 to 2 ms
