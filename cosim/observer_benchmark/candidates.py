@@ -20,7 +20,6 @@ from cosim.scenario.tables import ComponentTable
 from cosim.simulation.scenario import Scenario
 from plant_models.user_file import names_code
 
-
 OPTIONAL = {"odometer_fault"}
 """Inputs that stay at their start value where nobody in a scenario knows them."""
 
