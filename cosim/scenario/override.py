@@ -8,7 +8,7 @@ from typing import Any
 from cosim.errors import ScenarioError, nearest
 from cosim.scenario.tables import ComponentTable
 
-TABLES = ("balises", "master", "report")
+TABLES = ("balises", "network", "master", "report")
 COMPONENT_KEYS = {field.alias or name for name, field in ComponentTable.model_fields.items()}
 INNER = ("options", "parameters")
 
@@ -18,8 +18,9 @@ def override(tables: dict[str, Any], name: str, value: Any) -> tuple[str, ...]:
 
     Args:
         tables: keys of a scenario, changed in place.
-        name: ``component.parameter``, ``component.key``, ``component.options.name``, ``balises.key``, ``master.key``,
-            ``report.key``, or a top-level key such as ``stop``. value: what it becomes.
+        name: ``component.parameter``, ``component.key``, ``component.options.name``, ``balises.key``,
+            ``network.key``, ``master.key``, ``report.key``, or a top-level key such as ``stop``.
+        value: what it becomes.
 
     Returns:
         The path of keys to the value.
