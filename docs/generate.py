@@ -180,6 +180,7 @@ def schema_tables() -> dict[str, Any]:
         "false_telegram": tables.FalseTelegramTable,
         "report": tables.ReportTable,
         "phase": tables.PhaseTable,
+        "measure": tables.MeasureTable,
     }
 
 

@@ -171,6 +171,8 @@ def by_positions(positions: Sequence[float], location_accuracy: float = 0.0) -> 
 def from_csv(path: str | Path) -> TrackLayout:
     """Balises from a CSV file with a header: ``position`` [m], optional ``identity`` and ``location_accuracy`` [m].
 
+    Other columns are left alone, and so are lines that begin with ``#``: source and licence of the positions.
+
     Args:
         path: of the file.
 
@@ -182,10 +184,15 @@ def from_csv(path: str | Path) -> TrackLayout:
         raise ScenarioError(f"Balise list {path} does not exist.")
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:  # spreadsheets write a byte order mark
-            reader = csv.DictReader(stream, skipinitialspace=True)
+            # a line that is left out still counts: messages name lines of the file
+            lines = [(number, line) for number, line in enumerate(stream, start=1) if not line.startswith("#")]
+            reader = csv.DictReader((line for _, line in lines), skipinitialspace=True)
             if "position" not in (reader.fieldnames or []):
                 raise ScenarioError(f"Balise list {path}: no column 'position' in the header {reader.fieldnames}.")
-            balises = [_row_to_balise(path, number, reader.line_num, row) for number, row in enumerate(reader, start=1)]
+            balises = [
+                _row_to_balise(path, number, lines[reader.line_num - 1][0], row)
+                for number, row in enumerate(reader, start=1)
+            ]
     except (UnicodeDecodeError, csv.Error, OSError) as error:
         raise ScenarioError(f"Balise list {path} cannot be read: {error}.") from error
     try:

@@ -11,7 +11,9 @@ from cosim.simulation.scenario import Scenario
 from fmus.cli.progress import ProgressBar
 
 DEFAULT = "freight_profile_d"
-OVERRIDES = "override component.parameter, master.KEY, balises.KEY, report.KEY or a top-level key; may be repeated"
+OVERRIDES = (
+    "override component.parameter, master.KEY, balises.KEY, report.KEY, a top-level key, or case; may be repeated"
+)
 
 
 def add_scenario(parser: argparse.ArgumentParser, default: str | None = DEFAULT) -> None:

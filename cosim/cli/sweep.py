@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from cosim.cli.scenarios import add_scenario, load_scenario, parse_setting
-from cosim.errors import ScenarioError
+from cosim.errors import ScenarioError, nearest
 from cosim.results.folder import check_writable
+from cosim.scenario.override import CASE
+from cosim.studies.groups import groups_text, write_groups
 from cosim.studies.sampling import MOST, Range, uniform
 from fmus.cli.progress import ProgressBar
 
@@ -34,7 +36,9 @@ def register(commands: Any) -> None:
     )
     parser = commands.add_parser("sweep", description=description, epilog=epilog)
     add_scenario(parser, default=None)
-    parser.add_argument("--vary", action="append", required=True, metavar="NAME=VALUES", help=VARY)
+    parser.add_argument("--vary", action="append", default=[], metavar="NAME=VALUES", help=VARY)
+    parser.add_argument("--cases", action="store_true", help="run all cases of the scenario, each with all --vary")
+    parser.add_argument("--by", metavar="NAME", help="one line for each value of NAME, such as case: means of its runs")
     parser.add_argument(
         "--zip", action="store_true", help="first values together, then second ones, ... instead of all combinations"
     )
@@ -44,6 +48,8 @@ def register(commands: Any) -> None:
         "--workers", type=int, default=1, metavar="N", help="processes at a time (default: 1, this one)"
     )
     parser.add_argument("--out", metavar="DIR", help="folder for the results (default: results/NAME_sweep)")
+    parser.add_argument("--table-only", action="store_true", help="keep the table, and no results folder for each run")
+    parser.add_argument("--resume", action="store_true", help="take over the runs that are done in the folder already")
     parser.add_argument("--json", action="store_true", help="print the table as JSON")
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
     parser.set_defaults(execute=execute)
@@ -59,7 +65,13 @@ def execute(options: argparse.Namespace) -> int:
     if options.zip and options.samples is not None:
         raise ScenarioError("--zip and --samples exclude each other.")
     mode: Any = "latin" if options.samples is not None else "zip" if options.zip else "grid"
-    values = _values(options.vary)
+    values = ({CASE: list(scenario.cases)} if options.cases else {}) | _values(options.vary)
+    if not values:
+        raise ScenarioError("Nothing is varied: give --vary NAME=VALUES, or --cases for a scenario with cases.")
+    if options.cases and not scenario.cases:
+        raise ScenarioError(f"--cases: {scenario.name} has no cases; expected tables [cases.NAME] in it.")
+    if options.by is not None and options.by not in values:
+        raise ScenarioError(f"--by {options.by}: this is not varied; {nearest(options.by, list(values))}")
     if options.samples is None and (ranges := [name for name, given in values.items() if isinstance(given, Range)]):
         raise ScenarioError(
             f"--vary {ranges[0]}: a range is sampled; say with --samples N at how many points, or list values: a,b."
@@ -69,11 +81,20 @@ def execute(options: argparse.Namespace) -> int:
         Path(options.out) if options.out is not None else Path("results") / f"{scenario.name}_sweep"
     )
     with ProgressBar("run", silent=options.quiet or options.json) as bar:
-        result = sweep.run(options.workers, progress=bar, keep=False, directory=directory.absolute())
+        result = sweep.run(
+            options.workers,
+            progress=bar,
+            keep=False,
+            directory=directory.absolute(),
+            folders=not options.table_only,
+            resume=options.resume,
+        )
+    if options.by is not None:
+        write_groups(result, options.by, directory)
     if options.json:
         print((directory / "index.json").read_text(encoding="utf-8"), end="")
     else:
-        print(result.text())
+        print(result.text() if options.by is None else groups_text(result, options.by))
         print(f"\n{len(result) - len(result.failed)} of {len(result)} runs done: {directory}")
     return SOME_FAILED if result.failed else DONE
 

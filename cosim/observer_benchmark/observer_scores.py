@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from cosim.evaluation.balise_gaps import rows_before
 from cosim.evaluation.event_counts import USED
 from cosim.evaluation.indicators import IndicatorStatistics, indicator_statistics, on_intervals
 from cosim.evaluation.metrics import PhaseMetrics, phase_metrics
@@ -20,7 +21,6 @@ from cosim.evaluation.roles import Quantity, estimate, estimation_error
 from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.results.result import BaliseRecord, Result
 from cosim.results.summary_file import jsonable
-from fmus.fmi.standard import TIME_TOLERANCE
 
 WHOLE = "whole run"
 DIVERGED = 1000.0
@@ -46,7 +46,8 @@ class CertifiedGap:
     """What the gains are certified for, beside the gaps of the run.
 
     Args:
-        limit: gaps that vary are certified up to here [s]; None where that is not known.
+        limit: gaps that vary are certified up to here [s], infinite where no limit was found; None where that is not
+            known.
         expected: longest gap to expect before the run [s], None where it cannot be known. seen: longest that occurred
             [s].
     """
@@ -167,9 +168,7 @@ def error_at_balises(result: Result, spec: ReportSpec, name: str, quantity: Quan
     ]
     if error is None or not times:
         return None
-    rows = np.searchsorted(result.time, np.array(times) - TIME_TOLERANCE)
-    rows = np.where(result.time[np.minimum(rows, len(error) - 1)] > np.array(times) + TIME_TOLERANCE, rows - 1, rows)
-    errors = error[np.clip(rows, 0, len(error) - 1)]
+    errors = error[rows_before(result.time, np.array(times))]
     if not np.all(np.isfinite(errors)):
         return ErrorAtBalises(len(errors), inf, inf, inf)
     largest = float(np.max(np.abs(errors)))

@@ -5,6 +5,7 @@ file.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import inf
 from typing import Any
 
 from cosim.evaluation.metrics import PhaseMetrics
@@ -33,10 +34,19 @@ def main_row(score: ObserverScore) -> dict[str, Any]:
         "at balises rms p [m]": at_p and at_p.rms,
         "slip seen after [s]": "/".join("-" if d is None else number(d) for d in delays) or None,
         "false alarms": score.false_alarms,
-        "certified [s]": None if score.certificate is None else score.certificate.limit,
+        "certified [s]": None if score.certificate is None else certified_limit(score.certificate),
         "holds": certified(score.certificate),
         "cost [us/step]": score.cost,
     }
+
+
+def certified_limit(certificate: CertifiedGap) -> float | str | None:
+    """Longest gap that is certified [s], ``any`` where no limit was found, None where it is not known.
+
+    Args:
+        certificate: of an observer.
+    """
+    return "any" if certificate.limit == inf else certificate.limit
 
 
 def certified(certificate: CertifiedGap | None) -> str | None:

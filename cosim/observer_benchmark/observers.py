@@ -6,6 +6,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from cosim.observer_benchmark.playback import (
     known_facts,
     playback_scenario,
     recording_scenario,
+    told_to,
     train_observers,
 )
 from cosim.results.folder import write_results
@@ -218,8 +220,8 @@ def _record(scenario: Scenario, folder: Path, warn: Callable[[str], None] | None
 def _loop_notes(sides: Sides, recording: Result) -> list[str]:
     """What to know of the recording: who acted on the train in it, and whether every step is there."""
     notes = []
-    if sides.in_loop:
-        names = ", ".join(sides.in_loop)
+    if sides.acting:
+        names = ", ".join(sides.acting)
         notes.append(
             f"{names} acts on the train in this scenario: the run was recorded with it in the loop, and every observer "
             f"only "
@@ -294,7 +296,7 @@ def _shipped(sides: Sides, model: str) -> Candidate:
     table = ComponentTable.model_validate({"observer": model, **said})
     system = make_declared(table, model)
     name = model.rpartition(":")[2].replace(".", "_")
-    parameters = {s.name for s in system.parameter_signals}
+    parameters = {s.name for s in told_to(system)}
     untold = parameters - table.parameters.keys()
     facts = {fact: known for fact, known in known_facts(sides).items() if fact in untold}
     told = {fact: value for fact, (value, _) in facts.items()}
@@ -308,7 +310,7 @@ def _shipped(sides: Sides, model: str) -> Candidate:
 
 def _assumed(system: Any, facts: Mapping[str, tuple[float, str]]) -> str:
     given = ", ".join(f"{fact} = {value:g} ({why})" for fact, (value, why) in facts.items())
-    units = {s.name: (s.start, s.unit) for s in system.parameter_signals}
+    units = {s.name: (s.start, s.unit) for s in told_to(system)}
     rest = ", ".join(
         f"{f} = {units[f][0]:g}" + (f" {units[f][1]}" if units[f][1] != "1" else "")
         for f in FACTS
@@ -372,7 +374,7 @@ class _Judge:
         }
         known: dict[str, Any] = labelled | {
             "settings": candidate.settings,
-            "in_loop": candidate.name in self.sides.in_loop,
+            "in_loop": candidate.name in self.sides.acting,
             "certificate": self._certificate(candidate),
         }
         if candidate.misfit:
@@ -421,7 +423,9 @@ class _Judge:
             return None  # parameters that cannot be: the run of this observer says so
         if candidate.name not in found:
             return None
-        return CertifiedGap(found[candidate.name]["aperiodic_limit"], self._expected.seconds, self._seen)
+        limit = found[candidate.name]["aperiodic_limit"]
+        # plain data have None for an infinite limit
+        return CertifiedGap(inf if limit is None else limit, self._expected.seconds, self._seen)
 
 
 def _silent(_text: str) -> None:

@@ -23,7 +23,8 @@ from cosim.scenario.schema import ScenarioTable
 from cosim.scenario.structure import describe_component
 from cosim.scenario.tables import ComponentTable
 from cosim.simulation.scenario import Scenario
-from fmu_observer.observers.train.train_observer import TrainObserver
+from fmu_observer.observers.gated_observer import GatedObserver
+from plant_models.hybrid import Signal
 
 ESTIMATES = ("position", "speed")
 PLAYED_MASTER = ("algorithm", "inputs", "events", "stepper", "record_memory")
@@ -47,8 +48,19 @@ class Sides:
 
     @property
     def in_loop(self) -> tuple[str, ...]:
-        """Observers that act on the train."""
+        """Observers that something on the plant side, or another observer, listens to."""
         return tuple(name for name in self.observers if name in self.plant)
+
+    @property
+    def acting(self) -> tuple[str, ...]:
+        """Observers that act on the train; all that are listened to where nobody says which component the train is."""
+        balises, report = self.table.balises, self.table.report
+        told = (None if balises is None else balises.position) or report.true_position or report.true_speed or ""
+        train = told.partition(".")[0]
+        if train not in self.table.components:
+            return self.in_loop
+        before = _ancestors([train], self.links, self.table.components)
+        return tuple(name for name in self.in_loop if name in before)
 
     def sources(self, name: str) -> dict[str, Link]:
         """Where the inputs of a component come from.
@@ -240,30 +252,44 @@ def _table(table: Any) -> dict[str, Any]:
 # -- observers
 # ----------------------------------------------------------------------------------------------------------
 
-FACTS = ("mass", "davis_a", "davis_b", "davis_c", "wheel_radius", "wheel_inertia", "n_axles")
-"""What every train observer is told of the train."""
+FACTS = (
+    "mass",
+    "davis_a",
+    "davis_b",
+    "davis_c",
+    "wheel_radius",
+    "wheel_inertia",
+    "n_axles",
+    "estimated_position",
+    "estimated_speed",
+)
+"""What every train observer is told of the train, and where it believes it to start."""
 
 
-def train_observers() -> dict[str, type[TrainObserver]]:
-    """The shipped train observers by name."""
+def train_observers() -> dict[str, type[GatedObserver]]:
+    """The shipped train observers by name: they receive balises and say position and speed."""
     return {
         n: kind
         for n, kind in fmu_observer.OBSERVERS.usable().items()
-        if isinstance(kind, type) and issubclass(kind, TrainObserver)
+        if isinstance(kind, type)
+        and issubclass(kind, GatedObserver)
+        and {signal.name for signal in kind.outputs}.issuperset(ESTIMATES)
     }
 
 
 def known_facts(sides: Sides) -> dict[str, tuple[float, str]]:
     """What the scenario says of the train that an observer should know too: value, and who says so.
 
-    What its own observers were told in agreement comes first; then parameters and preset of the plant.
+    What its own observers, as far as they want to know it, were told in agreement comes first; then parameters and
+    preset of the plant.
 
     Args:
         sides: the plant side and the observers, from `find_sides`.
     """
     found: dict[str, tuple[float, str]] = {}
     for fact in FACTS:
-        told = [sides.table.components[n].parameters.get(fact) for n in sides.observers]
+        wanting = [sides.table.components[n] for n in sides.observers if _wants(sides.table.components[n], fact)]
+        told = [table.parameters.get(fact) for table in wanting]
         values = {value for value in told if isinstance(value, int | float) and not isinstance(value, bool)}
         if len(values) == 1 and None not in told:
             found[fact] = float(values.pop()), "as for the observers of the scenario"
@@ -273,6 +299,22 @@ def known_facts(sides: Sides) -> dict[str, tuple[float, str]]:
         for fact, value in _plant_facts(sides.table.components[plant]).items():
             found.setdefault(fact, (value, f"as for {plant}"))
     return found
+
+
+def _wants(table: ComponentTable, fact: str) -> bool:
+    """Whether an observer has a parameter or start value of this name; of one that cannot tell: yes."""
+    if table.observer is None:
+        return True
+    return fact in {signal.name for signal in told_to(make_declared(table, ""))}
+
+
+def told_to(system: Any) -> tuple[Signal, ...]:
+    """What a component's table may say to a model: its parameters and, of a hybrid system, its states at the start.
+
+    Args:
+        system: a hybrid system, or a model of plain Python.
+    """
+    return (*system.parameter_signals, *getattr(system, "states", ()))
 
 
 def _plant_facts(table: ComponentTable) -> dict[str, float]:

@@ -63,9 +63,14 @@ def expected_gap(layout: Layout, table: BalisesTable, start: float) -> ExpectedG
     if isinstance(layout, InstantLayout):
         gaps = np.diff([start, *layout.instants[layout.instants > start]])
         return ExpectedGap(float(gaps.max()), "longest gap between the balise instants") if len(gaps) else NO_BALISES
-    between = np.diff(layout.positions)
+    positions = layout.positions
+    if "track_start" in table.model_fields_set:  # a train that begins there does not meet what lies before
+        positions = positions[positions >= table.track_start]
+    if not len(positions):
+        return ExpectedGap(None, f"no balise lies behind the start of the track at {table.track_start:g} m")
+    between = np.diff(positions)
     spacings = (float(between.min()), float(between.max())) if len(between) else None
-    distance = float(np.diff([min(table.track_start, layout.positions[0]), *layout.positions]).max())
+    distance = float(np.diff([min(table.track_start, positions[0]), *positions]).max())
     if table.expected_speed is None:
         reason = "balises are laid by position; give balises.expected_speed to check"
         return ExpectedGap(None, reason, distance, spacings)

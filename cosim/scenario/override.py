@@ -11,6 +11,8 @@ from cosim.scenario.tables import ComponentTable
 TABLES = ("balises", "network", "master", "report")
 COMPONENT_KEYS = {field.alias or name for name, field in ComponentTable.model_fields.items()}
 INNER = ("options", "parameters")
+CASE = "case"
+"""Name under which a case of a scenario is chosen: it stands for all the values of the case."""
 
 
 def override(tables: dict[str, Any], name: str, value: Any) -> tuple[str, ...]:
@@ -19,16 +21,21 @@ def override(tables: dict[str, Any], name: str, value: Any) -> tuple[str, ...]:
     Args:
         tables: keys of a scenario, changed in place.
         name: ``component.parameter``, ``component.key``, ``component.options.name``, ``balises.key``,
-            ``network.key``, ``master.key``, ``report.key``, or a top-level key such as ``stop``.
+            ``network.key``, ``master.key``, ``report.key``, a top-level key such as ``stop``, or ``case``, which sets
+            all that the case of that name says.
         value: what it becomes.
 
     Returns:
         The path of keys to the value.
 
     Raises:
-        ScenarioError: there is no such component or table.
+        ScenarioError: there is no such component, table or case.
     """
     head, dot, rest = name.partition(".")
+    if name == CASE:
+        for key, entry in case_values(tables, value).items():
+            override(tables, key, entry)
+        return (name,)
     if not dot:
         tables[name] = value
         return (name,)
@@ -47,6 +54,26 @@ def override(tables: dict[str, Any], name: str, value: Any) -> tuple[str, ...]:
             raise ScenarioError(f"cannot set {name!r}: {key!r} is no table.")
     node[keys[-1]] = value
     return keys
+
+
+def case_values(tables: Mapping[str, Any], case: Any) -> dict[str, Any]:
+    """What a case of a scenario sets, by the names of `override`.
+
+    Args:
+        tables: keys of a scenario. case: name of the case.
+
+    Raises:
+        ScenarioError: the scenario has no such case, or it is no table.
+    """
+    cases = tables.get("cases") or {}
+    if not isinstance(cases, Mapping) or not cases:
+        raise ScenarioError(f"cannot set 'case' to {case!r}: the scenario has no cases; expected tables [cases.NAME].")
+    if case not in cases:
+        raise ScenarioError(f"no case {case!r}; {nearest(str(case), list(cases))}")
+    values = cases[case]
+    if not isinstance(values, Mapping):
+        raise ScenarioError(f"case {case!r}: expected a table with lines such as 'plant.mass = 80e3'.")
+    return {name: value for name, value in flat(values) if name != CASE}
 
 
 def _component_key(rest: str) -> tuple[str, ...]:

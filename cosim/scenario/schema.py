@@ -71,6 +71,7 @@ class ScenarioTable(Table):
     network: NetworkTable | None = None
     master: MasterTable = MasterTable()
     report: ReportTable = ReportTable()
+    cases: dict[str, dict[str, Any]] = Field(default_factory=dict)
     expect: list[ExpectationItem] = Field(default_factory=list)
 
     @model_validator(mode="after")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Discriminator, Field, PlainValidator, Tag, model_validator
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, PlainValidator, Tag, model_validator
 
 from cosim.errors import nearest
 from cosim.results.formats.catalogue import FORMATS
@@ -222,6 +222,20 @@ class PhaseTable(Table):
     end: float
 
 
+class MeasureTable(Table):
+    """A column of the printed table of a sweep."""
+
+    measure: str
+    label: str | None = None
+    factor: float = 1.0
+    unit: str | None = None
+
+
+MeasureItem = Annotated[
+    MeasureTable, BeforeValidator(lambda given: {"measure": given} if isinstance(given, str) else given)
+]
+
+
 class ReportTable(Table):
     """Roles of signals in the report, and the numbers to print beside the measured ones."""
 
@@ -239,4 +253,5 @@ class ReportTable(Table):
     published: dict[str, dict[str, float]] = {}
     independent: dict[str, dict[str, float]] = {}
     notes: list[str] = []
+    measures: list[MeasureItem] = []
     tables: list[Annotated[str, AfterValidator(_format)]] = ["csv"]

@@ -17,7 +17,7 @@ from cosim.scenario.manifest import read_manifest
 from cosim.scenario.model_name import ModelName, is_model, settings_of
 from cosim.scenario.origin import Origin
 from cosim.scenario.outcome import Outcome
-from cosim.scenario.override import override
+from cosim.scenario.override import case_values, override
 from cosim.scenario.package_names import is_package, stem
 from cosim.scenario.paths import COMPONENT_PATHS, MODEL_KEYS, absolute, move_file
 from cosim.scenario.run import run_scenario
@@ -245,8 +245,8 @@ class Scenario:
     def set(self, name: str, value: Any) -> Self:
         """Override one value.
 
-        That is ``component.parameter``, ``balises.key``, ``network.key``, ``master.key``, ``report.key`` or a top-level
-        key such as ``stop``.
+        That is ``component.parameter``, ``balises.key``, ``network.key``, ``master.key``, ``report.key``, a top-level
+        key such as ``stop``, or ``case``: all that a case of the scenario sets.
 
         Args:
             name: of the value. value: what it becomes; paths are relative to the working folder.
@@ -265,6 +265,15 @@ class Scenario:
         except ScenarioError as error:
             raise ScenarioError(f"{self.where}: {error}") from error
         return self
+
+    @property
+    def cases(self) -> dict[str, dict[str, Any]]:
+        """What each case sets, by the names of `set`; ``set("case", name)`` chooses one.
+
+        Raises:
+            ScenarioError: a case is no table.
+        """
+        return {name: case_values(self._data, name) for name in self._data.get("cases") or {}}
 
     def copy(self) -> Scenario:
         """An independent copy."""

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from cosim.evaluation.balise_gaps import PLAIN_ODOMETER, gap_errors, largest
 from cosim.evaluation.fault_detection import fault_detection
 from cosim.evaluation.metrics import judged_size, within
 from cosim.evaluation.roles import Quantity, estimation_error
@@ -15,7 +16,15 @@ from cosim.evaluation.spec import Phase
 from cosim.scenario.outcome import Outcome
 
 Measure = Callable[[Outcome], float]
+SHARES: Mapping[str, tuple[str, str]] = {
+    "missed_share": ("missed_faults", "faults"),
+    "false_share": ("false_alarms", "detections"),
+}
+"""Measures that are shares of counted things: name to those of the count and of the number in all."""
+RATES: Mapping[str, tuple[str, str]] = {"false_alarms_per_hour": ("false_alarms", "judged_time")}
+"""Measures that are counts in an hour: name to those of the count and of the time [s]."""
 ERROR_UNITS: Mapping[Quantity, str] = {"speed": "m/s", "position": "m"}
+GAP_UNITS = {"gap_error_max": "m", "gap_error_time_max": "s"}
 DETECTION_UNITS = {
     "faults": "1",
     "missed_faults": "1",
@@ -25,6 +34,9 @@ DETECTION_UNITS = {
     "detection_delay": "s",
     "recovery_delay": "s",
     "false_alarm_time": "s",
+    "missed_share": "1",
+    "false_share": "1",
+    "false_alarms_per_hour": "1/h",
     "balise_error": "m",
     "balise_error_max": "m",
 }
@@ -40,7 +52,9 @@ def error_measures(outcome: Outcome) -> dict[str, float]:
     Returns:
         ``observer.speed_error_max``, ``observer.speed_error_rms`` [m/s] and the same of the position [m], where
         recorded; NaN for a run that failed, whose errors are those of another interval of time, and where too few rows
-        are judged.
+        are judged. Where balises were read also ``observer.gap_error_max`` [m] and ``observer.gap_error_time_max`` [s],
+        the largest position error at the end of a gap between two of them and the longest running time of one, and the
+        same of the plain odometer, under the name of its component.
     """
     result, spec = outcome.result, outcome.spec
     measures: dict[str, float] = {}
@@ -57,7 +71,7 @@ def error_measures(outcome: Outcome) -> dict[str, float]:
             failed = outcome.failure is not None
             measures[f"{observer}.{quantity}_error_max"] = nan if failed else size.max_abs
             measures[f"{observer}.{quantity}_error_rms"] = nan if failed else size.rms
-    return measures | detection_measures(outcome)
+    return measures | detection_measures(outcome) | _gap_measures(outcome)
 
 
 def detection_measures(outcome: Outcome) -> dict[str, float]:
@@ -69,7 +83,8 @@ def detection_measures(outcome: Outcome) -> dict[str, float]:
     Returns:
         ``observer.faults``, ``observer.missed_faults``, ``observer.detections`` and ``observer.false_alarms`` as
         counts, ``observer.judged_time`` [s], the means ``observer.detection_delay`` and ``observer.recovery_delay``
-        [s], ``observer.false_alarm_time`` [s], the mean ``observer.balise_error`` [m] and the largest
+        [s], ``observer.false_alarm_time`` [s], ``observer.missed_share`` of the faults, ``observer.false_share`` of the
+        detections, ``observer.false_alarms_per_hour`` [1/h], the mean ``observer.balise_error`` [m] and the largest
         ``observer.balise_error_max`` [m] of the position before each balise; NaN where there is none, and for a run
         that failed.
     """
@@ -85,11 +100,26 @@ def detection_measures(outcome: Outcome) -> dict[str, float]:
             "detection_delay": _mean(found.start_delays),
             "recovery_delay": _mean(found.end_delays),
             "false_alarm_time": found.time_outside,
+            "missed_share": found.missed_rate,
+            "false_share": found.false_rate,
+            "false_alarms_per_hour": found.false_per_hour,
         }
         largest = float(sizes.max()) if sizes.size else nan
         numbers = (told if found.tells else {}) | {"balise_error": _mean(sizes), "balise_error_max": largest}
         failed = outcome.failure is not None
         measures |= {f"{found.observer}.{name}": nan if failed else float(v) for name, v in numbers.items()}
+    return measures
+
+
+def _gap_measures(outcome: Outcome) -> dict[str, float]:
+    """Position errors at the end of the gaps between balises, see `error_measures`."""
+    found, spec = gap_errors(outcome.result, outcome.spec), outcome.spec
+    measures: dict[str, float] = {}
+    for name, errors in found.errors.items():
+        component = str(spec.odometer).rpartition(".")[0] if name == PLAIN_ODOMETER else name
+        times = found.running_time(name)
+        for key, values in zip(GAP_UNITS, (errors, times[~np.isnan(times)]), strict=True):
+            measures[f"{component}.{key}"] = nan if outcome.failure is not None else largest(values)
     return measures
 
 
@@ -143,4 +173,4 @@ def measure_unit(name: str) -> str | None:
     for quantity, unit in ERROR_UNITS.items():
         if name.endswith((f".{quantity}_error_max", f".{quantity}_error_rms")):
             return unit
-    return DETECTION_UNITS.get(name.rpartition(".")[2])
+    return (GAP_UNITS | DETECTION_UNITS).get(name.rpartition(".")[2])

@@ -4,18 +4,20 @@ given.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cosim.errors import CosimError, ScenarioError
 from cosim.scenario.outcome import INTERRUPTED, Outcome
+from cosim.scenario.override import CASE
 from cosim.scenario.starts import start_values
 from cosim.scenario.structure import describe_component
 from cosim.studies.measures import Measure, error_measures, own_measures
 from cosim.studies.sampling import Mode, Range, Variation, variations
 from cosim.studies.sweep_files import run_folder, write_index, write_run
+from cosim.studies.sweep_journal import Journal
 from cosim.studies.sweep_result import SweepResult, SweepRun
 from cosim.studies.workers import Died, Raised, attempt, in_processes
 
@@ -49,13 +51,27 @@ class Sweep:
         """Names of what is varied, in order of appearance."""
         return list(dict.fromkeys(name for variation in self.variations for name in variation))
 
-    def each(self, workers: int = 1, progress: Progress | None = None) -> Iterator[SweepRun]:
+    def varied(self, number: int) -> Scenario:
+        """The scenario of one run.
+
+        Args:
+            number: of the variation, from 0.
+        """
+        scenario = self.scenario.copy()
+        for name, value in self.variations[number].items():
+            scenario.set(name, value)
+        return scenario
+
+    def each(
+        self, workers: int = 1, progress: Progress | None = None, without: Container[int] = ()
+    ) -> Iterator[SweepRun]:
         """Run all variations and hand each over as soon as it is done, so that none needs to be kept.
 
         Args:
             workers: processes at a time; 1 runs in this process. In processes of their own, a run that crashes fails
                 alone; results do not depend on their number.
             progress: called with the number done and the number in all.
+            without: numbers of variations that are not run.
 
         Yields:
             The runs, in order with one worker, as they come with several.
@@ -65,14 +81,14 @@ class Sweep:
         """
         if workers < 1:
             raise ScenarioError(f"A sweep needs at least one worker (got workers={workers}).")
-        jobs = [_Job(self.scenario, settings) for settings in self.variations]
-        one_by_one = ((number, attempt(_run, job)) for number, job in enumerate(jobs))
-        for done, (number, answer) in enumerate(
-            one_by_one if workers == 1 else in_processes(_run, jobs, workers), start=1
-        ):
+        numbers = [number for number in range(len(self)) if number not in without]
+        jobs = [_Job(self.scenario, self.variations[number]) for number in numbers]
+        one_by_one = ((place, attempt(_run, job)) for place, job in enumerate(jobs))
+        answers = one_by_one if workers == 1 else in_processes(_run, jobs, workers)
+        for done, (place, answer) in enumerate(answers, start=len(self) - len(jobs) + 1):
             if progress is not None:
-                progress(done, len(jobs))
-            run = _entry(number, self.variations[number], answer)
+                progress(done, len(self))
+            run = _entry(numbers[place], self.variations[numbers[place]], answer)
             yield run
             if run.failure == INTERRUPTED:  # who interrupts a run of a sweep means the sweep
                 raise KeyboardInterrupt
@@ -86,6 +102,8 @@ class Sweep:
         units: Mapping[str, str] | None = None,
         keep: bool = True,
         directory: str | Path | None = None,
+        folders: bool = True,
+        resume: bool = False,
     ) -> SweepResult:
         """Run all variations; one that fails does not stop the others.
 
@@ -98,21 +116,33 @@ class Sweep:
             keep: keep the outcomes in memory; without them only measures are left, and what is in `directory`.
             directory: where each run is written as soon as it is done, ``run_000``, ``run_001``, ..., with an index at
                 the end, also where the sweep is interrupted.
+            folders: write a results folder for each run; without them `directory` holds the table only.
+            resume: take the runs over that an earlier sweep left in `directory`, where scenario, settings and files are
+                the same; those that failed are run again.
 
         Returns:
             The runs in order of the variations, with settings, measures, outcome or failure.
 
         Raises:
-            ScenarioError: `workers` is less than 1.
+            ScenarioError: `workers` is less than 1, or `resume` without a `directory`.
             OutputError: results cannot be written.
         """
-        done: dict[int, SweepRun] = {}
+        if resume and directory is None:
+            raise ScenarioError("A sweep is resumed from its folder: give directory=...")
+        journal = None if directory is None else Journal(Path(directory), self)
+        done: dict[int, SweepRun] = {} if journal is None or not resume else journal.read()
+        if journal is not None:
+            journal.begin(done.values())
         result = SweepResult(self.scenario, self.names, [], dict(units or {}))
         try:
-            for run in self.each(workers, progress):
+            for run in self.each(workers, progress, done.keys()):
                 measured = _measured(run, measure or {})
-                folder = None if directory is None else write_run(measured, Path(directory) / run_folder(run.number))
+                folder = None
+                if directory is not None and folders:
+                    folder = write_run(measured, Path(directory) / run_folder(run.number))
                 done[run.number] = replace(measured, folder=folder, outcome=measured.outcome if keep else None)
+                if journal is not None:
+                    journal.add(done[run.number])
         finally:
             result = replace(result, runs=[done[number] for number in sorted(done)])
             if directory is not None and done:
@@ -140,12 +170,15 @@ def make_sweep(
         CosimError: a name or a value cannot be.
     """
     sweep = Sweep(scenario.copy(), variations(values, mode, count, seed))
+    cases: set[Any] = set()
     for number, settings in enumerate(sweep.variations):
         try:
-            varied = _varied(sweep.scenario, settings)
+            varied = sweep.varied(number)
             varied.table()
-            if number == 0:
-                _check_parameters(varied, sweep.names)
+            names = sweep.scenario.cases[settings[CASE]] if CASE in settings else ()
+            if number == 0 or (CASE in settings and settings[CASE] not in cases):
+                _check_parameters(varied, [*names, *sweep.names])
+            cases.add(settings.get(CASE))
         except CosimError as error:
             error.args = (f"vary: run {number} ({settings_text(settings)}): {error}", *error.args[1:])
             raise
@@ -159,13 +192,6 @@ def settings_text(settings: Mapping[str, Any]) -> str:
         settings: values by name.
     """
     return ", ".join(f"{name} = {value!r}" for name, value in settings.items())
-
-
-def _varied(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
-    varied = scenario.copy()
-    for name, value in settings.items():
-        varied.set(name, value)
-    return varied
 
 
 def _check_parameters(scenario: Scenario, names: Iterable[str]) -> None:

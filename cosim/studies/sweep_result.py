@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cosim.comparison.compare import compare
-from cosim.errors import ComparisonError, OutputError
+from cosim.errors import ComparisonError, OutputError, ScenarioError, nearest
 from cosim.evaluation.numbers import number as number_text
 from cosim.results.load import load_result
 from cosim.results.result import Result
@@ -56,6 +55,19 @@ class SweepRun:
 
 
 @dataclass(frozen=True)
+class Column:
+    """A column of a printed table.
+
+    Args:
+        measure: name. heading: above it. factor: what numbers are multiplied by.
+    """
+
+    measure: str
+    heading: str
+    factor: float = 1.0
+
+
+@dataclass(frozen=True)
 class SweepResult:
     """The runs of a sweep, in order of its variations.
 
@@ -83,6 +95,23 @@ class SweepResult:
     def measures(self) -> list[str]:
         """Names of all measures, in order of appearance."""
         return list(dict.fromkeys(name for run in self.runs for name in run.measures))
+
+    @property
+    def columns(self) -> list[Column]:
+        """The measures that printed tables show: those the scenario chooses under ``report.measures``, or all.
+
+        Raises:
+            ScenarioError: one that is chosen is none.
+        """
+        chosen = self.scenario.table().report.measures
+        if not chosen or not self.measures:
+            return [Column(name, with_unit(name, self.unit(name))) for name in self.measures]
+        unknown = [column.measure for column in chosen if column.measure not in self.measures]
+        if unknown:
+            raise ScenarioError(f"report.measures: {unknown[0]!r} is none; {nearest(unknown[0], self.measures)}")
+        return [
+            Column(c.measure, with_unit(c.label or c.measure, c.unit or self.unit(c.measure)), c.factor) for c in chosen
+        ]
 
     def unit(self, measure: str) -> str | None:
         """Unit of a measure; None where nobody has said it.
@@ -117,14 +146,19 @@ class SweepResult:
     def text(self) -> str:
         """The table as plain text, failures in words below it."""
         rows = self.table()
-        names = ["run", *self.names, *self.measures]
-        shown = [setting_text] * (1 + len(self.names)) + [partial(number_text, digits=4)] * len(self.measures)
-        heads = ["run", *self.names, *(with_unit(name, self.unit(name)) for name in self.measures)]
-        cells = [heads, *([show(row[name]) for name, show in zip(names, shown, strict=True)] for row in rows)]
+        settings = ["run", *self.names]
+        columns = self.columns
+        cells = [[*settings, *(column.heading for column in columns)]]
+        for row in rows:
+            numbers = (number_text(column.factor * row[column.measure], digits=4) for column in columns)
+            cells.append([*(setting_text(row[name]) for name in settings), *numbers])
         lines = text_table(cells, left=())
-        lines += [f"run {run.number} failed: {run.failure}" for run in self.failed]
-        lines += [f"run {run.number}: {fault}" for run in self.runs for fault in run.faults]
-        return "\n".join(lines)
+        return "\n".join([*lines, *self.troubles()])
+
+    def troubles(self) -> list[str]:
+        """What failed, in words, a line each."""
+        lines = [f"run {run.number} failed: {run.failure}" for run in self.failed]
+        return [*lines, *(f"run {run.number}: {fault}" for run in self.runs for fault in run.faults)]
 
     def compare(self, reference: int = 0, tolerance: Any = None, **options: Any) -> dict[int, Comparison]:
         """Compare every other run with one of them.

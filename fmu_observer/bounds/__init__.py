@@ -2,7 +2,7 @@
 exact worst case.
 """
 
-from fmu_observer.bounds.error_bounds import BoundRow, ErrorBounds, bound_text
+from fmu_observer.bounds.error_bounds import BoundRow, ErrorBounds, bound_data, bound_text
 from fmu_observer.bounds.formulas import (
     cdo_bound,
     comparison_bound,
@@ -18,6 +18,7 @@ __all__ = [
     "BoundRow",
     "ErrorBounds",
     "WorstCase",
+    "bound_data",
     "bound_text",
     "cdo_bound",
     "comparison_bound",

@@ -5,15 +5,18 @@ keeps a limit. NumPy.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from math import exp, inf, sqrt
+from typing import Any
 
 import numpy as np
 
 from fmu_observer.bounds.formulas import improved_dmo_bound
 from fmu_observer.bounds.gaps import FIRST, growth_over_missing_samples, largest_gap
 from fmu_observer.bounds.worst_case import worst_case
+
+COARSE = 18  # halvings where each value is a worst case: to 1e-5 of the gap
 
 
 @dataclass(frozen=True)
@@ -130,7 +133,7 @@ class ErrorBounds:
             "carried": self.carried,
         }
         found = {name: largest_gap(bound, limit) for name, bound in bounds.items()}
-        found["exact"] = largest_gap(exact, limit, horizon=1e3)
+        found["exact"] = largest_gap(exact, limit, 1e3, COARSE)
         return found
 
     def largest_periods(self, limit: float) -> dict[str, float]:
@@ -148,12 +151,11 @@ class ErrorBounds:
         return {
             "published": largest_gap(self.published, limit),
             "carried": largest_gap(lambda period: self._at_period(period).carried(max(period, FIRST)), limit),
-            "exact": largest_gap(lambda period: self._at_period(period).exact(max(period, FIRST)), limit, 1e3),
+            "exact": largest_gap(lambda period: self._at_period(period).exact(max(period, FIRST)), limit, 1e3, COARSE),
         }
 
     def _at_period(self, period: float) -> ErrorBounds:
-        values = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        return ErrorBounds(**(values | {"period": max(period, FIRST)}))
+        return replace(self, period=max(period, FIRST))
 
     def _forced(self, gap: float) -> float:
         """What a gap adds to the level, from zero."""
@@ -165,6 +167,31 @@ class ErrorBounds:
 
     def _level(self, z: np.ndarray) -> float:
         return sqrt(float(z @ self.P @ z))
+
+
+def bound_data(bounds: ErrorBounds, limit: float | None, missing: int) -> dict[str, Any]:
+    """The bounds as plain data.
+
+    Args:
+        bounds: of an observer. limit: of the error, for the largest gaps [m/s]; None for none.
+        missing: most samples missing in a row.
+
+    Returns:
+        Observer, numbers, `rows` and, with a limit, `largest_gaps` and `largest_periods` [s].
+
+    Raises:
+        ValueError: the limit is not positive, or `missing` is negative.
+    """
+    shared = ("observer", "preset", "period", "rate", "beta", "m", "gain", "sample_error", "noise", "disturbances")
+    data: dict[str, Any] = {name: getattr(bounds, name) for name in (*shared, "decay")}
+    data["rows"] = [asdict(row) for row in bounds.growth(missing)]
+    if limit is not None:
+        data |= {
+            "limit": limit,
+            "largest_gaps": bounds.largest_gaps(limit),
+            "largest_periods": bounds.largest_periods(limit),
+        }
+    return data
 
 
 def bound_text(bounds: ErrorBounds, limit: float | None, missing: int) -> str:

@@ -9,10 +9,10 @@ Bound = Callable[[float], float]
 
 HORIZON = 1e4  # [s]: a bound that keeps its limit so long keeps it for ever
 FIRST = 1e-3  # [s]
-BISECTIONS = 60
+HALVINGS = 60  # of the bracket, to rounding
 
 
-def largest_gap(bound: Bound, limit: float, horizon: float = HORIZON) -> float:
+def largest_gap(bound: Bound, limit: float, horizon: float = HORIZON, halvings: int = HALVINGS) -> float:
     """Largest gap up to which a bound stays at or below a limit: the use that Aguiar Cota 2019, 4.2 makes of tau_M.
 
     The bounds of this room start at the error of the sample and cross a limit above that once: they are convex, or rise
@@ -20,7 +20,8 @@ def largest_gap(bound: Bound, limit: float, horizon: float = HORIZON) -> float:
 
     Args:
         bound: of the time since the sample [s]. limit: that it may not exceed, in its unit, positive.
-        horizon: longest gap of interest [s].
+        horizon: longest gap of interest [s]. halvings: of the bracket, a factor of two wide at first; fewer for a bound
+            that is expensive.
 
     Returns:
         The gap [s]; 0 where the limit is exceeded at the sample already, inf where it is kept up to the horizon.
@@ -37,7 +38,7 @@ def largest_gap(bound: Bound, limit: float, horizon: float = HORIZON) -> float:
         if high >= horizon:
             return inf
         low, high = high, min(2.0 * high, horizon)
-    for _ in range(BISECTIONS):
+    for _ in range(halvings):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if bound(middle) <= limit else (low, middle)
     return low

@@ -15,7 +15,7 @@ import scipy
 
 from fmu_observer.certificates.exponential import small_exponential
 
-SCAN_POINTS = 1000  # over seven decades of time
+SCAN_POINTS = 300  # over seven decades of time
 THIRDS = 60
 
 

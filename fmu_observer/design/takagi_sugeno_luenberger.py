@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.certificates.quadratic import Condition, common_quadratic_form, decrease, flow_condition
+from fmu_observer.design.cvxpy_module import load_cvxpy
 from fmu_observer.design.pole_placement import observer_gain
 from fmu_observer.models import TakagiSugenoModel
 from fmu_observer.models.checks import check_numbers
@@ -140,7 +141,7 @@ def _nearest_decay(model: TakagiSugenoModel, decay: float) -> float | None:
 
 
 def _solve(model: TakagiSugenoModel, decay: float) -> tuple[np.ndarray | None, list[np.ndarray]]:
-    cp = _cvxpy()
+    cp = load_cvxpy("Design by linear matrix inequalities")
     T, n = np.asarray(model.scaling), model.order
     C = model.C / T
     P: Any = cp.Variable((n, n), symmetric=True)
@@ -157,13 +158,3 @@ def _solve(model: TakagiSugenoModel, decay: float) -> tuple[np.ndarray | None, l
     if P.value is None:
         return None, []
     return np.asarray(P.value), [np.asarray(L.value) for L in parts]
-
-
-def _cvxpy() -> Any:
-    try:
-        import cvxpy  # noqa: PLC0415 - only who designs pays for it
-    except ImportError as error:
-        raise ImportError(
-            "Design by linear matrix inequalities needs cvxpy: pip install 'fmu-observer[lmi]'."
-        ) from error
-    return cvxpy

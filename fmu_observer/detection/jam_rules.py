@@ -18,6 +18,7 @@ TRUSTED, HELD, UNCONFIRMED = 0.0, 1.0, 2.0
 odometer is followed again although nothing has confirmed it.
 """
 UNSETTLED = 1000.0  # faults since the residual was last small: so many that none is judged before it is
+REFUTATIONS = 2.0  # ways in a row that must be wrong before an odometer that is believed is held to lie
 ROUNDING = 1e-9  # of times that are sums of periods
 
 PERIOD = parameter("odometer_period", "s", 0.2, "Time between two readings of the odometer", min=1e-3)
@@ -116,6 +117,7 @@ class RuleMemory(NamedTuple):
     faults: Array
     last_odometer: Array
     unchanged_time: Array
+    refutations: Array
     samples: Array
 
 
@@ -136,10 +138,13 @@ class RepairedRules:
     *unconfirmed* (mode 2): `odometer_fault` stays 1. That ends when the wheel has rolled with a small residual for
     `trust_time`, or when a balise confirms the way.
 
+    Where a braked wheel is faster than a settled estimate by more than eps / M, a driven one slower, the speed is set
+    to the odometer while it is believed, too: it is the end of a jam that was too small to be seen.
+
     A fault begins where ``|r| > eps`` with the sign that the effort allows (a jam while braking, a skid while driving,
-    either while coasting), in time to keep the very sample out; or where a balise refutes the way of an odometer that
-    was believed. None is judged before `arming_delay` has passed and the residual has been below eps / 2 for
-    `settle_samples`, nor after `fault_limit` faults between which it was not.
+    either while coasting), in time to keep the very sample out; or where balises refute the way of an odometer that was
+    believed twice in a row. None is judged before `arming_delay` has passed and the residual has been below eps / 2 for
+    `settle_samples`, nor after `fault_limit` faults between which it was not, nor below `least_speed`.
 
     Source: the three states of Aguiar Cota 2019, Algorithm 3-3; the rules are ours.
     """
@@ -152,6 +157,7 @@ class RepairedRules:
         memory("faults", "1", UNSETTLED, "Faults since the residual was last small; 1000 after the start"),
         memory("last_odometer", "m/s", 0.0, "Reading before"),
         memory("unchanged_time", "s", 0.0, "Time since mode or rolling last changed"),
+        memory("refutations", "1", 0.0, "Ways between balises in a row that the odometer had wrong"),
         memory("samples", "1", 0.0, "Readings since the start"),
     )
     parameters = (
@@ -165,6 +171,7 @@ class RepairedRules:
         parameter("trust_time", "s", 20.0, "Time of rolling after which an unconfirmed odometer is believed", min=0.0),
         parameter("settle_samples", "1", 5.0, "Samples with a small residual before faults are judged", min=1.0),
         parameter("fault_limit", "1", 3.0, "Faults in a row without a small residual between them", min=1.0),
+        parameter("least_speed", "m/s", 0.5, "Estimated speed below which no fault begins", min=0.0),
         parameter("sign_rule", "1", 1.0, "1: jams only while braking, skids only while driving", min=0.0, max=1.0),
         parameter("way_share", "1", 0.01, "Error of the odometer's way that a balise allows, a share of it", min=0.0),
         parameter("way_floor", "m", 1.0, "Error of the odometer's way that a balise always allows", min=0.0),
@@ -188,7 +195,8 @@ class RepairedRules:
         passed = _is((m.samples + ROUNDING) * p.odometer_period >= p.arming_delay)
         faults = np.where(_is(settled >= p.settle_samples) * passed > 0.0, 0.0, m.faults)
         armed = _is(m.mode == TRUSTED) * _is(faults < p.fault_limit) * passed
-        onset = armed * _is(size > p.threshold) * (1.0 - impossible)
+        moves = _is(told.speed > p.least_speed)
+        onset = armed * moves * _is(size > p.threshold) * (1.0 - impossible)
         # held: is the odometer believed again
         hold = np.where(held > 0.0, m.hold_time + p.odometer_period, 0.0)
         agrees = held * _is(size <= agreement_limit(hold, p))
@@ -211,9 +219,13 @@ class RepairedRules:
             np.where(trusted > 0.0, 0.0, np.where(expired > 0.0, UNSETTLED, faults + onset)),
             told.odometer,
             np.where(changed > 0.0, 0.0, m.unchanged_time + p.odometer_period),
+            m.refutations,
             m.samples + 1.0,
         )
-        return Judgement(tuple(after), np.maximum(np.maximum(believed, expired), jumped), onset, 0.0 * size)
+        # A jam too small to be held is over: the estimate takes the reading, and learns nothing from the jump.
+        over = armed * impossible
+        restart = np.maximum(np.maximum(believed, expired), np.maximum(jumped, over))
+        return Judgement(tuple(after), restart, onset, 0.0 * size)
 
     def at_balise(self, before: tuple[Array, ...], told: Passing, p: Any) -> Judgement:
         """Judge the way between two balises, where nothing changed on it.
@@ -224,8 +236,10 @@ class RepairedRules:
         m = RuleMemory(*before)
         clean = told.known * _is(told.duration >= p.way_time) * _is(m.unchanged_time >= told.duration)
         right = _is(np.abs(told.way - np.abs(told.distance)) <= way_limit(told, p))
-        confirmed, refuted = clean * right, clean * (1.0 - right)
         held, open_ = _is(m.mode == HELD), _is(m.mode == UNCONFIRMED)
+        row = clean * (1.0 - right) * (m.refutations + 1.0)
+        # Once may be a jam that is over; what is not believed anyway is refuted by that.
+        confirmed, refuted = clean * right, _is(row >= np.where(m.mode == TRUSTED, REFUTATIONS, 1.0))
         mode = np.where(refuted > 0.0, HELD, np.where(confirmed * (held + open_) > 0.0, TRUSTED, m.mode))
         changed = _is(mode != m.mode)
         begun = refuted * (1.0 - held)
@@ -241,6 +255,7 @@ class RepairedRules:
             np.where(confirmed * changed > 0.0, UNSETTLED, m.faults + begun),
             m.last_odometer,
             np.where(changed > 0.0, 0.0, m.unchanged_time),
+            row,
             m.samples,
         )
         return Judgement(tuple(after), confirmed * held, begun, shift)

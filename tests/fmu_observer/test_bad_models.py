@@ -44,6 +44,15 @@ ANGLE, RATE, TORQUE = state("angle", "rad"), state("rate", "rad/s"), input_signa
         ({"lipschitz": -1.0}, "lipschitz must be finite and not negative, got -1.0"),
         ({"phi": lambda x, _u: vector(x[0])}, r"phi\(x, u\) returns shape \(1,\), expected \(2,\)"),
         ({"phi": lambda _x, _u: None}, r"phi\(x, u\) returns shape \(\), expected \(2,\)"),
+        ({"H": np.ones((2, 1))}, r"H has shape \(2, 1\), expected \(2, 0\) for 2 states and 0 unknown inputs"),
+        (
+            {"unknown_inputs": (input_signal("wind", "N"),)},
+            r"H has shape \(2, 0\), expected \(2, 1\) for 2 states and 1 unknown",
+        ),
+        (
+            {"unknown_inputs": (input_signal("rate", "1"),), "H": np.ones((2, 1))},
+            "states, inputs and unknown inputs: rate",
+        ),
         ({"phi": 3}, r"phi\(x, u\) fails at the start values: 'int' object is not callable"),
     ],
 )

@@ -26,6 +26,26 @@ def test_the_reference_is_the_printed_profile(t: float) -> None:
         assert reference == pytest.approx(np.interp(t, times, speeds), abs=1e-12)
 
 
+@pytest.mark.parametrize("count", [4, 14])
+def test_a_profile_may_have_more_points_and_keeps_its_presets(count: int) -> None:
+    driver = Driver(profile_count=count)
+    for preset in driver.presets:
+        p = driver.unpack_parameters(driver.start_parameters(preset))
+        usual = DRIVER.unpack_parameters(DRIVER.start_parameters(preset))
+        assert len(p.profile_time) == len(p.profile_speed) == count
+        assert p.power_limit == usual.power_limit
+        for t in (0.0, 7.0, 44.0, 71.0, 100.0):
+            inputs = driver.unpack_inputs(np.zeros(1))
+            told = [d.output(t, np.zeros(2), inputs, q)["speed_reference"] for d, q in ((driver, p), (DRIVER, usual))]
+            assert told[0] == told[1]
+
+
+@pytest.mark.parametrize("count", [3, 65, 8.5, True])
+def test_a_profile_has_four_to_sixty_four_points(count: object) -> None:
+    with pytest.raises(ValueError, match="profile_count must be"):
+        Driver(profile_count=count)  # type: ignore[arg-type]
+
+
 def test_the_profiles_cover_the_distances_they_claim() -> None:
     t = np.linspace(0.0, 100.0, 100001)
     for preset, distance in (("profile_d", 65.0 * KMH_50), ("profile_b", 3000.0)):

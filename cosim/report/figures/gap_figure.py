@@ -1,4 +1,6 @@
-"""Figure of the sampling gaps beside the gaps the observers are certified for. Draws on axes given, or on its own."""
+"""Figures of the gaps between balises: how long they were beside the gaps the observers are certified for, and how far
+observers were off at their end. Draw on axes given, or on their own.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,8 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.axes import Axes
 
-from cosim.drawing.style import GAP, axes_or_new, observer_line, styled
+from cosim.drawing.style import BLACK, GAP, MARK, axes_or_new, observer_line, styled
+from cosim.evaluation.balise_gaps import ENVELOPE, PLAIN_ODOMETER, gap_errors
 from cosim.evaluation.event_counts import accepted_stamps
 from cosim.evaluation.facts import mapping_entry, number_entry
 from cosim.evaluation.numbers import number
@@ -17,6 +20,8 @@ from cosim.report.figures.drawing import legend_above, shade_zones, time_axis
 from cosim.report.figures.panel import Panel
 from cosim.results.result import Result
 
+SMALLEST, LARGEST = 1e-2, 1e3  # [m]; errors beyond are drawn at the edge
+MARKERS = "os^Dv<>p"
 SHOWN = 3.0  # limits above this many largest gaps are named, not drawn
 
 
@@ -88,6 +93,44 @@ def gap_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes
     return ax
 
 
+@styled
+def gap_error_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
+    """Magnitude of the position error in m at the end of each gap over its length, on a logarithmic axis, for every
+    observer and the plain odometer, with the envelope of SUBSET-041.
+
+    Args:
+        result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
+
+    Returns:
+        The axes.
+    """
+    ax = axes_or_new(ax, (8.2, 3.8))
+    found = gap_errors(result, spec)
+    lengths = np.array([gap.length for gap in found.gaps])
+    for i, (name, errors) in enumerate(found.errors.items()):
+        plain = name == PLAIN_ODOMETER
+        colour = BLACK if plain else observer_line(spec.observers, name)["color"]
+        ax.plot(
+            lengths,
+            np.clip(np.abs(errors), SMALLEST, LARGEST),
+            linestyle="none",
+            marker="x" if plain else MARKERS[i % len(MARKERS)],
+            markersize=4.5,
+            markeredgewidth=1.0,
+            color=colour,
+            alpha=0.75,
+            label=found.labels[name],
+        )
+    order = np.argsort(lengths)
+    granted = np.array([gap.envelope for gap in found.gaps])
+    ax.plot(lengths[order], granted[order], color=MARK, linewidth=1.2, label=ENVELOPE)
+    ax.set_yscale("log")
+    ax.set_xlabel("Way since the last balise [m]")
+    ax.set_ylabel("|Position error| at the end [m]")
+    legend_above(ax)
+    return ax
+
+
 class GapsPanel(Panel):
     """Sampling gaps."""
 
@@ -106,3 +149,24 @@ class GapsPanel(Panel):
     @staticmethod
     def available(result: Result, spec: ReportSpec) -> bool:  # noqa: ARG004, D102 - see Panel
         return len(sampling_gaps(result)[1]) > 0
+
+
+class GapErrorsPanel(Panel):
+    """Position errors at the end of the gaps."""
+
+    name = "gap_errors"
+    title = "Position errors at the end of the gaps"
+    caption = (
+        "How far each observer and the plain odometer were off when the next balise was read, over the way since the "
+        "last one. The line is what SUBSET-041 grants an odometer; smaller than 1 cm and larger than 1 km are drawn at "
+        "the edge."
+    )
+    place = 7
+
+    @staticmethod
+    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
+        return gap_error_figure(result, spec, ax)
+
+    @staticmethod
+    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
+        return bool(gap_errors(result, spec).errors)

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from cosim.evaluation.balise_gaps import ENVELOPE, gap_errors
 from cosim.evaluation.cost import was_compiled
 from cosim.evaluation.event_counts import count_events
 from cosim.evaluation.facts import list_entry, mapping_entry, statement
@@ -20,6 +21,7 @@ from cosim.report.figures.panels import draw_all, panels
 from cosim.report.figures.zooms import ZOOM_KEYS, Zoom, draw_zooms
 from cosim.report.page import run_tables
 from cosim.report.page.files import explained, page_bytes, write_file, write_page
+from cosim.report.page.gaps import gaps_table
 from cosim.report.page.phases import errors_table, phases_table
 from cosim.report.page.render import render
 from cosim.report.page.verdict import verdict_facts
@@ -111,6 +113,8 @@ def report_page(
         phases=phases_table(details, spec),
         certificates=certificates,
         explained=explained,
+        gaps=gaps_table(gap_errors(result, spec)),
+        envelope=ENVELOPE,
         counts=counts,
         telegrams=run_tables.telegrams_table(counts.outcomes, spec.labels),
         indicators=run_tables.indicators_table(result, spec),

@@ -4,7 +4,7 @@ overshoot of given gains, checked in NumPy.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from math import inf, sqrt
 from typing import Any
@@ -13,9 +13,9 @@ import numpy as np
 
 from fmu_observer.design.proposition_4_1.check import margins
 from fmu_observer.design.proposition_4_1.inequalities import DECAY, GAIN, Proposition41Problem
-from fmu_observer.design.proposition_4_1.solve import Candidate, least_alpha, least_condition
+from fmu_observer.design.proposition_4_1.solve import Candidate, least_alphas, least_condition
 
-BISECTIONS = 20
+BISECTIONS = 14
 SMALLEST = 1e-3  # of the decay asked for: below it nothing is called feasible
 
 
@@ -120,7 +120,7 @@ def smallest_alpha(A: Any, C: Any, m: float, *, gains: Any = None) -> float | No
         ImportError: cvxpy is not installed.
     """
     problem = Proposition41Problem.of(A, C, m, None)
-    return _smallest_alpha(problem, None if gains is None else _checked_gains(problem, gains))
+    return _smallest_alphas(problem, None if gains is None else _checked_gains(problem, gains))(problem.m)
 
 
 def largest_decay(A: Any, C: Any, most: float, alpha: float | None = None, *, gains: Any = None) -> float | None:
@@ -161,18 +161,25 @@ def _checked_gains(problem: Proposition41Problem, gains: Any) -> np.ndarray:
     return np.broadcast_to(values, shape)
 
 
-def _smallest_alpha(problem: Proposition41Problem, gains: np.ndarray | None) -> float | None:
-    unlimited = replace(problem, alpha=None)
-    for candidate in least_alpha(unlimited, gains):
-        found = margins(replace(problem, alpha=candidate.value), candidate.P, candidate.gains)
-        if min(found.values()) > 0.0:
-            return candidate.value
-    return None
+def _smallest_alphas(problem: Proposition41Problem, gains: np.ndarray | None) -> Callable[[float], float | None]:
+    """The least alpha by the decay, checked."""
+    candidates = least_alphas(problem, gains)
+
+    def of_decay(m: float) -> float | None:
+        for candidate in candidates(m):
+            asked = replace(problem, m=m, alpha=candidate.value)
+            if min(margins(asked, candidate.P, candidate.gains).values()) > 0.0:
+                return candidate.value
+        return None
+
+    return of_decay
 
 
 def _largest_decay(problem: Proposition41Problem, gains: np.ndarray | None) -> float | None:
+    smallest_alpha_of = _smallest_alphas(problem, gains)
+
     def feasible(m: float) -> bool:
-        least = _smallest_alpha(replace(problem, m=m), gains)
+        least = smallest_alpha_of(m)
         return least is not None and (problem.alpha is None or least <= problem.alpha)
 
     if feasible(problem.m):
@@ -187,7 +194,7 @@ def _largest_decay(problem: Proposition41Problem, gains: np.ndarray | None) -> f
 
 
 def _infeasible(problem: Proposition41Problem, gains: np.ndarray | None) -> InfeasibleDesign:
-    alpha, m = _smallest_alpha(problem, gains), _largest_decay(problem, gains)
+    alpha, m = _smallest_alphas(problem, gains)(problem.m), _largest_decay(problem, gains)
     asked = "" if problem.alpha is None else f" and alpha = {problem.alpha:g}"
     of = "free gains" if gains is None else "the gains given"
     text = f"Proposition 4-1 has no solution for m = {problem.m:g} 1/s{asked} with {of}"

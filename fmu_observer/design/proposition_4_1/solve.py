@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from fmu_observer.design.cvxpy_module import load_cvxpy
 from fmu_observer.design.proposition_4_1.inequalities import Proposition41Problem, inequalities
 
 STRICTNESS = (1e-8, 1e-7, 1e-6)  # asked of every inequality, the least first: what is recomputed must be positive
@@ -43,27 +44,35 @@ def least_condition(problem: Proposition41Problem, gains: np.ndarray | None) -> 
     Raises:
         ImportError: cvxpy is not installed.
     """
-
-    def objective(cp: Any, P: Any, _: Any) -> tuple[Any, list[Any]]:
-        largest = cp.Variable()
-        return largest, [P << largest * np.eye(problem.order)]
-
-    return _candidates(problem, gains, objective, problem.alpha)
+    cp = load_cvxpy("Design by Proposition 4-1")
+    question = _Question.of(cp, problem, gains, problem.alpha)
+    largest = cp.Variable()
+    yield from question.candidates(cp, largest, [question.P << largest * np.eye(problem.order)])
 
 
-def least_alpha(problem: Proposition41Problem, gains: np.ndarray | None) -> Iterator[Candidate]:
-    """Least alpha with ``P >= I``, that of the problem left aside.
+def least_alphas(problem: Proposition41Problem, gains: np.ndarray | None) -> Callable[[float], Iterator[Candidate]]:
+    """Least alpha with ``P >= I`` by the decay; decay and alpha of the problem are left aside.
 
     Args:
         problem: the question. gains: shape (N, n) to keep; None to seek them.
 
-    Yields:
-        What the solver returned, once for every strictness where it is usable; alpha as `value`.
+    Returns:
+        A function of the decay [1/s] that yields what the solver returned, once for every strictness where it is
+        usable, alpha as `value`. The question is posed once.
 
     Raises:
         ImportError: cvxpy is not installed.
     """
-    return _candidates(problem, gains, lambda _cp, _P, alpha: (alpha, []), None)
+    cp = load_cvxpy("Design by Proposition 4-1")
+    m, alpha = cp.Parameter(nonneg=True), cp.Variable()
+    question = _Question.of(cp, replace(problem, m=m, alpha=None), gains, alpha)
+    solve = question.candidates_of(cp, alpha, [])
+
+    def of_decay(decay: float) -> Iterator[Candidate]:
+        m.value = decay
+        yield from solve()
+
+    return of_decay
 
 
 def sharpest(drifts: np.ndarray, gain: np.ndarray, m: float) -> Iterator[tuple[np.ndarray, str]]:
@@ -78,7 +87,7 @@ def sharpest(drifts: np.ndarray, gain: np.ndarray, m: float) -> Iterator[tuple[n
     Raises:
         ImportError: cvxpy is not installed.
     """
-    cp = _cvxpy()
+    cp = load_cvxpy("Design by Proposition 4-1")
     n = len(gain)
     P, strict = cp.Variable((n, n), symmetric=True), cp.Parameter()
     constraints = [cp.sum(cp.multiply(np.outer(gain, gain), P)) <= 1.0, P >> strict * np.eye(n)]
@@ -91,31 +100,45 @@ def sharpest(drifts: np.ndarray, gain: np.ndarray, m: float) -> Iterator[tuple[n
             yield 0.5 * (P.value + P.value.T), str(question.status)
 
 
-def _candidates(
-    problem: Proposition41Problem,
-    gains: np.ndarray | None,
-    objective: Callable[[Any, Any, Any], tuple[Any, list[Any]]],
-    alpha: float | None,
-) -> Iterator[Candidate]:
-    cp = _cvxpy()
-    n = problem.order
-    P, strict = cp.Variable((n, n), symmetric=True), cp.Parameter()
-    if gains is None:
-        M: Sequence[Any] = [cp.Variable((n, 1)) for _ in problem.A]
-    else:
-        M = [P @ K[:, None] for K in gains]
-    unknown_alpha = cp.Variable()
-    goal, constraints = objective(cp, P, unknown_alpha)
-    limit = unknown_alpha if goal is unknown_alpha else alpha
-    for _, rows in inequalities(problem, P, M, limit).values():
-        matrix = cp.bmat(rows)
-        constraints.append(matrix >> strict * np.eye(matrix.shape[0]))
-    question = cp.Problem(cp.Minimize(goal), constraints)
-    for strict.value in STRICTNESS:
-        if _run(cp, question):
-            matrix = 0.5 * (P.value + P.value.T)
-            found = np.linalg.solve(matrix, np.hstack([m.value for m in M])).T if gains is None else gains
-            yield Candidate(matrix, np.asarray(found), float(goal.value), str(question.status))
+@dataclass(frozen=True, eq=False)
+class _Question:
+    """The unknowns with the inequalities on them.
+
+    Attributes:
+        P: unknown, shape (n, n). M: ``P K`` of each vertex. gains: those to keep, or None. strict: asked of every
+            inequality. constraints: the inequalities.
+    """
+
+    P: Any
+    M: Sequence[Any]
+    gains: np.ndarray | None
+    strict: Any
+    constraints: list[Any]
+
+    @classmethod
+    def of(cls, cp: Any, problem: Proposition41Problem, gains: np.ndarray | None, alpha: Any) -> _Question:
+        n = problem.order
+        P, strict = cp.Variable((n, n), symmetric=True), cp.Parameter(nonneg=True)
+        M = [cp.Variable((n, 1)) for _ in problem.A] if gains is None else [P @ K[:, None] for K in gains]
+        matrices = [cp.bmat(rows) for _, rows in inequalities(problem, P, M, alpha).values()]
+        return cls(P, M, gains, strict, [matrix >> strict * np.eye(matrix.shape[0]) for matrix in matrices])
+
+    def candidates(self, cp: Any, goal: Any, constraints: list[Any]) -> Iterator[Candidate]:
+        yield from self.candidates_of(cp, goal, constraints)()
+
+    def candidates_of(self, cp: Any, goal: Any, constraints: list[Any]) -> Callable[[], Iterator[Candidate]]:
+        posed = cp.Problem(cp.Minimize(goal), [*self.constraints, *constraints])
+
+        def solve() -> Iterator[Candidate]:
+            for self.strict.value in STRICTNESS:
+                if _run(cp, posed):
+                    matrix = 0.5 * (self.P.value + self.P.value.T)
+                    found = self.gains
+                    if found is None:
+                        found = np.linalg.solve(matrix, np.hstack([product.value for product in self.M])).T
+                    yield Candidate(matrix, found, float(goal.value), str(posed.status))
+
+        return solve
 
 
 def _run(cp: Any, question: Any) -> bool:
@@ -127,11 +150,3 @@ def _run(cp: Any, question: Any) -> bool:
         except cp.error.SolverError:
             return False
     return question.status in ("optimal", "optimal_inaccurate")
-
-
-def _cvxpy() -> Any:
-    try:
-        import cvxpy  # noqa: PLC0415 - only who designs pays for it
-    except ImportError as error:
-        raise ImportError("Design by Proposition 4-1 needs cvxpy: pip install 'fmu-observer[lmi]'.") from error
-    return cvxpy

@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from fmu_observer.design.cvxpy_module import load_cvxpy
 from fmu_observer.design.robust_residual.inequalities import robustness, sensitivity
 from fmu_observer.design.robust_residual.problem import ResidualProblem
 
@@ -60,7 +61,7 @@ def candidates(
     Raises:
         ImportError: cvxpy is not installed.
     """
-    cp = cvxpy_or_refusal()
+    cp = load_cvxpy("Design of a robust residual")
     M, size = problem.residual_gain, float(np.linalg.norm(problem.disturbance, 2))
     scaled = replace(problem, disturbance=problem.disturbance / size, residual_gain=1.0)
     n, q = problem.order, len(problem.C)
@@ -99,7 +100,7 @@ def sensitivity_candidates(problem: ResidualProblem, gains: np.ndarray) -> Itera
     Raises:
         ImportError: cvxpy is not installed.
     """
-    cp = cvxpy_or_refusal()
+    cp = load_cvxpy("Design of a robust residual")
     scaled = replace(problem, residual_gain=1.0)
     P, gamma2 = cp.Variable((problem.order, problem.order), symmetric=True), cp.Variable()
     strict = cp.Parameter(nonneg=True)
@@ -125,16 +126,3 @@ def solved(cp: Any, question: Any) -> bool:
         except cp.error.SolverError:
             return False
     return question.status in ("optimal", "optimal_inaccurate")
-
-
-def cvxpy_or_refusal() -> Any:
-    """The module cvxpy.
-
-    Raises:
-        ImportError: it is not installed.
-    """
-    try:
-        import cvxpy  # noqa: PLC0415 - only who designs pays for it
-    except ImportError as error:
-        raise ImportError("Design of a robust residual needs cvxpy: pip install 'fmu-observer[lmi]'.") from error
-    return cvxpy

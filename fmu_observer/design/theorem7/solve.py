@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from fmu_observer.design.cvxpy_module import load_cvxpy
 from fmu_observer.design.theorem7.inequalities import Theorem7Problem, Unknowns, inequalities
 
 Gains = tuple[np.ndarray, np.ndarray]
@@ -55,7 +56,7 @@ def candidates(problem: Theorem7Problem, performance: bool, gains: Gains | None 
     Raises:
         ImportError: cvxpy is not installed.
     """
-    cp = _cvxpy()
+    cp = load_cvxpy("Design by Theorem 7")
     unknowns = _unknowns(cp, problem, gains)
     margin, strict = cp.Variable(), cp.Parameter()
     matrices = [cp.bmat(rows) for rows in inequalities(problem, unknowns, performance).values()]
@@ -125,11 +126,3 @@ def _candidate(unknowns: Unknowns, gains: Gains | None, status: str) -> Candidat
 def _value(variable: Any) -> np.ndarray:
     """Its number, zero for an unknown that appears nowhere."""
     return np.zeros(variable.shape) if variable.value is None else np.asarray(variable.value)
-
-
-def _cvxpy() -> Any:
-    try:
-        import cvxpy  # noqa: PLC0415 - only who designs pays for it
-    except ImportError as error:
-        raise ImportError("Design by Theorem 7 needs cvxpy: pip install 'fmu-observer[lmi]'.") from error
-    return cvxpy

@@ -209,9 +209,7 @@ class HeldOdometerObserver(TrainObserver):
     def requirements(self, p: Any) -> dict[str, Array]:
         """Bounds of the numbers that the bounds rest on, and the proof of the decay at both ends of the drag slopes."""
         slowest, fastest = error_slopes(p)
-        proven = [
-            decay_proven(p.lyapunov_matrix, a11, (p.gain[1], p.gain[2]), p.bound_decay) for a11 in (slowest, fastest)
-        ]
+        proven = [_proven(a11, p) for a11 in (slowest, fastest)]
         limited = tuple(s for s in self.estimator_parameters if s.min is not None)
         return super().requirements(p) | within_bounds(limited, p) | {PROOF: proven[0] * proven[1]}
 
@@ -239,12 +237,11 @@ class HeldOdometerObserver(TrainObserver):
         Raises:
             ValueError: a parameter or the preset is unknown or not legal, or P does not prove the decay.
         """
-        p = self.unpack_parameters(parameter_values(self, parameters, preset, "of the bounds"))
+        p = self.unpack_parameters(parameter_values(self, parameters, preset, "to bound its error"))
         slopes = tuple(map(float, error_slopes(p)))
-        if not all(decay_proven(p.lyapunov_matrix, a11, (p.gain[1], p.gain[2]), p.bound_decay) for a11 in slopes):
-            raise ValueError(
-                f"{self.name}: {PROOF} (bound_decay = {float(p.bound_decay):g} 1/s, gain = {list(p.gain)})."
-            )
+        if not all(_proven(a11, p) for a11 in slopes):
+            gain = [float(k) for k in p.gain]
+            raise ValueError(f"{self.name}: {PROOF} (bound_decay = {float(p.bound_decay):g} 1/s, gain = {gain}).")
         gains = [np.array([float(first_gain(z, p)), *map(float, p.gain[1:])]) for z in (0.0, float(p.speed_max))]
         unknown = (p.unknown_acceleration, p.unknown_jerk, p.unknown_jerk_rate)
         return ErrorBounds(
@@ -326,6 +323,11 @@ def gain_norm(z: Array, p: Any) -> Array:
         z: that speed [m/s]. p: parameters, as in `HybridSystem.flow`.
     """
     return np.sqrt(first_gain(z, p) ** 2 + p.gain[1] ** 2 + p.gain[2] ** 2)
+
+
+def _proven(a11: Array, p: Any) -> Array:
+    """1 where the matrix proves the decay for an entry 11 of the error matrix, else 0."""
+    return decay_proven(p.lyapunov_matrix, a11, (p.gain[1], p.gain[2]), p.bound_decay)
 
 
 def _unknown_level(p: Any) -> Array:

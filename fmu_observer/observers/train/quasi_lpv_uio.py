@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import inf
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from fmu_observer.certificates import Certificate
+from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampled_error
 from fmu_observer.certificates.polytope import polytope_stability
-from fmu_observer.design.quasi_lpv_published import SECTION_3_3_4, SECTION_5_3_1, QuasiLpvDesign, quasi_lpv_vertices
+from fmu_observer.design.quasi_lpv_published import (
+    SECTION_3_3_4,
+    SECTION_5_3_1,
+    SEEN,
+    QuasiLpvDesign,
+    quasi_lpv_vertices,
+)
 from fmu_observer.detection.jam_detector import FAULT_OUTPUTS, ODOMETER_SAMPLE, RULES, RuleChoice, find_rules, verdict
 from fmu_observer.detection.jam_rules import SHARED_PARAMETERS, Passing, Reading
 from fmu_observer.observers.gap_certified import GapCertified
@@ -20,13 +26,17 @@ from plant_models.hybrid import Signal, input_signal, memory, output_signal, par
 from plant_models.hybrid.system import Array
 
 P, V, D, RATE, WAY = range(5)  # continuous states
-HELD, LAST_D, LAST_RATE, INNOVATION, BALISE_TIME, BALISE_PLACE, BALISE_ODOMETER, BALISES = range(5, 13)
+HELD, CORRECTION, LAST_D, LAST_RATE, INNOVATION, BALISE_TIME, BALISE_PLACE, BALISE_ODOMETER, BALISES = range(5, 14)
 HORIZON = 20.0  # [s], of the certificate, as of the others; what holds, holds for every gap
 OPEN_BOUND = 1e3  # [m]: where the odometer is followed unconfirmed, no balise is doubted
+
+HoldChoice = Literal["innovation", "reading"]
+HOLDS: tuple[HoldChoice, ...] = ("innovation", "reading")
 
 SPEED = state("estimated_speed", "m/s", 0.0, "Estimate of the train speed")
 OWN_MEMORY = (
     memory("held_odometer", "m/s", 0.0, "Last reading of the odometer"),
+    memory("held_innovation", "m/s", 0.0, "Odometer minus estimate just after the last sample"),
     memory("last_disturbance", "m/s2", 0.0, "Disturbance at the sample before"),
     memory("last_disturbance_rate", "m/s3", 0.0, "Its rate then"),
     memory("last_innovation", "m", 0.0, "Position error seen at the last balise"),
@@ -56,9 +66,15 @@ class QuasiLpvUio(GatedObserver, GapCertified):
     3.3.2.
 
     ``dp = v``, ``dv = F/M - a/M - (b + c z) v / M - d + K_1 i``, ``dd = d' + K_2 i``, ``dd' = K_3 i`` with the
-    innovation ``i = y_k - v``, y_k the odometer held since its last sample and z the speed of the scheduling: y_k. The
-    gain is ``h_1 K(low) + h_2 K(high)``, ``h_1 = (high - z) / (high - low)``, within [0, 1]. d is a deceleration by all
-    that the model does not know: gradient, missing brake effort, wrong coefficients. At a balise ``p = p_B``.
+    innovation i and the speed z of the scheduling, y_k, the last sample of the odometer. The gain is
+    ``h_1 K(low) + h_2 K(high)``, ``h_1 = (high - z) / (high - low)``, within [0, 1]. d is a deceleration by all that
+    the model does not know: gradient, missing brake effort, wrong coefficients. At a balise ``p = p_B``.
+
+    What is held between samples: the reading, ``i = y_k - v`` as published; then the estimate of a train that brakes
+    with a lags by half a period, ``a period / 2``, and so does the residual, which alone is half of the threshold of
+    chapter 5. Or the innovation [ours], ``i = y_k - v(t_k)``, which has no such lag. `reading_age` is how old a reading
+    is when it is sampled, half the period for one that was aggregated over it; it is made up for with the estimated
+    acceleration.
 
     The residual ``M (y_k - v)`` is judged at each odometer sample by the rules of the jam detector. While they say that
     the odometer lies, i = 0.
@@ -73,10 +89,14 @@ class QuasiLpvUio(GatedObserver, GapCertified):
 
     Args:
         rules: ``repaired`` or ``printed``.
+        hold: what is held between samples, ``innovation`` or ``reading``.
+
+    Raises:
+        ValueError: an unknown option.
 
     Presets, per unit mass, so that efforts are m/s2: `as_published` (default), the gains of section 3.3.4, whose
     coefficients are 20 % below those of the train; `as_published_5_3_1`, those of the validation. Nothing printed is
-    unstable; what is repaired are the rules, which are an option. The arming delay of 6 s is ours.
+    unstable; what is repaired are options, the rules and what is held. The arming delay of 6 s is ours.
     """
 
     name = "quasi_lpv_uio"
@@ -102,10 +122,13 @@ class QuasiLpvUio(GatedObserver, GapCertified):
         "as_published_5_3_1": _preset(SECTION_5_3_1),
     }
     default_preset = "as_published"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"rules": tuple(RULES)}
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"rules": tuple(RULES), "hold": HOLDS}
 
-    def __init__(self, rules: RuleChoice = "repaired") -> None:
+    def __init__(self, rules: RuleChoice = "repaired", hold: HoldChoice = "innovation") -> None:
         self.rules = find_rules(self.name, rules)
+        if hold not in HOLDS:
+            raise ValueError(f"{self.name}: unknown hold {hold!r}; use 'innovation' or 'reading'.")
+        self.hold = hold
         self.repaired = rules == "repaired"
         self.states = (
             POSITION,
@@ -126,10 +149,11 @@ class QuasiLpvUio(GatedObserver, GapCertified):
             parameter("gain_high", "1", high, "Gain at schedule_max, in 1/s, 1/s2 and 1/s3", size=3),
             parameter("schedule_min", "m/s", 0.0, "Speed of the lower vertex"),
             parameter("schedule_max", "m/s", 50.0, "Speed of the upper vertex"),
+            parameter("reading_age", "s", 0.0, "Age of a reading when it is sampled", min=0.0),
             *SHARED_PARAMETERS,
             *self.rules.parameters,
         )
-        super().__init__(rules=rules)
+        super().__init__(rules=rules, hold=hold)
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """The vertices are apart."""
@@ -141,12 +165,11 @@ class QuasiLpvUio(GatedObserver, GapCertified):
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Derivatives of position, speed, disturbance, its rate and the odometer's way, shape (5,)."""
         lies = self.rules.discarded(self._rule_memory(x))
-        z = np.where(lies > 0.0, x[V], x[HELD]) if self.repaired else x[HELD]
+        z = self._scheduling(x)
         h = np.clip((p.schedule_max - z) / (p.schedule_max - p.schedule_min), 0.0, 1.0)
         gain = [h * p.gain_low[i] + (1.0 - h) * p.gain_high[i] for i in range(3)]
-        innovation = (1.0 - lies) * (x[HELD] - x[V])
-        drag = (p.davis_b + p.davis_c * z) * x[V]
-        acceleration = (np.maximum(u.effort, 0.0) - drag) / p.mass - x[D] + gain[0] * innovation
+        innovation = (1.0 - lies) * self._difference(x)
+        acceleration = self._free_acceleration(x, u, p) + gain[0] * innovation
         runs_on = 1.0 - lies if self.repaired else 1.0
         return vector(x[V], acceleration, runs_on * x[RATE] + gain[1] * innovation, gain[2] * innovation, x[HELD])
 
@@ -165,7 +188,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
             "speed": x[V],
             "innovation": x[INNOVATION],
             "disturbance": x[D],
-            "residual": p.residual_gain * (x[HELD] - x[V]),
+            "residual": p.residual_gain * self._difference(x),
         } | verdict(self.rules, self._rule_memory(x), p)
 
     def own_bound(self, x: Array, p: Any) -> Array:
@@ -178,26 +201,43 @@ class QuasiLpvUio(GatedObserver, GapCertified):
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate of the error ``[p, v, d, d']`` at both vertices, changing between them at any time."""
-        found = polytope_stability(speed_errors(p))
-        radius = float(np.abs(np.exp(found.abscissa * max_gap)))
+        errors, gains = speed_errors(p)
+        held = self.hold == "innovation"
+        found = polytope_stability(errors - gains @ SEEN)
+        sampled = _sampled(errors, gains, float(p.odometer_period)) if held else None
+        period = f"{float(p.odometer_period):g} s"
+        between = (
+            f"the innovation held for {period}"
+            if held
+            else f"what the speed changes while a reading is held, {period}, an input to it, whatever the period"
+        )
         model = (
             f"error of speed, disturbance and its rate at both vertices ({float(p.schedule_min):g} and "
-            f"{float(p.schedule_max):g} m/s), changing between them at any time; a balise ends the position error. "
-            f"What the speed changes while a reading is held, {float(p.odometer_period):g} s, is an input to it, "
-            "whatever the period; times at which the odometer is not believed, and standstill, are left out"
+            f"{float(p.schedule_max):g} m/s), changing between them at any time, {between}; a balise ends the position "
+            "error; times at which the odometer is not believed, and standstill, are left out"
         )
-        limit = inf if found.holds else 0.0
+        if sampled is None:
+            holds, margin, P = found.holds, found.margin, found.lyapunov_matrix
+            constant, radius = found.abscissa < 0.0, float(np.exp(found.abscissa * max_gap))
+            note = f"the speed error falls at least as exp(-{max(found.decay, 0.0):.3g} t)"
+        else:
+            holds, margin, P = sampled.holds, sampled.quadratic_margin, np.asarray(sampled.lyapunov_matrix)
+            constant, radius = sampled.spectral_radius < 1.0, sampled.spectral_radius
+            note = (
+                f"periods of the odometer: a constant one up to {sampled.constant_limit:.3g} s, varying ones up to "
+                f"{sampled.aperiodic_limit:.3g} s"
+            )
         return Certificate(
             max_gap=max_gap,
             horizon=max(HORIZON, max_gap),
-            constant_limit=inf if found.abscissa < 0.0 else 0.0,
-            aperiodic_limit=limit,
+            constant_limit=inf if constant else 0.0,
+            aperiodic_limit=inf if holds else 0.0,
             spectral_radius=radius,
-            quadratic_margin=found.margin,
-            holds=found.holds,
+            quadratic_margin=margin,
+            holds=holds,
             error_model=model,
-            notes=(f"the speed error falls at least as exp(-{found.decay:.3g} t)",) if found.holds else (),
-            lyapunov_matrix=tuple(tuple(map(float, row)) for row in found.lyapunov_matrix),
+            notes=(note,),
+            lyapunov_matrix=tuple(tuple(map(float, row)) for row in P),
         )
 
     def deciding_parameters(self) -> tuple[Signal, ...]:
@@ -209,12 +249,15 @@ class QuasiLpvUio(GatedObserver, GapCertified):
 
     def _at_sample(self, x: Array, u: Any, p: Any) -> Array:
         own = [x[i] for i in range(BALISES + 1)]
-        told = Reading(u.odometer, x[V], p.residual_gain * (u.odometer - x[V]), u.effort)
+        acceleration = self._free_acceleration(x, u, p) - self.friction(0.0, x, u, p)[0]
+        now = np.maximum(u.odometer + p.reading_age * np.where(x[V] > 0.0, acceleration, 0.0), 0.0)
+        told = Reading(u.odometer, x[V], p.residual_gain * (now - x[V]), u.effort)
         judged = self.rules.at_sample(self._rule_memory(x), told, p)
-        own[V] = np.where(judged.restart > 0.0, u.odometer, x[V])
+        own[V] = np.maximum(np.where(judged.restart > 0.0, now, x[V]), 0.0)
+        own[CORRECTION] = now - own[V]
         own[D] = np.where(judged.onset > 0.0, x[LAST_D], x[D])
         own[RATE] = np.where(judged.onset > 0.0, x[LAST_RATE], x[RATE])
-        own[HELD], own[LAST_D], own[LAST_RATE] = u.odometer, own[D], own[RATE]
+        own[HELD], own[LAST_D], own[LAST_RATE] = now, own[D], own[RATE]
         return vector(*own, *judged.memory)
 
     def _at_balise(self, t: Array, x: Array, u: Any, p: Any) -> Array:
@@ -231,17 +274,34 @@ class QuasiLpvUio(GatedObserver, GapCertified):
         )
         judged = self.rules.at_balise(self._rule_memory(x), told, p)
         own[V] = np.maximum(np.where(judged.restart > 0.0, x[HELD], x[V]) + judged.shift, 0.0)
+        own[CORRECTION] = np.where(judged.restart > 0.0, 0.0, x[CORRECTION])
         own[P], own[WAY], own[INNOVATION] = u.balise_position, 0.0 * x[WAY], x[P] - u.balise_position
         own[BALISE_TIME], own[BALISE_PLACE], own[BALISE_ODOMETER] = t, u.balise_position, x[HELD]
         own[BALISES] = x[BALISES] + 1.0
         return vector(*own, *judged.memory)
 
+    def _difference(self, x: Array) -> Array:
+        """Odometer minus estimate, as held [m/s]."""
+        return x[CORRECTION] if self.hold == "innovation" else x[HELD] - x[V]
+
+    def _scheduling(self, x: Array) -> Array:
+        """Speed of the scheduling [m/s]."""
+        if not self.repaired:
+            return x[HELD]
+        return np.where(self.rules.discarded(self._rule_memory(x)) > 0.0, x[V], x[HELD])
+
+    def _free_acceleration(self, x: Array, u: Any, p: Any) -> Array:
+        """Acceleration without innovation and dry friction [m/s2]."""
+        drag = (p.davis_b + p.davis_c * self._scheduling(x)) * x[V]
+        return (np.maximum(u.effort, 0.0) - drag) / p.mass - x[D]
+
     def _rule_memory(self, x: Array) -> tuple[Array, ...]:
         return tuple(x[BALISES + 1 + i] for i in range(len(self.rules.memory)))
 
 
-def speed_errors(p: Any) -> np.ndarray:
-    """``A_i - K_i C`` of speed, disturbance and its rate at both vertices, shape (2, 3, 3): (3.45).
+def speed_errors(p: Any) -> tuple[np.ndarray, np.ndarray]:
+    """``A_i`` of speed, disturbance and its rate at both vertices, shape (2, 3, 3), and ``K_i``, shape (2, 3, 1):
+    (3.45).
 
     Args:
         p: parameters, as in `HybridSystem.flow`.
@@ -250,6 +310,13 @@ def speed_errors(p: Any) -> np.ndarray:
     drifts = quasi_lpv_vertices(
         float(p.davis_b) / mass, float(p.davis_c) / mass, float(p.schedule_min), float(p.schedule_max)
     )
-    gains = np.stack([np.asarray(p.gain_low, float), np.asarray(p.gain_high, float)])
-    drifts[:, :, 0] -= gains
-    return drifts
+    return drifts, np.stack([np.asarray(p.gain_low, float), np.asarray(p.gain_high, float)])[:, :, None]
+
+
+def _sampled(drifts: np.ndarray, gains: np.ndarray, period: float) -> Certificate:
+    """Certificate for gaps between odometer samples up to the period, the innovation held."""
+    levels = (0, 1, 2)
+    vertices = tuple(
+        ImpulsiveError.with_innovation(A, K, np.zeros((1, 1)), SEEN, levels) for A, K in zip(drifts, gains, strict=True)
+    )
+    return certify_sampled_error(vertices, period, "", switching=True)

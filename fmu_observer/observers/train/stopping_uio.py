@@ -36,10 +36,19 @@ from plant_models.hybrid import (
     state,
     vector,
 )
+from plant_models.hybrid.output_warning import OutputWarning
 from plant_models.hybrid.system import Array
 
-POSITION, SPEED, DISTURBANCE, RATE = range(4)  # indices of the continuous states
-HELD_INNOVATION, AT_BALISE, DETECTOR, READING, UNCHANGED, HELD = 4, 5, 6, 10, 11, 12  # indices of the memory
+POSITION, SPEED, DISTURBANCE, RATE = range(4)  # indices of the continuous states, and then of the memory
+HELD_INNOVATION, AT_BALISE, BALISES, DETECTOR, READING, UNCHANGED, HELD = (
+    4,
+    5,
+    6,
+    7,
+    11,
+    12,
+    13,
+)  # indices of the memory
 HORIZON = 20.0  # [s], of the certificate, as of the others; what holds, holds for every gap
 PRINTED_GAIN = (101.4, 2650.0, 3750.0)
 _PRINTED_START = {"estimated_speed": 30.0, "disturbance_estimate": -0.91, "disturbance_rate": 0.13}
@@ -82,6 +91,7 @@ class StoppingUio(GatedObserver, GapCertified):
         state("disturbance_rate", "m/s3", 0.337, "Estimate of the rate of the disturbance"),
         memory("held_innovation", "m/s", 0.0, "Odometer minus estimate at the last sample"),
         memory("last_innovation", "m", 0.0, "Position error seen at the last balise"),
+        memory("balises_used", "1", 0.0, "Balises used so far"),
         *THRESHOLD_MEMORY,
         memory("last_reading", "m/s", 0.0, "Odometer at the last sample"),
         memory("unchanged_time", "s", 0.0, "Time for which the odometer has not changed"),
@@ -96,6 +106,7 @@ class StoppingUio(GatedObserver, GapCertified):
         output_signal("speed", "m/s", "Estimated speed", display_unit="km/h"),
         output_signal("disturbance", "m/s2", "Estimated acceleration that the model does not know, forward > 0"),
         output_signal("innovation", "m", "Estimated minus true position at the last balise", variability="discrete"),
+        output_signal("balises", "1", "Number of balises used so far", variability="discrete"),
         output_signal("residual", "m/s", "Odometer minus estimate at the last sample", variability="discrete"),
         output_signal("residual_level", "m/s", "Its magnitude as the detector judges it", variability="discrete"),
         output_signal("odometer_fault", "1", "1 while a jam is detected", variability="discrete"),
@@ -105,6 +116,11 @@ class StoppingUio(GatedObserver, GapCertified):
             "1",
             "1 once the odometer was seen to be held: not for this observer",
             variability="discrete",
+            warning=OutputWarning(
+                "the odometer stands still and then jumps: held data look like a fault at every sample. Give it one "
+                "that is new every 1 to 2 ms, or use quasi_lpv_uio",
+                ("speed", "residual"),
+            ),
         ),
     )
     parameters = (
@@ -146,10 +162,11 @@ class StoppingUio(GatedObserver, GapCertified):
         )
 
     def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """A sample: innovation, verdict, and whether the odometer is held; a balise: its position, shape (13,)."""
+        """A sample: innovation, verdict, and whether the odometer is held; a balise: its position, shape (14,)."""
         if event == BALISE.name:
             own = [x[i] for i in range(self.own_count)]
             own[POSITION], own[AT_BALISE] = u.balise_position, x[POSITION] - u.balise_position
+            own[BALISES] = x[BALISES] + 1.0
             return vector(*own)
         innovation = u.odometer - x[SPEED]
         before = ThresholdMemory(*(x[i] for i in range(DETECTOR, READING)))
@@ -162,6 +179,7 @@ class StoppingUio(GatedObserver, GapCertified):
             *(x[i] for i in range(4)),
             innovation,
             x[AT_BALISE],
+            x[BALISES],
             *kept,
             u.odometer,
             np.where(jump > 0.0, 0.0, x[UNCHANGED] + p.sample_period),
@@ -176,6 +194,7 @@ class StoppingUio(GatedObserver, GapCertified):
             "speed": x[SPEED],
             "disturbance": x[DISTURBANCE],
             "innovation": x[AT_BALISE],
+            "balises": x[BALISES],
             "residual": x[HELD_INNOVATION],
             "residual_level": detector.residual,
             "odometer_fault": detector.fault,

@@ -5,25 +5,45 @@ A controller as a hybrid system of its own; knows the hybrid foundation and the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid import HybridSystem, Signal, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.system import Array
 from plant_models.railway.track.table import piecewise_linear
 
 PROFILE_POINTS = 8
+FEWEST_POINTS, MOST_POINTS = 4, 64  # the shipped profiles have four
 _KMH_50 = 50.0 / 3.6
+_PROFILE_D = ((0.0, 20.0, 65.0, 85.0), (0.0, _KMH_50, _KMH_50, 0.0))
+_PROFILE_B = ((0.0, 30.0, 60.0, 90.0), (0.0, 50.0, 50.0, 0.0))
 
 
-def _padded(*points: float) -> tuple[float, ...]:
-    return (*points, *[points[-1]] * (PROFILE_POINTS - len(points)))
+def _padded(points: Sequence[float], count: int) -> tuple[float, ...]:
+    return (*points, *[points[-1]] * (count - len(points)))
 
 
-_PROFILE_D = (_padded(0.0, 20.0, 65.0, 85.0), _padded(0.0, _KMH_50, _KMH_50, 0.0))
-_PROFILE_B = (_padded(0.0, 30.0, 60.0, 90.0), _padded(0.0, 50.0, 50.0, 0.0))
+def _presets(count: int) -> dict[str, dict[str, Any]]:
+    """The presets for a profile of so many points."""
+    profiles = {"profile_d": _PROFILE_D, "profile_b": _PROFILE_B}
+    presets: dict[str, dict[str, Any]] = {
+        name: {"profile_time": _padded(times, count), "profile_speed": _padded(speeds, count)}
+        for name, (times, speeds) in profiles.items()
+    }
+    presets["profile_b"]["power_limit"] = 10e6
+    return presets
+
+
+def _profile(count: int) -> tuple[Signal, ...]:
+    """Times and speeds of a profile of so many points, by default profile D."""
+    times, speeds = (_padded(points, count) for points in _PROFILE_D)
+    return (
+        parameter("profile_time", "s", times, "Times of the speed profile, ascending", size=count),
+        parameter("profile_speed", "m/s", speeds, "Speeds of the profile", min=0.0, size=count, display_unit="km/h"),
+    )
 
 
 class Driver(HybridSystem):
@@ -43,6 +63,12 @@ class Driver(HybridSystem):
     rises.
 
     The profile is a broken line through (`profile_time`, `profile_speed`); unused points repeat the last.
+
+    Args:
+        profile_count: number of points of the profile.
+
+    Raises:
+        ValueError: the count is not a whole number from 4 to 64.
 
     Presets: `profile_d` (default): 50 km/h, up in 0-20 s, brake in 65-85 s, 902.8 m. `profile_b`: 50 m/s, 30 s each up,
     hold and down, 3000 m; near 50 m/s it needs 7.9 MW, more than the locomotive's 4.2 MW, so this preset raises
@@ -82,22 +108,18 @@ class Driver(HybridSystem):
             min=0.0,
             display_unit="km/h",
         ),
-        parameter("profile_time", "s", _PROFILE_D[0], "Times of the speed profile, ascending", size=PROFILE_POINTS),
-        parameter(
-            "profile_speed",
-            "m/s",
-            _PROFILE_D[1],
-            "Speeds of the profile",
-            min=0.0,
-            size=PROFILE_POINTS,
-            display_unit="km/h",
-        ),
+        *_profile(PROFILE_POINTS),
     )
-    presets: Mapping[str, Mapping[str, Any]] = {
-        "profile_d": {"profile_time": _PROFILE_D[0], "profile_speed": _PROFILE_D[1]},
-        "profile_b": {"profile_time": _PROFILE_B[0], "profile_speed": _PROFILE_B[1], "power_limit": 10e6},
-    }
+    presets: Mapping[str, Mapping[str, Any]] = _presets(PROFILE_POINTS)
     default_preset = "profile_d"
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"profile_count": range(FEWEST_POINTS, MOST_POINTS + 1)}
+
+    def __init__(self, *, profile_count: int = PROFILE_POINTS) -> None:
+        require_whole("driver", FEWEST_POINTS, MOST_POINTS, profile_count=profile_count)
+        own = tuple(s for s in type(self).parameters if not s.name.startswith("profile_"))
+        self.parameters = (*own, *_profile(profile_count))
+        self.presets = _presets(profile_count)
+        super().__init__(profile_count=profile_count)
 
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Derivatives of the integral part and of the developed effort [N/s], shape (2,) or (2, members)."""

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, vector
+from plant_models.hybrid.output_warning import OutputWarning
 from plant_models.hybrid.system import Array
 from plant_models.railway.control.logic import either, every, holds, some
 from plant_models.railway.control.stopping_planner import (
@@ -40,9 +41,7 @@ class _Memory(NamedTuple):
     limited: Array
     standing: Array
     fault: Array
-    last_position: Array
-    last_speed: Array
-    unchanged_time: Array
+    request: Array
     plans: Array
 
 
@@ -50,9 +49,9 @@ class StoppingController(HybridSystem):
     """Stops a train at a mark: ``u = u* - (L1 (v - v_r) + L2 p_i + dhat) m / b`` with ``p_i' = v - v_r``.
 
     **Plan**: the constant brake u* that ends at `stop_position`, from the position and speed of the instant at which it
-    is made (`stopping_planner`). It is made when `enabled` and moving, and again when a detected fault is over, and
-    when the estimated position jumps by more than `position_jump`, as it does at a balise. The reference ``v_r' = -w1
-    v_r + b u*`` is a closed form, so no step decides where it stops.
+    is made (`stopping_planner`). It is made when `enabled` and moving, again when a detected fault is over, and
+    whenever `plan_request` changes: connect what counts the balises that the observer has used. The reference
+    ``v_r' = -w1 v_r + b u*`` is a closed form, so no step decides where it stops.
 
     **Tracking**: PI with the estimated disturbance compensated. The minus sign is the one of the closed loop (3.14),
     whose poles are -L1 .. as designed (-1 and -0.5 for the printed gains); with the plus sign of the printed (3.12)
@@ -95,9 +94,7 @@ class StoppingController(HybridSystem):
         memory("limited", "1", 0.0, "1 where the mark is too near for the brake"),
         memory("standing", "1", 0.0, "1 while the train is held"),
         memory("fault_before", "1", 0.0, "Fault at the last instant"),
-        memory("last_position", "m", 0.0, "Estimated position when it last changed"),
-        memory("last_speed", "m/s", 0.0, "Estimated speed at that time"),
-        memory("unchanged_time", "s", 0.0, "Time since then"),
+        memory("request_before", "1", 0.0, "Plan request at the last instant"),
         memory("plan_count", "1", 0.0, "Number of plans made"),
     )
     inputs = (
@@ -105,6 +102,7 @@ class StoppingController(HybridSystem):
         input_signal("estimated_speed", "m/s", 0.0, "Estimated speed of the train", display_unit="km/h"),
         input_signal("disturbance", "m/s2", 0.0, "Estimated acceleration that the model does not know, forward > 0"),
         input_signal("odometer_fault", "1", 0.0, "1 while a jam is detected"),
+        input_signal("plan_request", "1", 0.0, "Whenever it changes the plan is renewed: a count of balises, say"),
         input_signal("enabled", "1", 1.0, "1 while the train is to be stopped; 0: no effort, and no plan"),
     )
     outputs = (
@@ -118,9 +116,22 @@ class StoppingController(HybridSystem):
             "1",
             "1 where the drag alone stops the train short of the mark",
             variability="discrete",
+            warning=OutputWarning(
+                "no brake leads to the mark: the drag alone stops the train short of it, so it rolls; enable the "
+                "controller later",
+                ("speed_reference", "remaining_distance"),
+            ),
         ),
         output_signal(
-            "limited_plan", "1", "1 where the brake is too weak: the train will pass the mark", variability="discrete"
+            "limited_plan",
+            "1",
+            "1 where the brake is too weak: the train will pass the mark",
+            variability="discrete",
+            warning=OutputWarning(
+                "the mark is too near for effort_limit, or behind: the train brakes with all there is and passes it; "
+                "enable the controller sooner, or raise effort_limit",
+                ("speed_reference", "remaining_distance"),
+            ),
         ),
         output_signal("plans", "1", "Number of plans made so far", variability="discrete"),
         output_signal("remaining_distance", "m", "Way from the estimated position to the mark, now"),
@@ -138,7 +149,6 @@ class StoppingController(HybridSystem):
         parameter("compensates", "1", 1.0, "1: the estimated disturbance is compensated", min=0.0, max=1.0),
         parameter("heeds_faults", "1", 1.0, "1: brake released in a fault, a new plan after it", min=0.0, max=1.0),
         parameter("replans_after_faults", "1", 1.0, "1: a new plan after a fault", min=0.0, max=1.0),
-        parameter("position_jump", "m", 0.05, "Jump of the estimated position from which the plan is renewed", min=0.0),
         parameter("effort_limit", "N", 100.0, "Largest brake effort", min=1e-9),
         parameter("traction_limit", "N", 0.0, "Largest traction effort", min=0.0),
         parameter("holding_effort", "N", 10.0, "Brake effort that holds the train at standstill", min=0.0),
@@ -153,19 +163,15 @@ class StoppingController(HybridSystem):
     default_preset = "fault_tolerant"
 
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Plan where one is due, track it, hold at standstill: the memory for the coming period, shape (16,)."""
+        """Plan where one is due, track it, hold at standstill: the memory for the coming period, shape (14,)."""
         m = _Memory(*(x[i] for i in range(len(_Memory._fields))))
         enabled = holds(u.enabled > 0.5)
         fault = every(holds(u.odometer_fault > 0.5), holds(p.heeds_faults > 0.5))
         limit = either(m.standing, ROLLS_AWAY * p.standstill_speed, p.standstill_speed)
         standing = every(enabled, holds(u.estimated_speed <= limit))
         recovered = every(m.fault, 1.0 - fault, holds(p.replans_after_faults > 0.5))
-        # A position that is held between communication points moves by steps: judged only when it has changed.
-        changed = holds(u.estimated_position != m.last_position)
-        elapsed = m.unchanged_time + p.control_period
-        moved = u.estimated_position - m.last_position - 0.5 * elapsed * (m.last_speed + u.estimated_speed)
-        jumped = every(m.planned, changed, 1.0 - fault, holds(np.abs(moved) > p.position_jump))
-        due = every(enabled, 1.0 - standing, some(1.0 - m.planned, recovered, jumped))
+        asked = every(1.0 - fault, holds(u.plan_request != m.request))
+        due = every(enabled, 1.0 - standing, some(1.0 - m.planned, recovered, asked))
         m = _planned(m, due, recovered, t, u, p)
         reference, _ = reference_motion(t - m.plan_start, m.plan_speed, m.plan_position, _plan(m), p.davis_b / p.mass)
         error = u.estimated_speed - reference
@@ -184,9 +190,7 @@ class StoppingController(HybridSystem):
                 planned=every(enabled, 1.0 - standing),
                 standing=standing,
                 fault=fault,
-                last_position=u.estimated_position,
-                last_speed=either(changed, u.estimated_speed, m.last_speed),
-                unchanged_time=either(changed, 0.0, elapsed),
+                request=u.plan_request,
             )
         )
 
@@ -240,6 +244,6 @@ def _planned(m: _Memory, due: Array, recovered: Array, t: Array, u: Any, p: Any)
 
 
 def _feedforward(m: _Memory, t: Array, p: Any) -> Array:
-    """Effort of the plan [N]; after its end what keeps the final speed."""
-    over = holds(t - m.plan_start >= m.plan_duration)
+    """Effort of the plan [N]; after its end what keeps the final speed. A stop is braked for until the train stands."""
+    over = every(holds(t - m.plan_start >= m.plan_duration), holds(p.final_speed > 0.0))
     return either(over, p.davis_b * p.final_speed, -m.plan_deceleration * p.mass) / p.brake_coefficient

@@ -51,11 +51,25 @@ class StoppingPlan:
     drag_rate: float
 
     def speed(self, time: Array) -> Array:
-        """v_r [m/s] at times [s] since the start, any shape; constant after the end."""
+        """v_r [m/s], constant after the end.
+
+        Args:
+            time: since the start of the plan [s], any shape.
+
+        Returns:
+            Speeds of the same shape.
+        """
         return reference_motion(time, self.start_speed, 0.0, self._plan(), self.drag_rate)[0]
 
     def position(self, time: Array) -> Array:
-        """p_r [m] at times [s] since the start, any shape."""
+        """p_r [m].
+
+        Args:
+            time: since the start of the plan [s], any shape.
+
+        Returns:
+            Positions of the same shape.
+        """
         return reference_motion(time, self.start_speed, self.start_position, self._plan(), self.drag_rate)[1]
 
     def _plan(self) -> BrakePlan:

@@ -52,7 +52,6 @@ class DrawnFaults:
             memory("drawn_sign", "1", -1.0, "Its kind: -1 jam, 1 skid"),
             memory("drawn_depth", "1", 0.0, "Its depth"),
         )
-        self.frictions: tuple[str, ...] = ()
         self.switchings: tuple[str, ...] = ("fault_from", "fault_to", "fault_freed")
         self.events: tuple[PeriodicEvent, ...] = (
             PeriodicEvent("drawing", "draw_period", None, _NOISES, "A fault may be drawn"),
@@ -76,14 +75,6 @@ class DrawnFaults:
         let_go = 1.0 - one_where(s[_SIGN] * u.effort > 0.0)
         released = np.where(s[_SIGN] < 0.0, braking_stopped(u), 0.0)
         return [_window(passed) * np.maximum(let_go, released)]
-
-    def friction(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
-        """None.
-
-        Args:
-            t: time [s]. s: states of the cause. u: inputs. p: parameters.
-        """
-        return []
 
     def switching(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
         """See `FaultCause.switching`.

@@ -31,13 +31,12 @@ class FaultCause(Protocol):
 
     Attributes:
         parameters: beyond those that all causes share. continuous: states that flow. remembered: memory.
-        frictions: names of states with dry friction. switchings: names of the switching functions. events: periodic.
+        switchings: names of the switching functions. events: periodic.
     """
 
     parameters: tuple[Signal, ...]
     continuous: tuple[Signal, ...]
     remembered: tuple[Signal, ...]
-    frictions: tuple[str, ...]
     switchings: tuple[str, ...]
     events: tuple[PeriodicEvent, ...]
 
@@ -50,19 +49,32 @@ class FaultCause(Protocol):
         """
 
     def rates(self, t: Array, s: list[Array], passed: Array, u: Any, p: Any) -> list[Array]:
-        """Derivatives of the continuous states; arguments as in `fault`."""
+        """Derivatives of the continuous states.
 
-    def friction(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
-        """Dry frictions of the states in `frictions`; arguments as in `fault`."""
+        Args:
+            t: time [s]. s: states of the cause. passed: switches, shape (k,). u: inputs. p: parameters.
+        """
 
     def switching(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
-        """Switching functions; arguments as in `fault`."""
+        """Switching functions.
+
+        Args:
+            t: time [s]. s: states of the cause, continuous ones first. u: inputs. p: parameters.
+        """
 
     def jump(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
-        """All states of the cause after its periodic event; arguments as in `fault`."""
+        """All states of the cause after its periodic event.
+
+        Args:
+            t: time [s]. s: states of the cause, continuous ones first. u: inputs with the noises. p: parameters.
+        """
 
     def requirements(self, p: Any) -> dict[str, Array]:
-        """What the parameters of the cause must fulfil, see `HybridSystem.requirements`; `p`: parameters."""
+        """What the parameters of the cause must fulfil, see `HybridSystem.requirements`.
+
+        Args:
+            p: parameters.
+        """
 
 
 def one_where(condition: Array) -> Array:

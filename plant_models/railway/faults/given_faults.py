@@ -16,7 +16,7 @@ from plant_models.railway.faults.fault_cause import Fault, braking_stopped, one_
 
 
 class GivenFaults:
-    """Up to `count` faults, fault i in ``[fault_onset[i], fault_onset[i] + fault_length[i])``.
+    """Up to `count` faults in the order of time, fault i in ``[fault_onset[i], fault_onset[i] + fault_length[i])``.
 
     A jam ends earlier where the brake was released for `release_time` in it.
 
@@ -36,7 +36,6 @@ class GivenFaults:
             state("released_for", "s", 0.0, "For how long the brake was released in each jam", size=count),
         )
         self.remembered: tuple[Signal, ...] = ()
-        self.frictions: tuple[str, ...] = ()
         self.switchings: tuple[str, ...] = tuple(
             f"fault_{edge}[{i + 1}]" for edge in ("from", "to", "freed") for i in range(count)
         )
@@ -62,14 +61,6 @@ class GivenFaults:
         released = braking_stopped(u)
         return [released * self._active(i, passed) * one_where(p.fault_kind[i] < 0.0) for i in range(self.count)]
 
-    def friction(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
-        """None.
-
-        Args:
-            t: time [s]. s: states of the cause. u: inputs. p: parameters.
-        """
-        return []
-
     def switching(self, t: Array, s: list[Array], u: Any, p: Any) -> list[Array]:
         """See `FaultCause.switching`.
 
@@ -90,27 +81,24 @@ class GivenFaults:
         return s
 
     def requirements(self, p: Any) -> dict[str, Array]:
-        """Faults are jams or skids, and do not overlap.
+        """Faults are jams or skids, listed in the order of time, and do not overlap.
 
         Args:
             p: parameters.
         """
-        starts, faults = p.fault_onset, range(self.count)
-        ends = [starts[i] + p.fault_length[i] for i in faults]
-        used = [one_where(p.fault_length[i] > 0.0) for i in faults]
         needed: dict[str, Array] = {}
-        for i in faults:
+        latest = -np.inf
+        for i in range(self.count):
             text = f"fault {i + 1} is neither jam nor skid: fault_kind[{i + 1}] must be -1 (jam) or 1 (skid)"
             needed[text] = one_where(np.abs(np.abs(p.fault_kind[i]) - 1.0) < 1e-3)
-        for i in faults[1:]:
-            text = (
-                f"fault {i + 1} overlaps one before it in the list: move fault_onset[{i + 1}] or shorten "
-                f"fault_length[{i + 1}]"
-            )
-            overlaps = [
-                used[i] * used[j] * np.where(starts[i] < ends[j], one_where(starts[j] < ends[i]), 0.0) for j in range(i)
-            ]
-            needed[text] = 1.0 - one_where(sum(overlaps) > 0.0)
+            used = one_where(p.fault_length[i] > 0.0)
+            if i:
+                text = (
+                    f"fault {i + 1} overlaps one before it in the list, or is listed behind a later one: set "
+                    f"fault_onset[{i + 1}] behind the ends of those before it"
+                )
+                needed[text] = 1.0 - used * one_where(p.fault_onset[i] < latest)
+            latest = np.where(used > 0.0, np.maximum(latest, p.fault_onset[i] + p.fault_length[i]), latest)
         return needed
 
     def _active(self, i: int, passed: Array) -> Array:

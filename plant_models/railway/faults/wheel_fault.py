@@ -20,6 +20,7 @@ from plant_models.railway.faults.fault_cause import FaultCause, one_where
 from plant_models.railway.faults.given_faults import GivenFaults
 
 Cause = Literal["given", "drawn", "adhesion"]
+DistanceFrom = Literal["speed", "position"]
 
 UNLIMITED = 1e9  # [N]; the adhesion where nobody says what it is
 
@@ -30,11 +31,13 @@ class WheelFault(HybridSystem):
     `speed` is that of the wheel without the fault, `wheel_speed` of the train. `wheel_distance` is the integral of
     `wheel_speed`: the edges of a fault are hit exactly wherever they lie in a communication step, so that a micro-jam,
     shorter than any sampling, is in the distance, although no sample of `wheel_speed` may show it. Between
-    communication points `speed` is held, or goes as the master lets inputs go.
+    communication points `speed` is held, or goes as the master lets inputs go: what the train gains in speed within a
+    step, half of it times the step, is missing in its integral. With ``distance_from="position"`` that concerns the
+    faults alone: the distance is `position`, of the train, and what the faults add to it.
 
     `cause`:
 
-    - ``given``: `fault_count` faults by onset, length, depth and kind.
+    - ``given``: `fault_count` faults by onset, length, depth and kind, in the order of time.
     - ``drawn``: faults of a Poisson process from the seed, jams at `jam_rate` while `effort` brakes, skids at
       `skid_rate` while it pulls; the length has an exponential, the depth a uniform distribution. One at a time, and at
       most one begins in a `draw_period`. A fault does nothing while the effort that causes it is taken back.
@@ -50,9 +53,10 @@ class WheelFault(HybridSystem):
     Args:
         cause: see above.
         fault_count: number of faults of ``given``.
+        distance_from: ``speed``, or ``position``, which adds that input.
 
     Raises:
-        ValueError: an unknown cause, or a count below one.
+        ValueError: an unknown cause or source of the distance, or a count below one.
 
     Source: Aguiar Cota 2019, (2.29), Figs. 2-13 and 2-14, section 3.2.2.4; the causes, the time laws and the
     distributions are ours.
@@ -62,12 +66,6 @@ class WheelFault(HybridSystem):
     description = "Wheel that jams and skids, given, drawn or by adhesion: speed in, wheel speed and distance out"
     source = "Aguiar Cota 2019, (2.26)-(2.29), Figs. 2-13 and 2-14; causes and time laws are ours"
     internal_step = 1e-2  # the flow is exact for a held input, whatever the step
-    inputs = (
-        input_signal("speed", "m/s", 0.0, "Circumferential speed of the wheel without the fault", display_unit="km/h"),
-        input_signal("effort", "N", 0.0, "Effort demanded of the train: traction > 0, brake < 0"),
-        input_signal("adhesion_limit", "N", UNLIMITED, "Largest force that the rails can take"),
-        input_signal("brake_released", "1", 0.0, "1 while the brake is released because of a fault"),
-    )
     outputs = (
         output_signal("wheel_speed", "m/s", "Circumferential speed of the wheel", display_unit="km/h"),
         output_signal("wheel_distance", "m", "Distance run by the wheel's rim"),
@@ -90,31 +88,31 @@ class WheelFault(HybridSystem):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
         "cause": ("given", "drawn", "adhesion"),
         "fault_count": range(1, 65),
+        "distance_from": ("speed", "position"),
     }
 
-    def __init__(self, *, cause: Cause = "given", fault_count: int = 4) -> None:
+    def __init__(self, *, cause: Cause = "given", fault_count: int = 4, distance_from: DistanceFrom = "speed") -> None:
         if cause not in self.option_choices["cause"]:
             raise ValueError(f"Unknown cause {cause!r}; choose one of: given, drawn, adhesion.")
+        if distance_from not in self.option_choices["distance_from"]:
+            raise ValueError(f"Unknown distance_from {distance_from!r}; choose one of: speed, position.")
         require_whole("wheel_fault", fault_count=fault_count)
         self._cause: FaultCause = (
             GivenFaults(fault_count) if cause == "given" else DrawnFaults() if cause == "drawn" else AdhesionFaults()
         )
+        self.distance_from = distance_from
+        self.inputs = (*_INPUTS, *((_POSITION,) if distance_from == "position" else ()))
         self.parameters = (*_SHARED, *self._cause.parameters)
         self.states = (_DISTANCE, *self._cause.continuous, *self._cause.remembered)
-        self.frictions, self.switchings = self._cause.frictions, self._cause.switchings
-        self.events = self._cause.events
-        super().__init__(cause=cause, fault_count=fault_count)
+        self.switchings, self.events = self._cause.switchings, self._cause.events
+        super().__init__(cause=cause, fault_count=fault_count, distance_from=distance_from)
 
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Derivatives of the distance and of the states of the cause, shape (nc,) or (nc, members)."""
         s, passed = self._states(x), self.switches(t, x, u, p)
-        return vector(
-            u.speed * (1.0 + self._cause.fault(t, s, passed, u, p).depth), *self._cause.rates(t, s, passed, u, p)
-        )
-
-    def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Dry friction on the states of the cause, shape (len(frictions),)."""
-        return vector(*self._cause.friction(t, self._states(x), u, p))
+        turning = 1.0 if self.distance_from == "speed" else 0.0  # else only what the fault adds is integrated here
+        rate = u.speed * (turning + self._cause.fault(t, s, passed, u, p).depth)
+        return vector(rate, *self._cause.rates(t, s, passed, u, p))
 
     def switching(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Switching functions of the cause."""
@@ -130,7 +128,7 @@ class WheelFault(HybridSystem):
         jammed, skidding = np.maximum(-depth, 0.0), np.maximum(depth, 0.0)
         return {
             "wheel_speed": u.speed * (1.0 + depth),
-            "wheel_distance": x[0],
+            "wheel_distance": x[0] if self.distance_from == "speed" else u.position + x[0],
             "active": one_where(np.abs(depth) > 0.0),
             "depth": depth + 0.0 * x[0],
             "effort_loss": np.minimum(p.jam_loss * jammed + p.skid_loss * skidding, 1.0),
@@ -151,3 +149,10 @@ _SHARED = (
     parameter("jam_loss", "1", 0.0, "Share of the effort that is lost in a full jam", min=0.0, max=1.0),
     parameter("skid_loss", "1", 0.0, "Share of the effort that is lost in a skid of depth 1", min=0.0, max=1.0),
 )
+_INPUTS = (
+    input_signal("speed", "m/s", 0.0, "Circumferential speed of the wheel without the fault", display_unit="km/h"),
+    input_signal("effort", "N", 0.0, "Effort demanded of the train: traction > 0, brake < 0"),
+    input_signal("adhesion_limit", "N", UNLIMITED, "Largest force that the rails can take"),
+    input_signal("brake_released", "1", 0.0, "1 while the brake is released because of a fault"),
+)
+_POSITION = input_signal("position", "m", 0.0, "Position of the train")

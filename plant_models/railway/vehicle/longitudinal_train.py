@@ -54,7 +54,7 @@ class LongitudinalTrain(LongitudinalForces):
     name = "longitudinal_train"
     description = "Train as one point per unit mass: effort in, position, speed and adhesion limit out"
     source = "Aguiar Cota 2019, (2.1)-(2.8), (2.26)-(2.28), Tables 2.1 and 5.1"
-    internal_step = 1e-2  # the fastest time constant, 1 / davis_b, is 10 s
+    internal_step = 2e-3  # a stop is placed within 2e-6 m per m/s2 of braking; the motion would allow 10 ms
     states = (
         state("train_position", "m", 0.0, "Position of the train at start"),
         state("train_speed", "m/s", 0.0, "Speed of the train at start"),

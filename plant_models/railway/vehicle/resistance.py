@@ -64,7 +64,8 @@ def davis_from_vehicle(
     """Davis coefficients from the dimensions of a vehicle.
 
     ``a = 1e-5 gamma M sqrt(1e4 / m)``, ``b = 3.6e-7 M``, ``c = 0.1296 (k1 S + k2 P L)``. The thesis does not name the
-    units of the result: they are kN, kN.s/m and kN.s2/m2 (independently derived); this function returns newtons.
+    units of the result: they are kN, kN.s/m and kN.s2/m2 (independently derived); this function returns newtons. The
+    same formula for a whole train: M is its mass, m the mass on one axle, S the front area, P L the skin.
 
     Args:
         mass: mass of the vehicle M [kg].
@@ -73,14 +74,15 @@ def davis_from_vehicle(
         perimeter: partial perimeter down to the rail P [m]. The 2.857 m tabulated for the BB27000 is its width; it is
             the value that gives the tabulated coefficients.
         length: length of the vehicle L [m].
-        gamma: quality of the bearings and the track, 0.9 to 1.5 [1].
-        k1: front and rear shape, 9e-4 (high-speed) to 20e-4 (conventional).
-        k2: condition of the surface, 20e-6 to 30e-6.
+        gamma: quality of the bearings and the track, 0.9 (modern) to 1.5 (mixed freight) [1].
+        k1: front and rear shape, 9e-4 (high-speed) to 20e-4 (conventional) [daN/((km/h)^2 m^2)].
+        k2: condition of the surface, 20e-6 (high-speed) to 30e-6 (conventional) [daN/((km/h)^2 m^2)].
 
     Raises:
         ValueError: a mass or a length is not positive.
 
-    Source: Bouchama 2024, (3.15). The defaults are the values that give a, b, c of its Table 4.1 for the BB27000.
+    Source: Bouchama 2024, (3.15), and Aguiar Cota 2019, (2.3)-(2.5), which prints N/m2 for k1 and k2 and kilograms for
+    tonnes under the root. The defaults are the values that give a, b, c of Table 4.1 of Bouchama 2024 for the BB27000.
     """
     for name, value in {"mass": mass, "axle_mass": axle_mass, "cross_section": cross_section, "length": length}.items():
         if value <= 0.0:

@@ -23,7 +23,7 @@ from cosim.evaluation.error_table import error_text
 from cosim.evaluation.metrics import phase_metrics
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.drawing import thin
-from cosim.report.figures.gap_figure import certified_gaps, sampling_gaps
+from cosim.report.figures.gap_figure import GapErrorsPanel, GapsPanel, certified_gaps, sampling_gaps
 from cosim.report.figures.main_picture import main_picture
 from cosim.report.figures.panel import Panel
 from cosim.report.figures.panels import draw_all, panels
@@ -79,7 +79,7 @@ def result() -> Result:
 @pytest.mark.parametrize("panel", PANELS, ids=lambda p: p.name)
 def test_axes_have_names_with_units(panel: type[Panel], result: Result) -> None:
     ax = panel.draw(result, synthetic_spec(), None)
-    assert ax.get_xlabel() == "Time [s]"
+    assert ax.get_xlabel() == ("Way since the last balise [m]" if panel is GapErrorsPanel else "Time [s]")
     assert re.search(r"\[(km/h|m/s|m|%|kN|s)\]", ax.get_ylabel())
     assert ax.get_legend() is not None
 
@@ -197,7 +197,7 @@ def test_observer_without_a_limit_has_no_level(result: Result) -> None:
 
 
 def test_certified_gaps_name_their_observers(result: Result) -> None:
-    texts = PANELS[-1].draw(result, synthetic_spec(), None).get_legend_handles_labels()[1]
+    texts = GapsPanel.draw(result, synthetic_spec(), None).get_legend_handles_labels()[1]
     assert "certified to 0.286 s: Takagi-Sugeno CDO (exceeded)" in texts
     assert "certified to 0.500 s: differentiator + CDO, two CDOs (exceeded)" in texts
 

@@ -33,6 +33,12 @@ def test_what_ships_is_the_same_after_saving(name: str, tmp_path: Path) -> None:
         assert place.resolve() == (scenario.folder / str(before.components["plant"].fmu)).resolve()
         scenario.set("plant.fmu", place)
         before, after = scenario.table(), Scenario.load(tmp_path / "saved.toml").set("plant.fmu", place).table()
+    if before.balises is not None and before.balises.file is not None:  # relative too
+        place = (scenario.folder / before.balises.file).resolve()
+        saved = Scenario.load(tmp_path / "saved.toml")
+        assert after.balises is not None
+        assert (saved.folder / str(after.balises.file)).resolve() == place
+        before, after = (s.set("balises.file", str(place)).table() for s in (scenario, saved))
     assert after == before
 
 

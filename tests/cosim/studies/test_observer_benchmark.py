@@ -26,8 +26,9 @@ from cosim.observer_benchmark.observer_scores import (
     longest_gap,
     telegram_outcomes,
 )
+from cosim.observer_benchmark.observer_table import certified, certified_limit
 from cosim.observer_benchmark.observers import ObserverBenchmark, benchmark_observers
-from cosim.observer_benchmark.playback import find_sides, known_facts
+from cosim.observer_benchmark.playback import find_sides, known_facts, train_observers
 from cosim.results.load import load_result
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 
@@ -195,7 +196,10 @@ def test_by_default_all_take_part_that_fit_and_the_others_are_named() -> None:
     scenario = two()
     found, notes = find_candidates(scenario, find_sides(scenario), None)
     names = [candidate.name for candidate in found]
-    assert names == ["observer", "uio", "adaptive_gain_cdo", "differentiator_cdo", "multirate_cdo"]
+    assert names[:2] == ["observer", "uio"]
+    left_out = {"augmented_high_gain_cdo", "augmented_takagi_sugeno_cdo"}
+    assert set(names[2:]) == train_observers().keys() - {"takagi_sugeno_cdo", "discrete_uio"} - left_out
+    assert {"adaptive_gain_cdo", "differentiator_cdo", "multirate_cdo", "odometer_reset"} < set(names)
     assert any("gradient" in note and "augmented_high_gain_cdo" in note for note in notes)
     fits = {c.name: {signal: link[0] for signal, link in c.sources.items()} for c in found}
     assert fits["adaptive_gain_cdo"] == {"effort": "driver.effort", "odometer": "odometer.reading"}
@@ -208,6 +212,23 @@ def test_facts_come_from_the_observers_where_they_agree_else_from_the_plant() ->
     assert facts["davis_b"] == (30.0, "as for locomotive")
     assert "wheel_radius" not in facts
     assert known_facts(find_sides(scenario.set("uio.mass", 70e3)))["mass"] == (95e3, "as for locomotive")
+
+
+def test_an_observer_that_does_not_want_a_fact_does_not_hide_it() -> None:
+    scenario = two().set("observer.mass", 80e3).set("uio.mass", 80e3).set("observer.estimated_position", 7.0)
+    scenario.set("uio.estimated_position", 7.0).add("plain", observer="odometer_reset").connect(
+        "odometer.reading -> plain.odometer"
+    )
+    facts = known_facts(find_sides(scenario.set("plain.estimated_position", 7.0)))
+    assert facts["mass"][0] == 80e3  # the plain odometer has no mass
+    assert facts["estimated_position"] == (7.0, "as for the observers of the scenario")
+    assert "estimated_position" not in known_facts(find_sides(scenario.set("plain.estimated_position", 0.0)))
+
+
+def test_no_limit_is_told_as_any_gap() -> None:
+    assert certified_limit(CertifiedGap(np.inf, 22.5, 31.9)) == "any"
+    assert certified(CertifiedGap(np.inf, 22.5, 31.9)) == "yes/yes"
+    assert certified_limit(CertifiedGap(0.5, None, None)) == 0.5
 
 
 def test_a_scenario_without_observers_serves_shipped_ones() -> None:

@@ -1,0 +1,128 @@
+"""The journal of a sweep: a line for each run as soon as it is done, from which a later one goes on. Touches that file
+only.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable
+from contextlib import suppress
+from math import nan
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cosim.errors import OutputError
+from cosim.results.summary_file import jsonable, restored
+from cosim.scenario.save import scenario_text
+from cosim.studies.sweep_result import SweepRun
+
+if TYPE_CHECKING:
+    from cosim.simulation.scenario import Scenario
+    from cosim.studies.sweep import Sweep
+
+JOURNAL = "runs.jsonl"
+
+
+class Journal:
+    """The file ``runs.jsonl`` in the folder of a sweep.
+
+    Args:
+        directory: the folder; created where it does not exist. sweep: what is run.
+    """
+
+    def __init__(self, directory: Path, sweep: Sweep) -> None:
+        self.path = directory / JOURNAL
+        self._sweep = sweep
+
+    def read(self) -> dict[int, SweepRun]:
+        """The runs of an earlier sweep that are runs of this one as well, by number in this one; those that failed left
+        out. A last line that was cut off is no run.
+
+        Raises:
+            OutputError: the file cannot be read.
+        """
+        try:
+            lines = self.path.read_text(encoding="utf-8").splitlines() if self.path.is_file() else []
+        except OSError as error:
+            raise OutputError(f"{self.path} cannot be read: {error.strerror or error}.") from error
+        entries: dict[str, dict[str, Any]] = {}
+        for line in lines:
+            with suppress(json.JSONDecodeError):
+                entry = restored(json.loads(line))
+                entries[entry["key"]] = entry
+        known = {number: entries.get(self.key(number)) for number in range(len(self._sweep))} if entries else {}
+        return {
+            number: self._run(number, entry)
+            for number, entry in known.items()
+            if entry is not None and entry["failure"] is None
+        }
+
+    def begin(self, runs: Iterable[SweepRun]) -> None:
+        """Write the file anew with the runs that are done already.
+
+        Args:
+            runs: of an earlier sweep.
+
+        Raises:
+            OutputError: the file cannot be written.
+        """
+        self._write("w", runs)
+
+    def add(self, run: SweepRun) -> None:
+        """Add a run.
+
+        Args:
+            run: with its measures.
+
+        Raises:
+            OutputError: the file cannot be written.
+        """
+        self._write("a", [run])
+
+    def _write(self, mode: str, runs: Iterable[SweepRun]) -> None:
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            with self.path.open(mode, encoding="utf-8") as file:
+                file.writelines(json.dumps(jsonable(self._entry(run)), allow_nan=False) + "\n" for run in runs)
+        except OSError as error:
+            raise OutputError(f"{self.path} cannot be written: {error.strerror or error}.") from error
+
+    def key(self, number: int) -> str:
+        """What a run follows from: the text of its scenario, and size and age of the files it names.
+
+        Args:
+            number: of the variation.
+        """
+        scenario = self._sweep.varied(number)
+        digest = hashlib.sha256(scenario_text(scenario.table(), scenario.folder).encode())
+        for place in _files(scenario):
+            digest.update(f"{place} {place.stat().st_size} {place.stat().st_mtime_ns}".encode())
+        return digest.hexdigest()
+
+    def _entry(self, run: SweepRun) -> dict[str, Any]:
+        return {
+            "key": self.key(run.number),
+            "settings": dict(run.settings),
+            "measures": dict(run.measures),
+            "failure": run.failure,
+            "faults": list(run.faults),
+            "folder": None if run.folder is None else str(run.folder),
+        }
+
+    def _run(self, number: int, entry: dict[str, Any]) -> SweepRun:
+        measures = {name: nan if value is None else float(value) for name, value in entry["measures"].items()}
+        folder = None if entry["folder"] is None else Path(entry["folder"])
+        settings = self._sweep.variations[number]
+        return SweepRun(number, settings, None, None, measures, tuple(entry["faults"]), folder)
+
+
+def _files(scenario: Scenario) -> list[Path]:
+    """Files that the components are made from."""
+    tables = scenario.table().components.values()
+    named = [
+        str(entry) for table in tables for entry in (table.fmu, table.recording, table.model, table.observer) if entry
+    ]
+    places = [scenario.folder / name.partition(".py:")[0] for name in named]
+    python = [place.with_name(f"{place.name}.py") for place in places]
+    return sorted(place for place in (*places, *python) if place.is_file())
