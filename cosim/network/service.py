@@ -117,7 +117,7 @@ class NetworkService:
         self._own = [np.flatnonzero(node_of == i) for i in range(nodes)]
         self._order = settings.order or tuple(range(nodes))
         self._by_name = sorted(range(nodes), key=lambda i: settings.nodes[i].name)
-        self._weights = None if settings.weights is None else [settings.weights[i] for i in self._by_name]
+        self._weights = None if settings.weights is None else settings.weights[self._by_name]
         self._holding = [
             sorted({name for signal in node.signals for name in holders.get(signal, ())}) for node in settings.nodes
         ]

@@ -122,4 +122,4 @@ def quadratic_sender(weights: Sequence[Array], error: Array) -> int:
     Args:
         weights: P_i of the nodes, each of shape (p, p). error: x, the network error, shape (p,).
     """
-    return int(smallest(quadratic_costs(weights, error)))
+    return int(np.argmin(np.asarray(weights) @ error @ error))
