@@ -116,10 +116,10 @@ def smallest(costs: Sequence[Array]) -> Array:
     return chosen
 
 
-def quadratic_sender(weights: Sequence[Array], error: Array) -> int:
+def quadratic_sender(weights: Array, error: Array) -> int:
     """The node sigma_k of a quadratic protocol, ``argmin_i x' P_i x``, (1.18); of equal nodes the first.
 
     Args:
-        weights: P_i of the nodes, each of shape (p, p). error: x, the network error, shape (p,).
+        weights: P_i of the nodes, shape (l, p, p). error: x, the network error, shape (p,).
     """
     return int(np.argmin(np.asarray(weights) @ error @ error))

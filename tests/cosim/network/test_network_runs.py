@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from toys import STOP, run, scenario
@@ -9,7 +11,13 @@ from toys import STOP, run, scenario
 from cosim import Outcome
 from cosim.results.packets_file import read_packets, write_packets
 
-ROUGH = {"delay_model": "uniform", "delay": 0.02, "delay_spread": 0.2, "loss_fraction": 0.2, "jitter": 0.03}
+ROUGH: dict[str, Any] = {
+    "delay_model": "uniform",
+    "delay": 0.02,
+    "delay_spread": 0.2,
+    "loss_fraction": 0.2,
+    "jitter": 0.03,
+}
 
 
 def of(outcome: Outcome, *names: str) -> np.ndarray:
@@ -21,7 +29,7 @@ SIGNALS = ("listener.estimate", "listener.first", "listener.second", "listener.p
 
 
 @pytest.mark.parametrize("network", [{"delay": 0.05}, {}, ROUGH | {"duplicate_fraction": 0.3}])
-def test_the_communication_step_does_not_matter(network: dict[str, float]) -> None:
+def test_the_communication_step_does_not_matter(network: dict[str, Any]) -> None:
     runs = [run(step, **network) for step in (0.001, 0.01, 0.1)]
     values = [of(outcome, *SIGNALS) for outcome in runs]
     # the ramp is integrated in parts of other lengths: rounding, of some 2000 additions
@@ -102,7 +110,11 @@ def test_seeds_and_names_decide_and_the_order_of_components_does_not() -> None:
 
 def test_the_order_of_nodes_changes_nothing_but_round_robin() -> None:
     nodes = {"rear": ["source.ramp_value"], "front": ["source.sine", "source.cosine"]}
-    for protocol in ({"protocol": "periodic", "order": ["front", "rear", "rear"]}, {"protocol": "try-once-discard"}):
+    protocols: tuple[dict[str, Any], ...] = (
+        {"protocol": "periodic", "order": ["front", "rear", "rear"]},
+        {"protocol": "try-once-discard"},
+    )
+    for protocol in protocols:
         one, two = run(**protocol), run(**protocol, nodes=nodes)
         assert one.result.packets == two.result.packets
     assert run().result.packets != run(nodes=nodes).result.packets
