@@ -8,18 +8,23 @@ from fmu_observer.models.model import ObserverModel
 from fmu_observer.models.pendulum import pendulum
 from fmu_observer.models.registry import MODELS, find_model
 from fmu_observer.models.sector_nonlinearity import sector_nonlinearity
+from fmu_observer.models.state_affine import StateAffineModel
+from fmu_observer.models.state_affine_registry import STATE_AFFINE_MODELS, find_state_affine_model
 from fmu_observer.models.takagi_sugeno import Premise, TakagiSugenoModel
 from fmu_observer.models.takagi_sugeno_registry import TAKAGI_SUGENO_MODELS, find_takagi_sugeno_model
 
 __all__ = [
     "MODELS",
+    "STATE_AFFINE_MODELS",
     "TAKAGI_SUGENO_MODELS",
     "ObserverModel",
     "Premise",
+    "StateAffineModel",
     "TakagiSugenoModel",
     "braked_train",
     "coupled_vehicles",
     "find_model",
+    "find_state_affine_model",
     "find_takagi_sugeno_model",
     "freight_train",
     "linear_pendulum",
