@@ -89,22 +89,46 @@ class Rules(Protocol):
     parameters: tuple[Signal, ...]
 
     def at_sample(self, before: tuple[Array, ...], told: Reading, p: Any) -> Judgement:
-        """Judge an odometer sample."""
+        """Judge an odometer sample.
+
+        Args:
+            before: memory, in the order of `memory`. told: the sample. p: parameters, as in `HybridSystem.flow`.
+        """
 
     def at_balise(self, before: tuple[Array, ...], told: Passing, p: Any) -> Judgement:
-        """Judge the way between two balises."""
+        """Judge the way between two balises.
+
+        Args:
+            before: memory, in the order of `memory`. told: the way. p: parameters, as in `HybridSystem.flow`.
+        """
 
     def fault(self, memory: tuple[Array, ...]) -> Array:
-        """1 while the odometer is judged to lie or is not confirmed."""
+        """1 while the odometer is judged to lie or is not confirmed.
+
+        Args:
+            memory: in the order of the signals.
+        """
 
     def discarded(self, memory: tuple[Array, ...]) -> Array:
-        """1 while the estimate must not follow the odometer."""
+        """1 while the estimate must not follow the odometer.
+
+        Args:
+            memory: in the order of the signals.
+        """
 
     def recovering(self, memory: tuple[Array, ...]) -> Array:
-        """1 while it begins to be believed again."""
+        """1 while it begins to be believed again.
+
+        Args:
+            memory: in the order of the signals.
+        """
 
     def limit(self, memory: tuple[Array, ...], p: Any) -> Array:
-        """Residual at which the verdict changes [m/s]."""
+        """Residual at which the verdict changes [m/s].
+
+        Args:
+            memory: in the order of the signals. p: parameters.
+        """
 
 
 class RuleMemory(NamedTuple):
