@@ -23,8 +23,9 @@ RULES = (
     "end they wait for two samples that agree"
 )
 SEEDS_SAY = (
-    "synthetic data, more jams than in the thesis' runs: what is missed is shorter than a sample; what is called false are "
-    "jams shorter than the recorded step of 0.05 s, which the odometer counts and the record of the truth does not show"
+    "synthetic data, more jams than in the thesis' runs: what is missed is shorter than a sample; what is called false "
+    "are jams shorter than the recorded step of 0.05 s, which the odometer counts and the record of the truth does "
+    "not show"
 )
 REASONS = (RULES, RULES, SEEDS_SAY, SEEDS_SAY, CONFIDENTIAL, CONFIDENTIAL)
 
