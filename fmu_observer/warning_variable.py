@@ -36,10 +36,10 @@ class WarningVariable(ModelVariable):
         return made
 
     def __getstate__(self) -> tuple[Any, OutputWarning]:
-        return super().__getstate__(), self.warning  # type: ignore[misc]  # that of attrs keeps its own fields only
+        return super().__getstate__(), self.warning  # that of attrs keeps its own fields only
 
     def __setstate__(self, state: tuple[Any, OutputWarning]) -> None:
-        super().__setstate__(state[0])  # type: ignore[misc]
+        super().__setstate__(state[0])
         self.warning = state[1]
 
 

@@ -128,8 +128,8 @@ def judged_detections(
 ) -> tuple[list[float], list[float], int]:
     """Which detections belong to which faults.
 
-    A detection belongs to a fault that it overlaps, the fault taken to last `grace` longer. A fault is detected where
-    one does; its detection begins with the first of them and ends with the last.
+    A detection belongs to a fault that it overlaps, the fault taken to last `grace` longer, though not beyond the begin
+    of the next. A fault is detected where one does; its detection begins with the first of them and ends with the last.
 
     Args:
         faults: true intervals [s], in order. detections: told intervals [s], in order. end: of the run [s].
@@ -139,8 +139,9 @@ def judged_detections(
         Delays of the detected faults at their start and at their end [s], and the number of false detections.
     """
     starts, ends, matched = [], [], set()
-    for a, b in faults:
-        own = [k for k, (c, d) in enumerate(detections) if c <= b + grace and d > a]
+    following = [a for a, _ in faults[1:]] + [inf]
+    for (a, b), next_begin in zip(faults, following, strict=True):
+        own = [k for k, (c, d) in enumerate(detections) if c <= min(b + grace, next_begin) and d > a]
         matched |= set(own)
         if own:
             starts.append(max(detections[own[0]][0] - a, 0.0))

@@ -43,15 +43,15 @@ class Spread:
     high: float = nan
     count: int = 0
 
-    def text(self, factor: float = 1.0) -> str:
+    def text(self, factor: float = 1.0, digits: int = 3) -> str:
         """The mean, and the interval where there is one.
 
         Args:
-            factor: what the numbers are multiplied by.
+            factor: what the numbers are multiplied by. digits: significant ones.
         """
         if not isfinite(self.mean):
             return DASH
-        mean, low, high = (number_text(factor * value) for value in (self.mean, self.low, self.high))
+        mean, low, high = (number_text(factor * value, digits) for value in (self.mean, self.low, self.high))
         return f"{mean} ({low} to {high})" if isfinite(self.low) else mean
 
 

@@ -66,17 +66,19 @@ def random_runs(
     unknown: Unknown = Unknown(),
     observer: str = "discrete_measurement_observer",
     xi: float = 1.7,
+    lost: str = "held",
 ) -> Worst:
     """Many short runs; accelerations jump between their limits, or lie anywhere between them.
 
     Args:
         preset: of the observer, one of set C. members: runs. seconds: length of each. seed: of all that is drawn.
         unknown: inputs that the observer does not know. observer: name. xi: largest acceleration [m/s2].
+        lost: option `missing` of the observer.
     """
     rng = np.random.default_rng(seed)
     count = round(seconds / PIECE)
     true, effort, readings, faults = _motions(rng, members, count, unknown, xi)
-    system = OBSERVERS[observer]()
+    system = OBSERVERS[observer](missing=lost)
     batch = Batch(system, members, preset)
     batch.set("internal_step", 5e-3)  # its fourth order leaves 1e-9 m/s at poles of 3 1/s
     told = {
@@ -109,7 +111,7 @@ def random_runs(
     carried, reading, position, age = (taken[:, :, 4 + i] for i in range(4))
     speed = np.abs(errors[:, :, 1])
     published = np.nan
-    if unknown == Unknown(missing=unknown.missing):
+    if unknown == Unknown(missing=unknown.missing) and lost == "held":
         norm, beta, m, gain = np.linalg.norm(errors[:, :, 1:], axis=2), *_published(system, preset)
         last = np.arange(count + 1) - np.rint(age / PIECE).astype(int)
         at_sample = np.take_along_axis(norm, last, axis=1)

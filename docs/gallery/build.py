@@ -73,7 +73,10 @@ def page(folder: Path) -> str:
 def section(script: Path) -> str:
     """Title, source, figure and table of one script."""
     folder = script.parent
-    content = json.loads((folder / "numbers" / f"{script.stem}.json").read_text(encoding="utf-8"))
+    numbers = folder / "numbers" / f"{script.stem}.json"
+    if not numbers.is_file():
+        sys.exit(f"{folder.name}/{script.name} has left no numbers yet: python docs/gallery/build.py {script.stem}")
+    content = json.loads(numbers.read_text(encoding="utf-8"))
     heading, *rows = [[cell.replace("|", "\\|") for cell in row] for row in table(content["lines"])]
     lines = ["| " + " | ".join(cells) + " |" for cells in (heading, *rows)]
     lines.insert(1, "|" + "---|" * len(heading))

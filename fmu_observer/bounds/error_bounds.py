@@ -37,7 +37,8 @@ class BoundRow:
 
 @dataclass(frozen=True, eq=False)
 class ErrorBounds:
-    """Bounds of the speed error of an observer whose odometer reading is held between samples.
+    """Bounds of the speed error of an observer whose odometer reading is held between samples, and held on where
+    samples are missing.
 
     Attributes:
         observer: name. preset: that the numbers come from.

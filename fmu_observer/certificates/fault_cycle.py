@@ -99,7 +99,7 @@ class FaultCycle:
         if time > self.end:
             driven = driven + self._exponential(time - self.end)
             driven = driven - (identity if time <= self.recovery else self._exponential(time - self.recovery))
-        return free + driven @ self.steady_error
+        return np.asarray(free + driven @ self.steady_error)
 
     def over_the_cycle(self, start_error: np.ndarray) -> np.ndarray:
         """The error at the recovery by the cycle map (3.33), which knows the four dwell times only.
@@ -115,7 +115,7 @@ class FaultCycle:
         identity = np.eye(len(self.effort_column))
         free = self._exponential(d00 + d10 + d11 + d01) @ np.asarray(start_error, dtype=float)
         first = self._exponential(d11 + d01) @ (identity - self._exponential(d10))
-        return free + (first - (identity - self._exponential(d01))) @ self.steady_error
+        return np.asarray(free + (first - (identity - self._exponential(d01))) @ self.steady_error)
 
     def next_start(self, start_error: np.ndarray, decay: float) -> float:
         """From when on the error is no larger than it was at t_k: the usable dwell time [s].

@@ -71,7 +71,7 @@ def extended_gain(
             where (A, C) has one, or where (A, H, C) has an invariant zero at the origin.
         ValueError: a shape does not fit, rho is not legal, the number of poles is wrong, or one is repeated too often.
     """
-    extended, seen = extended_matrices(*(np.asarray(matrix, dtype=float) for matrix in (A, H, C)), rho)
+    extended, seen = extended_matrices(np.asarray(A, dtype=float), np.asarray(H), np.asarray(C), rho)
     return observer_gain(extended, seen, poles, states, name)
 
 
@@ -79,7 +79,8 @@ def decaying_gain(A: np.ndarray, C: np.ndarray, decay: float, noise: float = 1.0
     """Gain with a quadratic Lyapunov function: the error decays at least at a given rate.
 
     P solves the filter's Riccati equation of ``A + decay I`` with unit process noise; ``V = e' inv(P) e`` then falls at
-    least as ``exp(-2 decay t)``, whatever the numbers: the inequality of Aguiar Cota 2019, 2.2.2, with a decay rate.
+    least as ``exp(-2 decay t)``, whatever the numbers. Aguiar Cota 2019, (2.17), asks for such a function; how to find
+    it is ours.
 
     Args:
         A: shape (n, n) [1/s]. C: shape (q, n). decay: at least this rate [1/s]. noise: variance of a measurement beside

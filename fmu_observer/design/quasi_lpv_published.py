@@ -54,7 +54,7 @@ class QuasiLpvDesign:
     @property
     def errors(self) -> np.ndarray:
         """``A_i - K_i C``, shape (2, 3, 3)."""
-        return self.vertices - self.gains @ SEEN
+        return np.asarray(self.vertices - self.gains @ SEEN)
 
 
 SEEN = np.array([[1.0, 0.0, 0.0]])
@@ -64,7 +64,7 @@ SEEN = np.array([[1.0, 0.0, 0.0]])
 def quasi_lpv_vertices(davis_b: float, davis_c: float, low: float, high: float) -> np.ndarray:
     """``A(z) = [[-w1 - w2 z, -1, 0], [0, 0, 1], [0, 0, 0]]`` at the two ends of the speed range, shape (2, 3, 3).
 
-    Aguiar Cota 2019, (3.35)-(3.40): state [v, d_R, d_R'], the resisting disturbance enters with a minus sign.
+    Aguiar Cota 2019, (3.35)-(3.43): state [v, d_R, d_R'], the resisting disturbance enters with a minus sign.
 
     Args:
         davis_b: w1 [1/s]. davis_c: w2 [1/m]. low, high: speeds of the vertices [m/s].

@@ -17,13 +17,14 @@ from fmu_observer.models.checks import check_numbers
 GRID = 400
 SPAN = 1e4  # the grid reaches from the slowest pole over this to the fastest times this
 STEPS = 60  # of the search for a peak; each comes much nearer
+SETTLED, RESPONSES, FINEST = 20.0, 500, 0.05  # a step response: time constants, points, part of the fastest one
 LONGEST = 0.5  # of a step times the norm of A, from which intervals are doubled
 
 
 def h_infinity_norm(channel: ResidualChannel, tolerance: float = 1e-7) -> float:
     """Largest gain from finite energy to finite energy: the peak of the largest singular value over all frequencies.
 
-    ``||r|| <= lambda ||s||`` of Aguiar Cota 2019, (2.25) and (3.46), holds for each lambda that is larger. By level
+    ``||r|| <= lambda ||s||`` of Aguiar Cota 2019, (2.25) and (3.48), holds for each lambda that is larger. By level
     sets of the Hamiltonian (Bruinsma, Steinbuch 1990).
 
     Args:
@@ -163,6 +164,43 @@ def minimum_fault(threshold: float, gamma: float) -> float:
     return threshold / gamma
 
 
+def sudden_fault(channel: ResidualChannel, threshold: float, length: float = inf) -> float:
+    """Smallest fault of constant size, beginning at once, whose residual reaches a threshold at some instant [ours].
+
+    What a threshold on |r| really sees, without noise and disturbance: the peak of the residual, not its energy. A
+    fault of the sensor shows at its first instant with the whole feedthrough D.
+
+    Args:
+        channel: from one fault to one residual, stable. threshold: of |r|. length: of the fault [s].
+
+    Returns:
+        The fault, in its unit; inf where it does not show.
+
+    Raises:
+        ValueError: the channel has several signals or residuals or is unstable, or a number is not positive.
+    """
+    A, B, C, D = channel.matrices
+    if D.shape != (1, 1) or not channel.stable:
+        raise ValueError(
+            f"Sudden fault: the channel has {D.shape[1]} signals and {len(D)} residuals, expected one "
+            f"of each and poles in the left half plane, here {channel.poles.tolist()}."
+        )
+    check_numbers("Sudden fault", {"threshold": threshold})
+    if not length > 0.0:
+        raise ValueError(f"Sudden fault: the length must be positive, got {length} s.")
+    until = min(length, SETTLED / float(-channel.poles.real.max()))
+    step = min(until / RESPONSES, FINEST / float(np.abs(channel.poles).max()))
+    n = len(A)
+    whole = np.zeros((n + 1, n + 1))
+    whole[:n, :n], whole[:n, n:] = A, B
+    transition = scipy.linalg.expm(whole * step)
+    x, peak = np.eye(n + 1)[n], 0.0
+    for _ in range(int(until / step) + 1):
+        peak = max(peak, abs(float((C @ x[:n])[0] + D[0, 0])))
+        x = transition @ x
+    return threshold / peak if peak > 0.0 else inf
+
+
 def level_crossings(channel: ResidualChannel, level: float) -> np.ndarray:
     """Frequencies at which a singular value of the response equals a level, in order, shape (K,) [rad/s].
 
@@ -203,7 +241,8 @@ def _grid(channel: ResidualChannel) -> np.ndarray:
     if not len(sizes):
         return np.array([0.0, inf])
     resonances = np.abs(channel.poles.imag)
-    return np.r_[0.0, np.sort(np.r_[np.geomspace(sizes.min() / SPAN, sizes.max() * SPAN, GRID), resonances]), inf]
+    about = np.geomspace(sizes.min() / SPAN, sizes.max() * SPAN, GRID)
+    return np.asarray(np.r_[0.0, np.sort(np.r_[about, resonances]), inf])
 
 
 def _between(edges: np.ndarray) -> np.ndarray:
@@ -214,7 +253,7 @@ def _between(edges: np.ndarray) -> np.ndarray:
 
 def _energy(A: np.ndarray, C: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray]:
     """``int exp(A' t) C' C exp(A t) dt`` over [0, length] and ``exp(A length)``, by doubling a short interval."""
-    doublings = max(0, int(np.ceil(np.log2(max(np.linalg.norm(A, 2) * length / LONGEST, 1.0)))))
+    doublings = max(0, int(np.ceil(np.log2(max(float(np.linalg.norm(A, 2)) * length / LONGEST, 1.0)))))
     n, short = len(A), length / 2**doublings
     block = np.block([[-A.T, C.T @ C], [np.zeros((n, n)), A]])
     exponential = scipy.linalg.expm(block * short)

@@ -61,7 +61,7 @@ class ResidualChannel:
         finite = np.where(np.isfinite(omega), omega, 0.0)
         shifted = 1j * finite[:, None, None] * np.eye(len(self.A)) - self.A
         inner = np.linalg.solve(shifted, np.broadcast_to(self.B.astype(complex), (len(omega), *self.B.shape)))
-        return np.where(np.isfinite(omega)[:, None, None], self.C @ inner, 0.0) + self.D
+        return np.asarray(np.where(np.isfinite(omega)[:, None, None], self.C @ inner, 0.0) + self.D)
 
 
 def residual_channel(
@@ -74,7 +74,7 @@ def residual_channel(
 ) -> ResidualChannel:
     """Error and residual of ``dx = A x + E s``, ``y = C x + F s`` under ``dxh = A xh + L (y - C xh)``.
 
-    ``de = (A - L C) e + (E - L F) s`` and ``r = L_r (C e + F s)``: Aguiar Cota 2019, (2.23)-(2.24), repaired. An
+    ``de = (A - L C) e + (E - L F) s`` and ``r = L_r (C e + F s)``: Aguiar Cota 2019, (2.21)-(2.25), repaired. An
     unknown input or a fault of the actuator has E alone; noise and a fault of the sensor have F alone, as in (3.45)
     with F = -1: a jam makes the measured speed low.
 

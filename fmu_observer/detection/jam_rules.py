@@ -222,8 +222,9 @@ class RepairedRules:
             m.refutations,
             m.samples + 1.0,
         )
-        # A jam too small to be held is over: the estimate takes the reading, and learns nothing from the jump.
-        over = armed * impossible
+        # A jam too small to be held is over: the estimate takes the reading, and learns nothing from the jump. An
+        # estimate that has not settled must learn, and does not.
+        over = armed * impossible * _is(m.settled >= p.settle_samples)
         restart = np.maximum(np.maximum(believed, expired), np.maximum(jumped, over))
         return Judgement(tuple(after), restart, onset, 0.0 * size)
 

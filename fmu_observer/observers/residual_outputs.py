@@ -1,4 +1,4 @@
-"""Residuals as outputs of an observer of a linear model: ``r = L_r (y - C xh)``, Aguiar Cota 2019, (2.22)."""
+"""Residuals as outputs of an observer of a linear model: ``r = L_r (y - C xh)``, Aguiar Cota 2019, (2.21)-(2.25)."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from fmu_observer.design.extended_disturbance import extended_gain
 from fmu_observer.detection.threshold_detector import THRESHOLD_PARAMETERS, ThresholdMemory, judge
 from fmu_observer.observers.train.stopping_uio import PRINTED_GAIN, observer_matrix, sampled_error
 from plant_models.hybrid import Runtime, scalar_names
-from plant_models.railway.control.stopping_planner import BrakePlan, constant_brake, plan_stop, reference_motion
+from plant_models.railway.control.stopping_planner import BrakePlan, constant_brake, plan_stop
 
 W0, W1, W2, B = 0.01, 0.1, 0.001, 0.1  # Davis set A, brake coefficient
 L1, L2 = 1.4, 0.5
@@ -101,7 +101,7 @@ def stops() -> Stop:
     driven = np.eye(3) * H + A * H**2 / 2.0 + A @ A * H**3 / 6.0
     memory = ThresholdMemory(np.zeros(members), np.zeros(members), np.ones(members), np.zeros(members))
     plan = BrakePlan(*(np.full(members, float(value)) for value in constant_brake(30.0, 100.0, W1)))
-    began = (np.zeros(members), v.copy(), p.copy())
+    began = (np.zeros(members), v.copy())  # when, and at which speed
     known = np.full(members, np.inf)  # when the jam was detected
     errors, thresholds = np.full(members, np.nan), _Thresholds()
     detected: list[tuple[float, int]] = []
@@ -109,7 +109,8 @@ def stops() -> Stop:
     k = 0
     while np.isnan(errors).any():
         t = k * H
-        reference = reference_motion(t - began[0], began[1], began[2], plan, W1)[0]
+        fallen = np.exp(-W1 * np.minimum(t - began[0], plan.duration))
+        reference = (began[1] + plan.deceleration / W1) * fallen - plan.deceleration / W1
         u = np.minimum(-plan.deceleration / B - (L1 * (z[0] - reference) + L2 * integral + z[1]) / B, 0.0)
         integral = integral + H * (z[0] - reference)
         onset = max((o for o in ONSETS if o <= t + 1e-9), default=np.inf)
@@ -137,7 +138,7 @@ def stops() -> Stop:
         if ends.any():
             renewed = constant_brake(v, 100.0 - p, W1)
             plan = BrakePlan(*(np.where(ends, new, old) for new, old in zip(renewed, plan, strict=True)))
-            began = tuple(np.where(ends, new, old) for new, old in zip((k * H, v, p), began, strict=True))
+            began = tuple(np.where(ends, new, old) for new, old in zip((k * H, v), began, strict=True))
             integral = np.where(ends, 0.0, integral)
     return Stop(errors, detected, recovered)
 
@@ -253,6 +254,18 @@ def test_the_onset_shows_when_the_closed_form_says_so() -> None:
             k += 1
             runtime.advance(k * period)
         assert k == samples
+
+
+def test_the_observer_takes_the_effort_as_zero_while_a_jam_is_detected() -> None:
+    """So it goes on to be right about a train that lost its brake: no effort, no error."""
+    runtime = observer(
+        estimated_speed=20.0, disturbance_estimate=2.0, disturbance_rate=0.0, judged_fault=1.0, armed=0.0
+    )
+    runtime.u[:2] = -26.223, 20.0
+    runtime.start(0.0)
+    runtime.advance(0.5)
+    assert told(runtime, "odometer_fault") == 1.0
+    assert runtime.x[1:4] == pytest.approx([20.0, 2.0, 0.0], abs=1e-12)
 
 
 @pytest.mark.parametrize(("held_for", "held"), [(1, 0.0), (200, 1.0)])

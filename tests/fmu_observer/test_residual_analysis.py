@@ -20,6 +20,7 @@ from fmu_observer.design.residual_analysis import (
     minimum_fault,
     minimum_gain,
     pulse_ratio,
+    sudden_fault,
 )
 from fmu_observer.design.residual_channel import ResidualChannel, decoupled_channel, residual_channel
 from fmu_observer.models import coupled_vehicles
@@ -224,6 +225,19 @@ def test_the_smallest_fault_that_a_threshold_sees() -> None:
     for bad in ((0.0, 1.0), (1.0, -1.0)):
         with pytest.raises(ValueError, match="must be finite and positive"):
             minimum_fault(*bad)
+
+
+def test_the_smallest_sudden_fault() -> None:
+    """``s / (s + 2)`` shows it at once and less later; a lag of gain 1.5 shows it late; by hand."""
+    assert sudden_fault(HIGH_PASS, 3.0) == pytest.approx(3.0, rel=1e-12)
+    assert sudden_fault(LAG, 3.0) == pytest.approx(2.0, rel=1e-6)
+    assert sudden_fault(LAG, 3.0, length=0.5) == pytest.approx(2.0 / (1.0 - exp(-1.0)), rel=1e-2)  # of 500 points
+    silent = ResidualChannel(-np.eye(1), np.zeros((1, 1)), np.eye(1), np.zeros((1, 1)))
+    assert sudden_fault(silent, 1.0) == inf
+    assert sudden_fault(from_fault(SECTION_5_3_1, 0), 0.65) == pytest.approx(0.65 / 3.36, rel=1e-9)
+    for channel, threshold, length in ((random_channel(0), 1.0, inf), (LAG, 0.0, inf), (LAG, 1.0, 0.0)):
+        with pytest.raises(ValueError, match="Sudden fault"):
+            sudden_fault(channel, threshold, length)
 
 
 # -- refusals ---------------------------------------------------------------------------------------------------------

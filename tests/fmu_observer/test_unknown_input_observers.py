@@ -266,8 +266,10 @@ def test_a_quadratic_lyapunov_function_gives_the_decay(seed: int, decay: float) 
 def test_three_disturbance_states_have_names_and_units() -> None:
     observer = ProportionalIntegralUio("coupled_vehicles", rho=3)
     found = {s.name: s.unit for s in observer.outputs}
-    assert found["acceleration_error_rate"] == "m/s2/s"
-    assert found["acceleration_error_second_rate"] == "m/s2/s/s"
+    assert found["acceleration_error_rate"] == "m/s3"
+    assert found["acceleration_error_second_rate"] == "m/s4"
+    pushed = replace(braked_train(), unknown_inputs=(input_signal("push", "N"),))
+    assert {s.name: s.unit for s in ProportionalIntegralUio(pushed, rho=3).outputs}["push_second_rate"] == "N/s2"
     assert "as_published" not in observer.presets
     assert observer.condition().values["rank"] == 6
 

@@ -104,6 +104,8 @@ def test_the_reference_stays_where_it_stops() -> None:
     speeds, positions = reference_motion(np.array([-1.0, 0.0, 5.0, 7.0]), 10.0, 3.0, plan, 0.0)
     assert speeds == pytest.approx([10.0, 10.0, 0.0, 0.0])
     assert positions == pytest.approx([3.0, 3.0, 28.0, 28.0])
+    speed, position = reference_motion(7.0, 14.0, 3.0, plan, 0.0)  # 4 m/s are left, and go on
+    assert (speed, position) == pytest.approx((4.0, 3.0 + 45.0 + 8.0))
 
 
 def test_the_sign_of_the_feedback() -> None:

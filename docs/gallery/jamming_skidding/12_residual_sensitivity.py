@@ -6,8 +6,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from shared.sheet import Sheet
 
-from fmu_observer.design.quasi_lpv_published import PUBLISHED, SEEN, QuasiLpvDesign
-from fmu_observer.design.residual_analysis import minimum_fault, pulse_ratio
+from fmu_observer.design.quasi_lpv_published import PUBLISHED, SECTION_5_3_1, SEEN, QuasiLpvDesign
+from fmu_observer.design.residual_analysis import minimum_fault, pulse_ratio, sudden_fault
 from fmu_observer.design.robust_residual import ResidualProblem, common_bands, proven_sensitivity
 
 PULSES = {  # length [s]: ||r|| / ||f||, by an independent simulation
@@ -20,6 +20,9 @@ NOT_HAD = (
     "disturbance, so that the gain from fault to residual is zero at rest; the inequality (3.57) has no solution"
 )
 BAND = "gamma holds for frequencies above this edge only; the print claims it for all"
+PEAK = (
+    "a threshold sees the peak of the residual, which is M f at the first instant: smaller than the rule of thumb says"
+)
 PULSE = "none is printed; by closed integrals over all that the fault leaves behind, the independent one by simulation"
 
 
@@ -47,6 +50,9 @@ def main() -> None:
         why = "the print cuts 0.6466 to 0.64; a rule of thumb: gamma holds neither at all frequencies nor for long jams"
         words = f"smallest fault by threshold / gamma, threshold {threshold:g}"
         sheet.add(words, "m/s", published, minimum_fault(threshold, 2.32), why, independent=other)
+        words = f"smallest fault whose residual reaches {threshold:g} when it begins at once"
+        channel = problem_of(SECTION_5_3_1).fault_channels(SECTION_5_3_1.gains)[0]
+        sheet.add(words, "m/s", published, sudden_fault(channel, threshold), PEAK)
     axes[0].set(xlabel="frequency [rad/s]", ylabel="gain from fault to residual over gamma [1]")
     axes[1].set(xlabel="length of the jam [s]", ylabel="||r|| / ||f|| over gamma [1]")
     for axis in axes:

@@ -48,8 +48,8 @@ def designs(sheet: Sheet) -> None:
             found = design_proposition_4_1(train_vertices([W1]), C, m, alpha)
         except InfeasibleDesign as told:
             sheet.add(f"beta, {words}", "1", "infeasible", "infeasible", independent="infeasible")
-            sheet.add(f"least alpha at m {m:g} 1/s, {words}", "1", None, told.nearest_alpha or 0.0, NEAREST)
-            sheet.add(f"largest m at alpha {alpha:g}, {words}", "1/s", None, told.nearest_m or 0.0, NEAREST)
+            sheet.add(f"least alpha that is feasible, {words}", "1", None, told.nearest_alpha or 0.0, NEAREST)
+            sheet.add(f"largest m that is feasible, {words}", "1/s", None, told.nearest_m or 0.0, NEAREST)
         else:
             assert cell is not None
             sheet.add(f"beta, {words}", "1", cell[0], found.beta, independent=BETA[m, alpha])

@@ -1,7 +1,7 @@
 """Residual generators that stand disturbances and show faults, by linear matrix inequalities. Solving needs the extra
 `lmi`.
 
-Aguiar Cota 2019, 3.3.1.3, Algorithm 3-2, repaired: a decay rate in the first step, M fixed, the inequality of the
+Aguiar Cota 2019, (3.44)-(3.58), Algorithm 3-2, repaired: a decay rate in the first step, M fixed, the inequality of the
 second step with its signs.
 """
 

@@ -58,7 +58,8 @@ class RobustResidualDesign:
         """Least gain from fault to residual over a band, at the vertices held still.
 
         Args:
-            low, high: ends of the band [rad/s]. A fault of T seconds lies in the band from about ``2 / T`` on.
+            low, high: ends of the band [rad/s]. For a fault of a given length ask `pulse_ratio` of the
+                `fault_channels`: most of its energy lies at low frequencies.
         """
         return min(minimum_gain(channel, low, high) for channel in self.fault_channels)
 

@@ -1,6 +1,6 @@
 """The matrix inequalities (3.56)-(3.58): the same formulas for a solver's unknowns and for numbers. Nothing is solved.
 
-Aguiar Cota 2019, 3.3.1.3. All are to be negative.
+Aguiar Cota 2019, section 3.3. All are to be negative.
 """
 
 from __future__ import annotations

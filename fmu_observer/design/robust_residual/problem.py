@@ -12,7 +12,7 @@ from fmu_observer.models.checks import check_numbers, checked_matrix
 
 @dataclass(frozen=True, eq=False)
 class ResidualProblem:
-    """``dx = sum h_i A_i x + D eta``, ``y = C x - F f``, ``r = M (y - yh)``: Aguiar Cota 2019, (3.42)-(3.45).
+    """``dx = sum h_i A_i x + D eta``, ``y = C x - F f``, ``r = M (y - yh)``: Aguiar Cota 2019, (3.35)-(3.45).
 
     Attributes:
         vertices: A_i, shape (N, n, n) [1/s]; one of them for a linear system.

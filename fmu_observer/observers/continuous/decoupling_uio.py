@@ -30,7 +30,7 @@ class DecouplingUio(ModelObserver):
     error.
 
     The estimate follows the measurements at once, noise included: what is decoupled cannot be filtered. The residuals
-    ``r = L_r (y - C xh)`` of (2.22) are outputs; a fault that acts like an unknown input does not show in them.
+    ``r = L_r (y - C xh)`` of (2.21)-(2.25) are outputs; a fault that acts like an unknown input does not show in them.
 
     Defaults [ours]: poles from -2 1/s on; L_r the identity.
 

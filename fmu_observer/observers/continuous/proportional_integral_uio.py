@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
+from functools import reduce
 from typing import Any, ClassVar
 
 import numpy as np
@@ -29,8 +31,8 @@ class ProportionalIntegralUio(ModelObserver):
     The unknown inputs d and their derivatives up to the (rho - 1)-th are states, ``d^(rho) = 0``: rho = 1 believes in a
     constant disturbance, rho = 2 in a ramp. The error obeys ``de = (A_e - L C_e) e`` but for ``d^(rho)``, which moves
     it. It needs an observable extended pair: (A, C) observable, and no invariant zero of (A, H, C) at the origin; of
-    rank(C H) nothing is asked. The residuals ``r = L_r (y - C xh)`` of (2.22) are outputs; a fault that persists is
-    taken for a disturbance, so they show how it begins.
+    rank(C H) nothing is asked. The residuals ``r = L_r (y - C xh)`` of (2.21)-(2.25) are outputs; a fault that persists
+    is taken for a disturbance, so they show how it begins.
 
     Defaults [ours]: poles from -2 1/s on; L_r the identity. The preset ``as_published``, of the model ``braked_train``
     with rho = 2, has gain and starts of 3.2.3: poles -50, -50 and -1.5 1/s, so it asks for internal steps of 1 to 2 ms
@@ -62,7 +64,7 @@ class ProportionalIntegralUio(ModelObserver):
         self.rho = int(rho)
         ways = [(s, f"{s.name}{_suffix(k)}", k) for k in range(self.rho) for s in chosen.unknown_inputs]
         text = [f"{'Derivative of: ' * k}{s.description}" for s, _, k in ways]
-        units = [s.unit + f"{'/s' * k}" for s, _, k in ways]
+        units = [reduce(lambda unit, _: _per_second(unit), range(k), s.unit) for s, _, k in ways]
         self._disturbances = tuple(name for _, name, _ in ways)
         self.extra_states = tuple(
             state(f"estimated_{name}", unit, s.start if k == 0 else 0.0, f"Estimate: {words}")
@@ -131,6 +133,12 @@ class ProportionalIntegralUio(ModelObserver):
 
     def _gain(self, p: Any) -> Array:
         return as_matrix(p.gain, len(self.A_e), len(self.model.measurements))
+
+
+def _per_second(unit: str) -> str:
+    """Unit of the derivative: ``m/s3`` of ``m/s2``."""
+    found = re.fullmatch(r"(.+)/s(\d*)", unit)
+    return f"{unit}/s" if found is None else f"{found[1]}/s{int(found[2] or 1) + 1}"
 
 
 def _suffix(derivative: int) -> str:

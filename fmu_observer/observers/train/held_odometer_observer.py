@@ -5,10 +5,10 @@ speed error that run between them: what the two of them share.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import sqrt
-from typing import Any
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -24,9 +24,11 @@ from plant_models.hybrid import PeriodicEvent, input_signal, memory, output_sign
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
+Missing = Literal["predicted", "held"]
+
 # own states: estimates and bounds, filtered slip, memory
 LEVEL, POSITION_BOUND = 4, 5
-HELD_SPEED, HELD_TIME, HELD_ERROR, STARTED, LAST_INNOVATION = 7, 8, 9, 10, 11
+HELD_SPEED, HELD_TIME, HELD_ERROR, STARTED, PREDICTING, LAST_INNOVATION = 7, 8, 9, 10, 11, 12
 
 REPAIRED = HELD_ODOMETER_PRESETS["repaired"]
 PROOF = (
@@ -41,7 +43,7 @@ class HeldOdometerObserver(TrainObserver):
     ``dv = effort/m - w(v) - d + k1 r``, ``d d = d' + k2 r``, ``d d' = k3 r``, ``r = y_k - v`` with the odometer reading
     ``y_k`` of the last sample, held, and ``w`` the Davis resistance, ``k1 = gain[1] + gain_schedule (b + c z) / m`` and
     z the speed that a subclass gives. The position is the integral of the speed; at a balise it is set to that of the
-    balise. A sample at which the input `odometer_fault` is 1 is not used: the reading before it stays.
+    balise. A sample at which the input `odometer_fault` is 1 is not used, and the option `missing` says what then.
 
     The error obeys ``de = (A - K C) e + K (v(t) - y_k) + w``: the motion since the sample drives it, so it does not
     vanish while the train accelerates, and three bounds of it run as outputs.
@@ -55,6 +57,14 @@ class HeldOdometerObserver(TrainObserver):
        train may stand still only the latter counts, for there the disturbance jumps by the brake's effort.
 
     `position_bound` is the integral of `error_bound` since the last balise, from its location accuracy on.
+
+    Args:
+        missing: what becomes of the estimate after a sample that is not used, until the next one that is: ``predicted``
+            by the model and the disturbance alone [ours], ``held`` to the last reading that was used, as in the thesis.
+            Held, the estimate is drawn to an old speed; predicted, it goes on, and `published_bound` does not apply.
+
+    Raises:
+        ValueError: another word for `missing`.
     """
 
     source = "Aguiar Cota 2019, (4.1)-(4.19), (4.40), 4.3.4, 5.4"
@@ -91,6 +101,7 @@ class HeldOdometerObserver(TrainObserver):
         memory("held_time", "s", 0.0, "Time of that reading"),
         memory("held_error", "m/s", 0.0, "Largest error of that reading"),
         memory("sampled_once", "1", 0.0, "1 after the first sample"),
+        memory("predicting", "1", 0.0, "1 while no reading acts on the estimate"),
         memory("last_innovation", "m", 0.0, "Position error seen at the last balise"),
     )
     estimator_parameters = (
@@ -118,6 +129,13 @@ class HeldOdometerObserver(TrainObserver):
     stability_parameters = ("gain", "gain_schedule", "speed_max")
     presets: Mapping[str, Mapping[str, Any]] = HELD_ODOMETER_PRESETS
     default_preset = "repaired"
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"missing": ("predicted", "held")}
+
+    def __init__(self, missing: Missing = "predicted") -> None:
+        if missing not in self.option_choices["missing"]:
+            raise ValueError(f"{self.name}: unknown missing {missing!r}; use 'predicted' or 'held'.")
+        self.missing = missing
+        super().__init__(missing=missing)
 
     # -- what a subclass writes -------------------------------------------------------------------------------------
 
@@ -137,17 +155,21 @@ class HeldOdometerObserver(TrainObserver):
 
     def estimator_flow(self, t: Array, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
         """Derivatives of the estimates, of the carried level, and of the position bound."""
-        speed, residual, age = x[1], x[HELD_SPEED] - x[1], self._age(t, x)
+        speed, predicting = x[1], x[PREDICTING] > 0.0
+        residual = np.where(predicting, 0.0, x[HELD_SPEED] - speed)
         traction = np.maximum(u.effort, 0.0)  # a negative effort is a brake: see friction
         acceleration = (traction - rolling_drag(speed, p)) / p.mass - x[2]
-        reading = self.largest_gain_level(x, p) * (p.acceleration_max * age + x[HELD_ERROR])
+        told = self.error_bound(t, x, p)
+        # Without a reading it is the error itself that K is missing: (A) e = (A - K C) e + K C e.
+        driving = np.where(predicting, told, self._since_reading(t, x, p))
+        reading = self.largest_gain_level(x, p) * driving
         return (
             speed,
             acceleration + first_gain(self.scheduling_speed(x), p) * residual,
             x[3] + p.gain[1] * residual,
             p.gain[2] * residual,
             reading + _unknown_level(p) - p.bound_decay * x[LEVEL],
-            self.error_bound(t, x, p),
+            told,
         )
 
     def estimate(self, x: Array, u: Any, p: Any) -> Estimate:
@@ -203,6 +225,7 @@ class HeldOdometerObserver(TrainObserver):
             np.where(first > 0.0, p.start_position_error, x[POSITION_BOUND]),
             x[POSITION_BOUND + 1],
             *(np.where(taken > 0.0, new, x[HELD_SPEED + i]) for i, new in enumerate(held)),
+            (1.0 - usable) if self.missing == "predicted" else 0.0 * usable,
             x[LAST_INNOVATION],
         )
 

@@ -8,7 +8,8 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampled_error
+from fmu_observer.certificates import Certificate, ImpulsiveError, first_unstable_gap
+from fmu_observer.certificates.periodic import PeriodicStability, periodic_stability
 from fmu_observer.certificates.polytope import polytope_stability
 from fmu_observer.design.quasi_lpv_published import (
     SECTION_3_3_4,
@@ -27,6 +28,7 @@ from plant_models.hybrid.system import Array
 
 P, V, D, RATE, WAY = range(5)  # continuous states
 HELD, CORRECTION, LAST_D, LAST_RATE, INNOVATION, BALISE_TIME, BALISE_PLACE, BALISE_ODOMETER, BALISES = range(5, 14)
+SPEEDS = 21  # between the vertices, for the certificate
 HORIZON = 20.0  # [s], of the certificate, as of the others; what holds, holds for every gap
 OPEN_BOUND = 1e3  # [m]: where the odometer is followed unconfirmed, no balise is doubted
 
@@ -221,12 +223,10 @@ class QuasiLpvUio(GatedObserver, GapCertified):
             constant, radius = found.abscissa < 0.0, float(np.exp(found.abscissa * max_gap))
             note = f"the speed error falls at least as exp(-{max(found.decay, 0.0):.3g} t)"
         else:
-            holds, margin, P = sampled.holds, sampled.quadratic_margin, np.asarray(sampled.lyapunov_matrix)
-            constant, radius = sampled.spectral_radius < 1.0, sampled.spectral_radius
-            note = (
-                f"periods of the odometer: a constant one up to {sampled.constant_limit:.3g} s, varying ones up to "
-                f"{sampled.aperiodic_limit:.3g} s"
-            )
+            stable, longest = sampled
+            holds, margin, P = stable.holds, stable.margin, stable.lyapunov_matrix
+            constant, radius = stable.spectral_radius < 1.0, stable.spectral_radius
+            note = f"the odometer's period may be up to {longest:.3g} s at a steady speed"
         return Certificate(
             max_gap=max_gap,
             horizon=max(HORIZON, max_gap),
@@ -313,10 +313,12 @@ def speed_errors(p: Any) -> tuple[np.ndarray, np.ndarray]:
     return drifts, np.stack([np.asarray(p.gain_low, float), np.asarray(p.gain_high, float)])[:, :, None]
 
 
-def _sampled(drifts: np.ndarray, gains: np.ndarray, period: float) -> Certificate:
-    """Certificate for gaps between odometer samples up to the period, the innovation held."""
-    levels = (0, 1, 2)
-    vertices = tuple(
-        ImpulsiveError.with_innovation(A, K, np.zeros((1, 1)), SEEN, levels) for A, K in zip(drifts, gains, strict=True)
-    )
-    return certify_sampled_error(vertices, period, "", switching=True)
+def _sampled(drifts: np.ndarray, gains: np.ndarray, period: float) -> tuple[PeriodicStability, float]:
+    """Stability over a period with the innovation held, at speeds between the vertices, and the first unstable
+    period [s].
+    """
+    shares = np.linspace(0.0, 1.0, SPEEDS)[:, None, None]
+    blended = zip(*((1.0 - shares) * pair[0] + shares * pair[1] for pair in (drifts, gains)), strict=True)
+    errors = [ImpulsiveError.with_innovation(A, K, np.zeros((1, 1)), SEEN) for A, K in blended]
+    found = periodic_stability(np.stack([error.transition(period) for error in errors]))
+    return found, first_unstable_gap((errors[0], errors[-1]), HORIZON)

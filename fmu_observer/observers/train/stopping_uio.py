@@ -217,7 +217,8 @@ class StoppingUio(GatedObserver, GapCertified):
         transition = sampled_error(float(p.davis_b) / float(p.mass), np.asarray(p.observer_gain, dtype=float), period)
         radius = float(np.abs(np.linalg.eigvals(transition)).max())
         stable = radius < 1.0
-        margin, rows = -inf, ()
+        margin = -inf
+        rows: tuple[tuple[float, ...], ...] = ()
         if stable:
             rate = np.diag([1.0, 1.0 / 50.0, 1.0 / 2500.0])  # the disturbances in units of the speed
             scaled = rate @ transition @ np.linalg.inv(rate)

@@ -15,7 +15,7 @@ from plant_models.hybrid.system import Array
 
 NEWTON_STEPS = 7  # an eighth changes nothing but the last bit, for c from 1e-6 to 1 - 1e-9
 SERIES_BELOW = 0.3
-BERNOULLI = (1 / 12, -1 / 720, 1 / 30240, -1 / 1209600, 1 / 47900160, -691 / 1307674368000, 1 / 74724249600)
+BERNOULLI = (1 / 12, -1 / 720, 1 / 30240, -1 / 1209600, 1 / 47900160, -691 / 1307674368000)
 NEVER = 1e9  # [s]
 SMALLEST = 1e-300
 
@@ -200,7 +200,7 @@ def _newton_step(w: Array, share: Array, left: Array, ratio: Array) -> Array:
     series = w < SERIES_BELOW
     near, far = np.where(series, w, 0.0), np.where(series, 1.0, w)
     square = near * near
-    tail = 0.0
+    tail: Array = 0.0
     for coefficient in reversed(BERNOULLI):
         tail = tail * square + coefficient
     bend = near * (0.5 - near * tail)  # 1 - w/(e^w - 1) near zero

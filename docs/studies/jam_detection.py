@@ -1,0 +1,184 @@
+"""Jam detection in numbers: missed and false alarms, delays, latch-ups; printed and repaired rules; a wheel that never
+rolls again.
+
+``python docs/studies/jam_detection.py`` (half a minute) writes the tables of docs/jam_detection.md and draws
+docs/images/jam_detection.png. The trains and their jams are synthetic; they are those of ``docs/gallery/jam_runs.py``.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "gallery"))
+
+from jam_runs import CASES, PERIOD, STEP, Jams, Verdicts, observe, random_jams, readings, trains, verdicts
+
+from cosim.drawing.style import RC
+from cosim.evaluation.fault_detection import clopper_pearson, garwood
+from cosim.evaluation.numbers import number
+
+LENGTHS = (0.05, 0.1, 0.2, 0.4, 0.6, 1.0, 2.0, 3.0, 5.0)  # [s]
+DEPTHS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
+NOISES = (0.0, 0.02, 0.05, 0.1)  # [m/s]
+SEED, NOISE = 1, 0.02
+PAGE = Path(__file__).resolve().parents[1] / "jam_detection.md"
+PICTURE = PAGE.parent / "images" / "jam_detection.png"
+RULES = ("repaired", "printed")
+
+
+def one(case: str, rules: str, members: int, noise: float = NOISE, **jam: Sequence[float]) -> tuple[Jams, Verdicts]:
+    """Random jams in one case, with one set of rules; the same trains and readings for both."""
+    rng = np.random.default_rng(SEED)
+    run = trains(CASES[case], members, rng)
+    jams = random_jams(rng, members, CASES[case], jam.get("lengths", LENGTHS), jam.get("depths", DEPTHS))
+    read = readings(run, jams, noise, rng, True)
+    found = observe(CASES[case], run, read, rules, with_balises=CASES[case].speed > 20.0)
+    return jams, verdicts(run, jams, found["odometer_fault"])
+
+
+def rates_table(members: int = 1000) -> str:
+    """Missed, false, late, latched for each case, rules and noise."""
+    head = "| case | noise [m/s] | rules | missed of all jams [%] | false alarms per hour, 95 % | delay at start [s] | "
+    lines = [head + "latest end [s] | on at rest [%] |", "|---|---|---|---|---|---|---|---|"]
+    for case in CASES:
+        for noise in NOISES:
+            for rules in RULES:
+                _, v = one(case, rules, members, noise)
+                missed, false = int((~v.found).sum()), int(v.false.sum())
+                low, high = clopper_pearson(missed, members)
+                few, many = garwood(false, float(v.moving.sum()) / 3600.0)
+                latest = float(np.nanmax(v.late)) if np.isfinite(v.late).any() else np.nan
+                share = f"{100 * missed / members:.1f} ({100 * low:.1f} to {100 * high:.1f})"
+                lines.append(
+                    f"| {case} | {noise:g} | {rules} | {share} | "
+                    f"{number(false / (float(v.moving.sum()) / 3600.0))} ({number(few)} to {number(many)}) | "
+                    f"{np.nanmean(v.delay):.2f} | {'never' if np.isinf(latest) else f'{latest:.2f}'} | "
+                    f"{100 * v.on.mean():.1f} |"
+                )
+    return "\n".join(lines)
+
+
+def found_table(case: str = "3.3.4", members: int = 3000) -> tuple[str, dict[str, np.ndarray]]:
+    """Share of jams found by length and depth, as a table of the repaired rules and as arrays of both."""
+    shares = {}
+    for rules in RULES:
+        jams, v = one(case, rules, members)
+        shares[rules] = np.array(
+            [[v.found[(jams.depth == d) & (jams.length == n)].mean() for n in LENGTHS] for d in DEPTHS]
+        )
+    lines = ["| depth | " + " | ".join(f"{1000 * n:g} ms" for n in LENGTHS) + " |", "|---|" + "---|" * len(LENGTHS)]
+    for depth, row in zip(DEPTHS, shares["repaired"], strict=True):
+        lines.append(f"| {100 * depth:g} % | " + " | ".join(f"{100 * share:.0f}" for share in row) + " |")
+    return "\n".join(lines), shares
+
+
+def stuck_table(members: int = 100) -> str:
+    """A wheel that never rolls again, from 16 s on in scenario 3.3.4, with and without balises."""
+    case, lines = CASES["3.3.4"], []
+    lines.append("| depth | balises | told, share of the time [%] | largest position error [m] | odometer alone [m] |")
+    lines.append("|---|---|---|---|---|")
+    for depth in (0.05, 0.1, 0.3, 1.0):
+        for with_balises in (True, False):
+            rng = np.random.default_rng(SEED)
+            run = trains(case, members, rng)
+            jams = Jams(*(np.full(members, value) for value in (16.0, 1e3, depth)))
+            read = readings(run, jams, NOISE, rng, True)
+            found = observe(case, run, read, with_balises=with_balises)
+            t, every = PERIOD * np.arange(read.shape[1]), round(PERIOD / STEP)
+            window = (t > 17.0) & (run.v[:, ::every].min(axis=0) > 1.0)
+            error = np.abs(found["position"] - run.p[:, ::every])[:, window].max()
+            alone = odometer_error(run.p[:, ::every], read, 200.0 if with_balises else np.inf)[:, window].max()
+            told = 100.0 * float((found["odometer_fault"][:, window] > 0.5).mean())
+            lines.append(
+                f"| {100 * depth:g} % | {'every 200 m' if with_balises else 'none'} | {told:.0f} | {error:.1f} | "
+                f"{alone:.1f} |"
+            )
+    return "\n".join(lines)
+
+
+def odometer_error(position: np.ndarray, read: np.ndarray, spacing: float) -> np.ndarray:
+    """Error of the integrated odometer, reset at balises, shape (members, samples) [m]."""
+    way = np.concatenate([np.zeros((len(read), 1)), np.cumsum(PERIOD * read[:, 1:], axis=1)], axis=1)
+    error = way - position
+    last = np.floor(position / spacing) if np.isfinite(spacing) else np.zeros_like(position)
+    passed = np.concatenate([np.zeros((len(read), 1), bool), np.diff(last, axis=1) > 0], axis=1)
+    latest = np.maximum.accumulate(np.where(passed, np.arange(read.shape[1]), 0), axis=1)
+    return np.abs(error - np.take_along_axis(error, latest, axis=1))
+
+
+def micro_table(members: int = 200) -> str:
+    """Micro-jams: full, 10 ms in every 200 ms and fewer, from 10 s on: the residual shows nothing, the balises do."""
+    case = CASES["3.3.4"]
+    lines = [
+        "| jam in each 0.2 s | reading low by [%] | told, share of the time [%] | largest position error [m] | "
+        "odometer alone [m] |",
+        "|---|---|---|---|---|",
+    ]
+    for share in (0.005, 0.01, 0.02, 0.03):
+        rng = np.random.default_rng(SEED)
+        run = trains(case, members, rng)
+        read = readings(run, None, NOISE, rng, True)
+        t, every = PERIOD * np.arange(read.shape[1]), round(PERIOD / STEP)
+        growing = np.clip((t - 10.0) / 10.0, 0.0, 1.0)  # more and more of them: no edge to be seen
+        read = read * (1.0 - share * growing)
+        found = observe(case, run, read)
+        window = (t > 20.0) & (run.v[:, ::every].min(axis=0) > 1.0)
+        error = np.abs(found["position"] - run.p[:, ::every])[:, window].max()
+        told = 100.0 * float((found["odometer_fault"][:, window] > 0.5).mean())
+        alone = odometer_error(run.p[:, ::every], read, 200.0)[:, window].max()
+        lines.append(f"| {200 * share:g} ms | {100 * share:g} | {told:.0f} | {error:.1f} | {alone:.1f} |")
+    return "\n".join(lines)
+
+
+def draw(shares: dict[str, np.ndarray], path: Path = PICTURE) -> None:
+    """Share of jams found over their length, a curve for each depth, and the same for the end of the fault."""
+    mpl.rcParams.update(RC)
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+    colours = plt.cm.viridis(np.linspace(0.0, 0.9, len(DEPTHS)))
+    for depth, row, colour in zip(DEPTHS, shares["repaired"], colours, strict=True):
+        left.plot(LENGTHS, 100.0 * row, "o-", ms=3, color=colour, label=f"{100 * depth:g} %")
+    for row, colour in zip(shares["printed"], colours, strict=True):
+        left.plot(LENGTHS, 100.0 * row, ":", lw=1, color=colour)
+    left.set(xscale="log", xlabel="length of the jam [s]", ylabel="found [%]")
+    left.legend(title="depth; dotted: printed rules", fontsize=7, title_fontsize=7)
+    for rules, style in (("repaired", "-"), ("printed", ":")):
+        for case, colour in zip(("3.3.4", "HS", "AS"), ("C0", "C1", "C2"), strict=True):
+            _, v = one(case, rules, 1000)
+            late = np.sort(v.late[~np.isnan(v.late)])
+            right.plot(
+                late, 100.0 * np.arange(1, len(late) + 1) / len(late), style, color=colour, label=f"{case}, {rules}"
+            )
+    right.set(xlim=(0.0, 2.5), xlabel="end of the fault told after that of the jam [s]", ylabel="of the jams found [%]")
+    right.legend(fontsize=7)
+    for axis in (left, right):
+        axis.grid(alpha=0.3)
+    figure.savefig(path, dpi=90)
+
+
+def main() -> None:
+    """Write all tables into the page, and the picture."""
+    found, shares = found_table()
+    text = PAGE.read_text(encoding="utf-8")
+    for name, table in (
+        ("rates", rates_table()),
+        ("found", found),
+        ("stuck", stuck_table()),
+        ("micro", micro_table()),
+    ):
+        part = re.compile(rf"(<!-- study: {name} -->\n).*?(<!-- end -->)", re.DOTALL)
+        assert part.search(text), name
+        text = part.sub(lambda m, table=table: f"{m[1]}\n{table}\n\n{m[2]}", text)
+        print(table, end="\n\n")
+    PAGE.write_text(text, encoding="utf-8", newline="\n")
+    draw(shares)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,133 @@
+"""Fault detection in numbers: which detections belong to which faults, exact intervals, positions before balises."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf, isnan
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.stats
+
+from cosim.evaluation.fault_detection import (
+    clopper_pearson,
+    fault_detection,
+    garwood,
+    intervals,
+    judged_detections,
+    position_errors,
+)
+from cosim.evaluation.fault_table import HEADINGS, cells, fault_text
+from cosim.evaluation.spec import ReportSpec
+from cosim.report.page.run_tables import faults_table
+from cosim.results.result import BaliseRecord, Result
+from cosim.scenario.outcome import Outcome
+from cosim.studies.measures import detection_measures, measure_unit
+
+SPEC = ReportSpec(true_position="train.position", true_fault="wheel.active", observers=["o", "alone"])
+
+
+def made(true: list[tuple[float, float]], told: list[tuple[float, float]], stop: float = 100.0) -> Result:
+    """A run at 10 m/s in rows 0.1 s apart; the observer `o` is 1 m behind, `alone` tells nothing and is 3 m ahead."""
+    t = np.round(np.arange(0.0, stop + 0.05, 0.1), 9)
+    t = np.sort(np.append(t, 50.0))  # a balise: two rows
+
+    def on(spans: list[tuple[float, float]]) -> np.ndarray:
+        return np.any([np.zeros(len(t), bool), *((t >= a) & (t < b) for a, b in spans)], axis=0).astype(float)
+
+    columns: dict[str, Any] = {
+        "time": t,
+        "train.position": 10.0 * t,
+        "wheel.active": on(true),
+        "o.position": 10.0 * t - np.where(np.arange(len(t)) < np.searchsorted(t, 50.0) + 1, 1.0, 0.0),
+        "o.odometer_fault": on(told),
+        "alone.position": 10.0 * t + 3.0,
+    }
+    table = np.zeros(len(t), [(name, "f8") for name in columns])
+    for name, values in columns.items():
+        table[name] = values
+    return Result(table, [], [BaliseRecord(50.0, 50.0, "b", 500.0, 500.0)])
+
+
+def test_faults_misses_false_alarms_and_delays() -> None:
+    true = [(10.0, 13.0), (20.0, 20.2), (30.0, 31.0)]
+    told = [(10.4, 13.2), (20.5, 21.0), (60.0, 61.0)]  # late by 0.4 s; just after a short one; of no fault
+    result = made(true, told)
+    (found, alone) = fault_detection(result, SPEC)
+    assert (found.faults, found.detected, found.missed, found.detections, found.false) == (3, 2, 1, 3, 1)
+    np.testing.assert_allclose(found.start_delays, [0.4, 0.5], atol=1e-9)
+    np.testing.assert_allclose(found.end_delays, [0.2, 0.8], atol=1e-9)
+    assert found.time_outside == pytest.approx(0.2 + 0.5 + 1.0)
+    assert (found.detection_rate, found.missed_rate, found.false_rate) == (2 / 3, 1 / 3, 1 / 3)
+    assert found.false_per_hour == pytest.approx(36.0)
+    assert found.position_errors == (pytest.approx(-1.0),)  # the row before the balise, not the one after
+    assert not alone.tells
+    assert alone.position_errors == (pytest.approx(3.0),)
+    shown = dict(zip(HEADINGS, cells(found), strict=True))
+    assert (shown["Faults"], shown["Missed"], shown["False"]) == ("3", "1", "1")
+    assert len(fault_text([found, alone], SPEC).splitlines()) == 4
+    assert len(faults_table(result, SPEC).groups[0][1]) == 2
+
+
+def test_a_detection_that_never_ends_is_told_so() -> None:
+    (found, _) = fault_detection(made([(10.0, 12.0)], [(10.2, 200.0)]), SPEC)
+    assert found.end_delays == (inf,)
+    assert found.to_data()["end_delays"] == [None]
+    assert "not ended" in cells(found)
+
+
+def test_one_detection_may_cover_two_faults_and_two_one_fault() -> None:
+    assert judged_detections([(1.0, 2.0), (3.0, 4.0)], [(1.5, 4.5)], 10.0) == ([0.5, 0.0], [2.5, 0.5], 0)
+    assert judged_detections([(1.0, 5.0)], [(1.2, 2.0), (3.0, 5.1)], 10.0) == (
+        [pytest.approx(0.2)],
+        [pytest.approx(0.1)],
+        0,
+    )
+    assert judged_detections([], [(1.0, 2.0)], 10.0) == ([], [], 1)
+
+
+def test_what_is_before_the_evaluation_does_not_count() -> None:
+    (found, _) = fault_detection(made([(2.0, 3.0)], [(2.0, 3.0), (4.0, 5.0)]), replace(SPEC, evaluate_after=6.0))
+    assert (found.faults, found.detections, found.false, found.duration) == (0, 0, 0, pytest.approx(94.0))
+    assert isnan(found.missed_rate)
+
+
+def test_without_the_role_or_a_run_nothing_is_judged() -> None:
+    assert fault_detection(made([], []), ReportSpec(observers=["o"])) == []
+    assert fault_detection(Result(np.zeros(0, [("time", "f8"), ("wheel.active", "f8")]), []), SPEC) == []
+    assert position_errors(made([], []), ReportSpec(observers=["o"]), "o") == []
+
+
+def test_rows_of_one_time_do_not_cut_an_interval() -> None:
+    t = np.array([0.0, 1.0, 1.0, 2.0, 3.0])
+    assert intervals(t, np.array([1.0, 1.0, 0.0, 1.0, 0.0])) == [(0.0, 1.0), (2.0, 3.0)]
+    assert intervals(t, np.array([0.0, 1.0, 1.0, 1.0, 1.0])) == [(1.0, 3.0)]
+
+
+@pytest.mark.parametrize(("count", "exposure"), [(0, 2.0), (1, 0.5), (7, 3.0), (120, 10.0)])
+def test_garwood_is_the_exact_poisson_interval(count: int, exposure: float) -> None:
+    """Against the definition: at the limits the tails of the Poisson distribution are 2.5 %."""
+    low, high = garwood(count, exposure)
+    assert scipy.stats.poisson.cdf(count, high * exposure) == pytest.approx(0.025)
+    if count:
+        assert scipy.stats.poisson.sf(count - 1, low * exposure) == pytest.approx(0.025)
+    else:
+        assert low == 0.0
+
+
+@pytest.mark.parametrize(("count", "trials"), [(0, 5), (5, 5), (3, 40), (1, 1000)])
+def test_clopper_pearson_is_that_of_scipy(count: int, trials: int) -> None:
+    expected = scipy.stats.binomtest(count, trials).proportion_ci(method="exact")
+    assert clopper_pearson(count, trials) == pytest.approx((expected.low, expected.high), abs=1e-9)
+    assert all(map(isnan, clopper_pearson(0, 0)))
+    assert all(map(isnan, garwood(0, 0.0)))
+
+
+def test_they_are_measures_of_a_sweep() -> None:
+    measures = detection_measures(Outcome(made([(10.0, 13.0)], [(10.4, 13.2)]), SPEC))
+    assert measures["o.missed_faults"] == measures["o.false_alarms"] == 0.0
+    assert measures["o.detection_delay"] == pytest.approx(0.4)
+    assert measures["alone.balise_error"] == pytest.approx(3.0)
+    assert "alone.missed_faults" not in measures
+    assert (measure_unit("o.detection_delay"), measure_unit("o.missed_faults")) == ("s", "1")

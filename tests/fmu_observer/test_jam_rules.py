@@ -1,0 +1,327 @@
+"""Jam rules: the printed ones rule by rule and their latch-up, the repaired ones and the theorem of
+docs/jam_detection.md.
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from jam_members import PERIOD, Members
+
+from fmu_observer.design.jam_recovery import held_position_error, held_speed_error, recovery_bounds
+from fmu_observer.design.quasi_lpv_published import SECTION_3_3_4, SECTION_5_3_1
+from fmu_observer.detection.jam_detector import RULES, JamDetector
+from fmu_observer.detection.jam_rules import (
+    HELD,
+    TRUSTED,
+    UNCONFIRMED,
+    Passing,
+    Reading,
+    RepairedRules,
+    RuleMemory,
+    agreement_limit,
+)
+from fmu_observer.detection.printed_jam_rules import PrintedMemory, PrintedRules
+from fmu_observer.observers.train.quasi_lpv_uio import speed_errors
+from plant_models.hybrid import Runtime
+
+SHARED = {"odometer_period": PERIOD, "threshold": 0.9, "residual_gain": 2.3, "arming_delay": 0.0}
+PRINTED = SimpleNamespace(**SHARED, rule_4=0.0)
+P = SimpleNamespace(**SHARED, **{s.name: s.start for s in RepairedRules.parameters})
+ARMED = RuleMemory(TRUSTED, 0.0, 0.0, 9.0, 0.0, 20.0, 9.0, 0.0, 99.0)
+THETA = 0.9 / 2.3
+
+
+def printed(readings: list[float], speed: float, p: Any = PRINTED) -> list[tuple[float, float]]:
+    """(F, R) in force at each sample beside an estimate that stays."""
+    memory: tuple[Any, ...] = tuple(0.0 for _ in PrintedRules.memory)
+    found = []
+    for y in readings:
+        memory = PrintedRules().at_sample(memory, Reading(y, speed, 2.3 * (y - speed), -1.0), p).memory
+        found.append((float(memory[0]), float(memory[1])))
+    return found
+
+
+def repaired(before: RuleMemory, y: float, speed: float, effort: float = -1.0, p: Any = P) -> Any:
+    return RepairedRules().at_sample(before, Reading(y, speed, p.residual_gain * (y - speed), effort), p)
+
+
+# -- printed
+# --------------------------------------------------------------------------------------------------------
+
+
+def test_the_printed_rules_take_effect_a_sample_late() -> None:
+    #         falls     beyond eps  still  rises   falls   falls
+    assert printed([20.0, 19.0, 18.9, 19.9, 19.8, 19.7], 20.0) == [(0, 0), (0, 0), (1, 0), (1, 0), (1, 1), (0, 0)]
+
+
+def test_the_printed_fault_stays_for_ever_where_the_reading_only_falls() -> None:
+    """The latch-up: the wheel rolls, and nothing ends the fault."""
+    falling = [20.0 - 0.18 * k for k in range(100)]
+    assert printed(falling, 20.0)[-1] == (1.0, 0.0)
+
+
+def test_rule_4_calls_a_rise_a_fault_and_rule_5_a_standing_wheel() -> None:
+    rising = [20.0, 19.9, 19.95, 19.9, 19.85, 19.8]
+    assert (1.0, 1.0) not in printed(rising, 19.9)
+    assert (1.0, 1.0) in printed(rising, 19.9, SimpleNamespace(**SHARED, rule_4=1.0))
+    memory = PrintedMemory(1.0, 1.0, 1.0, 1.0, 0.5, 9.0)  # rule 3 and rule 5 at once: the later one counts
+    after = PrintedRules().at_sample(memory, Reading(0.0, 0.1, -0.2, -1.0), PRINTED).memory
+    assert PrintedMemory(*after).next_fault == 1.0
+
+
+def test_the_printed_rules_know_no_balises() -> None:
+    memory = tuple(0.5 for _ in PrintedRules.memory)
+    assert PrintedRules().at_balise(memory, Passing(4.0, 200.0, 9.0, 200.0, 0.0, 0.0, 1.0), PRINTED).memory == memory
+
+
+# -- repaired, sample by sample
+# ------------------------------------------------------------------------------------
+
+
+def test_a_fault_begins_at_the_sample_that_shows_it() -> None:
+    for gap, expected in ((THETA - 1e-6, TRUSTED), (THETA + 1e-6, HELD)):
+        judged = repaired(ARMED, 20.0 - gap, 20.0)
+        assert RuleMemory(*judged.memory).mode == expected
+        assert judged.onset == (expected == HELD)
+
+
+@pytest.mark.parametrize(
+    ("offset", "effort", "expected"),
+    [(-1, -1.0, HELD), (1, -1.0, TRUSTED), (1, 1.0, HELD), (-1, 1.0, TRUSTED), (1, 0.0, HELD), (-1, 0.0, HELD)],
+)
+def test_jams_only_while_braking_and_skids_only_while_driving(offset: int, effort: float, expected: float) -> None:
+    judged = repaired(ARMED, 20.0 + offset, 20.0, effort)
+    assert RuleMemory(*judged.memory).mode == expected
+    # what no fault can be is the estimate's mistake: it takes the reading
+    assert judged.restart == (expected == TRUSTED)
+    without = SimpleNamespace(**{**vars(P), "sign_rule": 0.0})
+    assert RuleMemory(*repaired(ARMED, 20.0 + offset, 20.0, effort, without).memory).mode == HELD
+
+
+def test_nothing_is_judged_before_it_is_armed_or_near_standstill() -> None:
+    for before in (ARMED._replace(faults=1000.0, settled=0.0), ARMED._replace(faults=3.0, settled=0.0)):
+        assert RuleMemory(*repaired(before, 15.0, 20.0).memory).mode == TRUSTED
+    late = SimpleNamespace(**{**vars(P), "arming_delay": 60.0})
+    assert RuleMemory(*repaired(ARMED, 15.0, 20.0, p=late).memory).mode == TRUSTED
+    assert RuleMemory(*repaired(ARMED, 0.0, 0.49).memory).mode == TRUSTED
+    settling = ARMED._replace(faults=1000.0, settled=0.0)
+    for _ in range(5):
+        settling = RuleMemory(*repaired(settling, 20.0, 20.0).memory)
+    assert settling.faults == 0.0
+    assert RuleMemory(*repaired(settling, 15.0, 20.0).memory).mode == HELD
+
+
+def test_agreement_widens_with_the_time_held_and_takes_two_samples() -> None:
+    for held, gap, expected in ((1.0, 0.45, TRUSTED), (1.0, 0.55, HELD), (4.0, 0.75, TRUSTED)):
+        memory = ARMED._replace(mode=HELD, hold_time=held - PERIOD, last_odometer=20.0 - gap)
+        first = repaired(memory, 20.0 - gap, 20.0)
+        assert RuleMemory(*first.memory).mode == HELD
+        second = repaired(RuleMemory(*first.memory), 20.0 - gap, 20.0)
+        assert RuleMemory(*second.memory).mode == expected
+        assert second.restart == (expected == TRUSTED)
+    assert float(agreement_limit(2.0, P)) == pytest.approx(0.9 + 2.3 * 0.1 * 2.0)
+
+
+def test_a_wheel_that_jumps_does_not_roll() -> None:
+    memory = ARMED._replace(mode=HELD, hold_time=5.0, agreeing=1.0, last_odometer=19.0)
+    jumped = repaired(memory, 20.0, 20.0)  # 1 m/s in a sample: it agrees, and the row begins anew
+    assert (RuleMemory(*jumped.memory).mode, RuleMemory(*jumped.memory).agreeing) == (HELD, 1.0)
+
+
+def test_a_braked_wheel_that_is_too_fast_is_believed_at_once() -> None:
+    judged = repaired(ARMED._replace(mode=HELD, hold_time=0.2), 25.0, 20.0)
+    assert (RuleMemory(*judged.memory).mode, judged.restart) == (TRUSTED, 1.0)
+
+
+def test_a_hold_ends_at_its_limit_and_is_not_called_healthy() -> None:
+    judged = repaired(ARMED._replace(mode=HELD, hold_time=P.hold_limit - PERIOD), 5.0, 20.0)
+    memory = RuleMemory(*judged.memory)
+    assert (memory.mode, judged.restart, memory.faults) == (UNCONFIRMED, 1.0, 1000.0)
+    rules = RepairedRules()
+    assert (rules.fault(judged.memory), rules.recovering(judged.memory), rules.discarded(judged.memory)) == (1, 1, 0)
+    for _ in range(99):
+        memory = RuleMemory(*repaired(memory, 5.0, 5.0).memory)
+    assert memory.mode == UNCONFIRMED
+    memory = RuleMemory(*repaired(memory, 5.0, 5.0).memory)  # 100 samples are the 20 s of trust_time
+    assert (memory.mode, memory.faults) == (TRUSTED, 0.0)
+
+
+# -- repaired, at balises
+# ------------------------------------------------------------------------------------------
+
+
+def passing(way: float, believed: float = 200.0, **changed: float) -> Passing:
+    return Passing(5.0, 200.0, way, believed, 0.0, 0.0, 1.0)._replace(**changed)
+
+
+@pytest.mark.parametrize(("way", "expected"), [(197.1, True), (196.9, False), (202.9, True), (203.1, False)])
+def test_the_way_of_the_odometer_is_right_within_1_m_and_1_percent(way: float, expected: bool) -> None:
+    held = ARMED._replace(mode=HELD)
+    judged = RepairedRules().at_balise(held, passing(way), P)
+    assert (RuleMemory(*judged.memory).mode == TRUSTED) == expected
+    assert judged.restart == expected
+
+
+def test_a_refuted_hold_corrects_the_speed_by_its_mean_error_and_halves_the_clock() -> None:
+    judged = RepairedRules().at_balise(ARMED._replace(mode=HELD, hold_time=9.0), passing(180.0, 210.0), P)
+    assert judged.shift == pytest.approx(-2.0)  # 10 m too far in 5 s
+    assert RuleMemory(*judged.memory).hold_time == 2.5
+
+
+def test_an_odometer_that_is_believed_must_be_refuted_twice() -> None:
+    first = RuleMemory(*RepairedRules().at_balise(ARMED, passing(180.0), P).memory)
+    assert first.mode == TRUSTED
+    assert RuleMemory(*RepairedRules().at_balise(first, passing(200.0), P).memory).refutations == 0.0
+    assert RuleMemory(*RepairedRules().at_balise(first, passing(180.0), P).memory).mode == HELD
+    unconfirmed = ARMED._replace(mode=UNCONFIRMED)
+    assert RuleMemory(*RepairedRules().at_balise(unconfirmed, passing(180.0), P).memory).mode == HELD
+    assert RuleMemory(*RepairedRules().at_balise(unconfirmed, passing(200.0), P).memory).mode == TRUSTED
+
+
+@pytest.mark.parametrize("changed", [{"known": 0.0}, {"duration": 0.5}, {"duration": 9.5}])
+def test_a_way_with_a_change_in_it_says_nothing(changed: dict[str, float]) -> None:
+    """No balise before; too short; longer than the mode has been what it is (9 s)."""
+    held = ARMED._replace(mode=HELD, hold_time=3.0)
+    judged = RepairedRules().at_balise(held, passing(100.0, **changed), P)
+    assert RuleMemory(*judged.memory)[:5] == held[:5]
+    assert judged.shift == 0.0
+
+
+# -- the theorem
+# ----------------------------------------------------------------------------------------------------
+
+
+def wheel(rng: np.random.Generator, members: int, seconds: float) -> np.ndarray:
+    """True speeds at the samples, shape (samples, members): braking at 0.3 to 1.2 m/s2, never to rest."""
+    t = PERIOD * np.arange(round(seconds / PERIOD))
+    rate, phase = rng.uniform(0.05, 0.2, members), rng.uniform(0.0, 6.0, members)
+    return np.asarray(
+        200.0 - (0.68 + rate) * t[:, None] - 0.05 * (np.cos(phase) - np.cos(0.1 * t[:, None] + phase)) / 0.1
+    )
+
+
+NO_DRAG = {"davis_a": 0.0, "davis_b": 0.0, "davis_c": 0.0, "odometer_noise": 0.02}
+
+
+def test_a_by_agreement_it_is_believed_at_the_second_rolling_sample() -> None:
+    """2000 jams of random length and depth; the model is wrong by delta at most."""
+    members, rng = 2000, np.random.default_rng(0)
+    onset_error, noise = 0.3, 0.02
+    run = Members(members, -0.68, **NO_DRAG)
+    run.set_rules(faults=0.0, settled=9.0, samples=99.0)
+    end = rng.integers(2, 60, members)  # samples until the wheel rolls
+    depth = rng.uniform(0.05, 1.0, members)
+    error = rng.uniform(-onset_error, onset_error, members)
+    model_error = rng.uniform(-1.0, 1.0, members) * run.p.disturbance_bound
+    v = 150.0 - (0.68 + 0.1) * PERIOD * np.arange(80)
+    run.x[1] = v[0] + error
+    run.x[2] = run.x[11 - 4] = 0.0
+    run.x[2] = run.x[7] = 0.1 - model_error
+    bounds = recovery_bounds(*speed_errors(run.p), run.p, onset_error=onset_error)
+    assert bounds.agrees
+    believed = np.full(members, -1)
+    for k in range(80):
+        now = v[k] * np.where(k < end, 1.0 - depth, 1.0) + rng.uniform(-noise, noise, members)
+        held = (believed < 0) & (k > 0)
+        assert (np.abs(run.x[1] - v[k])[held] <= held_speed_error(k * PERIOD, run.p, onset_error) + 1e-9).all()
+        run.sample(now)
+        if k == 0:
+            assert (run.rule("mode") == HELD).all()
+        believed = np.where((believed < 0) & (run.rule("mode") == TRUSTED), k, believed)
+    late = (believed - end + 1) * PERIOD
+    assert (believed > 0).all()
+    assert late.max() <= bounds.agreement + 1e-9
+    # Where the estimate is too low by more than theta the first sample shows it; the bound is met, not only kept.
+    assert np.isclose(late, bounds.agreement).mean() > 0.5
+
+
+@pytest.mark.parametrize("members", [500, 10000])
+def test_b_from_every_state_it_is_believed_for_good_within_the_bound(members: int) -> None:
+    """Observers whose estimate and memory are anything, beside wheels that roll."""
+    rng, noise = np.random.default_rng(1), 0.02
+    run = Members(members, -0.68, **NO_DRAG)
+    bounds = recovery_bounds(
+        *speed_errors(run.p), run.p, onset_error=0.3, disturbance_error=1.0, rate_error=0.2, curvature=5e-4
+    )
+    assert bounds.settles
+    v = wheel(rng, members, bounds.any_state + 5.0)
+    run.x[1] = v[0] + rng.uniform(-20.0, 20.0, members)
+    run.x[2], run.x[3] = rng.uniform(-1.0, 1.0, members), rng.uniform(-0.2, 0.2, members)
+    run.x[7], run.x[8] = run.x[2], run.x[3]
+    run.set_rules(
+        mode=rng.integers(0, 3, members),
+        hold_time=rng.uniform(0.0, 15.0, members),
+        agreeing=rng.integers(0, 5, members),
+        settled=rng.integers(0, 9, members),
+        faults=rng.choice([0.0, 1.0, 2.0, 3.0, 1000.0], members),
+        last_odometer=v[0] + rng.uniform(-20.0, 20.0, members),
+        samples=rng.integers(0, 99, members),
+    )
+    last = np.zeros(members)
+    for k in range(len(v)):
+        run.sample(v[k] + rng.uniform(-noise, noise, members))
+        last = np.where(run.rule("mode") > TRUSTED, (k + 1) * PERIOD, last)
+    assert last.max() <= bounds.any_state
+    assert last.max() > run.p.trust_time  # some went all the way
+    assert np.percentile(last, 99.0) < 60.0  # the bound, 107 s, is of the worst that could follow the worst
+    assert (np.abs(run.x[1] - v[-1])).max() < 0.3
+
+
+def test_the_position_strays_by_no_more_than_its_bound_while_the_model_runs_alone() -> None:
+    run = Members(1, -0.68, **NO_DRAG)
+    run.set_rules(mode=HELD, faults=0.0, samples=99.0)
+    run.x[1], run.x[2], run.x[7] = 150.3, 0.1, 0.1
+    run.x[2] += 0.1  # delta: the model brakes too much or too little
+    true, way = 150.0 - 0.78 * PERIOD * np.arange(60), 0.0
+    for k in range(50):
+        run.sample(np.zeros(1))
+        way += PERIOD * (true[k] - 0.5 * 0.78 * PERIOD)
+        bound = held_position_error((k + 1) * PERIOD, run.p, 0.3)
+        assert abs(float(run.x[0][0]) - way) <= bound + 1e-9
+
+
+@pytest.mark.parametrize("design", [SECTION_3_3_4, SECTION_5_3_1])
+def test_where_noise_is_too_much_the_bounds_say_so(design: Any) -> None:
+    run = Members(1, 0.0, odometer_noise=0.5, threshold=design.threshold, residual_gain=design.residual_gain)
+    bounds = recovery_bounds(*speed_errors(run.p), run.p, onset_error=0.3)
+    assert (bounds.agrees, bounds.settles, bounds.any_state) == (False, False, np.inf)
+    drifts, gains = speed_errors(run.p)
+    unstable = recovery_bounds(drifts, -gains, run.p, onset_error=0.0)
+    assert unstable.steady_residual == np.inf
+
+
+# -- the block
+# ------------------------------------------------------------------------------------------------------
+
+
+def test_the_presets_of_the_detector_are_the_published_designs() -> None:
+    for name, design in (("as_published", SECTION_3_3_4), ("as_published_5_3_1", SECTION_5_3_1)):
+        assert JamDetector.presets[name] == {"threshold": design.threshold, "residual_gain": design.residual_gain}
+
+
+@pytest.mark.parametrize("rules", RULES)
+def test_the_block_tells_a_jam(rules: Any) -> None:
+    """An estimate that is exact; a wheel that jams from 10 s to 12 s and rolls again."""
+    runtime = Runtime(JamDetector(rules))
+    runtime.start(0.0)
+    told = []
+    for k in range(1, 100):
+        t = k * PERIOD
+        v = 40.0 - 0.9 * t
+        y = v * (0.8 if 10.0 <= t - 1e-9 < 12.0 else 1.0)
+        runtime.u[:4] = 2.3 * (y - v), y, v, -0.9
+        runtime.advance(t)
+        told.append(float(runtime.update_outputs()[0]))
+    on = PERIOD * (1 + np.flatnonzero(told))
+    late = PERIOD if rules == "printed" else 0.0
+    assert on[0] == pytest.approx(10.2 + late)
+    assert on[-1] == pytest.approx(12.4 if rules == "printed" else 12.2, abs=0.21)
+
+
+def test_unknown_rules_are_refused() -> None:
+    with pytest.raises(ValueError, match="jam_detector: unknown rules 'mine'; use 'repaired' or 'printed'"):
+        JamDetector("mine")  # type: ignore[arg-type]
