@@ -8,11 +8,11 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from cosim import studies
 from cosim.cli.scenarios import add_scenario, load_scenario, parse_setting
 from cosim.errors import ScenarioError, nearest
 from cosim.results.folder import check_writable
 from cosim.scenario.override import CASE
-from cosim.studies.groups import groups_text, write_groups
 from cosim.studies.sampling import MOST, Range, uniform
 from fmus.cli.progress import ProgressBar
 
@@ -90,11 +90,11 @@ def execute(options: argparse.Namespace) -> int:
             resume=options.resume,
         )
     if options.by is not None:
-        write_groups(result, options.by, directory)
+        studies.write_groups(result, options.by, directory)
     if options.json:
         print((directory / "index.json").read_text(encoding="utf-8"), end="")
     else:
-        print(result.text() if options.by is None else groups_text(result, options.by))
+        print(result.text() if options.by is None else studies.groups_text(result, options.by))
         print(f"\n{len(result) - len(result.failed)} of {len(result)} runs done: {directory}")
     return SOME_FAILED if result.failed else DONE
 

@@ -139,8 +139,8 @@ def judged_detections(
         Delays of the detected faults at their start and at their end [s], and the number of false detections.
     """
     starts, ends, matched = [], [], set()
-    following = [a for a, _ in faults[1:]] + [inf]
-    for (a, b), next_begin in zip(faults, following, strict=True):
+    for number, (a, b) in enumerate(faults, 1):
+        next_begin = faults[number][0] if number < len(faults) else inf
         own = [k for k, (c, d) in enumerate(detections) if c <= min(b + grace, next_begin) and d > a]
         matched |= set(own)
         if own:

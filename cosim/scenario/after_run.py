@@ -49,8 +49,8 @@ def warnings_after(
 
 def _declared(table: np.ndarray, name: str, signal: str, warning: OutputWarning) -> Iterator[str]:
     """What an output warns of, with the instant of the first row that is not zero and the values there."""
-    column = f"{name}.{signal}"
-    if column not in (table.dtype.names or ()) or not len(table):
+    column, fields = f"{name}.{signal}", table.dtype.names or ()
+    if column not in fields or not len(table):
         return
     values = np.asarray(table[column], dtype=float)
     raised = np.flatnonzero(values != 0.0)
@@ -59,7 +59,7 @@ def _declared(table: np.ndarray, name: str, signal: str, warning: OutputWarning)
     if not len(raised):
         return
     time, first = np.asarray(table["time"], dtype=float), raised[0]
-    shown = [other for other in warning.shows if f"{name}.{other}" in table.dtype.names]
+    shown = [other for other in warning.shows if f"{name}.{other}" in fields]
     told = ", ".join(f"{other} = {float(table[f'{name}.{other}'][first]):.6g}" for other in shown)
     beside = f" ({told})" if told else ""
     if warning.at_end:

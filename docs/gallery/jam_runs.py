@@ -151,9 +151,21 @@ def observe(
     batch.set("effort", -case.known)
     batch.set("odometer", read[:, 0])
     batch.start()
-    found = batch.run(PERIOD * np.arange(1, read.shape[1]), results=list(OUTPUTS), inputs={"odometer": read})
+    # An input is held from one instant to the next, and the sample at the end of a step must see the new reading.
+    ahead = np.concatenate([read[:, 1:], read[:, -1:]], axis=1)
+    found = batch.run(PERIOD * np.arange(1, read.shape[1]), results=list(OUTPUTS), inputs={"odometer": ahead})
     assert not batch.failures, batch.failures
     return {name: found[:, :, i] for i, name in enumerate(OUTPUTS)}
+
+
+def odometer_error(position: np.ndarray, read: np.ndarray, spacing: float) -> np.ndarray:
+    """Integrated odometer, reset at balises, minus position at the samples, shape (members, samples) [m]."""
+    way = np.concatenate([np.zeros((len(read), 1)), np.cumsum(PERIOD * read[:, :-1], axis=1)], axis=1)
+    error = way - position
+    last = np.floor(position / spacing) if np.isfinite(spacing) else np.zeros_like(position)
+    passed = np.concatenate([np.zeros((len(read), 1), bool), np.diff(last, axis=1) > 0], axis=1)
+    latest = np.maximum.accumulate(np.where(passed, np.arange(read.shape[1]), 0), axis=1)
+    return np.asarray(error - np.take_along_axis(error, latest, axis=1))
 
 
 @dataclass(frozen=True)
@@ -199,3 +211,13 @@ def verdicts(run: Trains, jams: Jams, told: np.ndarray, after: float = 6.0) -> V
         fault[np.arange(len(rest)), rest],
         np.maximum(moving.sum(axis=1) * PERIOD - after, 0.0),
     )
+
+
+def at_samples(values: np.ndarray) -> np.ndarray:
+    """Of what stands every `STEP`, that at the readings."""
+    return values[:, :: round(PERIOD / STEP)]
+
+
+def before_balises(position: np.ndarray, spacing: float = 200.0) -> np.ndarray:
+    """Numbers of the last samples before the balises, of one train at its samples, shape (samples,)."""
+    return np.flatnonzero(np.diff(np.floor(position / spacing)) > 0)

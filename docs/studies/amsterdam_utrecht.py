@@ -1,12 +1,16 @@
 """Every train observer on the line Amsterdam - Utrecht: how far it is off at the end of the longest gaps.
 
-``python docs/studies/amsterdam_utrecht.py`` prints the tables of docs/amsterdam_utrecht.md. Everything runs in one run
-of the shipped scenario: its own observers, and beside them those that it leaves out, with gains for gaps of 32 s.
+``python docs/studies/amsterdam_utrecht.py`` prints the tables of docs/amsterdam_utrecht.md, with ``--write`` it puts
+them there. Everything runs in one run of the shipped scenario: its own observers, and beside them those that it leaves
+out, with gains for gaps of 32 s.
 """
 
 from __future__ import annotations
 
+import re
+import sys
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +21,7 @@ from cosim.evaluation.numbers import error_number, number
 from fmu_observer.design.augmented_gains import design_for_gap
 
 SCENARIO = "amsterdam_utrecht"
+PAGE = Path(__file__).parents[1] / "amsterdam_utrecht.md"
 LONGEST_TIME = 32.0  # [s] between two balises, in the slow parts of the run
 FAULTS = 16  # jams and skids of the scenario
 STEPS = (0.01, 0.05, 0.1)  # [s]
@@ -104,7 +109,7 @@ def all_gaps(found: GapErrors, quiet: GapErrors) -> str:
         found: of the run with faults. quiet: of the same run without.
     """
     head = [f"{len(found.gaps)} gaps", "largest [m]", "rms [m]", "largest [s]", "within SUBSET-041 [%]"]
-    head += ["largest without jams and skids [m]", "certified for 22.5 s"]
+    head += ["largest without jams and skids [m]"]
     rows = []
     for name, errors in found.errors.items():
         seconds = found.running_time(name)
@@ -152,16 +157,34 @@ def _metres(value: float) -> str:
     return error_number(float(value), 2)
 
 
-def main() -> None:
-    """Print all tables."""
+def tables() -> dict[str, str]:
+    """All tables, by their names on the page."""
     outcome, found = run(scenario())
     _, quiet = run(scenario(faults=False))
-    print(longest_gaps(found), "\n")
     known = certified(outcome)
-    names = list(found.errors)
     head, line, *rows = all_gaps(found, quiet).splitlines()
-    print("\n".join([head, line, *(f"{row} {known.get(n, '–')} |" for n, row in zip(names, rows, strict=True))]), "\n")
-    print(step_table())
+    head += " certified for 22.5 s |"
+    judged = [f"{row} {known.get(name, '–')} |" for name, row in zip(found.errors, rows, strict=True)]
+    return {
+        "longest gaps": longest_gaps(found),
+        "all gaps": "\n".join([head, f"{line} --- |", *judged]),
+        "steps": step_table(),
+    }
+
+
+def main() -> None:
+    """Print all tables, or write them into the page."""
+    made = tables()
+    if "--write" not in sys.argv:
+        print("\n\n".join(made.values()))
+        return
+    page = PAGE.read_text(encoding="utf-8")
+    for name, text in made.items():
+        part = rf"(<!-- study: {name} -->\n).*?(<!-- end -->)"
+        page, count = re.subn(part, lambda m, new=text: f"{m[1]}{new}\n{m[2]}", page, flags=re.DOTALL)
+        if count != 1:
+            sys.exit(f"{PAGE.name} has {count} parts '<!-- study: {name} -->' ... '<!-- end -->'")
+    PAGE.write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -18,7 +18,19 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "gallery"))
 
-from jam_runs import CASES, PERIOD, STEP, Jams, Verdicts, observe, random_jams, readings, trains, verdicts
+from jam_runs import (
+    CASES,
+    PERIOD,
+    STEP,
+    Jams,
+    Verdicts,
+    observe,
+    odometer_error,
+    random_jams,
+    readings,
+    trains,
+    verdicts,
+)
 
 from cosim.drawing.style import RC
 from cosim.evaluation.fault_detection import clopper_pearson, garwood
@@ -94,23 +106,13 @@ def stuck_table(members: int = 100) -> str:
             t, every = PERIOD * np.arange(read.shape[1]), round(PERIOD / STEP)
             window = (t > 17.0) & (run.v[:, ::every].min(axis=0) > 1.0)
             error = np.abs(found["position"] - run.p[:, ::every])[:, window].max()
-            alone = odometer_error(run.p[:, ::every], read, 200.0 if with_balises else np.inf)[:, window].max()
+            alone = np.abs(odometer_error(run.p[:, ::every], read, 200.0 if with_balises else np.inf)[:, window]).max()
             told = 100.0 * float((found["odometer_fault"][:, window] > 0.5).mean())
             lines.append(
                 f"| {100 * depth:g} % | {'every 200 m' if with_balises else 'none'} | {told:.0f} | {error:.1f} | "
                 f"{alone:.1f} |"
             )
     return "\n".join(lines)
-
-
-def odometer_error(position: np.ndarray, read: np.ndarray, spacing: float) -> np.ndarray:
-    """Error of the integrated odometer, reset at balises, shape (members, samples) [m]."""
-    way = np.concatenate([np.zeros((len(read), 1)), np.cumsum(PERIOD * read[:, 1:], axis=1)], axis=1)
-    error = way - position
-    last = np.floor(position / spacing) if np.isfinite(spacing) else np.zeros_like(position)
-    passed = np.concatenate([np.zeros((len(read), 1), bool), np.diff(last, axis=1) > 0], axis=1)
-    latest = np.maximum.accumulate(np.where(passed, np.arange(read.shape[1]), 0), axis=1)
-    return np.abs(error - np.take_along_axis(error, latest, axis=1))
 
 
 def micro_table(members: int = 200) -> str:
@@ -132,7 +134,7 @@ def micro_table(members: int = 200) -> str:
         window = (t > 20.0) & (run.v[:, ::every].min(axis=0) > 1.0)
         error = np.abs(found["position"] - run.p[:, ::every])[:, window].max()
         told = 100.0 * float((found["odometer_fault"][:, window] > 0.5).mean())
-        alone = odometer_error(run.p[:, ::every], read, 200.0)[:, window].max()
+        alone = np.abs(odometer_error(run.p[:, ::every], read, 200.0)[:, window]).max()
         lines.append(f"| {200 * share:g} ms | {100 * share:g} | {told:.0f} | {error:.1f} | {alone:.1f} |")
     return "\n".join(lines)
 

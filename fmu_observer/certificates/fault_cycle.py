@@ -225,16 +225,46 @@ def first_crossing(
     Returns:
         The time; inf where the error never reaches the threshold.
     """
-    matrix = np.asarray(error_matrix, dtype=float)
-    steady = np.linalg.solve(matrix, np.asarray(effort_column, dtype=float) * effort)
-    poles = np.linalg.eigvals(matrix)
-    times = np.geomspace(1e-6 / np.abs(poles).max(), 30.0 / -poles.real.max(), SCAN_POINTS)
+    times = _scan(error_matrix)
 
     def excess(t: float) -> float:
-        return abs(float(steady[row] - small_exponential(matrix * t)[row] @ steady)) - threshold
+        return _shown(error_matrix, effort_column, row, t) * abs(effort) - threshold
 
     above = np.flatnonzero([excess(float(t)) > 0.0 for t in times])
     if len(above) == 0:
         return float("inf")
     before = float(times[above[0] - 1]) if above[0] > 0 else 0.0
     return float(scipy.optimize.brentq(excess, before, float(times[above[0]]), xtol=1e-15))
+
+
+def smallest_effort(error_matrix: np.ndarray, effort_column: np.ndarray, threshold: float, row: int = 0) -> float:
+    """The effort whose loss shows at all: that of a smaller one never exceeds the threshold, however long it lasts.
+
+    Args:
+        error_matrix: A, stable, shape (n, n) [1/s]. effort_column: B, shape (n,).
+        threshold: of the magnitude, positive. row: of the component, the residual's by default.
+
+    Returns:
+        Magnitude of the effort, in the unit of u*; its loss then shows as a touch of the threshold.
+    """
+    times = _scan(error_matrix)
+    sizes = [_shown(error_matrix, effort_column, row, float(t)) for t in times]
+    k = int(np.argmax(sizes))
+    low, high = float(times[max(k - 1, 0)]), float(times[min(k + 1, len(times) - 1)])
+    found = scipy.optimize.minimize_scalar(
+        lambda t: -_shown(error_matrix, effort_column, row, t), bounds=(low, high), method="bounded"
+    )
+    return threshold / max(-float(found.fun), sizes[k])
+
+
+def _scan(error_matrix: np.ndarray) -> np.ndarray:
+    """Times from far below the fastest time constant to far above the slowest [s]."""
+    poles = np.linalg.eigvals(np.asarray(error_matrix, dtype=float))
+    return np.asarray(np.geomspace(1e-6 / np.abs(poles).max(), 30.0 / -poles.real.max(), SCAN_POINTS))
+
+
+def _shown(error_matrix: np.ndarray, effort_column: np.ndarray, row: int, t: float) -> float:
+    """Magnitude of a component of the error a time after an effort of one was lost."""
+    matrix = np.asarray(error_matrix, dtype=float)
+    steady = np.linalg.solve(matrix, np.asarray(effort_column, dtype=float))
+    return abs(float(steady[row] - small_exponential(matrix * t)[row] @ steady))

@@ -89,22 +89,46 @@ class Rules(Protocol):
     parameters: tuple[Signal, ...]
 
     def at_sample(self, before: tuple[Array, ...], told: Reading, p: Any) -> Judgement:
-        """Judge an odometer sample."""
+        """Judge an odometer sample.
+
+        Args:
+            before: memory, in the order of `memory`. told: the sample. p: parameters, as in `HybridSystem.flow`.
+        """
 
     def at_balise(self, before: tuple[Array, ...], told: Passing, p: Any) -> Judgement:
-        """Judge the way between two balises."""
+        """Judge the way between two balises.
+
+        Args:
+            before: memory, in the order of `memory`. told: the way. p: parameters, as in `HybridSystem.flow`.
+        """
 
     def fault(self, memory: tuple[Array, ...]) -> Array:
-        """1 while the odometer is judged to lie or is not confirmed."""
+        """1 while the odometer is judged to lie or is not confirmed.
+
+        Args:
+            memory: in the order of the signals.
+        """
 
     def discarded(self, memory: tuple[Array, ...]) -> Array:
-        """1 while the estimate must not follow the odometer."""
+        """1 while the estimate must not follow the odometer.
+
+        Args:
+            memory: in the order of the signals.
+        """
 
     def recovering(self, memory: tuple[Array, ...]) -> Array:
-        """1 while it begins to be believed again."""
+        """1 while it begins to be believed again.
+
+        Args:
+            memory: in the order of the signals.
+        """
 
     def limit(self, memory: tuple[Array, ...], p: Any) -> Array:
-        """Residual at which the verdict changes [m/s]."""
+        """Residual at which the verdict changes [m/s].
+
+        Args:
+            memory: in the order of the signals. p: parameters.
+        """
 
 
 class RuleMemory(NamedTuple):
@@ -139,7 +163,8 @@ class RepairedRules:
     `trust_time`, or when a balise confirms the way.
 
     Where a braked wheel is faster than a settled estimate by more than eps / M, a driven one slower, the speed is set
-    to the odometer while it is believed, too: it is the end of a jam that was too small to be seen.
+    to the odometer while it is believed, too: it is the end of a jam that was too small to be seen, and counts as a
+    fault.
 
     A fault begins where ``|r| > eps`` with the sign that the effort allows (a jam while braking, a skid while driving,
     either while coasting), in time to keep the very sample out; or where balises refute the way of an odometer that was
@@ -195,6 +220,9 @@ class RepairedRules:
         passed = _is((m.samples + ROUNDING) * p.odometer_period >= p.arming_delay)
         faults = np.where(_is(settled >= p.settle_samples) * passed > 0.0, 0.0, m.faults)
         armed = _is(m.mode == TRUSTED) * _is(faults < p.fault_limit) * passed
+        # A jam too small to be held is over: the estimate takes the reading, and learns nothing from the jump. It
+        # counts as a fault, for an estimate that has not settled must learn in the end.
+        over = armed * impossible
         moves = _is(told.speed > p.least_speed)
         onset = armed * moves * _is(size > p.threshold) * (1.0 - impossible)
         # held: is the odometer believed again
@@ -216,15 +244,12 @@ class RepairedRules:
             np.where(mode == HELD, hold, 0.0),
             np.where(changed > 0.0, 0.0, np.where(held > 0.0, row, quiet)),
             np.where(onset > 0.0, 0.0, settled),
-            np.where(trusted > 0.0, 0.0, np.where(expired > 0.0, UNSETTLED, faults + onset)),
+            np.where(trusted > 0.0, 0.0, np.where(expired > 0.0, UNSETTLED, faults + onset + over)),
             told.odometer,
             np.where(changed > 0.0, 0.0, m.unchanged_time + p.odometer_period),
             m.refutations,
             m.samples + 1.0,
         )
-        # A jam too small to be held is over: the estimate takes the reading, and learns nothing from the jump. An
-        # estimate that has not settled must learn, and does not.
-        over = armed * impossible * _is(m.settled >= p.settle_samples)
         restart = np.maximum(np.maximum(believed, expired), np.maximum(jumped, over))
         return Judgement(tuple(after), restart, onset, 0.0 * size)
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import integrate, stats
 
 from fmu_observer.identification.acceleration_run import PARAMETERS, integration_grid, speeds_and_sensitivities
 
@@ -55,7 +55,7 @@ class RunFits:
             In the units of the parameters, shape (4, runs).
         """
         deviations = np.sqrt(np.einsum("rii->ir", self.covariance))
-        return np.asarray(float(stats.t.ppf(0.5 + 0.5 * level, self.freedom)) * deviations)
+        return np.asarray(float(scipy.stats.t.ppf(0.5 + 0.5 * level, self.freedom)) * deviations)
 
 
 def fit_runs(time: Array, speeds: Array, forcing: Array | None = None) -> RunFits:
@@ -120,9 +120,9 @@ def with_covariance(
 
 def _first_guess(time: Array, speeds: Array, forcing: Array | None) -> Array:
     """Regression of the speed on integrals of itself: v = v0 + q t + a t - w1 int v - w2 int v^2, shape (4, runs)."""
-    known = 0.0 if forcing is None else integrate.cumulative_trapezoid(forcing, time, initial=0.0)
-    first = integrate.cumulative_trapezoid(speeds, time, axis=1, initial=0.0)
-    second = integrate.cumulative_trapezoid(speeds**2, time, axis=1, initial=0.0)
+    known = 0.0 if forcing is None else scipy.integrate.cumulative_trapezoid(forcing, time, initial=0.0)
+    first = scipy.integrate.cumulative_trapezoid(speeds, time, axis=1, initial=0.0)
+    second = scipy.integrate.cumulative_trapezoid(speeds**2, time, axis=1, initial=0.0)
     lines = np.broadcast_to(time, speeds.shape)
     columns = np.stack([lines, -first, -second, np.ones_like(speeds)])
     inverse, projected, _, _ = _normal(columns, speeds - known)

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from fmu_observer.certificates.fault_cycle import FaultCycle, first_crossing, overshoot
+from fmu_observer.certificates.fault_cycle import FaultCycle, first_crossing, overshoot, smallest_effort
 
 A = np.array([[-101.5, 1.0, 0.0], [-2650.0, 0.0, 1.0], [-3750.0, 0.0, 0.0]])  # A_o - K C of 3.2.3
 B = np.array([0.1, 0.0, 0.0])
@@ -90,6 +90,13 @@ def test_when_a_fault_shows() -> None:
     peak = max(abs(lasting.error(t, np.zeros(3))[0]) for t in np.linspace(1e-4, 0.2, 200))
     assert peak == pytest.approx(0.0189, abs=1e-4)
     assert first_crossing(A, B, EFFORT, 1.01 * peak) == np.inf
+
+
+def test_the_loss_of_a_weak_brake_never_shows() -> None:
+    weakest = smallest_effort(A, B, 0.005)
+    assert 0.1 * weakest == pytest.approx(2.6223 * 0.005 / 0.0189, rel=1e-3)  # 0.69 m/s2
+    assert first_crossing(A, B, 1.001 * weakest, 0.005) == pytest.approx(0.0194, abs=1.5e-3)
+    assert first_crossing(A, B, 0.999 * weakest, 0.005) == np.inf
 
 
 @pytest.mark.parametrize(

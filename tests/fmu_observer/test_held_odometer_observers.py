@@ -205,6 +205,29 @@ def test_bounds_hold_while_the_train_stops_and_starts_again(make: Any) -> None:
     assert 0.05 < worst <= 1.0
 
 
+@BOTH
+def test_a_standstill_ends_what_is_carried(make: Any) -> None:
+    """A brake that the observer is not told: where it ends, the disturbance jumps by 1 m/s2. What was carried, sharp
+    at 50 readings a second, does not cover that; from there on it begins anew.
+    """
+    sharp = {"unknown_acceleration": 0.0, "unknown_jerk_rate": 0.0, "odometer_error": 0.0}
+    bench = Bench(make(), odometer_period=0.02, acceleration_max=1.1, **sharp)
+    v = lambda t: max(10.0 - t, 0.0) if t < 14.0 else 1.0 * (t - 14.0)  # noqa: E731
+    bench.runtime.x[1] = 10.0
+    bench.set("u", {"odometer": 10.0})
+    bench.runtime.start(0.0)
+    told = []
+    for k in range(1, 2000):
+        t = 0.01 * k
+        bench.set("u", {"odometer": v(t)})
+        bench.runtime.advance(t)
+        out = bench.outputs()
+        error = abs(out["speed"] - v(t))
+        told.append((error - 1e-9) / max(out["error_bound"], 1e-12))
+    assert max(told) <= 1.0
+    assert max(told[:990]) > 0.1
+
+
 def test_the_position_bound_starts_anew_at_a_balise() -> None:
     bench = Bench(DiscreteMeasurementObserver(), start_position_error=3.0)
     bench.runtime.x[1] = 20.0

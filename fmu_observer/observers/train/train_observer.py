@@ -91,7 +91,7 @@ class TrainObserver(GatedObserver, GapCertified):
         output_signal("adhesion_force", "N", "Estimated adhesion force between wheels and rails"),
         output_signal("innovation", "m", "Estimated minus true position at the last balise, as it acts now"),
     )
-    train_parameters = (
+    train_parameters: tuple[Signal, ...] = (
         parameter("mass", "kg", 90000.0, "Train mass", min=1.0),
         parameter("davis_a", "N", 900.0, "Running resistance, constant term", min=0.0),
         parameter("davis_b", "N.s/m", 32.4, "Running resistance, linear term", min=0.0),

@@ -87,7 +87,7 @@ class GivenFaults:
             p: parameters.
         """
         needed: dict[str, Array] = {}
-        latest = -np.inf
+        latest: Array = -np.inf
         for i in range(self.count):
             text = f"fault {i + 1} is neither jam nor skid: fault_kind[{i + 1}] must be -1 (jam) or 1 (skid)"
             needed[text] = one_where(np.abs(np.abs(p.fault_kind[i]) - 1.0) < 1e-3)

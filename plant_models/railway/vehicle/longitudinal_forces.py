@@ -125,10 +125,10 @@ class LongitudinalForces(HybridSystem):
 
     def _outputs(self, position: Array, speed: Array, forces: Forces, degraded: Array, p: Any) -> dict[str, Array]:
         """The declared outputs; at rest the forces are those that hold the train."""
-        direction = np.sign(speed)
-        push, at_rest = forces.push, speed == 0.0
+        push, at_rest, direction = forces.push, speed == 0.0, np.sign(speed)
         dry = np.where(at_rest, np.clip(push, -p.davis_a, p.davis_a), direction * p.davis_a)
-        braked = np.where(at_rest, np.clip(push - dry, -forces.brake, forces.brake), direction * forces.brake)
+        freed = np.sign(push) * np.maximum(np.abs(push) - p.davis_a - forces.brake, 0.0)
+        moves = np.where(at_rest, freed, push - direction * (p.davis_a + forces.brake))
         size = np.abs(speed)
         level = p.adhesion_level * (1.0 + degraded * (p.degraded_level - 1.0))
         weight = p.adhesive_share * p.mass * p.gravity
@@ -136,7 +136,7 @@ class LongitudinalForces(HybridSystem):
         return {
             "position": position,
             "speed": speed,
-            "acceleration": (push - dry - braked) / p.mass,
+            "acceleration": moves / p.mass,
             "wheel_speed": speed,
             "resistance_force": forces.moving + dry,
             "gradient_force": forces.gradient,

@@ -20,3 +20,7 @@ def test_a_detection_of_the_next_fault_is_none_of_the_one_before() -> None:
 def test_a_late_detection_still_belongs_to_its_fault() -> None:
     starts, ends, false = judged_detections([(1.0, 1.1)], [(1.3, 1.4), (1.7, 1.8)], 9.0)
     assert (starts, ends, false) == (pytest.approx([0.3]), pytest.approx([0.3]), 1)
+
+
+def test_without_faults_every_detection_is_false() -> None:
+    assert judged_detections([], [(1.0, 2.0)], 9.0) == ([], [], 1)

@@ -42,3 +42,28 @@ def test_who_judges_the_odometer_stands_nearer_to_the_truth_than_who_believes_or
     }
     assert error["quasi_lpv_uio"] < 3.0
     assert min(error["adaptive_gain_cdo"], error["odometer_reset"]) > 6.0
+
+
+@pytest.mark.parametrize(("loss", "dry_from"), [(0.0, 500.0), (0.7, 400.0)])
+def test_a_wheel_locks_where_the_rails_are_wet_and_takes_its_brake_off(loss: float, dry_from: float) -> None:
+    s = Scenario(stop=40.0, step=0.05)
+    zone = {"zone_from[1]": 200.0, "zone_to[1]": dry_from}
+    # set D: 0.78 m/s2 of adhesion at 30 m/s, 0.3 of it in the zone; the brake of 0.6 m/s2 is between the two
+    s.add("train", model="longitudinal_train", preset="set_d", parameters={"train_speed": 30.0, "effort": -0.6, **zone})
+    s.add("wheel", model="wheel_fault", options={"cause": "adhesion"}, parameters={"effort": -0.6, "jam_loss": loss})
+    s.connect("train.wheel_speed -> wheel.speed", "train.adhesion_limit -> wheel.adhesion_limit")
+    s.connect("wheel.effort_loss -> train.effort_loss")
+    outcome = s.run(warn=lambda _: None)
+    position, jammed, depth = outcome["train.position"], outcome["wheel.active"] > 0.0, outcome["wheel.depth"]
+    begin, end = np.flatnonzero(jammed)[[0, -1]]
+    # the wheel is told of the adhesion at communication points, 1.5 m apart; it rolls again in 0.146 s
+    assert 200.0 <= position[begin] <= 200.0 + 2 * 1.5
+    if loss:
+        assert 400.0 <= position[end] <= 400.0 + 5 * 1.5
+        braking = outcome["train.acceleration"][depth == -1.0]
+        drag = outcome["train.resistance_force"][depth == -1.0]
+        np.testing.assert_allclose(braking, -0.3 * 0.6 - drag, rtol=1e-9)
+    else:  # the brake acts as if nothing were: the train stops in the zone, its wheel still locked
+        assert position[-1] < dry_from
+        np.testing.assert_allclose(outcome["train.acceleration"][0], -0.6 - 0.415, rtol=1e-9)
+        assert end == len(jammed) - 1

@@ -1,0 +1,86 @@
+"""Scenario 3.3.4 with a jam of 10 %: position of odometer and observer at the balise after it, and detection."""
+
+from __future__ import annotations
+
+import matplotlib.pyplot as plt
+import numpy as np
+from shared.jam_runs import (
+    CASES,
+    PERIOD,
+    Jams,
+    at_samples,
+    before_balises,
+    observe,
+    odometer_error,
+    readings,
+    trains,
+)
+from shared.sheet import Sheet
+
+CASE, NOISE = CASES["3.3.4"], 0.02
+JAMS = {(11.0, 2.0): (7.01, -0.22), (16.0, 3.0): (8.70, -0.40), (23.0, 3.0): (7.48, -0.57)}
+STORY = "4 m better"
+SPEED = "onset and length are not printed; the independent train was re-planned and is slower at that time"
+SMALLER = "with the innovation held there is no lag of half a period; the independent observer held the reading"
+PRINTED = (
+    "the printed rules taken literally act a sample late: one sample of the jam, 3 m/s, is learnt as a disturbance, "
+    "and the fault does not end with the jam; of the independent run it is not recorded whether the delay was applied"
+)
+DELAY = "the onsets lie on a sample here, which shows the jam at once; the printed rules act one sample later"
+
+
+def main() -> None:
+    """Three jams; printed and repaired rules."""
+    sheet = Sheet(__file__, "A jam of 10 %", "Aguiar Cota 2019, section 3.3.4, Figs 3-26 to 3-29")
+    figure, axis = plt.subplots(figsize=(6, 4), layout="constrained")
+    run = trains(CASE, len(JAMS))
+    onsets, lengths = (np.array(column) for column in zip(*JAMS, strict=True))
+    jams = Jams(onsets, lengths, np.full(len(JAMS), 0.1))
+    read = readings(run, jams, NOISE, np.random.default_rng(0), False)
+    position, t = at_samples(run.p), PERIOD * np.arange(read.shape[1])
+    alone = odometer_error(position, read, 200.0)
+    told = {
+        rules: observe(CASE, run, read, rules, aggregated=False, estimated_speed=44.1)
+        for rules in ("repaired", "printed")
+    }
+    for member, ((onset, length), (sensor, observer)) in enumerate(JAMS.items()):
+        rows = before_balises(position[member])
+        row = rows[t[rows] > onset + length][0]
+        what = f"at the balise after a jam at {onset:g} s of {length:g} s"
+        sheet.add(f"true minus odometer position {what}", "m", None, -alone[member, row], SPEED, independent=sensor)
+        for rules, why in (("repaired", SMALLER), ("printed", PRINTED)):
+            error = position[member, row] - told[rules]["position"][member, row]
+            published = STORY if (onset, rules) == (16.0, "printed") else None
+            sheet.add(
+                f"true minus estimated position {what}, {rules} rules",
+                "m",
+                published,
+                float(error),
+                why,
+                repeats=0.2,
+                independent=observer if rules == "printed" else None,
+            )
+        for rules in told:
+            fault = told[rules]["odometer_fault"][member] > 0.5
+            begins = abs(t[fault & (t >= onset - 1e-9)][0] - onset)
+            published_delay = 0.4 if rules == "printed" else None
+            sheet.add(
+                f"from onset to detection, jam at {onset:g} s, {rules} rules",
+                "s",
+                published_delay,
+                f"{begins:.1f}",
+                DELAY,
+                independent="0.2 to 0.4",
+            )
+    axis.plot(t, alone[1], label="odometer")
+    for rules, out in told.items():
+        shown = np.clip(out["position"][1] - position[1], -12.0, 12.0)
+        axis.plot(t, shown, label=f"observer, {rules} rules")
+    axis.axvspan(16.0, 19.0, color="0.9", zorder=0)
+    axis.set(xlabel="time [s]", ylabel="position error [m]", ylim=(-12.0, 12.0), xlim=(0.0, 50.0))
+    axis.legend(fontsize=8)
+    sheet.finish(figure)
+
+
+if __name__ == "__main__":
+    main()

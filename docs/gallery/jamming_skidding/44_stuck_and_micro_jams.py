@@ -1,0 +1,54 @@
+"""What an odometer cannot tell: a wheel stuck at 90 % of the speed, and micro-jams; what balises make of it."""
+
+from __future__ import annotations
+
+import matplotlib.pyplot as plt
+import numpy as np
+from shared.jam_runs import CASES, PERIOD, Jams, at_samples, observe, odometer_error, readings, trains
+from shared.sheet import Sheet
+
+CASE, NOISE, MEMBERS = CASES["3.3.4"], 0.02, 50
+OURS = (
+    "ours: the thesis says that micro-jams are not detectable and give a slow bias (section 5.3.3.2), without numbers"
+)
+STUCK = "ours: stuck from 16 s on, 50 runs, from 17 s until 5 m/s"
+
+
+def main() -> None:
+    """Largest position errors, and how long a fault is told."""
+    sheet = Sheet(__file__, "Stuck wheels and micro-jams", "Aguiar Cota 2019, section 5.3.3.2, Fig 5-7")
+    figure, axis = plt.subplots(figsize=(6, 4), layout="constrained")
+    run = trains(CASE, MEMBERS, np.random.default_rng(0))
+    position, speed = at_samples(run.p), at_samples(run.v)
+    t = PERIOD * np.arange(position.shape[1])
+    window = (t > 17.0) & (speed.min(axis=0) > 5.0)
+    jams = Jams(*(np.full(MEMBERS, value) for value in (16.0, 1e3, 0.1)))
+    stuck = readings(run, jams, NOISE, np.random.default_rng(1), True)
+    for with_balises, how in ((True, "balises every 200 m"), (False, "no balises")):
+        found = observe(CASE, run, stuck, with_balises=with_balises)
+        error = np.abs(found["position"] - position)
+        told = 100.0 * float((found["odometer_fault"][:, window] > 0.5).mean())
+        sheet.add(f"stuck 10 % low, {how}: fault told", "% of the time", None, told, STUCK, repeats=0.1)
+        sheet.add(
+            f"stuck 10 % low, {how}: largest position error", "m", None, error[:, window].max(), STUCK, repeats=0.2
+        )
+        axis.plot(t[window], error[0, window], label=f"stuck, {how}")
+    alone = np.abs(odometer_error(position, stuck, 200.0))
+    sheet.add("stuck 10 % low: odometer reset at balises", "m", None, alone[:, window].max(), STUCK, repeats=0.05)
+    axis.plot(t[window], alone[0, window], ":", label="stuck, odometer alone")
+    exact = readings(run, None, NOISE, np.random.default_rng(1), True)
+    micro = exact * (1.0 - 0.02 * np.clip((t - 10.0) / 10.0, 0.0, 1.0))  # 4 ms in 0.2 s, at first none
+    found = observe(CASE, run, micro)
+    told = 100.0 * float((found["odometer_fault"][:, window] > 0.5).mean())
+    error = np.abs(found["position"] - position)[:, window].max()
+    alone = np.abs(odometer_error(position, micro, 200.0))[:, window].max()
+    sheet.add("micro-jams of 4 ms in 0.2 s: fault told", "% of the time", "not detectable", f"{told:.0f}", OURS)
+    sheet.add("micro-jams of 4 ms in 0.2 s: largest position error", "m", None, error, OURS, repeats=0.1)
+    sheet.add("micro-jams of 4 ms in 0.2 s: odometer reset at balises", "m", None, alone, OURS, repeats=0.1)
+    axis.set(xlabel="time [s]", ylabel="position error [m]")
+    axis.legend(fontsize=8)
+    sheet.finish(figure)
+
+
+if __name__ == "__main__":
+    main()
