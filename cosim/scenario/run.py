@@ -203,7 +203,7 @@ class _Setup:
         self.notes += self.master.stepper.notes
         if self.packets is not None and self.master.stepper.compiled is not None:
             self.notes.append(
-                "Packets are sent and delivered by Python: the compiled stepper halts at communication points with one, "
+                "Packets are sent and delivered by Python: the compiled stepper halts at points with one, "
                 "and leaves steps with one inside to it."
             )
         self._begin_stream(self.master)
