@@ -12,6 +12,7 @@ from fmu_observer.models.state_affine import StateAffineModel
 from fmu_observer.models.state_affine_registry import STATE_AFFINE_MODELS, find_state_affine_model
 from fmu_observer.models.takagi_sugeno import Premise, TakagiSugenoModel
 from fmu_observer.models.takagi_sugeno_registry import TAKAGI_SUGENO_MODELS, find_takagi_sugeno_model
+from fmu_observer.models.tanh_system import tanh_system
 
 __all__ = [
     "MODELS",
@@ -30,4 +31,5 @@ __all__ = [
     "linear_pendulum",
     "pendulum",
     "sector_nonlinearity",
+    "tanh_system",
 ]

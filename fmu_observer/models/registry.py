@@ -10,6 +10,7 @@ from fmu_observer.models.freight_train import freight_train
 from fmu_observer.models.linear_pendulum import linear_pendulum
 from fmu_observer.models.model import ObserverModel
 from fmu_observer.models.pendulum import pendulum
+from fmu_observer.models.tanh_system import tanh_system
 
 MODELS: dict[str, Callable[[], ObserverModel]] = {
     "pendulum": pendulum,
@@ -17,6 +18,7 @@ MODELS: dict[str, Callable[[], ObserverModel]] = {
     "freight_train": freight_train,
     "braked_train": braked_train,
     "coupled_vehicles": coupled_vehicles,
+    "tanh_system": tanh_system,
 }
 
 
