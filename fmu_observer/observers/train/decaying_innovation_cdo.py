@@ -30,7 +30,7 @@ class DecayingInnovationCdo(HighGainTrainObserver):
     of the other high-gain observers, with ``eta = 0`` the constant gain of (3.112), for which holes may last ``1 /
     theta`` only.
 
-    Preset `balise_holes` [ours]: holes up to 22.5 s; 80 % of a position error is corrected within a second.
+    Preset `balise_holes` [ours]: for holes up to 32 s; the innovation ends 13 s after the balise.
     """
 
     name = "decaying_innovation_cdo"
@@ -41,7 +41,7 @@ class DecayingInnovationCdo(HighGainTrainObserver):
     stability_parameters = ("theta", "high_gain", "decay_rate", "decay_exponent")
     presets: Mapping[str, Mapping[str, Any]] = {
         "dense_balises": {},
-        "balise_holes": {"theta": 1.0, "high_gain": (2.4, 0.06), "decay_rate": 2.0, "decay_exponent": 0.5},
+        "balise_holes": {"theta": 0.12, "decay_rate": 0.15},
     }
     default_preset = "dense_balises"
 
