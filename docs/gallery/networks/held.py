@@ -26,7 +26,7 @@ def pair(
     """Plant and observer, the observer at (0, 0).
 
     Args:
-        gains: key of `GAINS`. decay: key of `DECAYS`. make: another observer than that of (3.72). step: internal step [s].
+        gains: key of `GAINS`. decay: key of `DECAYS`. make: another observer than that of (3.72). step: internal [s].
         parameters: of it.
     """
     if make is None:
