@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from cosim.balises.letter import Letter
 from cosim.balises.telegram import payload
 from cosim.coupling.planned import PlannedComponent
 from cosim.results.result import BaliseRecord
@@ -19,6 +20,9 @@ from fmus.fmi.described import EventPort
 from fmus.fmi.standard import TIME_TOLERANCE
 
 Timing = Literal["exact", "stale"]
+Told = BaliseRecord | Letter
+"""What receivers are told: telegrams of balises, and letters of others with an event of their own."""
+
 OUTCOMES = (
     "ignored",
     "doubted",
@@ -46,13 +50,13 @@ class Delivery:
     outcome: str = "told"
 
 
-StepThrough = Callable[[float, float, Sequence[BaliseRecord]], list[Delivery]]
+StepThrough = Callable[[float, float, Sequence[Any]], list[Delivery]]
 """Steps a receiver from one time to another [s] through telegrams; what became of each."""
 
 
 @dataclass
 class Receiver:
-    """A planned component that declares the balise event.
+    """A planned component that declares the balise event, or another one by which it is told of something.
 
     An FMI 2 receiver acts on a telegram in the step that follows, and knows one telegram for each step. A telegram of
     this very instant is therefore announced before the step that ends there; of telegrams that must not be announced
@@ -60,7 +64,7 @@ class Receiver:
 
     Args:
         planned: the component in the plan.
-        event: name of its event.
+        event: name of its event for balises; a `Letter` names its own.
         timing: ``exact`` uses a telegram at its own instant; ``stale`` hands it over unshifted at the next
             communication point, as a master without events would (for comparison only).
         compiled: the compiled stepper's way over a step with telegrams, where there is one.
@@ -70,7 +74,7 @@ class Receiver:
     event: str = "balise"
     timing: Timing = "exact"
     seen: dict[str, int] = field(default_factory=dict)
-    backlog: list[BaliseRecord] = field(default_factory=list)
+    backlog: list[Told] = field(default_factory=list)
     arrived: np.ndarray = field(default_factory=lambda: np.zeros(0))
     compiled: StepThrough | None = None
     _open: list[Delivery] = field(default_factory=list)
@@ -94,7 +98,7 @@ class Receiver:
         seen, backlog, self._announced = state
         self.seen, self.backlog = dict(seen), list(backlog)
 
-    def step(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
+    def step(self, t: float, until: float, telegrams: Sequence[Told]) -> list[Delivery]:
         """Step from `t` to `until` [s] with the prepared inputs through `telegrams`, in order of delivery.
 
         Args:
@@ -107,14 +111,15 @@ class Receiver:
         """
         return (self.compiled or self.step_in_python)(t, until, telegrams)
 
-    def step_in_python(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
+    def step_in_python(self, t: float, until: float, telegrams: Sequence[Told]) -> list[Delivery]:
         """As `step`, without the compiled stepper's way through a single telegram.
 
         Args:
             t: start of the step [s]. until: end of the step [s].
         """
         self.planned.send(t, until)
-        self._open.clear()
+        if not self._announced:
+            self._open.clear()
         waiting, self.backlog = self.backlog, []
         if self.timing == "stale":
             return self._step_then_notify(t, until, telegrams)
@@ -122,7 +127,7 @@ class Receiver:
             return self._notify_then_step(t, until, [*waiting, *telegrams])[len(waiting) :]
         return self._step_through(t, until, [*waiting, *telegrams])[len(waiting) :]
 
-    def hold_back(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
+    def hold_back(self, t: float, until: float, telegrams: Sequence[Told]) -> list[Delivery]:
         """Keep telegrams of a part of a step, from `t` to `until` [s], that the component does not take: its next step
         has them.
 
@@ -132,6 +137,22 @@ class Receiver:
         self.backlog.extend(telegrams)
         self.arrived = self.planned.outputs.copy()
         return [Delivery(snapped(telegram.delivered_at, t, until)) for telegram in telegrams]
+
+    def tell(self, t: float, letter: Letter) -> Delivery:
+        """Tell of a letter at `t` [s], where all components have come to; one that has not, or that knows one letter
+        for each step, is told of it in its next step.
+
+        Args:
+            t: the instant [s]. letter: delivered there.
+        """
+        component = self.planned.component
+        if abs(component.time - t) > TIME_TOLERANCE or self._announced:
+            self.backlog.append(letter)
+            return Delivery(t)
+        if not component.event_needs_step:
+            self._open.clear()
+        self._announced = component.event_needs_step
+        return self._notify_here(t, letter, letter.stamp)
 
     def stepped_elsewhere(self, delivery: Delivery, arrived: np.ndarray) -> None:
         """Somebody else has stepped it through one telegram, all as `step` would have done.
@@ -144,7 +165,7 @@ class Receiver:
 
     # -- a receiver that can be stopped anywhere --------------------------------------------------------------------
 
-    def _step_through(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
+    def _step_through(self, t: float, until: float, telegrams: Sequence[Told]) -> list[Delivery]:
         now = t
         deliveries: list[Delivery] = []
         arrived = None
@@ -160,7 +181,7 @@ class Receiver:
         self.arrived = self.planned.outputs.copy() if arrived is None else arrived
         return deliveries
 
-    def _deliver(self, now: float, notified_at: float, telegram: BaliseRecord) -> Delivery:
+    def _deliver(self, now: float, notified_at: float, telegram: Told) -> Delivery:
         component = self.planned.component
         if not component.event_needs_step:
             if notified_at > now:
@@ -177,14 +198,14 @@ class Receiver:
         self._announced = True
         return self._notify_here(notified_at, telegram, telegram.stamp)
 
-    def _notify_here(self, t: float, telegram: BaliseRecord, stamp: float) -> Delivery:
+    def _notify_here(self, t: float, telegram: Told, stamp: float) -> Delivery:
         before = self._outputs()
         delivery = Delivery(t, before, before)
         self._notify(t, telegram, stamp, delivery)
         delivery.after = self._outputs()
         return delivery
 
-    def _announce(self, now: float, notified_at: float, telegram: BaliseRecord) -> Delivery:
+    def _announce(self, now: float, notified_at: float, telegram: Told) -> Delivery:
         """FMI 2: the event happens at the end of the step from `now` to `notified_at` [s]."""
         delivery = Delivery(notified_at, self._look_ahead(now, notified_at))
         self._notify(now, telegram, min(telegram.stamp, notified_at), delivery)
@@ -208,11 +229,11 @@ class Receiver:
 
     # -- a receiver that takes whole steps only ---------------------------------------------------------------------
 
-    def _notify_then_step(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
+    def _notify_then_step(self, t: float, until: float, telegrams: Sequence[Told]) -> list[Delivery]:
         """Stamps inside the coming step tell the receiver what it may not be stopped for; without stamps it is told
         late.
         """
-        if self._port.stamp is None:
+        if any(self._port(telegram).stamp is None for telegram in telegrams):
             return self._step_then_notify(t, until, telegrams)
         at_once = 1 if self.planned.component.event_needs_step else len(telegrams)
         self.backlog.extend(telegrams[at_once:])
@@ -223,7 +244,7 @@ class Receiver:
         self.arrived = self._outputs()
         return deliveries
 
-    def _step_then_notify(self, t: float, until: float, telegrams: Sequence[BaliseRecord]) -> list[Delivery]:
+    def _step_then_notify(self, t: float, until: float, telegrams: Sequence[Told]) -> list[Delivery]:
         """Whatever was passed in the step is told at its end, as if it had happened there."""
         self._advance(t, until)
         self.arrived = self._outputs()
@@ -236,9 +257,9 @@ class Receiver:
 
     # -- internals --------------------------------------------------------------------------------------------------
 
-    @property
-    def _port(self) -> EventPort:
-        return self.planned.component.events[self.event]
+    def _port(self, telegram: Told) -> EventPort:
+        event = telegram.event if isinstance(telegram, Letter) else self.event
+        return self.planned.component.events[event]
 
     def _advance(self, now: float, until: float) -> None:
         self.planned.advance(now, until)
@@ -249,8 +270,8 @@ class Receiver:
         self.planned.read()
         return self.planned.outputs.copy()
 
-    def _notify(self, t: float, telegram: BaliseRecord, stamp: float, delivery: Delivery) -> None:
-        self.planned.component.notify(self._port, t, stamp, payload(telegram))
+    def _notify(self, t: float, telegram: Told, stamp: float, delivery: Delivery) -> None:
+        self.planned.component.notify(self._port(telegram), t, stamp, payload(telegram))
         self._open.append(delivery)
         self._note_outcome()
 

@@ -47,7 +47,7 @@ class BaliseService:
     ) -> None:
         self.localiser, self.channel, self.receivers = localiser, channel, list(receivers)
         self.odometer, self.position = odometer, position
-        self.mailbox = Mailbox()
+        self.mailbox: Mailbox[BaliseRecord] = Mailbox()
         self.passed = 0
         self._by_name = {r.planned.component.name: r for r in receivers}
         self._false = sorted(channel.false_telegrams, key=lambda f: f.time)

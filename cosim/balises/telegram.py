@@ -11,11 +11,14 @@ from dataclasses import dataclass, field, replace
 from math import inf, nan
 from operator import attrgetter
 from types import MappingProxyType
+from typing import Generic, TypeVar
 
+from cosim.balises.letter import Letter, Sent
 from cosim.errors import ScenarioError
 from cosim.results.result import BaliseRecord
 from plant_models.hybrid.noise import standard_normal, uniform_pair
 
+T = TypeVar("T", bound=Sent)
 NO_OUTCOMES: Mapping[str, str] = MappingProxyType({})
 
 
@@ -103,39 +106,43 @@ class Channel:
 
 
 @dataclass
-class Mailbox:
-    """Telegrams on their way, in order of delivery, and a record of all of them."""
+class Mailbox(Generic[T]):
+    """Telegrams, or packets of a network, on their way, in order of delivery, and a record of all of them."""
 
-    waiting: list[BaliseRecord] = field(default_factory=list)
-    log: list[BaliseRecord] = field(default_factory=list)
+    waiting: list[T] = field(default_factory=list)
+    log: list[T] = field(default_factory=list)
 
-    def post(self, telegram: BaliseRecord) -> None:
-        """Put a telegram on its way; a missed one is only logged."""
-        if telegram.kind == "missed":
+    def post(self, telegram: T) -> None:
+        """Put a telegram on its way; a missed or lost one is only logged."""
+        if telegram.kind in ("missed", "lost"):
             self.log.append(telegram)
             return
         self.waiting.append(telegram)
         self.waiting.sort(key=lambda e: (e.delivered_at, e.stamp))
 
-    def due(self, until: float) -> list[BaliseRecord]:
+    def due(self, until: float) -> list[T]:
         """Take out what is delivered at or before `until` [s]."""
         count = sum(1 for e in self.waiting if e.delivered_at <= until)
         taken, self.waiting = self.waiting[:count], self.waiting[count:]
         return taken
 
-    def delivered(self, telegram: BaliseRecord, outcomes: Mapping[str, str]) -> None:
+    def delivered(self, telegram: T, outcomes: Mapping[str, str]) -> None:
         """Log a delivered telegram with what became of it.
 
         Args:
             outcomes: by receiver.
         """
-        self.log.append(replace(telegram, outcomes=dict(outcomes)))
+        self.log.append(replace(telegram, outcomes=dict(outcomes)))  # type: ignore[type-var] # all are data classes
 
 
 PAYLOAD = ("position", "location_accuracy", "odometer_reading", "delivered_at")
 _of_telegram = attrgetter(*PAYLOAD)
 
 
-def payload(telegram: BaliseRecord) -> dict[str, float]:
-    """The numeric fields of a telegram, by the names a receiver may declare as ``balise_<field>``."""
+def payload(telegram: BaliseRecord | Letter) -> Mapping[str, float]:
+    """The numeric fields of a telegram, by the names a receiver may declare as ``balise_<field>``; of a letter its
+    own.
+    """
+    if isinstance(telegram, Letter):
+        return telegram.payload
     return dict(zip(PAYLOAD, _of_telegram(telegram), strict=True))

@@ -142,6 +142,8 @@ class CompiledStepper:
             return 0
         if balises is not None:
             limit = min(limit, balises.idle_until)
+        if self.system.network is not None:
+            limit = min(limit, self.system.network.idle_until)
         return free if limit == NEVER else min(free, self._steps_before(k, limit))
 
     def _steps_before(self, k: int, limit: float) -> int:
@@ -279,13 +281,11 @@ def _load() -> Any:
 def _check(control: StepControl, system: System) -> None:
     if type(control) is not FixedStep:
         raise NotCompilable(f"the step control '{control.name}' is Python's")
-    if system.events is not None:
+    if system.events is not None and not system.events.only_network:
         raise NotCompilable("events of the components are propagated")
     algorithm = system.algorithm
     if algorithm.name not in ("gauss-seidel", "jacobi") or getattr(algorithm, "threads", 1) != 1:
         raise NotCompilable(f"the algorithm '{algorithm.name}' is Python's")
-    if system.events is not None:
-        raise NotCompilable("events of components are passed on to others")
     for step in system.plan.steps:
         if step.inputs.gated:
             raise NotCompilable(f"inputs of {step.component.name} are sent by something in Python")

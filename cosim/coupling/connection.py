@@ -127,6 +127,25 @@ def connect(pairs: Sequence[Link], components: Mapping[str, Component]) -> list[
     return connections
 
 
+def event_connection(pair: Link, components: Mapping[str, Component]) -> Connection:
+    """A checked connection of a number to a field of an event, of which the master tells: it is sent with the event.
+
+    Args:
+        pair: link as the scenario has it. components: by name.
+
+    Raises:
+        CouplingError: an unknown variable, a wrong causality, or units that do not fit.
+    """
+    source_name, target_name, *given = pair
+    transformation = given[0] if given else Transformation()
+    source = split_name(source_name, components, "Connection source")
+    target = split_name(target_name, components, "Connection target")
+    components[source[0]].variable(source[1], *SOURCES)
+    components[target[0]].variable(target[1], "input")
+    factor, offset = _conversion(components, source, target) if transformation.convert_units else (1.0, 0.0)
+    return Connection(source, target, *transformation.after(factor, offset))
+
+
 def _elements(
     components: Mapping[str, Component], source: tuple[str, str], target: tuple[str, str]
 ) -> Iterable[tuple[Element, Element]]:

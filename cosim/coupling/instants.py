@@ -38,6 +38,8 @@ def held_signals(
 
     def holds(c: Connection) -> bool:
         source, target = c.source[0], c.target[0]
+        if source not in place:
+            return True  # it is not stepped: its values change between steps only
         together = source in loop_of and loop_of[source] == loop_of.get(target)
         if place[target] <= place[source] and not together:
             return True

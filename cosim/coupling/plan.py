@@ -7,7 +7,7 @@ from the two by index. The stepper executes the plan; nothing is looked up in a 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -60,6 +60,9 @@ class Plan:
         services: who took over how components move.
         interpolators: of the components with lines.
         held: signals of which all targets take the value at the start of a step; see `cosim.coupling.instants`.
+        relays: pass values on to those that belong to no step, while the components are initialised.
+
+    Values behind those of the last step belong to something that is not stepped (a network).
     """
 
     steps: list[PlannedComponent]
@@ -74,6 +77,7 @@ class Plan:
     services: list[Service] = field(default_factory=list)
     interpolators: list[InputInterpolator] = field(default_factory=list)
     held: Set[Signal] = frozenset()
+    relays: list[Callable[[], None]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self._now, self._start = self.values.data, self.start.data  # copied three times faster than as arrays
@@ -125,6 +129,7 @@ def make_plan(
     order: Sequence[str],
     extra: Mapping[str, Sequence[str]] | None = None,
     clocks: Sequence[ClockConnection] = (),
+    still: Component | None = None,
 ) -> Plan:
     """Prepare the plan; the components must be instantiated.
 
@@ -132,6 +137,7 @@ def make_plan(
         components: by name. connections: checked. order: execution order.
         extra: variables besides the outputs to record, by component.
         clocks: checked connections between clocks.
+        still: a component with outputs that is not stepped, and is none of `order`.
 
     Raises:
         CouplingError: a variable to record does not exist or is not a number.
@@ -148,6 +154,10 @@ def make_plan(
         columns |= {(name, signal): first + i for i, signal in enumerate(read_names[name])}
         signals += [_info(components[name], signal) for signal in read_names[name]]
         spans[name] = slice(first, len(signals))
+    if still is not None:
+        outputs = still.names("output")
+        columns |= {(still.name, signal): len(signals) + i for i, signal in enumerate(outputs)}
+        signals += [_info(still, signal) for signal in outputs]
     twice = np.zeros(2 * len(signals))
     values, start = twice[: len(signals)], twice[len(signals) :]
     continuous = np.array([s.variability == "continuous" for s in signals], dtype=bool)

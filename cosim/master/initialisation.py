@@ -59,6 +59,8 @@ def initialise(plan: Plan, start_time: float, stop_time: float) -> int:
         step.inputs.send()
         step.component.exit_initialization()
         step.read()
+    for relay in plan.relays:
+        relay()
     rounds = settling.rounds
     if settling.exchange_changes_feedback():
         settling.run()
@@ -163,3 +165,5 @@ def _exchange(plan: Plan) -> None:
     for step in plan.steps:
         step.write()
         step.read()
+    for relay in plan.relays:
+        relay()

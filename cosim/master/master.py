@@ -25,6 +25,7 @@ from cosim.master.finite import make_finite_check
 from cosim.master.initialisation import initialise
 from cosim.master.stepper import ChooseStepper, StepperChoice, python_stepper
 from cosim.master.system import Row, System
+from cosim.network.service import NetworkService
 from cosim.process.last_call import LAST_CALL
 from cosim.results.recorder import Recorder
 from cosim.results.result import SignalInfo
@@ -55,6 +56,7 @@ class Master:
         recorder: makes the recorder for signals and an expected number of rows.
         stepper: chooses who executes the plan, Python by default; `cosim.compiled.choice` knows the other one.
         events: of the components: ``propagate`` them to others at the same instant, or leave them ``local``.
+        network: over which measurements travel, or None.
 
     `between_steps` is called between two steps, or chunks of the compiled stepper; it may raise KeyboardInterrupt.
 
@@ -76,9 +78,10 @@ class Master:
         stepper: ChooseStepper = python_stepper,
         recorder: Callable[[Sequence[SignalInfo], int], Recorder] = Recorder,
         events: Events = "propagate",
+        network: NetworkService | None = None,
     ) -> None:
         self.plan, self.axis, self.balises = plan, axis, balises
-        self.system = System(plan, algorithm(plan), balises, events)
+        self.system = System(plan, algorithm(plan), balises, events, network)
         self.control = control(self.system)
         event_rows = 0 if balises is None else balises.expected_rows(axis.start, axis.stop)
         self.recorder = recorder(plan.signals, axis.count + 1 + event_rows)

@@ -17,6 +17,7 @@ from cosim.errors import CouplingError
 from cosim.master.algorithms.algorithm import Algorithm
 from cosim.master.algorithms.links import downstream
 from cosim.master.events.choose import Events, make_coordinator
+from cosim.network.service import NetworkService
 
 __all__ = ["NO_ROWS", "Checkpoint", "Row", "System"]
 
@@ -33,6 +34,7 @@ class Checkpoint:
         non_numeric: the values that are no doubles, shape (m,).
         algorithm: what the algorithm remembers, or None.
         events: what the coordinator remembers, or None.
+        network: what the network remembers, or None.
     """
 
     states: list[Any]
@@ -42,6 +44,7 @@ class Checkpoint:
     non_numeric: np.ndarray
     algorithm: Any = None
     events: Any = None
+    network: Any = None
 
 
 class System:
@@ -52,14 +55,22 @@ class System:
         algorithm: how they are brought over a step.
         balises: balise service, or None.
         events: ``propagate`` events of the components to others, or leave them ``local``.
+        network: over which measurements travel, or None.
     """
 
     def __init__(
-        self, plan: Plan, algorithm: Algorithm, balises: BaliseService | None = None, events: Events = "propagate"
+        self,
+        plan: Plan,
+        algorithm: Algorithm,
+        balises: BaliseService | None = None,
+        events: Events = "propagate",
+        network: NetworkService | None = None,
     ) -> None:
-        self.plan, self.algorithm, self.balises = plan, algorithm, balises
+        self.plan, self.algorithm, self.balises, self.network = plan, algorithm, balises, network
         if balises is not None:
             balises.attach(plan)
+        if network is not None:
+            network.attach(plan, () if balises is None else balises.receivers)
         self.events = make_coordinator(self, events)
 
     def start(self, t: float) -> None:
@@ -155,6 +166,7 @@ class System:
             self.plan.non_numeric.copy(),
             self.algorithm.save(),
             events,
+            None if self.network is None else self.network.save(),
         )
 
     def restore(self, checkpoint: Checkpoint, keep: Set[str] = frozenset()) -> None:
@@ -179,6 +191,8 @@ class System:
         self.algorithm.restore(checkpoint.algorithm)
         if self.events is not None:
             self.events.restore(checkpoint.events)
+        if self.network is not None:
+            self.network.restore(checkpoint.network)
         if self.balises is not None and self.balises.plant in [step.component.name for step in stay]:
             self.balises.restore_but_plant(checkpoint.balises)
         elif self.balises is not None:

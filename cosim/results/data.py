@@ -63,6 +63,31 @@ class BaliseRecord:
     outcomes: Mapping[str, str] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, slots=True)
+class PacketRecord:
+    """One packet of a run on its way through the network, see `cosim.network`.
+
+    Args:
+        stamp: when its values were measured and it was sent [s].
+        delivered_at: when it arrived [s]; NaN for a lost one.
+        node: who sent it.
+        number: of the transmission, from 0; a duplicate has that of its packet.
+        values: measurements by ``component.signal``, in the units of their components.
+        kind: ``sent``, ``lost`` (it never arrives) or ``duplicate`` (the same once more).
+        outcomes: what became of it at each receiver: ``held`` (its inputs follow), ``dropped`` (a duplicate, or older
+            than what is held), as for telegrams where it is told by an event, or ``undelivered`` (still on its way when
+            the run ended).
+    """
+
+    stamp: float
+    delivered_at: float
+    node: str
+    number: int
+    values: Mapping[str, float]
+    kind: Literal["sent", "lost", "duplicate"] = "sent"
+    outcomes: Mapping[str, str] = field(default_factory=dict)
+
+
 @dataclass(frozen=True)
 class ResultData:
     """Everything a run leaves behind, as the readers of files return it.
@@ -76,6 +101,7 @@ class ResultData:
         summary: versions, parameters, certificates, methods, wall times, warnings; JSON-able.
         failure: why the run ended early, or None.
         messages: what the components logged, in order of time.
+        packets: those of the network, in order of sending.
     """
 
     table: np.ndarray
@@ -84,6 +110,7 @@ class ResultData:
     summary: Mapping[str, Any] = field(default_factory=dict)
     failure: str | None = None
     messages: Sequence[Message] = ()
+    packets: Sequence[PacketRecord] = ()
 
     @property
     def time(self) -> np.ndarray:

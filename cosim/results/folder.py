@@ -20,10 +20,12 @@ from cosim.results.data import ResultData, SignalInfo
 from cosim.results.events_file import read_events, write_events
 from cosim.results.formats.catalogue import FORMATS, check_formats, fastest_first, table_files, usual_file
 from cosim.results.optional import is_installed
+from cosim.results.packets_file import read_packets, write_packets
 from cosim.results.summary_file import read_summary, write_summary
 from cosim.results.unfinished import read_unfinished
 
 EVENTS, MESSAGES, SUMMARY = "events.csv", "messages.csv", "summary.json"
+PACKETS = "packets.csv"  # of runs with a network
 LAYOUT = 1  # version of the layout of summary.json
 
 
@@ -50,7 +52,7 @@ def check_writable(directory: str | Path, formats: Sequence[str] = ()) -> Path:
         raise OutputError(
             f"Results cannot be written to {folder}: {_reason(error)}. Choose another output folder."
         ) from error
-    for name in (*table_files().values(), EVENTS, MESSAGES, SUMMARY):
+    for name in (*table_files().values(), EVENTS, MESSAGES, PACKETS, SUMMARY):
         if (folder / name).is_dir():
             raise OutputError(
                 f"Results cannot be written to {folder}: {name} is a folder there. Choose another output folder."
@@ -69,7 +71,10 @@ def _write_all(result: ResultData, folder: Path, formats: Sequence[str]) -> list
     write_messages(folder / MESSAGES, result.messages)
     content = {"layout": LAYOUT, "failure": result.failure, "signals": list(result.signals), "summary": result.summary}
     write_summary(folder / SUMMARY, content)
-    return [*(usual_file(name) for name in dict.fromkeys(formats)), EVENTS, MESSAGES, SUMMARY]
+    if result.packets:
+        write_packets(folder / PACKETS, result.packets)
+    packets = [PACKETS] if result.packets else []
+    return [*(usual_file(name) for name in dict.fromkeys(formats)), EVENTS, MESSAGES, *packets, SUMMARY]
 
 
 def write_results(result: ResultData, directory: str | Path, formats: Sequence[str] = ("csv",)) -> dict[str, Path]:
@@ -82,7 +87,8 @@ def write_results(result: ResultData, directory: str | Path, formats: Sequence[s
             that an earlier run left in another format is removed, since it would not belong to the other files.
 
     Returns:
-        Paths by what they hold: the formats, ``events``, ``messages``, ``summary``.
+        Paths by what they hold: the formats, ``events``, ``messages``, ``summary``, and ``packets`` where there is a
+        network.
 
     Raises:
         OutputError: a format is unknown or lacks a package, or a file cannot be written; former files are then still
@@ -96,12 +102,16 @@ def write_results(result: ResultData, directory: str | Path, formats: Sequence[s
                 (Path(scratch) / name).replace(folder / name)
         for stale in set(table_files()) - set(formats):
             (folder / usual_file(stale)).unlink(missing_ok=True)
+        if not result.packets:
+            (folder / PACKETS).unlink(missing_ok=True)
     except OSError as error:
         hint = "Free the disk, or close the program that has the file open."
         raise OutputError(f"Results could not be written to {folder}: {_reason(error)}. {hint}") from error
+    packets = {"packets": folder / PACKETS} if result.packets else {}
     return {name: folder / usual_file(name) for name in dict.fromkeys(formats)} | {
         "events": folder / EVENTS,
         "messages": folder / MESSAGES,
+        **packets,
         "summary": folder / SUMMARY,
     }
 
@@ -124,7 +134,8 @@ def _read(folder: Path, table_name: str | None = None) -> tuple[ResultData, Mapp
         return read_unfinished(folder / usual_file("npy"), folder / EVENTS, folder / MESSAGES, content), content
     table = _table(folder, table_name)
     messages = read_messages(folder / MESSAGES) if (folder / MESSAGES).exists() else []  # older results have none
-    return ResultData(table, signals, read_events(folder / EVENTS), messages=messages), content
+    packets = read_packets(folder / PACKETS) if (folder / PACKETS).exists() else []
+    return ResultData(table, signals, read_events(folder / EVENTS), messages=messages, packets=packets), content
 
 
 def read_results(directory: str | Path, table: str | None = None) -> ResultData:

@@ -7,11 +7,11 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Self
 
-from cosim.results.data import BaliseRecord, ResultData, SignalInfo
+from cosim.results.data import BaliseRecord, PacketRecord, ResultData, SignalInfo
 from cosim.results.save import save_result
 from cosim.results.to_frames import events_to_pandas, to_pandas, to_xarray
 
-__all__ = ["BaliseRecord", "Result", "SignalInfo"]
+__all__ = ["BaliseRecord", "PacketRecord", "Result", "SignalInfo"]
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ from cosim.master.control.fixed import FixedStep
 from cosim.master.control.multirate import set_rates
 from cosim.master.master import Master
 from cosim.master.system import System
+from cosim.network.service import NetworkService
 from cosim.results.recorder import Recorder
 from cosim.scenario.schema import ScenarioTable
 from cosim.scenario.tables import MasterTable
@@ -37,13 +38,14 @@ def make_master(
     balises: BaliseService | None,
     progress: Callable[[float], None] | None,
     choice: AlgorithmChoice,
+    network: NetworkService | None = None,
 ) -> Master:
     """The master that a scenario asks for.
 
     Args:
         table: the scenario. plan: prepared, components instantiated. axis: communication points.
         balises: balise service, or None. progress: called now and then with the time reached [s].
-        choice: the algorithm, and what it iterates.
+        choice: the algorithm, and what it iterates. network: over which measurements travel, or None.
 
     Raises:
         CouplingError: the components cannot do what is asked for; they are named.
@@ -58,9 +60,10 @@ def make_master(
         stepper=partial(choose_stepper, table.master.stepper),
         recorder=partial(Recorder, every=table.master.record_every, memory=1e6 * table.master.record_memory),
         events=table.master.events,
+        network=network,
     )
     _check_rates(table, choice)
-    _set_rates(table, plan, axis, balises)
+    _set_rates(table, plan, axis, balises, network)
     master.choose_stepper()
     return master
 
@@ -139,7 +142,9 @@ def _check_rates(table: ScenarioTable, choice: AlgorithmChoice) -> None:
             )
 
 
-def _set_rates(table: ScenarioTable, plan: Plan, axis: TimeAxis, balises: BaliseService | None) -> None:
+def _set_rates(
+    table: ScenarioTable, plan: Plan, axis: TimeAxis, balises: BaliseService | None, network: NetworkService | None
+) -> None:
     every = {name: component.every for name, component in table.components.items() if component.every != 1}
     substeps = {name: component.substeps for name, component in table.components.items() if component.substeps != 1}
     if every and table.master.control != "fixed":
@@ -148,6 +153,8 @@ def _set_rates(table: ScenarioTable, plan: Plan, axis: TimeAxis, balises: Balise
         )
     taken = {name: "its clocks are connected" for wire in plan.clocks for name in (wire.source[0], wire.target[0])}
     taken |= {} if balises is None else {r.planned.component.name: "it is told of balises" for r in balises.receivers}
+    if network is not None:
+        taken |= {listener.component: "it is told of packets" for listener in network.listeners}
     if balises is not None:
         taken[balises.plant] = "it is watched for balises"
     set_rates(plan, axis, every, substeps, taken)

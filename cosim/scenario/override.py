@@ -8,7 +8,7 @@ from typing import Any
 from cosim.errors import ScenarioError, nearest
 from cosim.scenario.tables import ComponentTable
 
-TABLES = ("balises", "master", "report")
+TABLES = ("balises", "network", "master", "report")
 COMPONENT_KEYS = {field.alias or name for name, field in ComponentTable.model_fields.items()}
 INNER = ("options", "parameters")
 CASE = "case"
@@ -20,9 +20,10 @@ def override(tables: dict[str, Any], name: str, value: Any) -> tuple[str, ...]:
 
     Args:
         tables: keys of a scenario, changed in place.
-        name: ``component.parameter``, ``component.key``, ``component.options.name``, ``balises.key``, ``master.key``,
-            ``report.key``, a top-level key such as ``stop``, or ``case``, which sets all that the case of that name
-            says. value: what it becomes.
+        name: ``component.parameter``, ``component.key``, ``component.options.name``, ``balises.key``,
+            ``network.key``, ``master.key``, ``report.key``, a top-level key such as ``stop``, or ``case``, which sets
+            all that the case of that name says.
+        value: what it becomes.
 
     Returns:
         The path of keys to the value.

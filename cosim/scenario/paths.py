@@ -16,6 +16,7 @@ COMPONENT_PATHS = ("fmu", "recording")
 MODEL_KEYS = ("model", "observer")
 """Keys that hold the name of a model, perhaps ``file.py:Class``."""
 BALISE_PATHS = ("file",)
+NETWORK_PATHS = ("delay_file",)
 
 
 def map_paths(tables: Mapping[str, Any], move: Callable[[str], str]) -> dict[str, Any]:
@@ -31,6 +32,7 @@ def map_paths(tables: Mapping[str, Any], move: Callable[[str], str]) -> dict[str
         _map_keys(table, COMPONENT_PATHS, move)
         _map_keys(table, MODEL_KEYS, lambda name: move_file(name, move))
     _map_keys(moved.get("balises"), BALISE_PATHS, move)
+    _map_keys(moved.get("network"), NETWORK_PATHS, move)
     return moved
 
 

@@ -18,8 +18,8 @@ from cosim.components.fmi3 import FMI3Component
 from cosim.components.logged_slave import log_calls
 from cosim.components.start_values import StartValue
 from cosim.components.surroundings import SurroundingsOfSteps
-from cosim.coupling.clocks import connect_clocks
-from cosim.coupling.connection import Connection, connect
+from cosim.coupling.clocks import ClockConnection, connect_clocks
+from cosim.coupling.connection import Connection, Link, connect
 from cosim.coupling.plan import Plan, make_plan
 from cosim.diagnostics.call_log import CallLog
 from cosim.diagnostics.messages import in_order
@@ -34,6 +34,8 @@ from cosim.master.algorithms.choose import AlgorithmChoice, choose_algorithm
 from cosim.master.axis import TimeAxis
 from cosim.master.interpolation.attach import attach_interpolators
 from cosim.master.master import Master, close
+from cosim.network.outputs import NAME as NETWORK
+from cosim.network.service import NetworkService
 from cosim.process.interruption import Interruption
 from cosim.process.sentinel import limited_calls
 from cosim.results.recorder import Recorder
@@ -49,6 +51,7 @@ from cosim.scenario.instances import check_instances
 from cosim.scenario.layouts import Layout, make_layout
 from cosim.scenario.master import idle_settings, make_master, stepping_groups
 from cosim.scenario.models import component_factories, protocol_parameters
+from cosim.scenario.network import Network, connect_over, make_network, network_summary, network_warnings
 from cosim.scenario.outcome import INTERRUPTED, Outcome
 from cosim.scenario.premises import premise_findings
 from cosim.scenario.roles import ROLES, check_roles, inferred_roles, signals_to_record, with_roles
@@ -138,6 +141,8 @@ class _Setup:
         self.choice: Choice | None = None
         self.algorithm = AlgorithmChoice()
         self.service: BaliseService | None = None
+        self.network: Network | None = None
+        self.packets: NetworkService | None = None
         self.master: Master | None = None
         self.interpolators: Mapping[str, str] = {}
         self.setup_seconds = 0.0
@@ -160,7 +165,8 @@ class _Setup:
         pairs = parse_connections(table.connections, self.where)
         self._load_components()
         clocks, pairs = connect_clocks(pairs, self.components)
-        connections = self.connections = connect(pairs, self.components)
+        connections, routed = self._connect(pairs)
+        self.connections = connections
         receivers, plant = self._balise_roles()
         check_roles(table, self.components, self.where)
         roles = inferred_roles(table, self.components, connections, plant)
@@ -169,14 +175,15 @@ class _Setup:
             [f"Roles that the report was not told: {', '.join(map(' = '.join, roles.items()))}."] if roles else []
         )
         table = self.table = check_expectations(table, self.components, receivers, self.where)
-        groups = stepping_groups(table, self.components, connections, plant, receivers)
+        stepped = [c for c in routed if c.source[0] != NETWORK]
+        groups = stepping_groups(table, self.components, stepped, plant, receivers)
         self.algorithm = choose_algorithm(table.master.algorithm, groups, self.components)
         order = [name for group in groups for name in group.names]
         starts = {n: self._start_values(n, c) for n, c in self.components.items()}
         if layout is not None:
             self._check_certificates(layout, receivers)
         self._instantiate(starts, connections)
-        self.plan = make_plan(self.components, connections, order, signals_to_record(table), clocks)
+        self.plan = self._make_plan(routed, order, clocks)
         doubts, notes = coupling_warnings(table, self.components, connections)
         for doubt in doubts:
             self._warn(doubt)
@@ -187,8 +194,10 @@ class _Setup:
             self.notes.append(interpolation_note(self.interpolators, table.master.inputs))
         if layout is not None:
             self._add_balises(layout, plant, receivers, starts[plant])
+        if self.network is not None:
+            self.packets = self.network.service(self.plan, self.axis.start)
         told = None if progress is None else lambda t: progress(t, self.axis.stop)
-        self.master = make_master(self.table, self.plan, self.axis, self.service, told, self.algorithm)
+        self.master = make_master(self.table, self.plan, self.axis, self.service, told, self.algorithm, self.packets)
         if self.master.system.events is not None:
             self.notes += self.master.system.events.notes
         self.notes += self.master.stepper.notes
@@ -261,7 +270,10 @@ class _Setup:
         if interruption.came:
             failure = failure or INTERRUPTED
         messages = in_order(component.messages for component in self.components.values())
-        result = Result(table, signals, events, summary, failure, messages)
+        packets = [] if self.packets is None else self.packets.records()
+        if self.network is not None:
+            summary["network"] = network_summary(self.network, packets, self.axis.start, float(table["time"][-1]))
+        result = Result(table, signals, events, summary, failure, messages, packets)
         outcome = Outcome(result, spec, tuple(self.table.report.tables))
         return outcome.with_summary(expectations=[judged.to_data() for judged in judge(self.table, outcome)])
 
@@ -281,9 +293,33 @@ class _Setup:
 
     def _unit(self, name: str) -> Unit | None:
         component, _, signal = name.partition(".")
+        if self.network is not None and component == NETWORK:
+            return self.network.outputs.unit(signal)
         return self.components[component].unit(signal)
 
     # -- set-up -----------------------------------------------------------------------------------------------------
+
+    def _connect(self, pairs: Sequence[Link]) -> tuple[list[Connection], list[Connection]]:
+        """Connections as they stand in the scenario, and as the plan takes them."""
+        self.network = make_network(self.table, self.components, self.folder, self.where)
+        if self.network is None:
+            connections = connect(pairs, self.components)
+            return connections, connections
+        found = connect_over(self.network, self.table, pairs, self.components, self.where)
+        for warning in network_warnings(self.network, self.table, self.components, self.where):
+            self._warn(warning)
+        return found
+
+    def _make_plan(
+        self, connections: Sequence[Connection], order: Sequence[str], clocks: Sequence[ClockConnection]
+    ) -> Plan:
+        extra = signals_to_record(self.table)
+        if self.network is None:
+            return make_plan(self.components, connections, order, extra, clocks)
+        for name, signals in self.network.hidden(self.components).items():
+            extra[name] += [signal for signal in signals if signal not in extra[name]]
+        components = {**self.components, NETWORK: self.network.outputs}
+        return make_plan(components, connections, order, extra, clocks, self.network.outputs)
 
     def _instantiate(self, starts: dict[str, dict[str, StartValue]], connections: list[Connection]) -> None:
         for name, component in self.components.items():

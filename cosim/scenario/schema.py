@@ -16,6 +16,7 @@ from pydantic import Field, PlainValidator, SerializeAsAny, TypeAdapter, Validat
 from cosim.errors import ScenarioError, nearest
 from cosim.expectations.expectation import Expectation
 from cosim.expectations.registry import EXPECTATIONS
+from cosim.scenario.network_table import NetworkTable
 from cosim.scenario.tables import (
     LINE,
     TABLE,
@@ -67,6 +68,7 @@ class ScenarioTable(Table):
     components: dict[Name, ComponentTable]
     connections: list[ConnectionItem] = Field(default_factory=list)
     balises: BalisesTable | None = None
+    network: NetworkTable | None = None
     master: MasterTable = MasterTable()
     report: ReportTable = ReportTable()
     cases: dict[str, dict[str, Any]] = Field(default_factory=dict)
@@ -85,6 +87,8 @@ class ScenarioTable(Table):
                     self.start,
                     self.stop,
                 )
+        if self.network is not None:
+            check_resolution("network: the time between two transmissions,", self.network.slot, self.start, self.stop)
         if self.master.smallest_step is not None:
             check_resolution("master.smallest_step", self.master.smallest_step, self.start, self.stop)
         return self
@@ -198,6 +202,7 @@ def _known_keys(location: tuple[Any, ...]) -> list[str]:
         "components": ComponentTable,
         "connections": ConnectionTable,
         "balises": BalisesTable,
+        "network": NetworkTable,
         "master": MasterTable,
         "report": ReportTable,
     }

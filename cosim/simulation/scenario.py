@@ -216,6 +216,11 @@ class Scenario:
         self._data["balises"] = {**self._data.get("balises", {}), **table}
         return self
 
+    def network(self, **table: Any) -> Self:
+        """Set keys of the network table: ``nodes={"front": ["odometer.reading"]}, period=0.016, delay=0.05``."""
+        self._data["network"] = {**self._data.get("network", {}), **plain(table)}
+        return self
+
     def master(self, **table: Any) -> Self:
         """Set keys of the master table."""
         self._data["master"] = {**self._data.get("master", {}), **table}
@@ -240,8 +245,8 @@ class Scenario:
     def set(self, name: str, value: Any) -> Self:
         """Override one value.
 
-        That is ``component.parameter``, ``balises.key``, ``master.key``, ``report.key``, a top-level key such as
-        ``stop``, or ``case``: all that a case of the scenario sets.
+        That is ``component.parameter``, ``balises.key``, ``network.key``, ``master.key``, ``report.key``, a top-level
+        key such as ``stop``, or ``case``: all that a case of the scenario sets.
 
         Args:
             name: of the value. value: what it becomes; paths are relative to the working folder.

@@ -31,7 +31,7 @@ class Link:
 
 
 def plan_links(plan: Plan) -> list[Link]:
-    """All connections of a plan, in its order."""
+    """All connections of a plan between components that are stepped, in its order."""
     owner = [place for place, step in enumerate(plan.steps) for _ in range(step.columns.start, step.columns.stop)]
     return [
         Link(
@@ -46,6 +46,7 @@ def plan_links(plan: Plan) -> list[Link]:
         for place, (name, column, held) in enumerate(
             zip(step.inputs.names, step.inputs.sources, step.inputs.held.tolist(), strict=True)
         )
+        if column < len(owner)
     ]
 
 

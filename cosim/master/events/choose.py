@@ -28,7 +28,8 @@ EXACT = {"String", "Binary", "Int64", "UInt64"}
 
 
 def make_coordinator(system: System, events: Events) -> EventCoordinator | None:
-    """The coordinator that a system needs; None where no event of a component concerns another one.
+    """The coordinator that a system needs; None where no event of a component concerns another one and there is no
+    network.
 
     Args:
         system: plan, algorithm and balises in place, components not initialised.
@@ -43,8 +44,8 @@ def make_coordinator(system: System, events: Events) -> EventCoordinator | None:
     if events == "local":
         for name in part:
             Gate(steps[name].component, steps[name].inputs, events_pass=False)
-        return None
-    if not part:
+        return None if system.network is None else EventCoordinator(system, [])
+    if not part and system.network is None:
         return None
     participants = {name: Participant(steps[name], gives=gives) for name, gives in part.items()}
     for wire in plan.clocks:

@@ -54,6 +54,11 @@ class EventCoordinator:
                 Stride(step, self._span, self._holder(step))
         self.notes = self._remarks()
 
+    @property
+    def only_network(self) -> bool:
+        """Whether it divides steps at the instants of the network alone."""
+        return not self._participants
+
     # -- steps ------------------------------------------------------------------------------------------------------
 
     def start(self, t: float) -> None:
@@ -64,6 +69,8 @@ class EventCoordinator:
         """
         for participant in self._participants:
             participant.gate.open()
+        if self._network_is_due(t):
+            self._system.network.handle(t)  # type: ignore[union-attr] # else nothing of it is due
         if self.iteration.concerns_anybody(t):
             self.iteration.run(t)
 
@@ -118,7 +125,9 @@ class EventCoordinator:
 
     def _next_stop(self, now: float, until: float) -> float:
         """The first instant after `now` at which something is known to happen, or `until` [s]."""
-        stop = until
+        stop, network = until, self._system.network
+        if network is not None and now + TIME_TOLERANCE < network.next_instant < stop:
+            stop = network.next_instant
         for participant in self._participants:
             component = participant.component
             if component.time < now - TIME_TOLERANCE or not component.can_vary_step:
@@ -184,11 +193,15 @@ class EventCoordinator:
         """Handle what happens at `t` [s], and give the rows before and after it; the row of `until` itself is the
         master's.
         """
-        if not self.iteration.concerns_anybody(t):
+        packets = self._network_is_due(t)
+        if not packets and not self.iteration.concerns_anybody(t):
             return ()
         plan = self._system.plan
         before = plan.values.copy()
-        self.iteration.run(t)
+        if packets:
+            self._system.network.handle(t)  # type: ignore[union-attr] # else nothing of it is due
+        if not packets or self.iteration.concerns_anybody(t):
+            self.iteration.run(t)
         changed = ~((before == plan.values) | (np.isnan(before) & np.isnan(plan.values)))
         if changed[plan.continuous].any():
             self._system.restart_interpolation(t, changed, np.ones_like(changed))
@@ -196,6 +209,10 @@ class EventCoordinator:
         if until - t > TIME_TOLERANCE:
             return [*first, (t, plan.values.copy())]
         return first if changed.any() else ()
+
+    def _network_is_due(self, t: float) -> bool:
+        network = self._system.network
+        return network is not None and network.is_due(t)
 
     def _stuck(self, t: float) -> RunError:
         names = [p.name for p in self._participants if abs(p.component.time - t) <= TIME_TOLERANCE]

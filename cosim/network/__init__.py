@@ -1,0 +1,1 @@
+"""A train's network: nodes that own signals, protocols, delays; packets with the stamp of their measurement."""

@@ -1,0 +1,124 @@
+"""The face of a network in a run: a component that is never stepped, whose outputs are what was last received."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable, Unknown
+
+from cosim.components.component import Component
+from cosim.components.fmi3 import FMI3Component
+from cosim.components.start_values import StartValue
+from cosim.coupling.connection import split_name
+from cosim.errors import ScenarioError
+from cosim.network.settings import NetworkSettings
+from fmus.fmi.types import FLOATING_TYPES, NUMERIC_TYPES
+
+NAME = "network"
+"""Of the network among the components."""
+KIND = "network"
+SENDER = "sender"
+
+
+class NetworkOutputs(FMI3Component):
+    """What was last received of each signal, ``network.component.signal``, and by whom and when it was sent.
+
+    Args:
+        settings: of the network. components: by name, for what the signals are.
+
+    Raises:
+        ScenarioError, CouplingError: a signal does not exist, or is no number.
+    """
+
+    def __init__(self, settings: NetworkSettings, components: Mapping[str, Component]) -> None:
+        self.settings = settings
+        self.sources = [_source(name, node.name, components) for node in settings.nodes for name in node.signals]
+        description = _description(settings, self.sources, components)
+        super().__init__(NAME, None, description, source="the network of the scenario", kind=KIND)
+
+    def configure(self, starts: Mapping[str, StartValue]) -> None:
+        """Nothing: shapes are declared.
+
+        Args:
+            starts: values by name.
+        """
+
+
+def error_name(signal: str) -> str:
+    """Output with the network error of a signal.
+
+    Args:
+        signal: ``component.signal``.
+    """
+    return f"error.{signal}"
+
+
+def stamp_name(node: str) -> str:
+    """Output with the stamp of what was last received of a node.
+
+    Args:
+        node: its name.
+    """
+    return f"stamp.{node}"
+
+
+def _source(name: str, node: str, components: Mapping[str, Component]) -> tuple[str, str]:
+    where = f"network.nodes.{node}"
+    component, signal = split_name(name, components, where)
+    variable = components[component].variable(signal, "output", "local")
+    if variable.type not in NUMERIC_TYPES:
+        raise ScenarioError(f"{where}: {name} is a {variable.type}; a packet carries numbers.")
+    elements = components[component].elements(signal)
+    if len(elements) != 1:
+        names = [f"{component}.{element.name}" for element in elements]
+        raise ScenarioError(f"{where}: {name} is an array; name its elements: {', '.join(names[:3])}, ...")
+    return component, signal
+
+
+def _description(
+    settings: NetworkSettings, sources: Sequence[tuple[str, str]], components: Mapping[str, Component]
+) -> ModelDescription:
+    variables: list[ModelVariable] = []
+
+    def add(name: str, description: str, **more: Any) -> None:
+        variables.append(
+            ModelVariable(
+                name=name,
+                valueReference=len(variables) + 1,
+                type="Float64",
+                causality="output",
+                variability="discrete",
+                description=description,
+                **more,
+            )
+        )
+
+    for kind in ("received", "error"):
+        for name, (component, signal) in zip(settings.signals, sources, strict=True):
+            units = _units(components[component], signal)
+            if kind == "received":
+                add(name, f"Last received value of {name}", **units)
+            else:
+                add(error_name(name), f"Last sent minus true value of {name} before the last transmission", **units)
+    add(SENDER, "Number of the node that sent last, from 1; 0 before")
+    for node in settings.nodes:
+        add(stamp_name(node.name), f"When what was last received of node {node.name} was measured", unit="s")
+    abilities = CoSimulation(modelIdentifier=KIND, canHandleVariableCommunicationStepSize=True)
+    return ModelDescription(
+        fmiVersion="3.0",
+        modelName=KIND,
+        instantiationToken=KIND,
+        description="A network",
+        generationTool=KIND,
+        coSimulation=abilities,
+        modelVariables=variables,
+        outputs=[Unknown(variable=variable, dependencies=[]) for variable in variables],
+    )
+
+
+def _units(component: Component, signal: str) -> dict[str, Any]:
+    variable = component.variables[signal]
+    if variable.type not in FLOATING_TYPES:
+        return {}
+    return {"unit": component.unit_name(signal), "displayUnit": variable.displayUnit}

@@ -1,0 +1,333 @@
+"""The network of a run: nodes send at their instants, packets arrive, receivers are told or hold what came last.
+
+Transmissions and deliveries are instants to which all components are stepped, so what is measured and what is told does
+not depend on the communication step, nor on the order in which components are stepped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from math import inf, nan
+from typing import Any
+
+import numpy as np
+
+from cosim.balises.delivery import Delivery, Receiver
+from cosim.balises.letter import Letter
+from cosim.balises.telegram import Mailbox
+from cosim.coupling.chain import Mover, Position, Stage, around
+from cosim.coupling.plan import Plan
+from cosim.network.chance import Chance
+from cosim.network.settings import NetworkSettings
+from cosim.results.data import PacketRecord
+from fmus.fmi.standard import TIME_TOLERANCE
+from plant_models.railway.network.protocols import periodic_sender, quadratic_sender
+
+PACKET_STAGE_TEXT = "packet receiver"
+
+
+@dataclass(frozen=True, slots=True)
+class Packet:
+    """A packet on its way.
+
+    Args:
+        stamp: when its values were measured and it was sent [s]. delivered_at: when it arrives [s].
+        node: number of its node, from 0. number: of the transmission, from 0. values: of the node's signals, in order.
+        kind: ``sent``, ``lost`` or ``duplicate``. place: in the log.
+    """
+
+    stamp: float
+    delivered_at: float
+    node: int
+    number: int
+    values: tuple[float, ...]
+    kind: str
+    place: int
+
+
+@dataclass(frozen=True)
+class Field:
+    """What one field of an event takes.
+
+    Args:
+        name: of the field. signal: number of the signal. factor, offset: conversion of units.
+    """
+
+    name: str
+    signal: int
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass
+class Listener:
+    """A component that is told of packets by an event of its own.
+
+    Args:
+        component: its name. event: by which it is told. fields: that take signals. nodes: of whose packets it is told.
+    """
+
+    component: str
+    event: str
+    fields: tuple[Field, ...]
+    nodes: frozenset[int]
+    receiver: Receiver | None = field(default=None, repr=False)
+
+
+@dataclass
+class Entry:
+    """One packet in the log.
+
+    Args:
+        packet: as it was sent. deliveries: by receiver, once it has arrived.
+    """
+
+    packet: Packet
+    deliveries: dict[str, Delivery | str] = field(default_factory=dict)
+
+
+class NetworkService:
+    """The network.
+
+    Args:
+        settings: what it is. start: of the run [s].
+        sources: columns of the measured signals in the values of the plan, shape (p,).
+        first: column of the network's own outputs.
+        listeners: components that are told by events. holders: by signal the components whose inputs hold it.
+    """
+
+    def __init__(
+        self,
+        settings: NetworkSettings,
+        start: float,
+        sources: np.ndarray,
+        first: int,
+        listeners: Sequence[Listener],
+        holders: Mapping[str, Sequence[str]],
+    ) -> None:
+        self.settings, self.sources, self.listeners = settings, sources, list(listeners)
+        self.chance = Chance(settings, start)
+        count, nodes = len(sources), len(settings.nodes)
+        self._held = slice(first, first + count)
+        self._errors = slice(first + count, first + 2 * count)
+        self._sender, self._stamps = first + 2 * count, slice(first + 2 * count + 1, first + 2 * count + 1 + nodes)
+        node_of = np.array(settings.node_of)
+        self._own = [np.flatnonzero(node_of == i) for i in range(nodes)]
+        self._order = settings.order or tuple(range(nodes))
+        self._weights = None if settings.weights is None else list(settings.weights)
+        self._holding = [
+            sorted({name for signal in node.signals for name in holders.get(signal, ())}) for node in settings.nodes
+        ]
+        self.mailbox: Mailbox[Packet] = Mailbox()
+        self.entries: list[Entry] = []
+        self.number = 0
+        self._start, self._begun = start, False
+        self._next = self.chance.instant(0)
+        self._sent = np.zeros(count)
+        self._newest = [-1] * nodes
+        self._arrived: list[set[int]] = [set() for _ in range(nodes)]
+        self._receivers: list[Receiver] = []
+
+    def attach(self, plan: Plan, known: Sequence[Receiver] = ()) -> None:
+        """Take a place in the plan: values are measured in it, and receivers that are behind are told in their steps.
+
+        Args:
+            plan: of the run. known: receivers of balises, which keep what they are told of packets as well.
+        """
+        self._plan = plan
+        by_name = {receiver.planned.component.name: receiver for receiver in known}
+        for listener in self.listeners:
+            name = listener.component
+            if name not in by_name:
+                receiver = by_name[name] = Receiver(plan.find(name), listener.event)
+                stage = Stage(Position.BALISES, PACKET_STAGE_TEXT, move=around(partial(self._move, receiver)))
+                receiver.planned.add_stage(stage)
+                self._receivers.append(receiver)
+            listener.receiver = by_name[name]
+        plan.relays.append(self._relay)
+
+    @property
+    def next_instant(self) -> float:
+        """When something is sent or arrives next [s]."""
+        return min(self._next, self.mailbox.waiting[0].delivered_at if self.mailbox.waiting else inf)
+
+    @property
+    def idle_until(self) -> float:
+        """Up to here [s] nothing is to be done for it."""
+        if any(listener.receiver is not None and listener.receiver.busy for listener in self.listeners):
+            return -inf
+        return self.next_instant
+
+    def is_due(self, t: float) -> bool:
+        """Whether something is sent or arrives at `t` [s]."""
+        return self.next_instant <= t + TIME_TOLERANCE
+
+    def handle(self, t: float) -> None:
+        """All components stand at `t` [s]: send what is due, then deliver what is due."""
+        if not self._begun:
+            self._begin()
+        while self._next <= t + TIME_TOLERANCE:
+            self._transmit(t)
+        for packet in self.mailbox.due(t + TIME_TOLERANCE):
+            self._deliver(t, packet)
+
+    # -- sending ----------------------------------------------------------------------------------------------------
+
+    def _relay(self) -> None:
+        """Before the run begins receivers hold what is measured, as if the network had run for long."""
+        values = self._plan.values
+        values[self._held] = values[self.sources]
+        values[self._errors] = 0.0
+        values[self._sender] = 0.0
+        values[self._stamps] = self._start
+
+    def _begin(self) -> None:
+        self._begun = True
+        self._sent[:] = self._plan.values[self._held]
+
+    def _transmit(self, t: float) -> None:
+        """Transmission `number`, now: one node sends what it measures."""
+        k, values = self.number, self._plan.values
+        stamp = self._next
+        measured = values[self.sources]
+        error = self._sent - measured
+        values[self._errors] = error
+        node = periodic_sender(self._order, k) if self._weights is None else quadratic_sender(self._weights, error)
+        own = self._own[node]
+        self._sent[own] = measured[own]
+        values[self._sender] = node + 1.0
+        self.number, self._next = k + 1, self.chance.instant(k + 1)
+        told = tuple(measured[own].tolist())
+        lost = self.chance.lost(k)
+        arrives = nan if lost else stamp + self.chance.delay(k)
+        self._post(Packet(stamp, arrives, node, k, told, "lost" if lost else "sent", len(self.entries)))
+        if not lost and self.chance.is_doubled(k):
+            arrives = stamp + self.chance.delay(k, second=True)
+            self._post(Packet(stamp, arrives, node, k, told, "duplicate", len(self.entries)))
+
+    def _post(self, packet: Packet) -> None:
+        self.entries.append(Entry(packet))
+        if packet.kind != "lost":
+            self.mailbox.post(packet)
+
+    # -- delivering -------------------------------------------------------------------------------------------------
+
+    def _deliver(self, t: float, packet: Packet) -> None:
+        node, values, entry = packet.node, self._plan.values, self.entries[packet.place]
+        checked = self.settings.sequence == "checked"
+        again = packet.number in self._arrived[node]
+        older = packet.number <= self._newest[node]
+        if self.settings.duplicate_fraction > 0.0:
+            self._arrived[node].symmetric_difference_update({packet.number})  # of two copies the second is the last
+        kept = not (checked and older)
+        if kept:
+            values[self._held][self._own[node]] = packet.values
+            values[self._stamps][node] = packet.stamp
+            self._newest[node] = packet.number
+        for name in self._holding[node]:
+            entry.deliveries[name] = "held" if kept else "dropped"
+        for listener in self.listeners:
+            if node not in listener.nodes or listener.receiver is None:
+                continue
+            if checked and again:
+                entry.deliveries[listener.component] = "dropped"
+            else:
+                letter = self._letter(listener, packet)
+                entry.deliveries[listener.component] = listener.receiver.tell(t, letter)
+
+    def _letter(self, listener: Listener, packet: Packet) -> Letter:
+        """What a listener is told: the values of the packet, and of other nodes what was last received."""
+        values = self._plan.values[self._held].copy()
+        values[self._own[packet.node]] = packet.values
+        told = {f.name: f.factor * float(values[f.signal]) + f.offset for f in listener.fields}
+        own = {"node": packet.node + 1.0, "number": float(packet.number), "delivered_at": packet.delivered_at}
+        return Letter(listener.event, packet.stamp, packet.delivered_at, own | told)
+
+    def _move(self, receiver: Receiver, drive: Mover, t: float, until: float) -> None:
+        """A receiver that is behind with what it was told is told in its step."""
+        if receiver.busy:
+            receiver.step(t, until, ())
+        else:
+            drive(t, until)
+
+    # -- what came out ----------------------------------------------------------------------------------------------
+
+    def records(self) -> list[PacketRecord]:
+        """All packets in the order of sending, duplicates behind theirs."""
+        names = [node.signals for node in self.settings.nodes]
+        return [
+            PacketRecord(
+                entry.packet.stamp,
+                entry.packet.delivered_at,
+                self.settings.nodes[entry.packet.node].name,
+                entry.packet.number,
+                dict(zip(names[entry.packet.node], entry.packet.values, strict=True)),
+                entry.packet.kind,  # type: ignore[arg-type] # as `_transmit` names it
+                self._outcomes(entry),
+            )
+            for entry in self.entries
+        ]
+
+    def _outcomes(self, entry: Entry) -> dict[str, str]:
+        node = entry.packet.node
+        told = [*self._holding[node], *(one.component for one in self.listeners if node in one.nodes)]
+        if entry.packet.kind == "lost":
+            return {}
+        if not entry.deliveries:
+            return dict.fromkeys(told, "undelivered")
+        return {name: what if isinstance(what, str) else what.outcome for name, what in entry.deliveries.items()}
+
+    # -- state ------------------------------------------------------------------------------------------------------
+
+    def save(self) -> Any:
+        """What time changes here; the values of the plan are saved elsewhere."""
+        return (
+            list(self.mailbox.waiting),
+            len(self.entries),
+            (self.number, self._next, self._begun, self._sent.copy()),
+            (list(self._newest), [set(numbers) for numbers in self._arrived]),
+            [receiver.save() for receiver in self._receivers],
+        )
+
+    def restore(self, state: Any) -> None:
+        """Return to what was saved.
+
+        Args:
+            state: as `save` gave it.
+        """
+        waiting, count, sending, (newest, arrived), receivers = state
+        self.mailbox.waiting = list(waiting)
+        del self.entries[count:]
+        for packet in waiting:
+            self.entries[packet.place].deliveries = {}
+        self.number, self._next, self._begun, sent = sending
+        self._sent[:] = sent
+        self._newest, self._arrived = list(newest), [set(numbers) for numbers in arrived]
+        for receiver, saved in zip(self._receivers, receivers, strict=True):
+            receiver.restore(saved)
+
+
+def ages(records: Sequence[PacketRecord], settings: NetworkSettings, start: float, stop: float) -> dict[str, Any]:
+    """How old what receivers hold is: mean and largest age of each node's values over a run.
+
+    Args:
+        records: of the run. settings: of the network. start, stop: of the run [s].
+
+    Returns:
+        By node ``mean_age`` and ``largest_age`` [s], from the exact instants of delivery.
+    """
+    found = {}
+    for node in settings.nodes:
+        own = [r for r in records if r.node == node.name and r.kind != "lost" and r.delivered_at <= stop]
+        now, stamp, area, largest = start, start, 0.0, 0.0
+        for record in sorted(own, key=lambda r: (r.delivered_at, r.stamp)):
+            if record.stamp < stamp and settings.sequence == "checked":
+                continue
+            area += (record.delivered_at - now) * (0.5 * (record.delivered_at + now) - stamp)
+            largest = max(largest, record.delivered_at - stamp)
+            now, stamp = record.delivered_at, record.stamp
+        area += (stop - now) * (0.5 * (stop + now) - stamp)
+        found[node.name] = {"mean_age": area / (stop - start), "largest_age": max(largest, stop - stamp)}
+    return found

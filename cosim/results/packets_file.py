@@ -1,0 +1,86 @@
+"""The packets of a run's network as CSV, one row each. Touches only the file it is given."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from cosim.results.data import PacketRecord
+from cosim.results.events_file import outcomes_text, parse_outcomes
+
+COLUMNS = ("stamp", "delivered_at", "node", "number", "kind", "values", "outcomes")
+
+
+def packet_row(packet: PacketRecord) -> dict[str, str]:
+    """One packet by column; values and outcomes as ``name=value;name=value``.
+
+    Args:
+        packet: of a run.
+    """
+    values = {name: repr(float(value)) for name, value in packet.values.items()}
+    return {
+        "stamp": repr(float(packet.stamp)),
+        "delivered_at": repr(float(packet.delivered_at)),
+        "node": packet.node,
+        "number": str(packet.number),
+        "kind": packet.kind,
+        "values": outcomes_text(values),
+        "outcomes": outcomes_text(packet.outcomes),
+    }
+
+
+def packet_from_row(row: Mapping[str, str]) -> PacketRecord:
+    """The packet of a row.
+
+    Args:
+        row: cells by column.
+
+    Raises:
+        ValueError: a number, the kind or an outcome cannot be read.
+    """
+    kind = row["kind"]
+    if kind not in ("sent", "lost", "duplicate"):
+        raise ValueError(f"kind {kind!r} is none of: sent, lost, duplicate.")
+    values = {name: float(text) for name, text in parse_outcomes(row["values"]).items()}
+    stamp, delivered_at = float(row["stamp"]), float(row["delivered_at"])
+    outcomes = parse_outcomes(row["outcomes"])
+    return PacketRecord(stamp, delivered_at, row["node"], int(row["number"]), values, kind, outcomes)
+
+
+def write_packets(path: str | Path, packets: Iterable[PacketRecord]) -> None:
+    """Write packets as CSV, numbers to the last bit.
+
+    Args:
+        path: file to write. packets: in the order to be kept.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    with Path(path).open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(packet_row(packet) for packet in packets)
+
+
+def read_packets(path: str | Path) -> list[PacketRecord]:
+    """Read the packets written by `write_packets`.
+
+    Args:
+        path: the file.
+
+    Raises:
+        ValueError: the file is not such a table; the message names the line.
+        OSError: the file cannot be read.
+    """
+    with Path(path).open(encoding="utf-8", newline="") as file:
+        reader = csv.DictReader(file)
+        if tuple(reader.fieldnames or ()) != COLUMNS:
+            raise ValueError(f"{path} is not a table of packets: expected the columns {', '.join(COLUMNS)}.")
+        packets = []
+        for row in reader:
+            try:
+                packets.append(packet_from_row(row))
+            except (TypeError, ValueError) as error:
+                raise ValueError(f"{path}, line {reader.line_num}: {error}") from error
+        return packets

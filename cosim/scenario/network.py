@@ -1,0 +1,221 @@
+"""The network of a scenario: which connections travel over it, and who is told of packets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim.components.component import Component
+from cosim.coupling.connection import Connection, Link, connect, event_connection, split_name
+from cosim.coupling.plan import Plan
+from cosim.errors import ScenarioError, nearest
+from cosim.network.outputs import NAME, NetworkOutputs
+from cosim.network.service import Field, Listener, NetworkService, ages
+from cosim.network.settings import NetworkSettings
+from cosim.results.data import PacketRecord
+from cosim.scenario.network_table import network_settings
+from cosim.scenario.schema import ScenarioTable
+from fmu_observer.event_protocol import DEFAULT_REPLAY_HORIZON
+
+
+@dataclass
+class Network:
+    """What a scenario's network does to its connections.
+
+    Args:
+        settings: of the network. outputs: its face among the components.
+        listeners: who is told by events. held: by signal, who holds it.
+    """
+
+    settings: NetworkSettings
+    outputs: NetworkOutputs
+    listeners: list[Listener] = field(default_factory=list)
+    held: dict[str, list[str]] = field(default_factory=dict)
+
+    def service(self, plan: Plan, start: float) -> NetworkService:
+        """The network for the master.
+
+        Args:
+            plan: with the network's outputs behind those of the components. start: of the run [s].
+        """
+        columns = np.array([plan.column(name) for name in self.settings.signals], dtype=np.intp)
+        first = plan.column(f"{NAME}.{self.settings.signals[0]}")
+        return NetworkService(self.settings, start, columns, first, self.listeners, self.held)
+
+    def hidden(self, components: Mapping[str, Component]) -> dict[str, list[str]]:
+        """Local variables that it measures, by component: they are read though no connection asks for them.
+
+        Args:
+            components: by name.
+        """
+        found: dict[str, list[str]] = {}
+        for component, signal in self.outputs.sources:
+            if components[component].variable(signal).causality == "local":
+                found.setdefault(component, []).append(signal)
+        return found
+
+
+def make_network(table: ScenarioTable, components: Mapping[str, Component], folder: Path, where: str) -> Network | None:
+    """The network of a scenario, before its connections are known; None where it has none.
+
+    Args:
+        table: the scenario. components: by name. folder: start of relative paths. where: name of the scenario, for
+            messages.
+
+    Raises:
+        ScenarioError, CouplingError: a signal or receiver does not exist; delays that cannot be.
+    """
+    if table.network is None:
+        return None
+    if NAME in components:
+        raise ScenarioError(f"{where}: a component cannot be called {NAME!r} where there is a network; rename it.")
+    for name in table.network.receivers or ():
+        if name not in components:
+            raise ScenarioError(f"{where}: network.receivers: no component {name!r}; {nearest(name, components)}")
+    settings = network_settings(table.network, folder, where)
+    return Network(settings, NetworkOutputs(settings, components))
+
+
+def connect_over(
+    network: Network, table: ScenarioTable, pairs: Sequence[Link], components: Mapping[str, Component], where: str
+) -> tuple[list[Connection], list[Connection]]:
+    """The connections of a scenario with a network.
+
+    Args:
+        network: which is told who listens. table: the scenario. pairs: as they stand in it. components: by name.
+        where: name of the scenario, for messages.
+
+    Returns:
+        Connections as they stand in the scenario, without those to fields of events; and the same as the plan takes
+        them, with the network as source of what travels over it.
+
+    Raises:
+        ScenarioError: an event is to be told of a signal that no node owns, or of several networks' worth of nothing.
+        CouplingError: as for `connect`.
+    """
+    assert table.network is not None
+    owned, told = set(network.settings.signals), table.network.receivers
+    direct: list[Link] = []
+    over: set[tuple[str, str]] = set()
+    fields: dict[tuple[str, str], list[Field]] = {}
+    for pair in pairs:
+        source, target = pair[0], pair[1]
+        component, name = split_name(target, components, "Connection target")
+        event = _event_of(components[component], name)
+        travels = source in owned and (told is None or component in told)
+        if event is not None and not _is_wired(pairs, component, event):
+            if not travels:
+                raise ScenarioError(
+                    f"{where}: {target} is told by the event '{event}', and no node of the network owns {source}; "
+                    f"{nearest(source, owned)}"
+                )
+            made = event_connection(pair, components)
+            number = network.settings.signals.index(source)
+            part = Field(name.removeprefix(f"{event}_"), number, made.factor, made.offset)
+            fields.setdefault((component, event), []).append(part)
+            continue
+        direct.append(pair)
+        if travels:
+            over.add((component, name))
+            network.held.setdefault(source, []).append(component)
+    connections = connect(direct, components)
+    node_of = network.settings.node_of
+    network.listeners += [
+        Listener(component, event, tuple(parts), frozenset(node_of[part.signal] for part in parts))
+        for (component, event), parts in sorted(fields.items())
+    ]
+    routed = [
+        replace(c, source=(NAME, ".".join(c.source)), source_array="", exact=False) if c.target_variable in over else c
+        for c in connections
+    ]
+    return connections, routed
+
+
+def network_warnings(
+    network: Network, table: ScenarioTable, components: Mapping[str, Component], where: str
+) -> list[str]:
+    """What to know of late packets before the run.
+
+    Args:
+        network: of the scenario. table: the scenario. components: by name. where: name of the scenario, for messages.
+
+    Raises:
+        ScenarioError: packets take longer than a receiver can go back.
+    """
+    shortest, longest = network.settings.delay_range
+    warnings = []
+    for name in sorted({listener.component for listener in network.listeners}):
+        component, own = components[name], table.components[name]
+        sealed = component.kind == "FMU" and "late_policy" not in component.variables
+        if sealed:
+            if longest > 0.0:
+                warnings.append(
+                    f"{name} is told of packets late, and is an FMU without the parameter late_policy: what it does "
+                    f"with their stamps is its own choice."
+                )
+            continue
+        if own.late_policy not in (None, "replay"):
+            continue
+        horizon = DEFAULT_REPLAY_HORIZON if own.replay_horizon is None else own.replay_horizon
+        if shortest > horizon:
+            raise ScenarioError(
+                f"{where}: packets take {shortest:g} s at least, and {name} can go back {horizon:g} s: it would reject "
+                f"all of them. Set components.{name}.replay_horizon to {shortest:g} s or more."
+            )
+        if horizon < longest < inf:
+            warnings.append(
+                f"Packets take up to {longest:g} s, and {name} can go back {horizon:g} s: what is older is rejected."
+            )
+    return warnings
+
+
+def network_summary(network: Network, records: Sequence[PacketRecord], start: float, stop: float) -> dict[str, Any]:
+    """What became of the packets, for the summary.
+
+    Args:
+        network: of the run. records: of the run. start, stop: of the run [s].
+    """
+    settings = network.settings
+    old = ages(records, settings, start, stop)
+    return {
+        "protocol": settings.protocol,
+        "period": settings.period,
+        "nodes": {node.name: list(node.signals) for node in settings.nodes},
+        "packets": {
+            node.name: _counts([r for r in records if r.node == node.name]) | old[node.name] for node in settings.nodes
+        },
+    }
+
+
+def _counts(records: Sequence[PacketRecord]) -> dict[str, Any]:
+    kinds = [record.kind for record in records]
+    outcomes = [set(record.outcomes.values()) for record in records]
+    arrived = sorted((r.delivered_at, r.stamp) for r in records if r.kind != "lost")
+    stamps = [r.stamp for r in records if r.kind != "duplicate"]
+    return {
+        "sent": kinds.count("sent") + kinds.count("lost"),
+        "lost": kinds.count("lost"),
+        "duplicates": kinds.count("duplicate"),
+        "overtaken": sum(1 for a, b in pairwise(arrived) if b[1] < a[1]),
+        "undelivered": sum("undelivered" in found for found in outcomes),
+        "largest_gap": max((b - a for a, b in pairwise(stamps)), default=None),
+    }
+
+
+def _event_of(component: Component, name: str) -> str | None:
+    """The event that an input belongs to as a field, or None."""
+    if name not in component.variables:
+        return None
+    reference = component.variables[name].valueReference
+    return next((event for event, port in component.events.items() if reference in port.payload.values()), None)
+
+
+def _is_wired(pairs: Sequence[Link], component: str, event: str) -> bool:
+    """Whether somebody else tells of the event: its count or clock has a source."""
+    return any(pair[1] in (f"{component}.{event}", f"{component}.{event}_count") for pair in pairs)
