@@ -24,7 +24,7 @@ from cosim.evaluation.error_table import error_text
 from cosim.evaluation.metrics import phase_metrics
 from cosim.expectations.registry import EXPECTATIONS
 from cosim.report.figures.main_picture import main_picture
-from cosim.scenario import schema, tables
+from cosim.scenario import network_table, schema, tables
 from cosim.scenario.model_name import ModelName
 
 DOCS = Path(__file__).parent
@@ -178,6 +178,7 @@ def schema_tables() -> dict[str, Any]:
         "iteration": tables.IterationTable,
         "balises": tables.BalisesTable,
         "false_telegram": tables.FalseTelegramTable,
+        "network": network_table.NetworkTable,
         "report": tables.ReportTable,
         "phase": tables.PhaseTable,
         "measure": tables.MeasureTable,

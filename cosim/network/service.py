@@ -116,7 +116,8 @@ class NetworkService:
         node_of = np.array(settings.node_of)
         self._own = [np.flatnonzero(node_of == i) for i in range(nodes)]
         self._order = settings.order or tuple(range(nodes))
-        self._weights = None if settings.weights is None else list(settings.weights)
+        self._by_name = sorted(range(nodes), key=lambda i: settings.nodes[i].name)
+        self._weights = None if settings.weights is None else settings.weights[self._by_name]
         self._holding = [
             sorted({name for signal in node.signals for name in holders.get(signal, ())}) for node in settings.nodes
         ]
@@ -194,7 +195,10 @@ class NetworkService:
         measured = values[self.sources]
         error = self._sent - measured
         values[self._errors] = error
-        node = periodic_sender(self._order, k) if self._weights is None else quadratic_sender(self._weights, error)
+        if self._weights is None:
+            node = periodic_sender(self._order, k)
+        else:  # of nodes with equal errors the first by name, however they are listed
+            node = self._by_name[quadratic_sender(self._weights, error)]
         own = self._own[node]
         self._sent[own] = measured[own]
         values[self._sender] = node + 1.0

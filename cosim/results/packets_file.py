@@ -5,10 +5,13 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Literal
 
 from cosim.results.data import PacketRecord
 from cosim.results.events_file import outcomes_text, parse_outcomes
 
+Kind = Literal["sent", "lost", "duplicate"]
+KINDS: Mapping[str, Kind] = {"sent": "sent", "lost": "lost", "duplicate": "duplicate"}
 COLUMNS = ("stamp", "delivered_at", "node", "number", "kind", "values", "outcomes")
 
 
@@ -39,9 +42,9 @@ def packet_from_row(row: Mapping[str, str]) -> PacketRecord:
     Raises:
         ValueError: a number, the kind or an outcome cannot be read.
     """
-    kind = row["kind"]
-    if kind not in ("sent", "lost", "duplicate"):
-        raise ValueError(f"kind {kind!r} is none of: sent, lost, duplicate.")
+    kind = KINDS.get(row["kind"])
+    if kind is None:
+        raise ValueError(f"kind {row['kind']!r} is none of: {', '.join(KINDS)}.")
     values = {name: float(text) for name, text in parse_outcomes(row["values"]).items()}
     stamp, delivered_at = float(row["stamp"]), float(row["delivered_at"])
     outcomes = parse_outcomes(row["outcomes"])

@@ -177,6 +177,7 @@ def _seal(manifest: dict[str, Any], new: Path, paths: Mapping[str, Path], summar
 def _seeds(data: Mapping[str, Any]) -> dict[str, Any]:
     """Every seed that the scenario gives; those it leaves to their defaults are in the versions of the packages."""
     seeds = {f"balises.{k}": v for k, v in data.get("balises", {}).items() if "seed" in k}
+    seeds |= {f"network.{k}": v for k, v in data.get("network", {}).items() if "seed" in k}
     for name, component in data["components"].items():
         seeds |= {f"{name}.{k}": v for k, v in component.get("parameters", {}).items() if "seed" in k}
     return seeds

@@ -6,7 +6,7 @@ called.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from cosim.balises.service import localiser_stage_text, receiver_stage_text
 from cosim.components.component import Component
@@ -19,6 +19,7 @@ from cosim.master.control.multirate import rate_stage_text
 from cosim.master.events.choose import taking_part
 from cosim.master.events.participant import interrupts
 from cosim.master.events.stride import event_stage_text
+from cosim.network.service import PACKET_STAGE_TEXT
 from cosim.scenario.schema import ScenarioTable
 from cosim.structure.structure import Balises
 
@@ -33,6 +34,7 @@ def movement_chains(
     clocks: Sequence[ClockConnection],
     choice: AlgorithmChoice,
     balises: Balises | None,
+    listeners: Collection[str] | None = None,
 ) -> dict[str, tuple[str, ...]]:
     """The chain of each component in words, outermost stage first; what a probe decides is named as such.
 
@@ -40,10 +42,12 @@ def movement_chains(
         table: the scenario. components: by name, in execution order. connections: checked.
         clocks: connections between clocks. choice: of the algorithm.
         balises: who finds the balises and who receives the telegrams, or None.
+        listeners: who is told of packets by events; None where there is no network.
     """
     part = taking_part(components, connections, clocks, table.master.events, _alone(table, balises))
-    divided = bool(part) and table.master.events == "propagate"
-    back = divided and any(
+    propagated = bool(part) and table.master.events == "propagate"
+    divided = propagated or listeners is not None
+    back = propagated and any(
         isinstance(c, FMI3Component) and interrupts(c, gives=part[name])
         for name, c in components.items()
         if name in part
@@ -56,7 +60,8 @@ def movement_chains(
         every, whole = table.components[name].every, not component.can_vary_step
         stages = [rate_stage_text(every)] if every > 1 else []
         stages += [event_stage_text(whole=whole)] if divided and (back or whole) else []
-        stages += _balise_stage(name, balises)
+        told = _balise_stage(name, balises)
+        stages += told or ([PACKET_STAGE_TEXT] if name in (listeners or ()) else [])
         stages += [COMPILED] if compiled else []
         inputs, substeps = name in connected, table.components[name].substeps
         chains[name] = *stages, plain_way(interpolator, substeps, inputs=inputs, gated=name in part)

@@ -149,7 +149,11 @@ def network_warnings(
         ScenarioError: packets take longer than a receiver can go back.
     """
     shortest, longest = network.settings.delay_range
-    warnings = []
+    whole = sorted({name for name, _ in network.outputs.sources if not components[name].can_vary_step})
+    warnings = [
+        f"{name} takes whole communication steps: packets sent between two points carry what it was at the earlier one."
+        for name in whole
+    ]
     for name in sorted({listener.component for listener in network.listeners}):
         component, own = components[name], table.components[name]
         sealed = component.kind == "FMU" and "late_policy" not in component.variables

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cosim.scenario.paths import BALISE_PATHS, COMPONENT_PATHS, MODEL_KEYS
+from cosim.scenario.paths import BALISE_PATHS, COMPONENT_PATHS, MODEL_KEYS, NETWORK_PATHS
 from plant_models.local_files import local_files
 from plant_models.user_file import names_a_file, split_name
 
@@ -33,7 +33,7 @@ class ForeignFile:
 
     @property
     def owner(self) -> str:
-        """Component, or ``balises``."""
+        """Component, ``balises`` or ``network``."""
         parts = self.key.split(".")
         return parts[1] if parts[0] == "components" else parts[0]
 
@@ -121,6 +121,9 @@ def _paths(table: ScenarioTable) -> Iterator[tuple[str, str]]:
     for key in BALISE_PATHS:
         if table.balises is not None and getattr(table.balises, key) is not None:
             yield f"balises.{key}", str(getattr(table.balises, key))
+    for key in NETWORK_PATHS:
+        if table.network is not None and getattr(table.network, key) is not None:
+            yield f"network.{key}", str(getattr(table.network, key))
 
 
 def _existing_parts(foreign: ForeignFile) -> list[Path]:

@@ -201,6 +201,10 @@ class _Setup:
         if self.master.system.events is not None:
             self.notes += self.master.system.events.notes
         self.notes += self.master.stepper.notes
+        if self.packets is not None and self.master.stepper.compiled is not None:
+            self.notes.append(
+                "Steps in which a packet is sent or arrives are Python's: the compiled stepper does those between them."
+            )
         self._begin_stream(self.master)
         self.setup_seconds = perf_counter() - begin
 

@@ -15,17 +15,19 @@ from cosim.coupling.connection import Connection, connect, unconnected_inputs
 from cosim.coupling.graph import Group, undeclared
 from cosim.errors import CosimError, CouplingError
 from cosim.master.algorithms.choose import AlgorithmChoice, choose_algorithm
+from cosim.network.outputs import NAME as NETWORK
 from cosim.scenario.backends import intended
 from cosim.scenario.balise_service import find_receivers, watched_plant
 from cosim.scenario.connections import parse_connections
 from cosim.scenario.master import stepping_groups
 from cosim.scenario.models import make_system, open_recording, python_component
 from cosim.scenario.movement import movement_chains
+from cosim.scenario.network import Network, connect_over, make_network
 from cosim.scenario.schema import ScenarioTable
 from cosim.scenario.starts import given_values
 from cosim.scenario.tables import ComponentTable
 from cosim.structure.inspect import group_index, make_links, make_part, rate_text
-from cosim.structure.structure import Balises, Link, Structure
+from cosim.structure.structure import Balises, Link, Packets, Structure
 
 
 def scenario_structure(table: ScenarioTable, name: str, folder: Path, where: str) -> Structure:
@@ -49,16 +51,21 @@ def _structure(table: ScenarioTable, name: str, folder: Path, where: str) -> Str
     places = {n: f"{where}: components.{n}" for n in table.components}
     components = {n: describe_component(n, t, folder, places[n], span) for n, t in table.components.items()}
     clocks, pairs = connect_clocks(parse_connections(table.connections, where), components)
-    connections = connect(pairs, components)
+    network = make_network(table, components, folder, where)
+    routed = connections = connect(pairs, components) if network is None else []
+    if network is not None:
+        connections, routed = connect_over(network, table, pairs, components, where)
+    stepped = [c for c in routed if c.source[0] != NETWORK]
     balises = _balises(table, components, where)
     plant, receivers = ("", ()) if balises is None else (balises.plant, balises.receivers)
-    groups = stepping_groups(table, components, connections, plant, receivers)
+    groups = stepping_groups(table, components, stepped, plant, receivers)
     choice, refusal = _choice(table, groups, components)
     order = [n for group in groups for n in group.names]
     loops = [loop for group in groups for loop in group.algebraic]
     number = group_index(group.names for group in groups)
     rates = {n: rate_text(t.every, t.substeps) for n, t in table.components.items()}
-    chains = movement_chains(table, {n: components[n] for n in order}, connections, clocks, choice, balises)
+    listeners = None if network is None else [listener.component for listener in network.listeners]
+    chains = movement_chains(table, {n: components[n] for n in order}, routed, clocks, choice, balises, listeners)
     return Structure(
         name=name,
         title=table.title,
@@ -73,6 +80,7 @@ def _structure(table: ScenarioTable, name: str, folder: Path, where: str) -> Str
         algorithm=choice.algorithm,
         reason=choice.reason,
         balises=balises,
+        network=None if network is None else _network(network),
         warnings=(*_warnings(table, components, connections), *choice.notes, *refusal),
     )
 
@@ -127,6 +135,14 @@ def _balises(table: ScenarioTable, components: Mapping[str, Component], where: s
     told = find_receivers(balises, components, plant, where)
     watched = balises.position or "", balises.speed or ""
     return Balises(plant, *watched, tuple(told), balises.method, balises.timing, balises.odometer)
+
+
+def _network(network: Network) -> Packets:
+    settings = network.settings
+    told = [f"{one.component} ({one.event})" for one in network.listeners]
+    held = sorted({name for names in network.held.values() for name in names})
+    nodes = {node.name: node.signals for node in settings.nodes}
+    return Packets(nodes, settings.protocol, settings.period, settings.delay_model, tuple(told), tuple(held))
 
 
 def _warnings(table: ScenarioTable, components: Mapping[str, Component], connections: list[Connection]) -> list[str]:

@@ -97,6 +97,11 @@ class _Exporter:
 
     def build(self) -> None:
         """All files."""
+        if self.table.network is not None:
+            raise ScenarioError(
+                f"{self.where}: network: SSP knows of no network; put the block 'network_protocol' between the "
+                f"components, which is exported with them."
+            )
         if self.table.balises is not None and self.table.balises.layout == "recorded":
             raise ScenarioError(
                 f"{self.where}: balises: recorded telegrams cannot be exported; lay the balises by 'positions' or "

@@ -5,6 +5,7 @@ Made by `cosim.structure.inspect`, printed by `cosim.structure.text`, drawn by `
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -119,6 +120,24 @@ class Balises:
 
 
 @dataclass(frozen=True)
+class Packets:
+    """The network of a run.
+
+    Args:
+        nodes: signals by node. protocol: which node sends. period: between two transmissions [s].
+        delay: kind of delay. told: components that are told by events, with their event. held: components whose inputs
+            hold what came last.
+    """
+
+    nodes: Mapping[str, tuple[str, ...]]
+    protocol: str
+    period: float
+    delay: str
+    told: tuple[str, ...] = ()
+    held: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Structure:
     """How the components of a run hang together, known before it.
 
@@ -128,7 +147,7 @@ class Structure:
         groups: names of the strongly connected groups in execution order; most hold one component.
         loops: algebraic loops, each a closed path of signals along direct feedthrough.
         algorithm: how the components are stepped. reason: why so.
-        balises: or None. clocks: connections between clocks.
+        balises: or None. clocks: connections between clocks. network: or None.
         warnings: what the run would warn of, or refuse.
     """
 
@@ -146,6 +165,7 @@ class Structure:
     balises: Balises | None = None
     clocks: tuple[Link, ...] = ()
     warnings: tuple[str, ...] = field(default=())
+    network: Packets | None = None
 
     def part(self, name: str) -> Part:
         """The component of this name."""

@@ -29,6 +29,7 @@ def structure_text(structure: Structure, width: int | None = None) -> str:
         _section("Algebraic loops", _loops(structure)),
         _section("Movement over a step, outermost stage first", _chains(structure)),
         _section("Balises", _balises(structure)),
+        _section("Network", _network(structure)),
         _section(
             "Algorithm", [f"{structure.algorithm}: {structure.reason}" if structure.reason else structure.algorithm]
         ),
@@ -185,6 +186,19 @@ def _balises(structure: Structure) -> list[str]:
         ["timing", balises.timing],
     ]
     rows += [["odometer reading", balises.odometer]] if balises.odometer else []
+    return text_table(rows, left=(0, 1))
+
+
+def _network(structure: Structure) -> list[str]:
+    network = structure.network
+    if network is None:
+        return []
+    rows = [[f"node {name}", ", ".join(signals)] for name, signals in network.nodes.items()]
+    rows += [
+        ["protocol", f"{network.protocol}, a transmission every {network.period:g} s, delay {network.delay}"],
+        ["notified", ", ".join(network.told) or "nobody"],
+        ["last value held", ", ".join(network.held) or "nowhere"],
+    ]
     return text_table(rows, left=(0, 1))
 
 

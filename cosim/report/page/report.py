@@ -117,6 +117,7 @@ def report_page(
         envelope=ENVELOPE,
         counts=counts,
         telegrams=run_tables.telegrams_table(counts.outcomes, spec.labels),
+        packets=run_tables.packets_table(result),
         indicators=run_tables.indicators_table(result, spec),
         faults=run_tables.faults_table(result, spec),
         components=run_tables.components_table(result),

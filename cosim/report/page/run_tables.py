@@ -92,6 +92,33 @@ def telegrams_table(
     return simple_table([heading, *chosen.values()], rows, range(1, len(chosen) + 1))
 
 
+PACKET_COLUMNS = {
+    "sent": "Sent",
+    "lost": "Lost",
+    "duplicates": "Duplicates",
+    "overtaken": "Overtaken",
+    "undelivered": "On their way at the end",
+    "mean_age": "Mean age [s]",
+    "largest_age": "Largest age [s]",
+}
+
+
+def packets_table(result: Result) -> Table:
+    """What became of the packets of each node, and how old what receivers hold is.
+
+    Args:
+        result: the run.
+    """
+    entry = mapping_entry(result, "network")
+    nodes = entry.get("nodes", {})
+    rows = [
+        [name, ", ".join(nodes.get(name, ())), *(number(found.get(key)) for key in PACKET_COLUMNS)]
+        for name, found in entry.get("packets", {}).items()
+    ]
+    headings = ["Node", "Signals", *PACKET_COLUMNS.values()]
+    return simple_table(headings, rows, range(2, len(headings)))
+
+
 def indicators_table(result: Result, spec: ReportSpec) -> Table:
     """How long slip was indicated, and how late.
 

@@ -12,18 +12,14 @@ import numpy as np
 
 from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, vector
 from plant_models.hybrid.option import require_whole
+from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 from plant_models.railway.network.loss import loss_threshold
-from plant_models.railway.network.protocols import (
-    quadratic_costs,
-    round_robin,
-    silent_nodes,
-    smallest,
-    try_once_discard,
-)
+from plant_models.railway.network.protocols import quadratic_costs, smallest, try_once_discard
 
 Protocol = Literal["round-robin", "periodic", "try-once-discard", "quadratic"]
-MAX_DELAY = 64
+PROTOCOLS = ("round-robin", "periodic", "try-once-discard", "quadratic")
+MOST_SIGNALS, MOST_NODES, MOST_TURNS, LONGEST_DELAY = 32, 16, 64, 64
 
 
 class NetworkProtocol(HybridSystem):
@@ -39,16 +35,16 @@ class NetworkProtocol(HybridSystem):
     steps the sources to the instant, this block cannot.
 
     Args:
-        node_sizes: number of signals of each node, in order.
-        protocol: ``round-robin``; ``periodic``, in the order `order`; ``try-once-discard``, the node with the largest
-            error; ``quadratic``, the node with the smallest ``e' P_i e``.
-        order: of ``periodic``, numbers of the nodes from 1; each must occur.
-        weights: of ``quadratic``, P_i row by row, shape (l, p, p).
+        signals: number of signals. Whose they are is the parameter `node_of`.
+        nodes: number of nodes.
+        protocol: ``round-robin``; ``periodic``, in the order of the parameter `order`; ``try-once-discard``, the node
+            with the largest error, each signal by its `error_scale`; ``quadratic``, the node with the smallest
+            ``e' P_i e``, whose matrices are the parameter `weights`, node by node and row by row.
+        turns: of ``periodic``: transmissions of one period.
         delay_periods: delay of every packet, in periods.
 
     Raises:
-        ValueError: a node without signals, an unknown protocol, a node that never sends, weights of another shape, or
-            a delay beyond `MAX_DELAY`.
+        ValueError: an unknown protocol, or a number that is not whole or out of its range.
 
     Source: Hann 2014, section 1.1.3 and (2.3) to (2.7); loss is ours.
     """
@@ -57,11 +53,6 @@ class NetworkProtocol(HybridSystem):
     description = "Network: signals in, values last received out, one node at a time, delayed"
     source = "Hann 2014, section 1.1.3, (2.3) to (2.7); loss is ours"
     internal_step = 1e-2  # nothing flows
-    parameters = (
-        parameter("period", "s", 0.016, "Time between two transmissions", min=1e-6),
-        parameter("offset", "s", 0.0, "Time of the first transmission after the start", min=0.0),
-        parameter("loss_fraction", "1", 0.0, "Share of the packets that is lost", min=0.0, max=1.0),
-    )
     events = (
         PeriodicEvent(
             "transmission",
@@ -72,94 +63,81 @@ class NetworkProtocol(HybridSystem):
         ),
     )
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
-        "protocol": ("round-robin", "try-once-discard"),
-        "delay_periods": range(5),
+        "signals": range(1, MOST_SIGNALS + 1),
+        "nodes": range(1, MOST_NODES + 1),
+        "protocol": PROTOCOLS,
+        "turns": range(1, MOST_TURNS + 1),
+        "delay_periods": range(LONGEST_DELAY + 1),
     }
 
     def __init__(
         self,
         *,
-        node_sizes: Sequence[int] = (1, 1),
+        signals: int = 2,
+        nodes: int = 2,
         protocol: Protocol = "round-robin",
-        order: Sequence[int] = (),
-        weights: Sequence[Sequence[Sequence[float]]] = (),
+        turns: int = 2,
         delay_periods: int = 0,
     ) -> None:
-        if not node_sizes:
-            raise ValueError("network_protocol: node_sizes is empty; a network needs at least one node.")
-        for number, size in enumerate(node_sizes, start=1):
-            require_whole("network_protocol", **{f"node_sizes, entry {number},": size})
-        require_whole("network_protocol", 0, MAX_DELAY, delay_periods=delay_periods)
-        self.node_sizes, self.delay_periods = tuple(node_sizes), delay_periods
-        count, nodes = sum(node_sizes), len(node_sizes)
-        self.protocol = protocol
-        self._order = _turns(protocol, order, nodes)
-        self._weights = _weights(protocol, self.node_sizes, weights)
-        self._node_of = [i for i, size in enumerate(self.node_sizes) for _ in range(size)]
-        self.inputs = (input_signal("signal", "1", 0.0, "Measurements, node by node", size=count),)
+        if protocol not in PROTOCOLS:
+            raise ValueError(f"Unknown protocol {protocol!r}; choose one of: {', '.join(PROTOCOLS)}.")
+        require_whole("network_protocol", 1, MOST_SIGNALS, signals=signals)
+        require_whole("network_protocol", 1, MOST_NODES, nodes=nodes)
+        require_whole("network_protocol", 1, MOST_TURNS, turns=turns)
+        require_whole("network_protocol", 0, LONGEST_DELAY, delay_periods=delay_periods)
+        self.signals, self.nodes, self.protocol = signals, nodes, protocol
+        self.turns = turns if protocol == "periodic" else nodes
+        self.delay_periods = delay_periods
+        self.parameters = (*_parameters(signals, nodes), *_protocol_parameters(protocol, signals, nodes, turns))
+        self.inputs = (input_signal("signal", "1", 0.0, "Measurements", size=signals),)
         self.outputs = (
-            output_signal("received", "1", "Values last received", variability="discrete", size=count),
-            output_signal(
-                "error",
-                "1",
-                "Last sent minus measured, before the last transmission",
-                variability="discrete",
-                size=count,
-            ),
-            output_signal("sender", "1", "Number of the node that sent last, from 1", variability="discrete"),
-            output_signal(
-                "stamp", "s", "When what was received of each node was measured", variability="discrete", size=nodes
-            ),
+            _held_output("received", "1", "Values last received", signals),
+            _held_output("error", "1", "Last sent minus measured, before the last transmission", signals),
+            _held_output("sender", "1", "Number of the node that sent last, from 1", None),
+            _held_output("stamp", "s", "When what was received of each node was measured", nodes),
         )
         self.states = (
-            memory("held_value", "1", 0.0, "Values last received", size=count),
-            memory("sent_value", "1", 0.0, "Values last sent", size=count),
-            memory("last_error", "1", 0.0, "Network error before the last transmission", size=count),
+            memory("held_value", "1", 0.0, "Values last received", size=signals),
+            memory("sent_value", "1", 0.0, "Values last sent", size=signals),
+            memory("last_error", "1", 0.0, "Network error before the last transmission", size=signals),
             memory("held_stamp", "s", 0.0, "When they were measured", size=nodes),
             memory("last_sender", "1", 0.0, "Number of the node that sent last"),
             memory("turn", "1", 0.0, "Place in the order of the next one"),
             memory("begun", "1", 0.0, "1 after the first transmission"),
-            *_packets(count, delay_periods),
+            *_packets(signals, delay_periods),
         )
-        super().__init__(
-            node_sizes=tuple(node_sizes),
-            protocol=protocol,
-            order=tuple(order),
-            weights=tuple(tuple(tuple(row) for row in weight) for weight in weights),
-            delay_periods=delay_periods,
-        )
+        super().__init__(signals=signals, nodes=nodes, protocol=protocol, turns=turns, delay_periods=delay_periods)
 
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """A node sends; what was sent a delay ago is received."""
-        count, nodes = len(self._node_of), len(self.node_sizes)
-        y = [u.signal[i] for i in range(count)]
+        y = [u.signal[i] for i in range(self.signals)]
+        owner = [p.node_of[i] for i in range(self.signals)]
         held, sent, _, stamps, (_, turn, begun), queue = self._parts(x)
         first = begun < 0.5
-        held = [np.where(first, y[i], held[i]) for i in range(count)]
-        sent = [np.where(first, y[i], sent[i]) for i in range(count)]
+        held = [np.where(first, y[i], held[i]) for i in range(self.signals)]
+        sent = [np.where(first, y[i], sent[i]) for i in range(self.signals)]
         stamps = [np.where(first, t, stamp) for stamp in stamps]
-        error = [sent[i] - y[i] for i in range(count)]
-        sender = self._sender(turn, error)
-        sent = [np.where(sender == float(self._node_of[i]), y[i], sent[i]) for i in range(count)]
-        lost = np.where(u.loss_noise < loss_threshold(p.loss_fraction), 1.0, 0.0)
-        queue = [*queue, (y, sender + 1.0 - lost * (sender + 1.0), t + 0.0 * turn)]
+        error = [sent[i] - y[i] for i in range(self.signals)]
+        sender = self._sender(turn, error, p)
+        sent = [np.where(sender == owner[i], y[i], sent[i]) for i in range(self.signals)]
+        arrives = np.where(u.loss_noise < loss_threshold(p.loss_fraction), 0.0, sender)
+        queue = [*queue, (y, arrives, t + 0.0 * turn)]
         values, of, when = queue[0]
-        held = [np.where(of == float(self._node_of[i] + 1), values[i], held[i]) for i in range(count)]
-        stamps = [np.where(of == float(j + 1), when, stamps[j]) for j in range(nodes)]
-        after = turn + 1.0
-        after = np.where(after >= float(len(self._order)), 0.0, after)
-        rest = queue[1:]
+        held = [np.where(of == owner[i], values[i], held[i]) for i in range(self.signals)]
+        stamps = [np.where(of == j + 1.0, when, stamps[j]) for j in range(self.nodes)]
+        following = np.where(turn + 1.0 >= float(self.turns), 0.0, turn + 1.0)
+        under_way = queue[1:]
         return vector(
             *held,
             *sent,
             *error,
             *stamps,
-            sender + 1.0,
-            after,
+            sender,
+            following,
             1.0,
-            *(value for packet in rest for value in packet[0]),
-            *(packet[1] for packet in rest),
-            *(packet[2] for packet in rest),
+            *(value for packet in under_way for value in packet[0]),
+            *(packet[1] for packet in under_way),
+            *(packet[2] for packet in under_way),
         )
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
@@ -167,73 +145,95 @@ class NetworkProtocol(HybridSystem):
         held, _, error, stamps, (sender, _, _), _ = self._parts(x)
         return {"received": vector(*held), "error": vector(*error), "sender": sender, "stamp": vector(*stamps)}
 
-    def _sender(self, turn: Array, error: list[Array]) -> Array:
-        """Number of the node that sends, from 0."""
-        if self.protocol in ("round-robin", "periodic"):
-            sender = 0.0 * turn
-            for place, node in enumerate(self._order):
-                sender = np.where(turn == float(place), float(node), sender)
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """Parameters keep their bounds; every signal has a node, and every node its turn."""
+        needed = dict(within_bounds(self.parameters, p))
+        if self.protocol == "periodic":
+            for node in range(1, self.nodes + 1):
+                times = sum(np.where(p.order[i] == float(node), 1.0, 0.0) for i in range(self.turns))
+                needed[f"node {node} never sends: it must occur in the parameter order"] = np.where(
+                    times > 0.5, 1.0, 0.0
+                )
+        return needed
+
+    def _sender(self, turn: Array, error: list[Array], p: Any) -> Array:
+        """Number of the node that sends, from 1."""
+        if self.protocol == "round-robin":
+            return turn + 1.0
+        if self.protocol == "periodic":
+            sender = p.order[0] + 0.0 * turn
+            for place in range(1, self.turns):
+                sender = np.where(turn == float(place), p.order[place], sender)
             return sender
-        return smallest(quadratic_costs(list(self._weights), error))
+        if self.protocol == "try-once-discard":
+            squares = [(error[i] / p.error_scale[i]) ** 2 for i in range(self.signals)]
+            nodes = [float(j) for j in range(1, self.nodes + 1)]
+            return smallest(
+                [-sum(np.where(p.node_of[i] == j, s, 0.0 * s) for i, s in enumerate(squares)) for j in nodes]
+            ) + (1.0)
+        count = self.signals
+        entries = [p.weights[i] for i in range(self.nodes * count * count)]
+        rows = [entries[i : i + count] for i in range(0, len(entries), count)]
+        return smallest(quadratic_costs([rows[i : i + count] for i in range(0, len(rows), count)], error)) + 1.0
 
     def _parts(self, x: Array) -> tuple[Any, ...]:
         """Held, sent, errors, stamps, (sender, turn, begun), and packets under way, the oldest first."""
-        count, nodes, places = len(self._node_of), len(self.node_sizes), self.delay_periods
-        cursor = 0
+        count, places, cursor = self.signals, self.delay_periods, 0
 
         def take(n: int) -> list[Array]:
             nonlocal cursor
             cursor += n
             return [x[i] for i in range(cursor - n, cursor)]
 
-        held, sent, error, stamps, rest = take(count), take(count), take(count), take(nodes), take(3)
+        held, sent, error, stamps, rest = take(count), take(count), take(count), take(self.nodes), take(3)
         values, senders, times = take(places * count), take(places), take(places)
         queue = [(values[i * count : (i + 1) * count], senders[i], times[i]) for i in range(places)]
         return held, sent, error, stamps, tuple(rest), queue
 
 
-def _packets(count: int, places: int) -> tuple[Any, ...]:
-    if places == 0:
-        return ()
+def spread(signals: int, nodes: int) -> list[int]:
+    """Number of the node of each signal, from 1, where they are spread evenly, the first nodes having more.
+
+    Args:
+        signals: how many. nodes: how many.
+    """
+    return [i * min(nodes, signals) // signals + 1 for i in range(signals)]
+
+
+def _parameters(signals: int, nodes: int) -> tuple[Any, ...]:
+    owner = tuple(float(node) for node in spread(signals, nodes))
     return (
-        memory("packet_value", "1", 0.0, "Measurements under way, the oldest first", size=places * count),
-        memory("packet_sender", "1", 0.0, "Who sent them, from 1; 0 where the packet is lost", size=places),
-        memory("packet_stamp", "s", 0.0, "When they were measured", size=places),
+        parameter("period", "s", 0.016, "Time between two transmissions", min=1e-6),
+        parameter("offset", "s", 0.0, "Time of the first transmission after the start", min=0.0),
+        parameter("loss_fraction", "1", 0.0, "Share of the packets that is lost", min=0.0, max=1.0),
+        parameter("node_of", "1", owner, "Number of the node of each signal, from 1", min=1.0, max=nodes, size=signals),
     )
 
 
-def _turns(protocol: str, order: Sequence[int], nodes: int) -> tuple[int, ...]:
-    """The periodic order from 0; one entry where the order is not periodic.
-
-    Raises:
-        ValueError: unknown protocol, a node that does not exist, or one that never sends.
-    """
-    if protocol == "round-robin":
-        return round_robin(nodes)
-    if protocol in ("try-once-discard", "quadratic"):
-        return (0,)
-    if protocol != "periodic":
-        raise ValueError(
-            f"Unknown protocol {protocol!r}; choose one of: round-robin, periodic, try-once-discard, quadratic."
-        )
-    for entry in order:
-        require_whole("network_protocol", 1, nodes, **{"an entry of order": entry})
-    silent = silent_nodes([entry - 1 for entry in order], nodes)
-    if silent:
-        raise ValueError(
-            f"network_protocol: node {silent[0] + 1} never sends: it does not occur in order = {list(order)}."
-        )
-    return tuple(entry - 1 for entry in order)
+def _protocol_parameters(protocol: str, signals: int, nodes: int, turns: int) -> tuple[Any, ...]:
+    if protocol == "periodic":
+        order = tuple(float(i % nodes + 1) for i in range(turns))
+        return (parameter("order", "1", order, "Nodes in the order of their turns", min=1.0, max=nodes, size=turns),)
+    if protocol == "try-once-discard":
+        text = "Errors of the signals that count alike"
+        return (parameter("error_scale", "1", (1.0,) * signals, text, min=1e-12, size=signals),)
+    if protocol == "quadratic":
+        owner = spread(signals, nodes)
+        start = try_once_discard([owner.count(node) for node in range(1, nodes + 1)]).ravel()
+        text = "Matrices P of the nodes, row by row; at first those of try-once-discard"
+        return (parameter("weights", "1", tuple(start.tolist()), text, size=len(start)),)
+    return ()
 
 
-def _weights(protocol: str, node_sizes: Sequence[int], weights: Any) -> np.ndarray:
-    if protocol != "quadratic":
-        return try_once_discard(node_sizes)
-    given = np.asarray(weights, dtype=float)
-    count = sum(node_sizes)
-    if given.shape != (len(node_sizes), count, count):
-        raise ValueError(
-            f"network_protocol: weights must hold one matrix of {count} x {count} for each of {len(node_sizes)} nodes, "
-            f"got shape {given.shape}."
-        )
-    return given
+def _held_output(name: str, unit: str, text: str, size: int | None) -> Any:
+    return output_signal(name, unit, text, variability="discrete", size=size)
+
+
+def _packets(signals: int, places: int) -> tuple[Any, ...]:
+    if places == 0:
+        return ()
+    return (
+        memory("packet_value", "1", 0.0, "Measurements under way, the oldest first", size=places * signals),
+        memory("packet_sender", "1", 0.0, "Who sent them, from 1; 0 where the packet is lost", size=places),
+        memory("packet_stamp", "s", 0.0, "When they were measured", size=places),
+    )

@@ -92,14 +92,15 @@ def quadratic_costs(weights: Sequence[Array], error: Array) -> list[Array]:
     Args:
         weights: P_i of the nodes, each of shape (p, p). error: x, the network error, shape (p,).
     """
-    count = len(error)
-    return [
-        sum(
-            error[a] * float(weight[a][b]) * error[b] for a in range(count) for b in range(count) if weight[a][b] != 0.0
-        )
-        + 0.0 * error[0]
-        for weight in weights
-    ]
+    costs = []
+    for weight in weights:
+        cost = 0.0 * error[0]
+        for row, left in zip(weight, error, strict=True):
+            for entry, right in zip(row, error, strict=True):
+                if not (isinstance(entry, float) and entry == 0.0):  # a plain zero; symbols are not looked at
+                    cost = cost + left * entry * right
+        costs.append(cost)
+    return costs
 
 
 def smallest(costs: Sequence[Array]) -> Array:
@@ -115,10 +116,10 @@ def smallest(costs: Sequence[Array]) -> Array:
     return chosen
 
 
-def quadratic_sender(weights: Sequence[Array], error: Array) -> int:
+def quadratic_sender(weights: Array, error: Array) -> int:
     """The node sigma_k of a quadratic protocol, ``argmin_i x' P_i x``, (1.18); of equal nodes the first.
 
     Args:
-        weights: P_i of the nodes, each of shape (p, p). error: x, the network error, shape (p,).
+        weights: P_i of the nodes, shape (l, p, p). error: x, the network error, shape (p,).
     """
-    return int(smallest(quadratic_costs(weights, error)))
+    return int(np.argmin(np.asarray(weights) @ error @ error))

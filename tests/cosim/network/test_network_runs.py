@@ -1,0 +1,159 @@
+"""Measurements over a network: exact whatever the step, and what becomes of late, lost and doubled packets."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from toys import STOP, run, scenario
+
+from cosim import Outcome
+from cosim.results.packets_file import read_packets, write_packets
+
+ROUGH: dict[str, Any] = {
+    "delay_model": "uniform",
+    "delay": 0.02,
+    "delay_spread": 0.2,
+    "loss_fraction": 0.2,
+    "jitter": 0.03,
+}
+
+
+def of(outcome: Outcome, *names: str) -> np.ndarray:
+    """Last values of signals."""
+    return np.array([outcome[name][-1] for name in names])
+
+
+SIGNALS = ("listener.estimate", "listener.first", "listener.second", "listener.passed_on", "network.source.sine")
+
+
+@pytest.mark.parametrize("network", [{"delay": 0.05}, {}, ROUGH | {"duplicate_fraction": 0.3}])
+def test_the_communication_step_does_not_matter(network: dict[str, Any]) -> None:
+    runs = [run(step, **network) for step in (0.001, 0.01, 0.1)]
+    values = [of(outcome, *SIGNALS) for outcome in runs]
+    # the ramp is integrated in parts of other lengths: rounding, of some 2000 additions
+    np.testing.assert_allclose(values[1:], [values[0]] * 2, rtol=0.0, atol=1e-12)
+    packets = [outcome.result.packets for outcome in runs]
+    assert [(p.stamp, p.node, p.kind, p.outcomes) for p in packets[0]] == [
+        (p.stamp, p.node, p.kind, p.outcomes) for p in packets[2]
+    ]
+    for packet in packets[2]:
+        for name, value in packet.values.items():
+            exact = {"sine": 3.0 * np.sin(2.0 * packet.stamp), "cosine": np.cos(2.0 * packet.stamp)}
+            assert value == pytest.approx(exact.get(name.partition(".")[2], packet.stamp), abs=1e-12)
+
+
+def test_packets_arrive_a_delay_later_and_are_replayed() -> None:
+    outcome = run(0.1, delay=0.05)
+    packets = outcome.result.packets
+    assert [p.node for p in packets[:4]] == ["front", "rear", "front", "rear"]
+    np.testing.assert_allclose([p.stamp for p in packets], 0.037 * np.arange(len(packets)), atol=1e-12)
+    np.testing.assert_allclose([p.delivered_at - p.stamp for p in packets], 0.05, atol=1e-12)
+    assert packets[0].outcomes == {"listener": "replayed"}
+    assert packets[-1].outcomes == {"listener": "undelivered"}
+    late = run(0.1, delay=0.05)
+    # the ramp has the slope of the held speed: replayed at its stamp a packet changes nothing, now or late
+    assert of(late, "listener.estimate")[0] == pytest.approx(STOP, abs=1e-9)
+    counts = outcome.result.summary["network"]["packets"]
+    assert counts["front"]["sent"] + counts["rear"]["sent"] == len(packets)
+    # of each node every 0.074 s: age 0.05 s to 0.124 s from the first delivery on
+    assert counts["rear"]["largest_age"] == pytest.approx(0.124, abs=1e-9)
+    assert counts["rear"]["mean_age"] == pytest.approx(0.087, rel=0.05)  # before the first one it is less
+
+
+def test_a_held_input_follows_at_the_instant_of_delivery() -> None:
+    outcome = run(0.1, delay=0.05)
+    time, held = outcome["time"], outcome["listener.passed_on"]
+    packet = next(p for p in outcome.result.packets if p.node == "front" and p.stamp > 0.5)
+    own = packet.values["source.cosine"]
+    network = outcome["network.source.cosine"]
+    at = np.flatnonzero(np.abs(time - packet.delivered_at) < 1e-9)
+    assert len(at) == 2  # a row before and one after
+    assert network[at[1]] == own != network[at[0]]
+    assert held[at[1] + 1] == own
+    assert outcome["network.stamp.front"][at[1]] == pytest.approx(packet.stamp, abs=1e-12)
+
+
+def test_an_older_packet_does_not_replace_a_newer_one_unless_numbers_are_ignored() -> None:
+    checked, ignored = (run(0.01, sequence=kind, **ROUGH) for kind in ("checked", "ignored"))
+    assert checked.result.summary["network"]["packets"]["front"]["overtaken"] > 0
+    stamps = [outcome["network.stamp.front"] for outcome in (checked, ignored)]
+    assert np.all(np.diff(stamps[0]) >= 0.0)
+    assert np.any(np.diff(stamps[1]) < 0.0)
+
+
+def test_a_duplicate_is_told_once_unless_numbers_are_ignored() -> None:
+    checked, ignored = (run(0.01, sequence=kind, duplicate_fraction=1.0) for kind in ("checked", "ignored"))
+    assert of(ignored, "listener.packets") == 2 * of(checked, "listener.packets")
+    assert {p.outcomes["listener"] for p in checked.result.packets if p.kind == "duplicate"} == {"dropped"}
+
+
+def test_all_versions_of_fmi_are_told_the_same() -> None:
+    runs = [run(0.01, backend, **ROUGH) for backend in ("block3", "block2")]
+    np.testing.assert_allclose(of(runs[1], *SIGNALS), of(runs[0], *SIGNALS), atol=1e-12)
+    told = [[p.outcomes for p in outcome.result.packets] for outcome in runs]
+    assert told[0] == told[1]
+
+
+def test_seeds_and_names_decide_and_the_order_of_components_does_not() -> None:
+    same, other = run(seed=3, **ROUGH), run(seed=4, **ROUGH)
+    assert [p.kind for p in same.result.packets] != [p.kind for p in other.result.packets]
+    turned = scenario(seed=3, **ROUGH)
+    data = turned._data
+    data["components"] = dict(reversed(data["components"].items()))
+    data["connections"] = data["connections"][::-1]
+    again = turned.run(warn=lambda _: None)
+    assert again.result.packets == same.result.packets
+    np.testing.assert_array_equal(of(again, *SIGNALS), of(same, *SIGNALS))
+
+
+def test_the_order_of_nodes_changes_nothing_but_round_robin() -> None:
+    nodes = {"rear": ["source.ramp_value"], "front": ["source.sine", "source.cosine"]}
+    protocols: tuple[dict[str, Any], ...] = (
+        {"protocol": "periodic", "order": ["front", "rear", "rear"]},
+        {"protocol": "try-once-discard"},
+    )
+    for protocol in protocols:
+        one, two = run(**protocol), run(**protocol, nodes=nodes)
+        assert one.result.packets == two.result.packets
+    assert run().result.packets != run(nodes=nodes).result.packets
+
+
+def test_steps_that_are_done_again_send_the_same_packets() -> None:
+    halved = scenario(0.1, **ROUGH).master(control="doubling", tolerance=1e-3).run(warn=lambda _: None)
+    once = run(0.1, **ROUGH)
+    assert [(p.stamp, p.delivered_at, p.kind) for p in halved.result.packets] == [
+        (p.stamp, p.delivered_at, p.kind) for p in once.result.packets
+    ]
+    np.testing.assert_allclose(of(halved, *SIGNALS), of(once, *SIGNALS), atol=1e-12)
+
+
+@pytest.mark.parametrize("protocol", ["round-robin", "try-once-discard"])
+@pytest.mark.parametrize("delay", [0, 3])
+def test_the_block_gives_the_numbers_of_the_service(protocol: str, delay: int) -> None:
+    made = scenario(0.01, period=0.04, protocol=protocol, delay=0.04 * delay, loss_fraction=0.3, seed=7)
+    made.add(
+        "block",
+        model="network_protocol",
+        options={"signals": 3, "nodes": 2, "protocol": protocol, "delay_periods": delay},
+        parameters={"period": 0.04, "loss_fraction": 0.3, "seed": 7.0, "node_of": [1.0, 1.0, 2.0]},
+        **{"as": "block3"},
+    )
+    made.connect(*(f"source.{name} -> block.signal[{i}]" for i, name in enumerate(("sine", "cosine", "ramp_value"), 1)))
+    outcome = made.network(receivers=["listener"]).run(warn=lambda _: None)
+    grid = np.flatnonzero(np.diff(outcome["time"], append=np.inf) > 1e-9)  # rows after events
+    for place, name in enumerate(("sine", "cosine", "ramp_value"), 1):
+        for ours, theirs in ((f"network.source.{name}", "received"), (f"network.error.source.{name}", "error")):
+            np.testing.assert_allclose(outcome[f"block.{theirs}[{place}]"][grid], outcome[ours][grid], atol=1e-12)
+    np.testing.assert_array_equal(outcome["block.sender"][grid], outcome["network.sender"][grid])
+    np.testing.assert_allclose(outcome["block.stamp[2]"][grid], outcome["network.stamp.rear"][grid], atol=1e-12)
+    assert 0.15 < np.mean([p.kind == "lost" for p in outcome.result.packets]) < 0.5
+
+
+def test_packets_are_kept_to_the_last_bit(tmp_path: object) -> None:
+    packets = run(**ROUGH).result.packets
+    path = f"{tmp_path}/packets.csv"
+    write_packets(path, packets)
+    again = read_packets(path)
+    assert [repr(p) for p in again] == [repr(p) for p in packets]  # nan is nan
