@@ -14,6 +14,7 @@ import numpy as np
 
 from cosim.errors import RunError
 from cosim.evaluation.metrics import phase_metrics
+from cosim.evaluation.numbers import error_number
 from cosim.evaluation.spec import ReportSpec
 from fmus.text_table import text_table
 
@@ -95,17 +96,17 @@ class SeedStudy:
                     "lower quartile": low,
                     "median": median,
                     "upper quartile": high,
-                    "independent": self.spec.independent.get(observer, {}).get(phase),
                     "published": self.spec.published.get(observer, {}).get(phase),
+                    "independent": self.spec.independent.get(observer, {}).get(phase),
                 }
             )
         return rows
 
     def text(self) -> str:
         """A plain-text table, failed seeds in words below it."""
-        rows = [["observer", "phase", "quartile", "median", "quartile", "independent", "published"]]
+        rows = [["observer", "phase", "quartile", "median", "quartile", "published", "independent"]]
         for observer, phase, *sizes in (row.values() for row in self.rows()):
-            rows.append([observer, phase, *("-" if size is None else f"{size:.4f}" for size in sizes)])
+            rows.append([observer, phase, *(error_number(size) for size in sizes)])
         head = f"Maximal speed error over {len(self.seeds)} balise seeds [m/s]"
         failed = [f"seed {seed} failed: {why}" for seed, why in self.failures.items()]
         return "\n".join([head, *text_table(rows, left=(0, 1)), *failed])

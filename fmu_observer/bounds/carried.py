@@ -47,8 +47,16 @@ def level(P: Any, a: Array, b: Array, c: Array) -> Array:
     Args:
         P: packed, shape (6,). a, b, c: components of z.
     """
-    square = a * (P[0] * a + 2.0 * (P[1] * b + P[2] * c)) + b * (P[3] * b + 2.0 * P[4] * c) + P[5] * c * c
-    return np.sqrt(np.maximum(square, 0.0))
+    return np.sqrt(np.maximum(level_squared(P, a, b, c), 0.0))
+
+
+def level_squared(P: Any, a: Array, b: Array, c: Array) -> Array:
+    """``z' P z`` of ``z = (a, b, c)``.
+
+    Args:
+        P: packed, shape (6,). a, b, c: components of z.
+    """
+    return a * (P[0] * a + 2.0 * (P[1] * b + P[2] * c)) + b * (P[3] * b + 2.0 * P[4] * c) + P[5] * c * c
 
 
 def level_of_box(P: Any, a: Array, b: Array, c: Array) -> Array:
@@ -57,8 +65,8 @@ def level_of_box(P: Any, a: Array, b: Array, c: Array) -> Array:
     Args:
         P: packed, shape (6,). a, b, c: largest sizes of the components, none negative.
     """
-    corners = (level(P, a, b, c), level(P, a, b, -c), level(P, a, -b, c), level(P, a, -b, -c))
-    return np.maximum(np.maximum(corners[0], corners[1]), np.maximum(corners[2], corners[3]))
+    corners = [level_squared(P, a, x, y) for x, y in ((b, c), (b, -c), (-b, c), (-b, -c))]
+    return np.sqrt(np.maximum(np.maximum(corners[0], corners[1]), np.maximum(corners[2], corners[3])))
 
 
 def first_component(P: Any) -> Array:

@@ -4,6 +4,7 @@ status.
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error, with_switching_noted
 from fmu_observer.certificates.certificate import Certificate
+from fmu_observer.certificates.decaying_error import DecayingError, decaying_error
 from fmu_observer.certificates.gap_error import GapError, first_unstable_gap
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.polytope import PolytopeStability, polytope_stability
@@ -14,6 +15,7 @@ from fmu_observer.certificates.sampled_error import SampledError
 
 __all__ = [
     "Certificate",
+    "DecayingError",
     "GapError",
     "ImpulsiveError",
     "PolytopeStability",
@@ -24,6 +26,7 @@ __all__ = [
     "certify_sampled_error",
     "certify_two_rate_error",
     "common_quadratic_form",
+    "decaying_error",
     "decrease",
     "first_unstable_gap",
     "polytope_stability",

@@ -86,6 +86,10 @@ class GeneratorError(GapError):
         """What a sample makes of it, shape (N, N)."""
 
     @abstractmethod
+    def moved(self, generator: np.ndarray) -> GapError:
+        """The same reset with another generator, shape (N, N), as a value that equals others so made."""
+
+    @abstractmethod
     def close(self, exponentials: np.ndarray) -> np.ndarray:
         """Exponentials of shape (count, N, N) as transitions of shape (count, n, n).
 

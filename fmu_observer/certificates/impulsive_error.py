@@ -12,7 +12,8 @@ from functools import cached_property
 
 import numpy as np
 
-from fmu_observer.certificates.gap_error import GapError, GeneratorError
+from fmu_observer.certificates.exponential import small_exponential
+from fmu_observer.certificates.gap_error import GapError, GeneratorError, matrix_powers
 
 NEGLIGIBLE = 1e-12  # relative: a smaller pivot of the reset is rounding
 
@@ -80,6 +81,20 @@ class ImpulsiveError(GeneratorError):
     def reset(self) -> np.ndarray:
         """R, shape (N, N)."""
         return np.asarray(self.reset_rows)
+
+    def moved(self, generator: np.ndarray) -> ImpulsiveError:
+        """The same reset with another generator, shape (N, N)."""
+        return ImpulsiveError.of(generator, self.reset)
+
+    def courses(self, longest: float, count: int) -> np.ndarray:
+        """zeta within a gap from what the reset before it read, at `count` + 1 instants from 0, shape (count + 1, N,
+        n).
+        """
+        start = np.eye(len(self.generator))[None]
+        return (
+            np.concatenate([start, matrix_powers(small_exponential(self.generator * longest / count), count)])
+            @ self.spread
+        )
 
     @property
     def size(self) -> int:

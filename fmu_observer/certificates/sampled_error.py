@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from fmu_observer.certificates.gap_error import GeneratorError
+from fmu_observer.certificates.impulsive_error import ImpulsiveError
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,10 @@ class SampledError(GeneratorError):
         matrix = np.eye(self.size + 1)
         matrix[-1] = np.eye(self.size + 1)[0]
         return matrix
+
+    def moved(self, generator: np.ndarray) -> ImpulsiveError:
+        """The same reset with another generator, shape (n + 1, n + 1)."""
+        return ImpulsiveError.of(generator, self.reset)
 
     @property
     def continuous_limit(self) -> np.ndarray:

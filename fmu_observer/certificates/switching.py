@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fmu_observer.certificates.decaying_error import DecayingError
 from fmu_observer.certificates.exponential import small_exponential
 from fmu_observer.certificates.gap_error import GapError, GeneratorError, matrix_powers
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
@@ -29,29 +30,30 @@ class SwitchingError:
     """The inclusion between the vertices of an error that moves among them at any time.
 
     Attributes:
-        centre: the error in the middle of the vertices.
+        centre: the error in the middle of the vertices, whose course over a gap and whose response to a disturbance
+            within it are known.
         distances: generators of the vertices less that of the centre, shape (vertices, N, N) [1/s].
     """
 
-    centre: ImpulsiveError
+    centre: ImpulsiveError | DecayingError
     distances: np.ndarray
 
     @classmethod
     def between(cls, vertices: Sequence[GapError]) -> SwitchingError:
-        """The inclusion spanned by vertices with one reset in common.
+        """The inclusion spanned by vertices with one reset, or one decaying correction, in common.
 
         Raises:
             ValueError: a vertex has no generator of its own, or the resets differ.
         """
-        known = [vertex for vertex in vertices if isinstance(vertex, GeneratorError)]
-        if len(known) < len(vertices) or not all(np.array_equal(v.reset, known[0].reset) for v in known):
+        known = [vertex for vertex in vertices if isinstance(vertex, GeneratorError | DecayingError)]
+        if len(known) < len(vertices) or len({vertex.moved(known[0].generator) for vertex in known}) > 1:
             raise ValueError(
                 "Certificate: changes within a gap can be judged only where all vertices flow linearly and share one "
                 "reset."
             )
         generators = np.stack([vertex.generator for vertex in known])
         middle = 0.5 * (generators.min(axis=0) + generators.max(axis=0))
-        return cls(ImpulsiveError.of(middle, known[0].reset), generators - middle)
+        return cls(known[0].moved(middle), generators - middle)
 
     def growth(self, P: np.ndarray, longest: float, gaps: np.ndarray) -> np.ndarray:
         """What changes within the gap add to ``V+ / V`` at most, V the quadratic function of `P`, over the gap [1/s].
@@ -78,11 +80,12 @@ class SwitchingError:
         flow = np.concatenate(
             [np.eye(len(sizes))[None], matrix_powers(small_exponential(self.centre.generator * step), POINTS)]
         )
+        course = self.centre.courses(longest, POINTS) @ np.linalg.inv(root)
         after = root @ self.centre.kept
-        seen = _norms(out @ flow @ before)
+        seen = _norms(out @ course)
         kernel, effect = strength * _norms(out @ flow @ into), strength * _norms(after @ flow @ into)
         stray = QUADRATURE * _convolved(effect, _volterra(seen, kernel, step), step)
-        grown = _norms(after @ flow @ before)
+        grown = _norms(after @ course)
         added = (2.0 * grown + stray) * stray
         times = step * np.arange(POINTS + 1)
         rates = np.concatenate([[2.0 * QUADRATURE * effect[0] * seen[0]], added[1:] / times[1:]])

@@ -71,7 +71,7 @@ def _rate(state: Array, parameters: Array, known: float) -> Array:
     speed = state[0]
     net, linear, square = parameters[0], parameters[1], parameters[2]
     slope = -linear - 2.0 * square * speed
-    rate = slope * state
+    rate: Array = slope * state
     rate[0] = known + net - linear * speed - square * speed**2
     rate[1] += 1.0
     rate[2] -= speed

@@ -11,6 +11,7 @@ from fmu_observer.models.registry import MODELS, find_model
 from fmu_observer.models.sector_nonlinearity import sector_nonlinearity
 from fmu_observer.models.takagi_sugeno import Premise, TakagiSugenoModel
 from fmu_observer.models.takagi_sugeno_registry import TAKAGI_SUGENO_MODELS, find_takagi_sugeno_model
+from fmu_observer.models.tanh_system import tanh_system
 
 __all__ = [
     "MODELS",
@@ -28,4 +29,5 @@ __all__ = [
     "linear_pendulum",
     "pendulum",
     "sector_nonlinearity",
+    "tanh_system",
 ]

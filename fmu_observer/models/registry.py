@@ -11,6 +11,7 @@ from fmu_observer.models.freight_train import freight_train
 from fmu_observer.models.linear_pendulum import linear_pendulum
 from fmu_observer.models.model import ObserverModel
 from fmu_observer.models.pendulum import pendulum
+from fmu_observer.models.tanh_system import tanh_system
 
 MODELS: dict[str, Callable[[], ObserverModel]] = {
     "pendulum": pendulum,
@@ -20,6 +21,7 @@ MODELS: dict[str, Callable[[], ObserverModel]] = {
     "coupled_vehicles": coupled_vehicles,
     "flexible_joint_arm": flexible_joint_arm,
     "flexible_joint_arm_as_printed": flexible_joint_arm_as_printed,
+    "tanh_system": tanh_system,
 }
 
 

@@ -31,9 +31,10 @@ EVENT_TIME = 0.337
 """Of the told events [s]: on no grid."""
 
 ORDER = {"locomotive": 2, "train": 2, "slider": 2, "differentiator_cdo": 1}
-ORDER |= {"levant_differentiator": 1, "filtering_differentiator": 1}
+ORDER |= {"levant_differentiator": 1, "filtering_differentiator": 1, "decaying_innovation": 2}
 """Of the internal method; 4 for the others. The differentiators' right-hand sides have roots and signs, which leaves
-order 1.
+order 1; the second derivative of an innovation that ends jumps there, which leaves order 3, more or less by where in a
+step.
 """
 
 TOLERANCE = 1e-11

@@ -25,7 +25,7 @@ CERTIFICATE_COLUMNS = {
     "largest_gap_seen": "Largest gap seen [s]",
 }
 HOLDS = {"True": "holds", "False": "does not hold"}
-SEED_COLUMNS = ("lower quartile", "median", "upper quartile", "independent", "published")
+SEED_COLUMNS = ("lower quartile", "median", "upper quartile", "published", "independent")
 COMPONENT_COLUMNS = {"name": "Name", "kind": "Kind", "fmi_version": "FMI", "model": "Model", "source": "Source"}
 MESSAGES_SHOWN = 100
 

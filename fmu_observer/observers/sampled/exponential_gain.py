@@ -29,7 +29,7 @@ class ExponentialGain(HighGainSampled):
         """Model, correction and decay of the innovation, shape (n + q,)."""
         eta = self.sampled_part(x)
         predicted = self.model.flow(self.estimates(x), self.known(u))
-        return np.hstack([predicted - self.correction(eta, p), -self.decay(eta, p)])
+        return np.hstack([predicted - self.correction(x, eta, p), -self.decay(eta, p)])
 
     def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """The innovation is set anew; the estimates stay continuous, shape (n + q,)."""

@@ -36,7 +36,11 @@ class HeldInnovation(HighGainSampled):
 
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Model and correction, shape (n,)."""
-        return self.model.flow(self.estimates(x), self.known(u)) - self.correction(self.sampled_part(x), p)
+        return self.model.flow(self.estimates(x), self.known(u)) - self.correction(x, self.acting(x, p), p)
+
+    def acting(self, x: Array, p: Any) -> Array:
+        """The innovation as it acts now, shape (q,)."""
+        return self.sampled_part(x)
 
     def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """The innovation is set anew; the estimates stay continuous, shape (n + q,)."""

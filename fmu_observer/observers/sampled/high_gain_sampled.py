@@ -13,7 +13,7 @@ from fmu_observer.design.high_gain_bounds import high_gain_bounds
 from fmu_observer.models import ObserverModel, find_model
 from fmu_observer.observers.model_observer import as_matrix
 from fmu_observer.observers.sampled.sampled_observer import SampledObserver, check_chain, per_measurement
-from plant_models.hybrid import parameter, vector
+from plant_models.hybrid import Signal, parameter, vector
 from plant_models.hybrid.system import Array
 
 THETA = 2.0  # [1/s] [ours]; two states: gaps up to 4 / theta = 2 s
@@ -33,7 +33,7 @@ class HighGainSampled(SampledObserver):
         chosen = find_model(model)
         width = check_chain(chosen, self.name)
         self.gain_parameters = (
-            parameter("theta", "1/s", self.theta_start, "High gain", min=0.0),
+            *self.theta_parameters(),
             self.gain_parameter(
                 "high_gain", chain_gain(chosen.order // width, width), "Shape K of the gain, row by row"
             ),
@@ -41,13 +41,26 @@ class HighGainSampled(SampledObserver):
         self.declare_sampled_part(chosen)
         super().__init__(chosen)
 
+    def theta_parameters(self) -> tuple[Signal, ...]:
+        """What theta is, or follows from."""
+        return (parameter("theta", "1/s", self.theta_start, "High gain", min=0.0),)
+
+    def theta_in_force(self, x: Array, p: Any) -> Array:
+        """High gain now [1/s]."""
+        return p.theta
+
+    def settled_theta(self, p: Any) -> float:
+        """High gain that certificates and conditions speak of [1/s]."""
+        return float(p.theta)
+
     def declare_sampled_part(self, model: ObserverModel) -> None:
         """Declare what stands behind the estimates, one value a measurement."""
         self.extra_states = (per_measurement(model, "innovation", "Error at the last sample, as it acts now"),)
 
-    def correction(self, eta: Array, p: Any) -> Array:
-        """``theta inv(Delta) K eta``, shape (n,)."""
-        powers = vector(*(p.theta ** (level + 1) for level in self.levels()))
+    def correction(self, x: Array, eta: Array, p: Any) -> Array:
+        """``theta inv(Delta) K eta`` with theta in force, shape (n,)."""
+        theta = self.theta_in_force(x, p)
+        powers = vector(*(theta ** (level + 1) for level in self.levels()))
         return powers * (as_matrix(p.high_gain, self.model.order, self.outputs_count) @ eta)
 
     def decay(self, eta: Array, p: Any) -> Array:
@@ -59,8 +72,9 @@ class HighGainSampled(SampledObserver):
         """``theta inv(Delta) K`` of shape (n, q), and ``theta K_1`` of shape (q, q), as numbers."""
         q = self.outputs_count
         K = as_matrix(np.asarray(p.high_gain, dtype=float), self.model.order, q)
-        powers = float(p.theta) ** (np.asarray(self.levels()) + 1.0)
-        return powers[:, None] * K, float(p.theta) * K[:q]
+        theta = self.settled_theta(p)
+        powers = theta ** (np.asarray(self.levels()) + 1.0)
+        return powers[:, None] * K, theta * K[:q]
 
     def condition_of(self, p: Any) -> Condition:
         """(1.51) and (1.52) with mu = 1: the smallest theta, and the longest gap, against the model's

@@ -34,7 +34,7 @@ class OutputPredictor(HighGainSampled):
         """Model with correction, and its uncorrected output, shape (n + q,)."""
         predicted = self.model.flow(self.estimates(x), self.known(u))
         error = self.model.measured(self.estimates(x)) - self.sampled_part(x)
-        return np.hstack([predicted - self.correction(error, p), self.model.measured(predicted)])
+        return np.hstack([predicted - self.correction(x, error, p), self.model.measured(predicted)])
 
     def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """The predicted output is set to the measured one, shape (n + q,)."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from fmu_observer.observers.train.held_odometer_observer import HeldOdometerObserver, gain_level, gain_norm
 from plant_models.hybrid.system import Array
 
@@ -28,9 +26,9 @@ class ContinuousDiscreteObserver(HeldOdometerObserver):
         return x[1]
 
     def largest_gain_level(self, x: Array, p: Any) -> Array:
-        """Largest level at both ends of the speeds, between which it is convex [1/s]."""
-        return np.maximum(gain_level(0.0, p), gain_level(p.speed_max, p))
+        """Largest level at speeds from 0 to `speed_max` [1/s]."""
+        return gain_level(p, 0.0, p.speed_max)
 
     def largest_gain_norm(self, x: Array, p: Any) -> Array:
-        """Largest norm at both ends of the speeds [1/s]."""
-        return np.maximum(gain_norm(0.0, p), gain_norm(p.speed_max, p))
+        """Largest norm at speeds from 0 to `speed_max` [1/s]."""
+        return gain_norm(p, 0.0, p.speed_max)

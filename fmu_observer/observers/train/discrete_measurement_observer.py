@@ -33,8 +33,8 @@ class DiscreteMeasurementObserver(HeldOdometerObserver):
 
     def largest_gain_level(self, x: Array, p: Any) -> Array:
         """Level of the gain in use [1/s]."""
-        return gain_level(x[HELD_SPEED], p)
+        return gain_level(p, x[HELD_SPEED])
 
     def largest_gain_norm(self, x: Array, p: Any) -> Array:
         """Norm of the gain in use [1/s]."""
-        return gain_norm(x[HELD_SPEED], p)
+        return gain_norm(p, x[HELD_SPEED])

@@ -7,13 +7,14 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import reduce
 from math import sqrt
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from fmu_observer.bounds import ErrorBounds
-from fmu_observer.bounds.carried import PACKED, decay_proven, first_component, level, level_of_box, unpacked
+from fmu_observer.bounds.carried import PACKED, decay_proven, first_component, level_of_box, level_squared, unpacked
 from fmu_observer.bounds.formulas import improved_dmo_bound
 from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampled_error, with_switching_noted
 from fmu_observer.observers.parameter_values import Value, parameter_values
@@ -330,22 +331,26 @@ def error_matrix(a11: float, p: Any) -> np.ndarray:
     return np.array([[a11, -1.0, 0.0], [-float(p.gain[1]), 0.0, 1.0], [-float(p.gain[2]), 0.0, 0.0]])
 
 
-def gain_level(z: Array, p: Any) -> Array:
-    """Level of the gain at a scheduling speed [1/s].
+def gain_level(p: Any, *speeds: Array) -> Array:
+    """Largest level of the gain at scheduling speeds, and between them, for it is convex [1/s].
 
     Args:
-        z: that speed [m/s]. p: parameters, as in `HybridSystem.flow`.
+        p: parameters, as in `HybridSystem.flow`. speeds: those speeds [m/s].
     """
-    return level(p.lyapunov_matrix, first_gain(z, p), p.gain[1], p.gain[2])
+    return _largest_root([level_squared(p.lyapunov_matrix, first_gain(z, p), p.gain[1], p.gain[2]) for z in speeds])
 
 
-def gain_norm(z: Array, p: Any) -> Array:
-    """Euclidean norm of the gain at a scheduling speed [1/s].
+def gain_norm(p: Any, *speeds: Array) -> Array:
+    """Largest Euclidean norm of the gain at scheduling speeds, and between them, for it is convex [1/s].
 
     Args:
-        z: that speed [m/s]. p: parameters, as in `HybridSystem.flow`.
+        p: parameters, as in `HybridSystem.flow`. speeds: those speeds [m/s].
     """
-    return np.sqrt(first_gain(z, p) ** 2 + p.gain[1] ** 2 + p.gain[2] ** 2)
+    return _largest_root([first_gain(z, p) ** 2 + p.gain[1] ** 2 + p.gain[2] ** 2 for z in speeds])
+
+
+def _largest_root(squares: Sequence[Array]) -> Array:
+    return np.sqrt(reduce(np.maximum, squares))
 
 
 def _proven(a11: Array, p: Any) -> Array:

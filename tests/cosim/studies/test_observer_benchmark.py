@@ -19,6 +19,7 @@ from cosim.errors import RunError, ScenarioError
 from cosim.evaluation.metrics import phase_metrics
 from cosim.evaluation.spec import ReportSpec
 from cosim.master.master import Master
+from cosim.observer_benchmark.candidates import find_candidates
 from cosim.observer_benchmark.observer_scores import (
     CertifiedGap,
     error_at_balises,
@@ -191,8 +192,6 @@ def test_a_certificate_is_held_against_both_gaps() -> None:
 
 
 def test_by_default_all_take_part_that_fit_and_the_others_are_named() -> None:
-    from cosim.observer_benchmark.observers import find_candidates
-
     scenario = two()
     found, notes = find_candidates(scenario, find_sides(scenario), None)
     names = [candidate.name for candidate in found]
