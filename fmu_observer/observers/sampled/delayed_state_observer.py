@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from fmu_observer.certificates import ImpulsiveError
 from fmu_observer.condition import Condition
+from fmu_observer.design.network_bounds import NetworkBounds, exact_interval, exact_predictor_delay, network_bounds
+from fmu_observer.limits import Limit, PrintedBound
 from fmu_observer.models import MODELS, ObserverModel, find_model
 from fmu_observer.observers.delay_memory import at_age, integral_weights, weighted
+from fmu_observer.observers.model_trial import WRONG_START, model_trial
+from fmu_observer.observers.parameter_values import Value, parameter_values
 from fmu_observer.observers.sampled.high_gain_sampled import HighGainSampled
 from fmu_observer.observers.sampled.sampled_observer import per_measurement
 from plant_models.hybrid import (
@@ -34,6 +39,8 @@ DELAY, MEMORY_PERIOD, MEMORY_PLACES = 0.1, 0.01, 20  # [s], [s], [1] [ours]: one
 THETA_PUBLISHED, THETA_REPAIRED = 1.0, 5.0  # [1/s]
 ITERATIONS = 3  # of the implicit end of the trapezoidal rule; each wins a factor of 2 / (period Lipschitz)
 MOST_PREDICTORS = 8
+MOST_PLACES = 60  # of a trial
+LONGEST_INTERVAL = 2.0  # [s] to which limits are looked for, each predictor its own share
 
 
 class _Past(NamedTuple):
@@ -124,8 +131,8 @@ class DelayedStateObserver(HighGainSampled):
         self.extra_memory = tuple(
             memory(name, "1", 0.0 if start is None else start, text, size=size)
             for name, size, start, text in (
-                ("input_mean", m * self.input_places, None, "Mean inputs of the last periods, the newest first"),
-                ("acting_input", m, None, "Mean inputs a delay ago, which act on the delayed state"),
+                ("past_input", m * self.input_places, None, "Mean inputs of the last periods, the newest first"),
+                ("delayed_input", m, None, "Mean inputs a delay ago, which act on the delayed state"),
                 ("distance_root", n * predictors, None, "Signed roots of the distances s of the predictors"),
                 (
                     "prediction",
@@ -133,11 +140,16 @@ class DelayedStateObserver(HighGainSampled):
                     tuple(float(s.start_values[0]) for s in chosen.states) * predictors,
                     "Predicted states at the last reading, predictor by predictor",
                 ),
-                ("rate", n * predictors * memory_places, None, "Rates f of the predictors, the newest first"),
-                ("offset", n if predictors else 0, None, "State now less the delayed one, at the last reading"),
-                ("offset_rate", n if predictors else 0, None, "Rate of it"),
-                ("read_at", 1, None, "Instant of the last reading"),
-                ("begun", 1, None, "1 after the first reading"),
+                ("past_rate", n * predictors * memory_places, None, "Rates f of the predictors, the newest first"),
+                (
+                    "prediction_offset",
+                    n if predictors else 0,
+                    None,
+                    "State now less the delayed one, at the last reading",
+                ),
+                ("prediction_offset_rate", n if predictors else 0, None, "Rate of it"),
+                ("reading_time", 1, None, "Instant of the last reading"),
+                ("reading_begun", 1, None, "1 after the first reading"),
             )
             if size
         )
@@ -300,16 +312,13 @@ class DelayedStateObserver(HighGainSampled):
     # -- certificate ------------------------------------------------------------------------------------------------
 
     def vertex_error(self, drift: np.ndarray, p: Any) -> ImpulsiveError:
-        """Error of the delayed state where every packet has all measurements; ``c = C z - w`` decays with HK, or is
-        held.
+        """Error of the delayed state, and of the outputs between packets that have all measurements.
+
+        A held output falls behind by what the plant does: a disturbance of the error, and no part of its equations.
         """
-        gain, decay = self.gain_matrices(p)
-        if not self.predicts_output:
-            C, q = self.model.C, self.outputs_count
-            generator = np.block([[drift - gain @ C, gain], [np.zeros((q, self.model.order + q))]])
-            reset = np.block([[np.eye(self.model.order), np.zeros((self.model.order, q))], [C, np.zeros((q, q))]])
-            return ImpulsiveError.of(generator, reset, (*self.levels(), *(0,) * q))
-        return ImpulsiveError.with_innovation(drift, gain, decay, self.model.C, self.levels())
+        n, q = self.model.order, self.outputs_count
+        reset = np.diag([1.0] * n + [0.0] * q)
+        return ImpulsiveError.of(self._generator(drift, p), reset, (*self.levels(), *(0,) * q))
 
     def remark(self) -> str:
         """What the certificate is about."""
@@ -325,6 +334,121 @@ class DelayedStateObserver(HighGainSampled):
             statement=f"{found.statement}; delay <= declared_memory [s]",
             source=f"{found.source}; Hann 2014, (2.16)",
         )
+
+    # -- limits -----------------------------------------------------------------------------------------------------
+
+    def network_bounds(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> NetworkBounds:
+        """Constants of Theorem 2.1 for the gains in use, the nodes sending in turn.
+
+        Args:
+            parameters: values by name that replace those of the preset. preset: to start from; None for the default.
+
+        Raises:
+            ValueError: a parameter or the preset is unknown, or the model gives no slopes.
+        """
+        p = self.unpack_parameters(parameter_values(self, parameters, preset, "to judge"))
+        return network_bounds(
+            self.model.drifts, self._drift(), self.gain_matrices(p)[0], self.model.C, len(self._order), self.predictors
+        )
+
+    def limits(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> tuple[Limit, ...]:
+        """Between two packets and in delay: (2.17) and (2.59) beside exact tests of the model linearised at its start,
+        and trials.
+
+        Args:
+            parameters: values by name that replace those of the preset. preset: to start from; None for the default.
+
+        Raises:
+            ValueError: as `network_bounds`.
+        """
+        values = parameter_values(self, parameters, preset, "to judge")
+        p, bounds = self.unpack_parameters(values), self.network_bounds(parameters, preset)
+        named, drift = self.named_values(values), self._drift()
+        where = "Hann 2014, (2.17)"
+        text = f"gamma = {bounds.gain:.3g}, N = {bounds.cycle}, L = {bounds.lipschitz:.3g} 1/s"
+        interval = exact_interval(self._generator(drift, p), self.model.C, self._order, LONGEST_INTERVAL)
+        nodes = len(self._order) if len(self._order) > 1 else 0
+        common = {"delay_parameter": "delay", "nodes": nodes}
+        high = min(2.0 * interval, LONGEST_INTERVAL)
+        packets = Limit(
+            "interval of the packets" + (", one node each" if nodes else ""),
+            printed=(
+                PrintedBound(bounds.longest_interval, f"tau_MATI < 1/(gamma |H| N L), {text}", where),
+                PrintedBound(
+                    bounds.strict_interval,
+                    f"gamma |H| N L tau exp(sigma N tau) < 1, the factor left out of (2.17) kept, sigma = "
+                    f"{bounds.decay:.3g} 1/s",
+                    "proof of (2.45)",
+                ),
+            ),
+            exact=interval,
+            exact_test="spectral radius over a period of the protocol, model linearised at its start",
+            trial=model_trial(
+                self, "period", high / 50.0, high, named, delayed=True, delay=min(float(p.delay), 0.05), **common
+            ),
+        )
+        if not self.predictors:
+            return (packets,)
+        exact = exact_predictor_delay(drift, self.predictors)
+        longest = min(1.5 * exact, LONGEST_INTERVAL * self.predictors)
+        places = int(np.ceil(longest / (max(self.predictors, 1) * float(p.memory_period)) - 1e-9))
+        observer = self.remembering(min(max(places, self.memory_places), MOST_PLACES))
+        stretched = named | {
+            "memory_period": max(float(p.memory_period), longest / observer.total_places),
+            **{f"prediction[{i + 1}]": v + WRONG_START for i, v in enumerate(observer.prediction_starts)},
+        }
+        period = min(self.model.sample_period, 0.5 * interval)
+        share = "" if self.predictors == 1 else f" / {self.predictors}"
+        delays = Limit(
+            f"delay, {self.predictors} predictor{'s' if self.predictors > 1 else ''}",
+            printed=(
+                PrintedBound(
+                    bounds.longest_delay,
+                    f"(L/sigma) (exp(sigma tau_MAD{share}) - 1) < 1, L = {bounds.lipschitz:.3g} 1/s, sigma = "
+                    f"{bounds.decay:.3g} 1/s",
+                    where if self.predictors == 1 else "Hann 2014, (2.59)",
+                ),
+            ),
+            exact=exact,
+            exact_test="roots of s = l (1 - exp(-s tau)), l the eigenvalues of the model linearised at its start",
+            trial=model_trial(observer, "delay", longest / 50.0, longest, stretched, period=period, **common),
+        )
+        return packets, delays
+
+    def remembering(self, memory_places: int) -> DelayedStateObserver:
+        """The same observer with another memory.
+
+        Args:
+            memory_places: see the class.
+        """
+        between: Between = "predicted" if self.predicts_output else "held"
+        return DelayedStateObserver(
+            self.model,
+            predictors=self.predictors,
+            memory_places=memory_places,
+            between_samples=between,
+            nodes=self.node_of,
+        )
+
+    @property
+    def prediction_starts(self) -> tuple[float, ...]:
+        """Starts of the predictions, predictor by predictor."""
+        return tuple(float(s.start_values[0]) for s in self.model.states) * self.predictors
+
+    def _drift(self) -> np.ndarray:
+        start = np.array([float(s.start_values[0]) for s in self.model.states])
+        return np.asarray(self.model.jacobian(start, np.zeros(len(self.model.inputs))), dtype=float)
+
+    def _generator(self, drift: np.ndarray, p: Any) -> np.ndarray:
+        """Of the errors of the estimate and of the kept outputs, shape (n + q, n + q)."""
+        gain, C, q = self.gain_matrices(p)[0], self.model.C, self.outputs_count
+        rates = C @ drift if self.predicts_output else 0.0 * C
+        return np.block([[drift - gain @ C, gain], [rates, np.zeros((q, q))]])
+
+    @cached_property
+    def _order(self) -> tuple[tuple[int, ...], ...]:
+        """Measurements of each node, from 0: the turns of a round."""
+        return tuple(tuple(i for i, of in enumerate(self.node_of) if of == node) for node in sorted(set(self.node_of)))
 
     # -- internals --------------------------------------------------------------------------------------------------
 
