@@ -174,7 +174,7 @@ class RepairedRules:
     Source: the three states of Aguiar Cota 2019, Algorithm 3-3; the rules are ours.
     """
 
-    memory = (
+    memory: tuple[Signal, ...] = (
         memory("odometer_mode", "1", TRUSTED, "0 believed, 1 held to lie, 2 followed without being confirmed"),
         memory("hold_time", "s", 0.0, "Time for which the model has run alone, as its error counts"),
         memory("agreeing", "1", 0.0, "Samples in a row that speak for the odometer"),
@@ -185,7 +185,7 @@ class RepairedRules:
         memory("refutations", "1", 0.0, "Ways between balises in a row that the odometer had wrong"),
         memory("samples", "1", 0.0, "Readings since the start"),
     )
-    parameters = (
+    parameters: tuple[Signal, ...] = (
         parameter(
             "disturbance_bound", "m/s2", 0.1, "Growth of the speed error while the model runs alone, delta", min=0.0
         ),

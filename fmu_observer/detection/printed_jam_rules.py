@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fmu_observer.detection.jam_rules import ROUNDING, Judgement, Passing, Reading
-from plant_models.hybrid import memory, parameter
+from plant_models.hybrid import Signal, memory, parameter
 from plant_models.hybrid.system import Array
 
 
@@ -42,7 +42,7 @@ class PrintedRules:
     `arming_delay` [ours; the print has none].
     """
 
-    memory = (
+    memory: tuple[Signal, ...] = (
         memory("fault_state", "1", 0.0, "F of Algorithm 3-3, in force"),
         memory("recovering_state", "1", 0.0, "R of Algorithm 3-3, in force"),
         memory("next_fault_state", "1", 0.0, "F from the next sample on"),
@@ -50,7 +50,7 @@ class PrintedRules:
         memory("last_odometer", "m/s", 0.0, "Reading before"),
         memory("samples", "1", 0.0, "Readings since the start"),
     )
-    parameters = (parameter("rule_4", "1", 1.0, "1 where rule 4 is applied", min=0.0, max=1.0),)
+    parameters: tuple[Signal, ...] = (parameter("rule_4", "1", 1.0, "1 where rule 4 is applied", min=0.0, max=1.0),)
 
     def at_sample(self, before: tuple[Array, ...], told: Reading, p: Any) -> Judgement:
         """Judge an odometer sample; it takes effect at the next one.

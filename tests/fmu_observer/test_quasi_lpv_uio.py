@@ -89,6 +89,19 @@ def test_a_jam_does_not_move_it(depth: float) -> None:
     assert bench.outputs()["position"] == pytest.approx(true, abs=0.05)
 
 
+def test_a_jam_that_begins_within_a_sample_teaches_nothing() -> None:
+    """The reading before is low by less than eps / M already; what it taught the disturbance is taken back."""
+    bench = brake(QuasiLpvUio(), 10.0)
+    before = bench.outputs()["disturbance"]
+    for k, low in ((51, 0.3), (52, 8.0)):
+        bench.set("u", {"odometer": 40.0 - 0.9 * k * PERIOD - low})
+        bench.runtime.advance(k * PERIOD)
+    assert bench.outputs()["odometer_fault"] == 1.0
+    assert bench.outputs()["disturbance"] == pytest.approx(before, abs=1e-6)
+    bench.runtime.advance(11.4)
+    assert bench.outputs()["disturbance"] == pytest.approx(before, abs=1e-6)
+
+
 def test_a_skid_does_not_move_it_either() -> None:
     bench = Bench(QuasiLpvUio(), davis_a=0.0, davis_b=0.0, davis_c=0.0)
     bench.set("u", {"effort": 0.5})

@@ -22,7 +22,11 @@ RULES = (
     "synthetic data; the repaired rules judge at the sample, those of the thesis one sample (0.2 s) later, and at the "
     "end they wait for two samples that agree"
 )
-SEEDS_SAY = "one or two jams in a case of the thesis, many here: a share of 0 of one jam has an interval to 0.975"
+SEEDS_SAY = (
+    "synthetic data, more jams than in the thesis' runs: what is missed is shorter than a sample; what is called false "
+    "are jams shorter than the recorded step of 0.05 s, which the odometer counts and the record of the truth does "
+    "not show"
+)
 REASONS = (RULES, RULES, SEEDS_SAY, SEEDS_SAY, CONFIDENTIAL, CONFIDENTIAL)
 
 
