@@ -1,7 +1,7 @@
 """Limits: how long a gap and a delay an observer survives, as printed bounds, exact tests and trials to be run.
 
-Values. An observer that has limits answers ``limits(parameters, preset)`` with a tuple of `Limit`. What a trial leads to
-is found by simulation, where there is a simulator.
+Values. An observer that has limits answers ``limits(parameters, preset)`` with a tuple of `Limit`. What a trial
+leads to is found by simulation, where there is a simulator.
 """
 
 from __future__ import annotations
