@@ -78,6 +78,7 @@ class Receiver:
     arrived: np.ndarray = field(default_factory=lambda: np.zeros(0))
     compiled: StepThrough | None = None
     _open: list[Delivery] = field(default_factory=list)
+    _kept: dict[int, Delivery] = field(default_factory=dict)
     _announced: bool = False
 
     @property
@@ -148,7 +149,8 @@ class Receiver:
         component = self.planned.component
         if abs(component.time - t) > TIME_TOLERANCE or self._announced:
             self.backlog.append(letter)
-            return Delivery(t)
+            delivery = self._kept[id(letter)] = Delivery(t)
+            return delivery
         if not component.event_needs_step:
             self._open.clear()
         self._announced = component.event_needs_step
@@ -273,6 +275,8 @@ class Receiver:
     def _notify(self, t: float, telegram: Told, stamp: float, delivery: Delivery) -> None:
         self.planned.component.notify(self._port(telegram), t, stamp, payload(telegram))
         self._open.append(delivery)
+        if id(telegram) in self._kept:
+            self._open.append(self._kept.pop(id(telegram)))  # what was promised when it was put into the backlog
         self._note_outcome()
 
     def _note_outcome(self) -> None:

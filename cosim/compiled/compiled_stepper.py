@@ -80,6 +80,7 @@ class CompiledStepper:
             self._quicken(place, step)
         self._crossings = self._watch_balises()
         self._first: int | None = None
+        self._stops_at_packets = False
         for place, step in enumerate(self.plan.steps):
             step.component.clock = partial(self._time_in_chunk, place, step.component)
 
@@ -90,6 +91,7 @@ class CompiledStepper:
             OutputError: the recorder takes no more rows.
         """
         own_crossings = self._crossings is not None and self._crossings.allow(recorder.every == 1)
+        self._stops_at_packets = recorder.every == 1
         free = self._free_steps(k)
         if free < 1:
             return Chunk(0, partial(self._whole_step, k))
@@ -106,6 +108,8 @@ class CompiledStepper:
         if self._crossings is not None:
             self._crossings.collect()
         self._set_times(k + done)
+        if done == wanted and self._stops_at_packets:
+            self._pass_packets(self.axis[k + done], recorder)
         if done:
             fitting = int(self._longest * SECONDS / max(head.seconds, 1e-9))
             self._longest = max(1, min(fitting, GROWTH * self._longest, LONGEST))
@@ -142,9 +146,25 @@ class CompiledStepper:
             return 0
         if balises is not None:
             limit = min(limit, balises.idle_until)
-        if self.system.network is not None:
-            limit = min(limit, self.system.network.idle_until)
-        return free if limit == NEVER else min(free, self._steps_before(k, limit))
+        network = self.system.network
+        if network is None or network.idle_until >= limit:
+            return free if limit == NEVER else min(free, self._steps_before(k, limit))
+        before = self._steps_before(k, network.idle_until)
+        meets = self.axis[k + before + 1] if network.idle_until > -math.inf and before < free else -math.inf
+        on_grid = abs(meets - network.idle_until) <= TIME_TOLERANCE and meets + 2.0 * TIME_TOLERANCE < limit
+        if on_grid and self._stops_at_packets:
+            before += 1  # what is sent or arrives there is seen to between two chunks
+        return min(free, before)
+
+    def _pass_packets(self, t: float, recorder: Recorder) -> None:
+        """All components stand at `t` [s], whose row is written: send and deliver what is due, and write it again."""
+        network, values = self.system.network, self.plan.values
+        if network is None or not network.is_due(t):
+            return
+        before = values.tobytes()
+        network.handle(t)
+        if values.tobytes() != before:
+            recorder.add_event(t, values)
 
     def _steps_before(self, k: int, limit: float) -> int:
         """How many steps from number `k` on end before `limit` [s], and not nearly there."""

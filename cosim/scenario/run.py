@@ -203,7 +203,8 @@ class _Setup:
         self.notes += self.master.stepper.notes
         if self.packets is not None and self.master.stepper.compiled is not None:
             self.notes.append(
-                "Steps in which a packet is sent or arrives are Python's: the compiled stepper does those between them."
+                "Packets are sent and delivered by Python: the compiled stepper halts at points with one, "
+                "and leaves steps with one inside to it."
             )
         self._begin_stream(self.master)
         self.setup_seconds = perf_counter() - begin

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -89,9 +90,15 @@ def test_a_duplicate_is_told_once_unless_numbers_are_ignored() -> None:
     assert {p.outcomes["listener"] for p in checked.result.packets if p.kind == "duplicate"} == {"dropped"}
 
 
-def test_all_versions_of_fmi_are_told_the_same() -> None:
-    runs = [run(0.01, backend, **ROUGH) for backend in ("block3", "block2")]
-    np.testing.assert_allclose(of(runs[1], *SIGNALS), of(runs[0], *SIGNALS), atol=1e-12)
+@pytest.mark.parametrize("together", [False, True])
+def test_all_versions_of_fmi_are_told_the_same(tmp_path: Path, *, together: bool) -> None:
+    network = ROUGH
+    if together:  # two packets arrive at one instant
+        (tmp_path / "delays.csv").write_text("delay\n0.047\n0.01\n")
+        network = {"delay_model": "recorded", "delay_file": str(tmp_path / "delays.csv")}
+    runs = [run(0.01, backend, **network) for backend in ("block3", "block2")]
+    names = (*SIGNALS, "listener.packets")
+    np.testing.assert_allclose(of(runs[1], *names), of(runs[0], *names), atol=1e-12)
     told = [[p.outcomes for p in outcome.result.packets] for outcome in runs]
     assert told[0] == told[1]
 
