@@ -1,0 +1,303 @@
+"""The law of the adaptive observers: estimates of a state and of unknown constants, the excitation these get, and the
+covariance of both errors. Pure functions after Hann 2014, section 4; covariance, cap and holding are ours.
+
+Sizes: n states, m unknown constants, q measurements. ``c`` is the innovation that acts, shape (q,), ``C xh - w`` with a
+predicted output w, or ``C xh(t_k) - y`` held. With it
+
+    ``d xh = A xh + B + Phi rhoh - inv(S) C' c + lambda d rhoh``, ``d rhoh = -H R H lambda' C' c``
+    ``d lambda = (A - inv(S) C' C) lambda + Phi``, ``d S = -mu S - S A - A' S + C' C``; what is carried is inv(S)
+    ``d R = -R (lambda' C' C lambda + forgetting floor I) R + forgetting R``
+
+inv(R) is the filtered Gramian of ``C lambda``, plus the floor: without excitation R would grow without bound, with a
+floor it never exceeds ``1 / floor``. H has a 1 for each constant that is learnt and a 0 for each that is held.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from plant_models.hybrid import Signal, state, vector
+from plant_models.hybrid.system import Array
+
+LARGEST_CLOSED = 3  # sizes whose smallest eigenvalue is given in closed form
+TINY = 1e-60  # keeps quotients and slopes finite where there is nothing yet
+NEARLY_ONE = 1.0 - 1e-15
+
+
+class Sizes(NamedTuple):
+    """Numbers of states, unknown constants and measurements."""
+
+    n: int
+    m: int
+    q: int
+
+    @property
+    def error(self) -> int:
+        """Components of the error: states, constants, predicted outputs or held innovations."""
+        return self.n + self.m + self.q
+
+
+class Adaptation(NamedTuple):
+    """What an adaptive observer carries beside its estimates.
+
+    Args:
+        R: adaptation gain, shape (m, m). sensitivity: lambda, shape (n, m). inverse_S: shape (n, n).
+        excitation: mean of ``lambda' C' C lambda`` over the excitation window, shape (m, m). covariance: of the error
+            of states, constants and predicted outputs (or held innovations), shape (n + m + q, n + m + q).
+    """
+
+    R: Array
+    sensitivity: Array
+    inverse_S: Array
+    excitation: Array
+    covariance: Array
+
+
+class Plant(NamedTuple):
+    """The matrices at an instant.
+
+    Args:
+        A: shape (n, n). B: shape (n,). Phi: shape (n, m). C: shape (q, n), each row in units of its own weight. noise:
+            intensity of the disturbances of states, constants and predicted outputs, a square matrix, or 0.
+    """
+
+    A: Array
+    B: Array
+    Phi: Array
+    C: Array
+    noise: Array = 0.0
+
+
+class Gains(NamedTuple):
+    """What acts: ``inv(S) C'`` of shape (n, q), ``H R H lambda' C'`` of shape (m, q), and their sum for the state."""
+
+    state: Array
+    constants: Array
+    total: Array
+
+
+def upper(size: int) -> list[tuple[int, int]]:
+    """Places of an upper triangle, row by row.
+
+    Args:
+        size: of the matrix.
+    """
+    return [(i, j) for i in range(size) for j in range(i, size)]
+
+
+def packed(matrix: Array, size: int) -> Array:
+    """Upper triangle of a symmetric matrix, row by row.
+
+    Args:
+        matrix: shape (size, size). size: of the matrix.
+    """
+    return vector(*(matrix[i, j] for i, j in upper(size)))
+
+
+def unpacked(values: Array, size: int) -> Array:
+    """Symmetric matrix of its upper triangle, shape (size, size).
+
+    Args:
+        values: row by row. size: of the matrix.
+    """
+    places = {pair: k for k, pair in enumerate(upper(size))}
+    return _matrix([[values[places[min(i, j), max(i, j)]] for j in range(size)] for i in range(size)])
+
+
+def start_covariance(C: np.ndarray, deviations: Sequence[float], sizes: Sizes, predicts: bool) -> np.ndarray:
+    """Covariance of the error at the start, where ``w = C xh`` and ``c = 0``, shape (n + m + q, n + m + q).
+
+    Args:
+        C: shape (q, n). deviations: of states and constants, shape (n + m,). sizes: see there. predicts: whether the
+            output is predicted; else the innovation is held.
+    """
+    n, m, _q = sizes
+    spread = np.zeros((sizes.error, n + m))
+    spread[: n + m] = np.eye(n + m)
+    if predicts:
+        spread[n + m :, :n] = C
+    return np.asarray(spread @ np.diag(np.square(deviations)) @ spread.T)
+
+
+def adaptation_states(sizes: Sizes, covariance: np.ndarray) -> tuple[Signal, ...]:
+    """The states of an `Adaptation`, in its order; R, S at identity, as published.
+
+    Args:
+        sizes: see there. covariance: at the start, see `start_covariance`.
+    """
+    n, m, _ = sizes
+
+    def triangle(name: str, first: np.ndarray, description: str) -> Signal:
+        start = tuple(float(first[i, j]) for i, j in upper(len(first)))
+        return state(name, "1", start, f"{description}, upper triangle row by row", size=len(start))
+
+    return (
+        triangle("adaptation_gain", np.eye(m), "Adaptation gain R"),
+        state("sensitivity", "1", (0.0,) * (n * m), "Sensitivity lambda of the state, row by row", size=n * m),
+        triangle("inverse_s", np.eye(n), "Inverse of S, of which the state's gain is made"),
+        triangle("mean_excitation", np.zeros((m, m)), "Mean Gramian of the excitation over its window"),
+        triangle("error_covariance", covariance, "Covariance of the errors of state, constants and outputs"),
+    )
+
+
+def adaptation_of(x: Array, sizes: Sizes) -> tuple[Adaptation, int]:
+    """An adaptation from its states, and how many they are.
+
+    Args:
+        x: state of the observer from the first of these on. sizes: see there.
+    """
+    n, m, _ = sizes
+    ends = np.cumsum(
+        [m * (m + 1) // 2, n * m, n * (n + 1) // 2, m * (m + 1) // 2, sizes.error * (sizes.error + 1) // 2]
+    )
+    parts = [x[int(a) : int(b)] for a, b in zip([0, *ends[:-1]], ends, strict=True)]
+    sensitivity = _matrix([[parts[1][i * m + j] for j in range(m)] for i in range(n)])
+    adaptation = Adaptation(
+        unpacked(parts[0], m),
+        sensitivity,
+        unpacked(parts[2], n),
+        unpacked(parts[3], m),
+        unpacked(parts[4], sizes.error),
+    )
+    return adaptation, int(ends[-1])
+
+
+def gains_of(adaptation: Adaptation, C: Array, learnt: Array) -> Gains:
+    """The gains in force.
+
+    Args:
+        adaptation: see there. C: shape (q, n). learnt: 1 or 0 for each constant, shape (m,).
+    """
+    on_state = adaptation.inverse_S @ C.T
+    seen = C @ adaptation.sensitivity
+    mask = np.reshape(learnt, (-1, 1))
+    on_constants = mask * (adaptation.R @ (mask * seen.T))
+    return Gains(on_state, on_constants, on_state + adaptation.sensitivity @ on_constants)
+
+
+def adaptation_flow(
+    adaptation: Adaptation, plant: Plant, gains: Gains, error_drift: Array, mu: Array, p: Any, sizes: Sizes
+) -> list[Array]:
+    """Derivatives of the states of an adaptation, in their order.
+
+    Args:
+        adaptation: see there. plant: matrices now. gains: in force. error_drift: see `error_drift`. mu: decay of S
+            [1/s]. p: named tuple with `forgetting` [1/s], `gain_floor` and `excitation_time` [s]. sizes: see there.
+    """
+    n, m, _ = sizes
+    R, L, Z, E, V = adaptation
+    A, C = plant.A, plant.C
+    seen = C @ L
+    gramian = seen.T @ seen
+    floor = p.forgetting * p.gain_floor * np.eye(m)
+    dL = A @ L - gains.state @ seen + plant.Phi
+    FV = error_drift @ V
+    return [
+        packed(p.forgetting * R - R @ (gramian + floor) @ R, m),
+        vector(*(dL[i, j] for i in range(n) for j in range(m))),
+        packed(mu * Z + A @ Z + Z @ A.T - gains.state @ gains.state.T, n),
+        packed((gramian - E) / p.excitation_time, m),
+        packed(FV + FV.T + plant.noise, sizes.error),
+    ]
+
+
+def error_drift(plant: Plant, gains: Gains, sizes: Sizes, predicts: bool) -> Array:
+    """Matrix of the error ``(xh - x, rhoh - rho, w - y)``, or of ``(.., .., c)`` for a held innovation, between
+    samples.
+
+    Args:
+        plant: matrices now. gains: in force. sizes: see there. predicts: whether the output is predicted.
+    """
+    n, m, q = sizes
+    model = np.hstack([plant.A, plant.Phi])
+    none = np.zeros((m, n + m))
+    if predicts:
+        free = np.vstack([model, none, plant.C @ model])
+        free = np.hstack([free, np.zeros((n + m + q, q))])
+        reads = np.hstack([plant.C, np.zeros((q, m)), -np.eye(q)])
+        acts = np.vstack([gains.total, gains.constants, np.zeros((q, q))])
+        return free - acts @ reads
+    top = np.hstack([model, -gains.total])
+    middle = np.hstack([none, -gains.constants])
+    return np.vstack([top, middle, np.zeros((q, n + m + q))])
+
+
+def covariance_after(V: Array, C: Array, row: int, variance: Array, sizes: Sizes, predicts: bool) -> Array:
+    """Covariance of the error after one measurement, shape (n + m + q, n + m + q).
+
+    Args:
+        V: before it. C: shape (q, n). row: of the measurement. variance: of its noise, in units of its weight. sizes:
+            see there. predicts: whether the output is predicted; else the innovation is held.
+    """
+    n, m, _q = sizes
+    jump = np.eye(sizes.error)
+    place = n + m + row
+    jump[place, :] = 0.0
+    if not predicts:
+        jump[place, :n] = np.asarray(C)[row]
+    added = np.zeros((sizes.error, sizes.error))
+    added[place, place] = 1.0
+    return jump @ V @ jump.T + variance * added
+
+
+def told_excitation(E: Array, size: int) -> Array:
+    """Excitation of each constant given the others, ``1 / diag(inv(E))``, shape (m,).
+
+    Args:
+        E: mean Gramian, shape (m, m). size: m, 1 to 3.
+    """
+    if size == 1:
+        return vector(E[0, 0])
+    if size == 2:
+        return vector(*(E[i, i] - E[0, 1] ** 2 / np.maximum(E[1 - i, 1 - i], TINY) for i in range(2)))
+    told = []
+    for i, j, k in ((0, 1, 2), (1, 0, 2), (2, 0, 1)):
+        others = np.maximum(E[j, j] * E[k, k] - E[j, k] ** 2, TINY)
+        shared = E[i, j] ** 2 * E[k, k] - 2.0 * E[i, j] * E[i, k] * E[j, k] + E[i, k] ** 2 * E[j, j]
+        told.append(E[i, i] - shared / others)
+    return vector(*told)
+
+
+def learnt_constants(E: Array, least: Array, size: int) -> Array:
+    """1 for each constant whose excitation is at least `least`, else 0, shape (m,).
+
+    Args:
+        E: mean Gramian, shape (m, m). least: excitation below which a constant is held; 0 for never. size: m.
+    """
+    told = told_excitation(E, size)
+    return vector(*(np.where(least > 0.0, np.where(told[i] >= least, 1.0, 0.0), 1.0) for i in range(size)))
+
+
+def smallest_eigenvalue(E: Array, size: int) -> Array:
+    """Smallest eigenvalue of a symmetric matrix in closed form.
+
+    Args:
+        E: shape (size, size). size: 1 to 3.
+
+    Raises:
+        ValueError: the size is larger.
+    """
+    if size > LARGEST_CLOSED:
+        raise ValueError(f"The smallest eigenvalue is known in closed form up to size {LARGEST_CLOSED}, got {size}.")
+    mean = sum((E[i, i] for i in range(size)), 0.0) / size
+    if size == 1:
+        return mean
+    if size == 2:
+        return mean - np.sqrt(0.25 * (E[0, 0] - E[1, 1]) ** 2 + E[0, 1] * E[0, 1] + TINY)
+    off = E[0, 1] ** 2 + E[0, 2] ** 2 + E[1, 2] ** 2
+    spread = np.sqrt((sum((E[i, i] - mean) ** 2 for i in range(3)) + 2.0 * off) / 6.0 + TINY)
+    unit = (E - mean * np.eye(3)) / spread
+    half = 0.5 * (
+        unit[0, 0] * (unit[1, 1] * unit[2, 2] - unit[1, 2] ** 2)
+        - unit[0, 1] * (unit[0, 1] * unit[2, 2] - unit[1, 2] * unit[0, 2])
+        + unit[0, 2] * (unit[0, 1] * unit[1, 2] - unit[1, 1] * unit[0, 2])
+    )
+    angle = np.arccos(np.clip(half, -NEARLY_ONE, NEARLY_ONE)) / 3.0
+    return mean + 2.0 * spread * np.cos(angle + 2.0 * np.pi / 3.0)
+
+
+def _matrix(rows: list[list[Array]]) -> Array:
+    return np.vstack([np.hstack(row) for row in rows])

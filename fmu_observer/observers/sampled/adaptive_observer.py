@@ -1,0 +1,202 @@
+"""Base of the adaptive observers of state-affine models: their signals, their outputs and what all of them do between
+samples.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fmu_observer.models import STATE_AFFINE_MODELS, StateAffineModel, find_state_affine_model
+from fmu_observer.models.model import stacked
+from fmu_observer.observers.adaptive_law import (
+    Adaptation,
+    Gains,
+    Plant,
+    Sizes,
+    adaptation_flow,
+    adaptation_of,
+    adaptation_states,
+    covariance_after,
+    error_drift,
+    gains_of,
+    learnt_constants,
+    packed,
+    smallest_eigenvalue,
+    start_covariance,
+)
+from fmu_observer.observers.gated_observer import GatedObserver
+from plant_models.hybrid import Signal, TriggeredEvent, input_signal, output_signal, parameter, state
+from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid.system import Array
+
+NOTHING_KNOWN = 100.0  # [ours] start value of every standard deviation
+LEAST_VARIANCE = 1e-30  # below it a standard deviation is told as 1e-15
+ADAPTIVE_PARAMETERS = (
+    parameter("mu", "1/s", 10.0, "Decay of S: the state's gain forgets measurements at this rate", min=1e-9),
+    parameter("forgetting", "1/s", 1.0, "Rate at which the adaptation gain forgets; 1 as published", min=0.0),
+    parameter("gain_floor", "1", 0.0, "One over the largest adaptation gain; 0 for no limit, as published", min=0.0),
+    parameter("least_excitation", "1", 0.0, "Mean excitation below which a constant is held; 0 for never", min=0.0),
+    parameter("excitation_time", "s", 1.0, "Window of the mean excitation", min=1e-9),
+)
+
+
+class AdaptiveObserver(GatedObserver):
+    """Base of the observers of state and unknown constants at once: Hann 2014, chapter 4.
+
+    The state is laid out as estimates, constants, adaptation (`adaptive_law.adaptation_states`), then what a subclass
+    keeps of the measurements, q numbers. Outputs are the estimates and the constants under their names, for each
+    constant `<name>_deviation`, the standard deviation of its error, and `<name>_learnt`, 1 where it is learnt and 0
+    where it is held for want of excitation; `smallest_excitation`, the smallest eigenvalue of the mean of
+    ``lambda' C' C lambda``; and `innovation`.
+
+    The covariance is exact for the model with white noise of `noise_deviation` at each measurement, whatever the
+    instants: the errors obey a linear equation that the observer knows. It begins at `NOTHING_KNOWN` for all.
+
+    Args:
+        model: a state-affine model or the name of one.
+
+    Raises:
+        ValueError: the model is unknown, or has more than three unknown constants.
+    """
+
+    internal_step = 5e-3
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(STATE_AFFINE_MODELS)}
+    predicts: ClassVar[bool]
+
+    def __init__(self, model: str | StateAffineModel = "time_varying_oscillator") -> None:
+        self.model = chosen = find_state_affine_model(model)
+        self.sizes = Sizes(chosen.order, len(chosen.unknowns), len(chosen.measurements))
+        if self.sizes.m not in (1, 2, 3):
+            raise ValueError(
+                f"{self.name}: the model {chosen.name!r} has {self.sizes.m} unknown constants; 1 to 3 can be learnt."
+            )
+        believed = (*chosen.states, *chosen.unknowns)
+        first = start_covariance(chosen.C, (NOTHING_KNOWN,) * len(believed), self.sizes, self.predicts)
+        self.states = (
+            *(state(f"estimated_{s.name}", s.unit, s.start, f"Estimate: {s.description}") for s in believed),
+            *adaptation_states(self.sizes, first),
+            self.kept_signal(),
+        )
+        self.inputs = chosen.inputs
+        self.outputs = adaptive_outputs(chosen)
+        self.parameters = (
+            *ADAPTIVE_PARAMETERS,
+            parameter("noise_deviation", "1", 0.0, "Standard deviation of the noise of a measurement", min=0.0),
+        )
+        payload = tuple(
+            input_signal(f"{chosen.event}_{s.name}", s.unit, s.start, s.description, variability="discrete")
+            for s in chosen.measurements
+        )
+        self.events = (TriggeredEvent(chosen.event, payload, "A measurement arrives, at its own time stamp"),)
+        super().__init__(model=chosen.name)
+
+    # -- what a subclass writes -------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def kept_signal(self) -> Signal:
+        """What is kept of the measurements: q predicted outputs (a state), or q held innovations (memory)."""
+
+    @abstractmethod
+    def acting(self, x: Array) -> Array:
+        """The innovation that acts, shape (q,)."""
+
+    @abstractmethod
+    def kept_after(self, x: Array, y: Array) -> Array:
+        """What is kept once the measurements y are known, shape (q,)."""
+
+    # -- what follows -----------------------------------------------------------------------------------------------
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """The parameters lie within their bounds."""
+        return super().requirements(p) | within_bounds(self.parameters[: len(ADAPTIVE_PARAMETERS) + 1], p)
+
+    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Estimates, constants, adaptation, and predicted outputs where they are predicted."""
+        estimate, rho, adaptation = self._parts(x)
+        known = stacked(tuple(getattr(u, s.name) for s in self.model.inputs))
+        plant = Plant(
+            self.model.drift(t, known), self.model.drive(t, known), self.model.regressor(t, known), self.model.C
+        )
+        gains = self._gains(adaptation, p)
+        c = self.acting(x)
+        predicted = plant.A @ estimate + plant.B + plant.Phi @ rho
+        drift = error_drift(plant, gains, self.sizes, self.predicts)
+        flows = [
+            predicted - gains.total @ c,
+            -(gains.constants @ c),
+            *adaptation_flow(adaptation, plant, gains, drift, p.mu, p, self.sizes),
+        ]
+        return np.hstack([*flows, self.model.C @ predicted] if self.predicts else flows)
+
+    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """What is kept is set by the measurements, and the covariance with it; all else stays continuous."""
+        y = stacked(tuple(getattr(u, f"{self.model.event}_{s.name}") for s in self.model.measurements))
+        V, variance = self._parts(x)[2].covariance, p.noise_deviation**2
+        for row in range(self.sizes.q):
+            V = covariance_after(V, self.model.C, row, variance, self.sizes, self.predicts)
+        count = self.sizes.error * (self.sizes.error + 1) // 2
+        before = self.own_count - self.sizes.q - count
+        return np.hstack([x[:before], packed(V, self.sizes.error), self.kept_after(x, y)])
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """Estimates, constants with their uncertainty, excitation and innovation."""
+        n, m, _ = self.sizes
+        estimate, rho, adaptation = self._parts(x)
+        learnt = learnt_constants(adaptation.excitation, p.least_excitation, m)
+        found = {s.name: estimate[i] for i, s in enumerate(self.model.states)}
+        for j, s in enumerate(self.model.unknowns):
+            variance = adaptation.covariance[n + j, n + j]
+            found |= {
+                s.name: rho[j],
+                f"{s.name}_deviation": np.sqrt(np.maximum(variance, LEAST_VARIANCE)),
+                f"{s.name}_learnt": learnt[j],
+            }
+        innovation = self.acting(x)
+        return found | {
+            "smallest_excitation": smallest_eigenvalue(adaptation.excitation, m),
+            "innovation": innovation[0] if self.sizes.q == 1 else innovation,
+        }
+
+    # -- internals --------------------------------------------------------------------------------------------------
+
+    def kept(self, x: Array) -> Array:
+        """The q numbers that are kept of the measurements, shape (q,)."""
+        return x[self.own_count - self.sizes.q : self.own_count]
+
+    def estimates(self, x: Array) -> Array:
+        """The estimated state, shape (n,)."""
+        return x[: self.sizes.n]
+
+    def _parts(self, x: Array) -> tuple[Array, Array, Adaptation]:
+        n, m, _ = self.sizes
+        return x[:n], x[n : n + m], adaptation_of(x[n + m :], self.sizes)[0]
+
+    def _gains(self, adaptation: Adaptation, p: Any) -> Gains:
+        learnt = learnt_constants(adaptation.excitation, p.least_excitation, self.sizes.m)
+        return gains_of(adaptation, self.model.C, learnt)
+
+
+def adaptive_outputs(model: StateAffineModel) -> tuple[Signal, ...]:
+    """Outputs of an adaptive observer of a model.
+
+    Args:
+        model: state-affine.
+    """
+    of_constants: list[Signal] = []
+    for s in model.unknowns:
+        of_constants += [
+            output_signal(s.name, s.unit, f"Estimate: {s.description}"),
+            output_signal(f"{s.name}_deviation", s.unit, f"Standard deviation of its error: {s.description}"),
+            output_signal(f"{s.name}_learnt", "1", f"1 where it is learnt, 0 where it is held: {s.description}"),
+        ]
+    q = len(model.measurements)
+    return (
+        *(output_signal(s.name, s.unit, f"Estimate: {s.description}") for s in model.states),
+        *of_constants,
+        output_signal("smallest_excitation", "1", "Smallest eigenvalue of the mean Gramian of the excitation"),
+        output_signal("innovation", "1", "Innovation that acts", size=None if q == 1 else q),
+    )
