@@ -29,6 +29,7 @@ COMMANDS = (
     Command("benchmark-observers", "cosim.cli.benchmark_observers", "compare observers on one recorded run"),
     Command("identify", "cosim.cli.identify", "identify parameters of a train from a measured run"),
     Command("bound", "cosim.cli.bound", "bounds of an observer's error between samples"),
+    Command("limits", "cosim.cli.limits", "gaps and delays that an observer survives"),
     Command("report", "cosim.cli.report", "report of results, or of several laid over each other"),
     Command("convert", "cosim.cli.convert", "write a result in another format"),
     Command("new", "cosim.cli.new", "write a starter scenario for an FMU"),

@@ -59,6 +59,14 @@ class DecayBounds:
         """
         return gap * float(np.exp(sigma * gap)) / self.longest_gap if self.longest_gap > 0.0 else inf
 
+    def strict_gap(self, sigma: float) -> float:
+        """Gap at which (3.105) is 1, its factor ``exp(sigma gap)`` kept [s].
+
+        Args:
+            sigma: rate asked for, below alpha / 2 [1/s]; 0 gives (3.109).
+        """
+        return float(scipy.special.lambertw(sigma * self.longest_gap).real) / sigma if sigma > 0.0 else self.longest_gap
+
 
 def dynamic_theta_bounds(
     A: np.ndarray, K: np.ndarray, C: np.ndarray, lipschitz: float, theta_max: float

@@ -2,6 +2,7 @@
 
 from fmu_observer.models.braked_train import braked_train
 from fmu_observer.models.coupled_vehicles import coupled_vehicles
+from fmu_observer.models.flexible_joint_arm import flexible_joint_arm, flexible_joint_arm_as_printed
 from fmu_observer.models.freight_train import freight_train
 from fmu_observer.models.linear_pendulum import linear_pendulum
 from fmu_observer.models.model import ObserverModel
@@ -27,6 +28,8 @@ __all__ = [
     "find_model",
     "find_state_affine_model",
     "find_takagi_sugeno_model",
+    "flexible_joint_arm",
+    "flexible_joint_arm_as_printed",
     "freight_train",
     "linear_pendulum",
     "pendulum",

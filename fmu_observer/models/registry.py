@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from fmu_observer.models.braked_train import braked_train
 from fmu_observer.models.coupled_vehicles import coupled_vehicles
+from fmu_observer.models.flexible_joint_arm import flexible_joint_arm, flexible_joint_arm_as_printed
 from fmu_observer.models.freight_train import freight_train
 from fmu_observer.models.linear_pendulum import linear_pendulum
 from fmu_observer.models.model import ObserverModel
@@ -18,6 +19,8 @@ MODELS: dict[str, Callable[[], ObserverModel]] = {
     "freight_train": freight_train,
     "braked_train": braked_train,
     "coupled_vehicles": coupled_vehicles,
+    "flexible_joint_arm": flexible_joint_arm,
+    "flexible_joint_arm_as_printed": flexible_joint_arm_as_printed,
     "tanh_system": tanh_system,
 }
 

@@ -131,15 +131,16 @@ def _of_model(system: Any) -> Situation:
     model = system.model
     x = _motion(model, np.array([float(s.start_values[0]) for s in model.states]) + 0.5)
     continuous = {s.name for s in system.inputs}
+    delay = next((float(s.start) for s in system.parameters if s.name == "delay"), 0.0)
 
     def inputs(t: float) -> Values:
         measured = _named(model.measurements, model.measured(x(t)), "measured_")
         return _named(model.inputs, _known(model)) | {n: v for n, v in measured.items() if n in continuous}
 
     def payload(event: str, t: float) -> Values:
-        named = _named(model.measurements, model.measured(x(t)), f"{event}_")
+        named = _named(model.measurements, model.measured(x(max(t - delay, 0.0))), f"{event}_")
         declared = next(e for e in system.triggered_events if e.name == event).payload
-        return {s.name: named[s.name] for s in declared}
+        return {s.name: named[s.name] for s in declared if s.name in named}  # a number of a node is left at its start
 
     return Situation(system, lambda t: _named(model.states, x(t)), inputs, payload, model.sample_period)
 

@@ -104,7 +104,16 @@ def test_every_observer_of_a_model_names_the_mode_it_cannot_see(name: str) -> No
 
 
 @pytest.mark.parametrize(
-    "name", ["high_gain", "exponential_gain", "output_predictor", "held_innovation", "hybrid_impulsive"]
+    "name",
+    [
+        "high_gain",
+        "exponential_gain",
+        "output_predictor",
+        "held_innovation",
+        "hybrid_impulsive",
+        "decaying_innovation",
+        "dynamic_high_gain",
+    ],
 )
 def test_observers_of_a_chain_refuse_what_is_none(name: str) -> None:
     """A chain of integrators measured at its head is observable, so nothing else needs asking."""

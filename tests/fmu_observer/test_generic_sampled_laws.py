@@ -16,6 +16,8 @@ from fmu_observer.design.high_gain_bounds import high_gain_bounds
 from fmu_observer.models import ObserverModel, find_model, pendulum
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.sampled import (
+    DecayingInnovation,
+    DynamicHighGain,
     ExponentialGain,
     HeldInnovation,
     HybridImpulsive,
@@ -30,7 +32,7 @@ TORQUE = 0.2
 START = (1.0, 0.5)  # of the true pendulum; observers start at rest, in the lower position
 END = 20.0
 
-EVENT = (ExponentialGain, OutputPredictor, HeldInnovation, HybridImpulsive)
+EVENT = (ExponentialGain, OutputPredictor, HeldInnovation, HybridImpulsive, DecayingInnovation, DynamicHighGain)
 PERIODIC = (RiccatiHighGain, TakagiSugenoPeriodic)
 ON_PENDULUM = (*EVENT, *PERIODIC, TakagiSugenoAperiodic)
 ALL = (*ON_PENDULUM, MultirateSylvester)

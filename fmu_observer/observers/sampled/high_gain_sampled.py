@@ -29,7 +29,7 @@ class HighGainSampled(SampledObserver):
 
     theta_start: ClassVar[float] = THETA
 
-    def __init__(self, model: str | ObserverModel = "pendulum") -> None:
+    def __init__(self, model: str | ObserverModel = "pendulum", **options: Any) -> None:
         chosen = find_model(model)
         width = check_chain(chosen, self.name)
         self.gain_parameters = (
@@ -39,7 +39,7 @@ class HighGainSampled(SampledObserver):
             ),
         )
         self.declare_sampled_part(chosen)
-        super().__init__(chosen)
+        super().__init__(chosen, **options)
 
     def theta_parameters(self) -> tuple[Signal, ...]:
         """What theta is, or follows from."""

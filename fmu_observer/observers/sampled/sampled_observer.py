@@ -7,18 +7,21 @@ It knows models and certificates; the chain form that high-gain observers ask fo
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampled_error, with_switching_noted
+from fmu_observer.limits import Limit, PrintedBound
 from fmu_observer.models import ObserverModel
 from fmu_observer.models.model import shift_matrix
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.model_observer import ModelObserver
-from plant_models.hybrid import Signal, state
+from fmu_observer.observers.model_trial import model_trial
+from fmu_observer.observers.parameter_values import Value, parameter_values
+from plant_models.hybrid import Signal, scalar_names, state
 from plant_models.hybrid.system import Array
 
 
@@ -41,6 +44,43 @@ class SampledObserver(ModelObserver, GatedObserver, GapCertified):
         vertices = tuple(self.vertex_error(drift, p) for drift in self.model.drifts)
         certificate = certify_sampled_error(vertices, max_gap, self.error_model())
         return with_switching_noted(certificate, vertices, "slopes") if len(vertices) > 1 else certificate
+
+    def limits(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> tuple[Limit, ...]:
+        """How long the observer may wait for a sample: printed bounds, the certificate, and a trial beside its model.
+
+        Args:
+            parameters: values by name that replace those of the preset. preset: to start from; None for the default.
+
+        Raises:
+            ValueError: a parameter is unknown, not finite or of another size, or the preset is unknown.
+        """
+        values = parameter_values(self, parameters, preset, "to judge")
+        certificate = self.certify(self.model.sample_period, parameters, preset)
+        longest = certificate.constant_limit
+        high = 2.0 * longest if np.isfinite(longest) else certificate.horizon
+        return (
+            Limit(
+                "period of the samples",
+                printed=self.printed_bounds(self.unpack_parameters(values)),
+                exact=longest,
+                exact_test="first period at which the error grows from sample to sample, at an extreme slope",
+                trial=model_trial(self, "period", high / 50.0, high, self.named_values(values)),
+            ),
+        )
+
+    def printed_bounds(self, p: Any) -> tuple[PrintedBound, ...]:
+        """Bounds of the sampling period that the source prints; by default that of the condition, where it has one."""
+        condition = self.condition_of(p)
+        gap = condition.values.get("longest_gap")
+        return () if gap is None else (PrintedBound(float(gap), condition.statement, condition.source),)
+
+    def named_values(self, values: np.ndarray) -> dict[str, float]:
+        """Parameters by scalar name, those that another program sets left out.
+
+        Args:
+            values: of all parameters, shape (k,).
+        """
+        return dict(zip(scalar_names(self.parameter_signals), map(float, values), strict=True))
 
     def error_model(self) -> str:
         """The error equations of the certificate in words."""

@@ -5,12 +5,12 @@ from.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 
-from fmu_observer.certificates import Certificate, SampledError, certify_sampled_error, with_switching_noted
+from fmu_observer.certificates import Certificate, GapError, SampledError, certify_sampled_error, with_switching_noted
 from fmu_observer.design.certified_gains import certified_gains
 from fmu_observer.observers.parameter_values import Value
 from fmu_observer.observers.train.high_gain import HIGH_GAIN_K, correction, innovation_decay
@@ -39,10 +39,11 @@ class HighGainTrainObserver(TrainObserver):
     first_stage_states: tuple[Signal, ...] = ()
     first_stage_parameters: tuple[Signal, ...] = ()
     theta_name: ClassVar[str] = "theta"
+    innovation_state: ClassVar[Signal] = BALISE_INNOVATION
     frictions = (SPEED.name,)
 
     def __init__(self, **options: Any) -> None:
-        self.estimator_states = (POSITION, SPEED, BALISE_INNOVATION, *self.first_stage_states)
+        self.estimator_states = (POSITION, SPEED, self.innovation_state, *self.first_stage_states)
         self.estimator_parameters = (*self.gain_parameters(), *self.first_stage_parameters)
         super().__init__(**options)
 
@@ -65,19 +66,32 @@ class HighGainTrainObserver(TrainObserver):
     def first_stage_flow(self, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
         """Derivatives of the first-stage states."""
 
+    def acting_innovation(self, x: Array, p: Any) -> Array:
+        """The innovation of the last balise as it acts now [m]."""
+        return x[2]
+
+    def innovation_flow(self, x: Array, p: Any) -> Array:
+        """Derivative of the innovation state."""
+        return innovation_decay(self.theta_in_force(x, p), p.high_gain, x[2])
+
+    def vertex_error(self, drift: Sequence[Sequence[float]], p: Any) -> GapError:
+        """Error equations of position and speed between two balises, for one drag slope in `drift`, shape (2, 2)."""
+        theta = float(getattr(p, self.theta_name))
+        return SampledError.of(drift, correction(theta, p.high_gain, 1.0), theta * float(p.high_gain[0]))
+
     def estimator_flow(self, t: Array, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
         """Derivatives of position, speed, innovation and first stage."""
         theta = self.theta_in_force(x, p)
-        speed, innovation = x[1], x[2]
-        on_position, on_speed = correction(theta, p.high_gain, innovation)
+        speed = x[1]
+        on_position, on_speed = correction(theta, p.high_gain, self.acting_innovation(x, p))
         traction = np.maximum(self.adhesion(x, u, p), 0.0)  # a negative one is a brake: see friction
         acceleration = (traction - rolling_drag(speed, p)) / p.mass
-        decay = innovation_decay(theta, p.high_gain, innovation)
-        return (speed - on_position, acceleration - on_speed, decay, *self.first_stage_flow(x, u, p))
+        moved = self.innovation_flow(x, p)
+        return (speed - on_position, acceleration - on_speed, moved, *self.first_stage_flow(x, u, p))
 
     def estimate(self, x: Array, u: Any, p: Any) -> Estimate:
         """Position, speed, adhesion force and innovation."""
-        return Estimate(x[0], x[1], self.adhesion(x, u, p), x[2])
+        return Estimate(x[0], x[1], self.adhesion(x, u, p), self.acting_innovation(x, p))
 
     def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """At a balise the innovation is set anew; position and speed stay continuous."""
@@ -101,10 +115,8 @@ class HighGainTrainObserver(TrainObserver):
         """Certificate of ``de = [[0, 1], [0, -s]] e - theta inv(Delta) K eta`` for all drag slopes s of the speed
         range.
         """
-        theta = float(getattr(p, self.theta_name))
-        gain = correction(theta, p.high_gain, 1.0)
         slopes = drag_slope_range(p, 0.0, TOP_SPEED)
-        vertices = tuple(SampledError.of([[0.0, 1.0], [0.0, -s]], gain, theta * float(p.high_gain[0])) for s in slopes)
+        vertices = tuple(self.vertex_error([[0.0, 1.0], [0.0, -s]], p) for s in slopes)
         model = (
             f"position and speed error with the drag slope (b + 2 c v)/M at 0 and {TOP_SPEED:g} m/s, constant over a "
             f"gap; "

@@ -84,6 +84,18 @@ def test_an_older_packet_does_not_replace_a_newer_one_unless_numbers_are_ignored
     assert np.any(np.diff(stamps[1]) < 0.0)
 
 
+def test_delays_are_made_equal_where_that_is_asked_for() -> None:
+    network = ROUGH | {"loss_fraction": 0.0}
+    outcome = run(0.01, equalise=0.22, **network)
+    late = np.array([p.delivered_at - p.stamp for p in outcome.result.packets])
+    np.testing.assert_allclose(late, 0.22, atol=1e-12)
+    assert outcome.result.summary["network"]["packets"]["front"]["overtaken"] == 0
+    half = run(0.01, equalise=0.1, **network)
+    late = np.array([p.delivered_at - p.stamp for p in half.result.packets])
+    usual = np.array([p.delivered_at - p.stamp for p in run(0.01, **network).result.packets])
+    np.testing.assert_allclose(late, np.maximum(usual, 0.1), atol=1e-12)
+
+
 def test_a_duplicate_is_told_once_unless_numbers_are_ignored() -> None:
     checked, ignored = (run(0.01, sequence=kind, duplicate_fraction=1.0) for kind in ("checked", "ignored"))
     assert of(ignored, "listener.packets") == 2 * of(checked, "listener.packets")

@@ -1,0 +1,80 @@
+"""``cosim limits OBSERVER``: how long a gap and a delay an observer survives, printed bounds beside exact and practical
+limits.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import asdict
+from typing import Any
+
+from cosim.cli.scenarios import parse_setting
+from cosim.errors import CosimError, ScenarioError, nearest
+from cosim.limits import limit_rows, limit_text
+from cosim.results.summary_file import jsonable
+from cosim.scenario.models import make_declared
+from cosim.scenario.tables import ComponentTable
+from fmu_observer import OBSERVERS
+from plant_models.user_file import names_code
+
+FEWEST = 4
+
+
+def register(commands: Any) -> None:
+    """Add the command to the parser.
+
+    Args:
+        commands: subparsers of the program.
+    """
+    text = (
+        "How much an observer survives: every printed bound of its sampling period and delay beside the exact limit of "
+        "its error equations and the practical one, found by native runs beside its own model."
+    )
+    parser = commands.add_parser("limits", description=text, epilog="Exit codes: 0 done, 2 error.")
+    parser.add_argument("observer", metavar="OBSERVER", help="an observer that has limits: a name, or file.py:Class")
+    parser.add_argument("--preset", metavar="NAME", help="values to start from (default: the observer's own)")
+    for flag, metavar, text in (
+        ("--set", "NAME=VALUE", "a parameter, for instance --set theta=5"),
+        ("--option", "NAME=VALUE", "an option, for instance --option predictors=2"),
+    ):
+        parser.add_argument(flag, action="append", default=[], metavar=metavar, dest=flag[2:], help=text)
+    parser.add_argument("--no-runs", action="store_true", help="leave the practical limits out")
+    parser.add_argument(
+        "--members", type=int, default=16, metavar="N", help="values that are tried at once (default: 16)"
+    )
+    parser.add_argument("--json", action="store_true", help="print the data as JSON instead of the table")
+    parser.set_defaults(execute=execute)
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Print the limits.
+
+    Args:
+        options: of the command line.
+
+    Raises:
+        CosimError: there is no such observer, it has no limits, or an argument is not legal.
+    """
+    name = options.observer
+    if name not in OBSERVERS and not names_code(name):
+        raise ScenarioError(f"There is no observer {name!r}; {nearest(name, OBSERVERS)}")
+    if options.members < FEWEST:
+        raise CosimError(f"limits: --members {options.members}: expected {FEWEST} values or more at once.")
+    table = {"observer": name, "options": dict(map(parse_setting, options.option))}
+    made = make_declared(ComponentTable.model_validate(table), "limits")
+    if not hasattr(made, "limits"):
+        raise CosimError(
+            f"Observer {name!r} tells no limits; observers of sampled measurements do, such as delayed_state_observer."
+        )
+    try:
+        rows = limit_rows(
+            made.limits(dict(map(parse_setting, options.set)), options.preset), not options.no_runs, options.members
+        )
+    except ValueError as error:
+        raise error if isinstance(error, CosimError) else CosimError(f"limits: {error}") from error
+    if options.json:
+        print(json.dumps(jsonable([asdict(row) for row in rows]), indent=2))
+    else:
+        print(limit_text(made.name, rows))
+    return 0

@@ -1,0 +1,83 @@
+"""The practical limit of an observer: the first value at which it loses its plant, found by native runs."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from fmu_observer.limits import Trial
+from fmus.batch.members import Batch
+
+MEMBERS = 16
+LAST_PART = 0.8  # of a run; behind it the error counts
+COMMUNICATION_STEP = 0.01  # [s]; the inputs are held for so long
+
+
+def survives(trial: Trial, values: Any) -> np.ndarray:
+    """Whether the observer finds its plant and keeps it, for values of what the trial varies, shape (k,).
+
+    Args:
+        trial: what is run. values: periods or delays [s], shape (k,).
+    """
+    tried = np.atleast_1d(np.asarray(values, dtype=float))
+    periods = tried if trial.varied == "period" else np.full(len(tried), trial.period)
+    delays = tried if trial.varied == "delay" else np.full(len(tried), trial.delay)
+    batch = Batch(trial.system, len(tried))
+    for name, value in trial.settings.items():
+        batch.set(name, value)
+    if trial.delay_parameter:
+        batch.set(trial.delay_parameter, delays)
+    for i, (period, delay) in enumerate(zip(periods, delays, strict=True)):
+        _tell(batch, trial, i, float(period), float(delay))
+    instants = COMMUNICATION_STEP * np.arange(round(trial.stop / COMMUNICATION_STEP) + 1)
+    batch.start(0.0)
+    middles = np.minimum(instants + 0.5 * COMMUNICATION_STEP, trial.stop)
+    names = list(trial.truth(instants[:1]))
+    found = batch.run(instants[1:], names, dict(trial.inputs(middles)))
+    with np.errstate(invalid="ignore", over="ignore"):
+        errors = np.stack([_error(trial, names, instants, found[i], delay) for i, delay in enumerate(delays)])
+    late = instants >= LAST_PART * trial.stop
+    first = np.maximum(errors[:, 0], 1e-300)
+    return np.all(np.isfinite(errors), axis=1) & (errors[:, late].max(axis=1) < trial.left * first)
+
+
+def practical_limit(trial: Trial, members: int = MEMBERS) -> float:
+    """First value at which the observer loses its plant [s]; inf where it keeps it over the whole range.
+
+    The range is tried at equally spaced values at once, then the step in which the first failure lies. So the limit is
+    known to a fraction ``1 / (members - 1)^2`` of the range; an island of failures narrower than a step may be missed.
+
+    Args:
+        trial: what is run. members: values that are tried at once.
+
+    Returns:
+        The limit; `low` of the trial where it fails there already.
+    """
+    low, high = trial.low, trial.high
+    for _ in range(2):
+        values = np.linspace(low, high, members)
+        lost = np.flatnonzero(~survives(trial, values))
+        if not len(lost):
+            return inf if high == trial.high else high
+        if lost[0] == 0:
+            return float(values[0])
+        low, high = float(values[lost[0] - 1]), float(values[lost[0]])
+    return high
+
+
+def _tell(batch: Batch, trial: Trial, member: int, period: float, delay: float) -> None:
+    numbers = np.arange(int((trial.stop - delay) / period) + 1)
+    stamps = numbers * period
+    payload = dict(trial.payload(stamps))
+    if trial.nodes:
+        payload["node"] = numbers % trial.nodes + 1.0
+    batch.notify(trial.event, member, stamps + delay, **payload)
+
+
+def _error(trial: Trial, names: list[str], instants: np.ndarray, found: np.ndarray, delay: float) -> np.ndarray:
+    """Norm of the error over time, shape (k,)."""
+    at = np.maximum(instants - delay, 0.0) if trial.delayed_truth else instants
+    truth = trial.truth(at)
+    return np.asarray(np.linalg.norm(found - np.stack([truth[name] for name in names], axis=1), axis=1))

@@ -1,0 +1,519 @@
+"""Observer of a state whose measurements come late and node by node, with finite-time predictors of the state now."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any, ClassVar, Literal, NamedTuple
+
+import numpy as np
+
+from fmu_observer.certificates import ImpulsiveError
+from fmu_observer.condition import Condition
+from fmu_observer.design.network_bounds import NetworkBounds, exact_interval, exact_predictor_delay, network_bounds
+from fmu_observer.limits import Limit, PrintedBound
+from fmu_observer.models import MODELS, ObserverModel, find_model
+from fmu_observer.observers.delay_memory import at_age, integral_weights, weighted
+from fmu_observer.observers.model_trial import WRONG_START, model_trial
+from fmu_observer.observers.parameter_values import Value, parameter_values
+from fmu_observer.observers.sampled.high_gain_sampled import HighGainSampled
+from fmu_observer.observers.sampled.sampled_observer import per_measurement
+from plant_models.hybrid import (
+    PeriodicEvent,
+    Signal,
+    TriggeredEvent,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+    state,
+    vector,
+)
+from plant_models.hybrid.option import require_whole
+from plant_models.hybrid.system import Array
+
+Between = Literal["predicted", "held"]
+BETWEEN: tuple[Between, ...] = ("predicted", "held")
+
+DELAY, MEMORY_PERIOD, MEMORY_PLACES = 0.1, 0.01, 20  # [s], [s], [1] [ours]: one predictor remembers 0.2 s
+THETA_PUBLISHED, THETA_REPAIRED = 1.0, 5.0  # [1/s]
+ITERATIONS = 3  # of the implicit end of the trapezoidal rule; each wins a factor of 2 / (period Lipschitz)
+MOST_PREDICTORS = 8
+MOST_PLACES = 60  # of a trial
+LONGEST_INTERVAL = 2.0  # [s] to which limits are looked for, each predictor its own share
+
+
+class _Past(NamedTuple):
+    """Memory of the observer: mean inputs by place, input that acts, signed roots, predictions and rates by predictor,
+    offset and its rate, instant of the last reading, and whether there was one.
+    """
+
+    means: list[list[Array]]
+    acting: list[Array]
+    roots: list[list[Array]]
+    predictions: list[list[Array]]
+    rates: list[list[list[Array]]]
+    offset: list[Array]
+    drift: list[Array]
+    read_at: Array
+    begun: Array
+
+
+class DelayedStateObserver(HighGainSampled):
+    """Observer of the state a delay ago, and of the state now: Hann 2014, (2.16), (2.57).
+
+    A measurement of the instant t arrives at t + delay, one node after the other. The observer follows the delayed
+    state ``x(t - delay)``, and its output w from packet to packet:
+
+    ``dz = f(z, u(t - delay)) - theta inv(Delta) K (C z - w)``, ``dw = C f(z, u(t - delay))``, ``w_i = y_i`` for the
+    measurements of the node that a packet is from. Predictors j = 1 ... m find from it the state now, each a share
+    ``delay / m`` further:
+
+    ``xi^j = xi^(j-1) + int f(xi^j, u) + s^j`` over the last ``delay / m``, ``ds = -sqrt|s| sign s``, so that s is zero
+    after ``2 sqrt|s(0)|``, exactly: its root is computed and not integrated. What it waits for is the output
+    `reaching_time`.
+
+    Past inputs and rates f(xi^j) are memory: shift registers with a reading every `memory_period`. An input counts with
+    its mean over the period, so its integral is exact; the integral of f follows the trapezoidal rule with an implicit
+    end. The declared memory is ``predictors * memory_places * memory_period``; a longer delay is refused. Between two
+    readings the prediction goes on along its rate. A delay below one `memory_period` takes inputs as they are now.
+
+    Packets act when they arrive: tell them with ``late_policy = "late"``, not to be replayed at their stamps. A packet
+    that was faster than `delay` has to wait for it, which the network does (`equalise`).
+
+    Presets, for chains of two blocks: `as_published` (theta = 1), `repaired` (theta = 5, which the published variances
+    imply). The model must be a chain with its first block measured.
+
+    Args:
+        model: a model or the name of one in `MODELS`.
+        predictors: m; 0 for the delayed state alone, which is then what the outputs are.
+        memory_places: places of the memory for each predictor.
+        between_samples: ``predicted`` as above, or ``held``: ``dw = 0``, for comparison.
+        nodes: number of the node, from 1, of each measurement; by default each is on a node of its own.
+
+    Raises:
+        ValueError: the model does not suit, or an option is not legal.
+    """
+
+    name = "delayed_state_observer"
+    description = "Observer of late measurements node by node, with finite-time predictors of the state now"
+    source = "Hann 2014, (2.16), (2.57), Theorem 2.1"
+    theta_start = THETA_REPAIRED
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "model": tuple(MODELS),
+        "predictors": (1, 0, 2, 3),
+        "between_samples": BETWEEN,
+    }
+
+    def __init__(
+        self,
+        model: str | ObserverModel = "pendulum",
+        *,
+        predictors: int = 1,
+        memory_places: int = MEMORY_PLACES,
+        between_samples: Between = "predicted",
+        nodes: Sequence[int] = (),
+    ) -> None:
+        chosen = find_model(model)
+        require_whole(self.name, 0, MOST_PREDICTORS, predictors=predictors)
+        require_whole(self.name, memory_places=memory_places)
+        if between_samples not in BETWEEN:
+            raise ValueError(
+                f"{self.name}: unknown between_samples {between_samples!r}; choose one of: {', '.join(BETWEEN)}."
+            )
+        self.predictors, self.memory_places, self.predicts_output = (
+            predictors,
+            memory_places,
+            between_samples == "predicted",
+        )
+        self.node_of = self._nodes(chosen, nodes)
+        n, m = chosen.order, len(chosen.inputs)
+        self.extra_memory = tuple(
+            memory(name, "1", 0.0 if start is None else start, text, size=size)
+            for name, size, start, text in (
+                ("past_input", m * self.input_places, None, "Mean inputs of the last periods, the newest first"),
+                ("delayed_input", m, None, "Mean inputs a delay ago, which act on the delayed state"),
+                ("distance_root", n * predictors, None, "Signed roots of the distances s of the predictors"),
+                (
+                    "prediction",
+                    n * predictors,
+                    tuple(float(s.start_values[0]) for s in chosen.states) * predictors,
+                    "Predicted states at the last reading, predictor by predictor",
+                ),
+                ("past_rate", n * predictors * memory_places, None, "Rates f of the predictors, the newest first"),
+                (
+                    "prediction_offset",
+                    n if predictors else 0,
+                    None,
+                    "State now less the delayed one, at the last reading",
+                ),
+                ("prediction_offset_rate", n if predictors else 0, None, "Rate of it"),
+                ("reading_time", 1, None, "Instant of the last reading"),
+                ("reading_begun", 1, None, "1 after the first reading"),
+            )
+            if size
+        )
+        self.extra_outputs = (
+            *(
+                output_signal(f"delayed_{s.name}", s.unit, f"Estimate of a delay ago: {s.description}")
+                for s in chosen.states
+            ),
+            *(
+                (
+                    output_signal(
+                        "reaching_time", "s", "Time until the last predictor is reached", variability="discrete"
+                    ),
+                )
+                if predictors
+                else ()
+            ),
+        )
+        super().__init__(
+            chosen,
+            predictors=predictors,
+            memory_places=memory_places,
+            between_samples=between_samples,
+            nodes=tuple(nodes),
+        )
+        if chosen.order == 2 * len(chosen.measurements):
+            self.presets = {"as_published": {"theta": THETA_PUBLISHED}, "repaired": {}}
+            self.default_preset = "repaired"
+
+    # -- declarations -----------------------------------------------------------------------------------------------
+
+    @property
+    def total_places(self) -> int:
+        """Longest delay in memory periods."""
+        return max(self.predictors, 1) * self.memory_places
+
+    @property
+    def input_places(self) -> int:
+        """Mean inputs that are remembered."""
+        return self.total_places + 2
+
+    def theta_parameters(self) -> tuple[Signal, ...]:
+        """Theta, the delay, and how the past is remembered."""
+        return (
+            *super().theta_parameters(),
+            parameter("delay", "s", DELAY, "Delay of every measurement when it arrives", min=0.0),
+            parameter("memory_period", "s", MEMORY_PERIOD, "Time between two readings into the memory", min=1e-6),
+        )
+
+    def declare_sampled_part(self, model: ObserverModel) -> None:
+        """The output a delay ago, and the inputs integrated since the last reading."""
+        integral = state("input_integral", "1", 0.0, "Inputs integrated since the last reading", size=len(model.inputs))
+        self.extra_states = (
+            per_measurement(model, "predicted_output", "Measurement a delay ago, as known now"),
+            *((integral,) if model.inputs else ()),
+        )
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """The delay fits into the declared memory."""
+        longest = self.total_places * p.memory_period
+        text = (
+            f"delay must fit into the declared memory, {self.total_places} times memory_period; raise the option "
+            f"memory_places or memory_period"
+        )
+        return super().requirements(p) | {text: np.where(p.delay <= longest * (1.0 + 1e-12), 1.0, 0.0)}
+
+    def deciding_parameters(self) -> tuple[Signal, ...]:
+        """The gains: the delay and the memory do not act on the delayed error."""
+        return tuple(s for s in super().deciding_parameters() if s.name not in ("delay", "memory_period"))
+
+    # -- equations --------------------------------------------------------------------------------------------------
+
+    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Delayed state, its output, and the integral of the inputs."""
+        model, z = self.model, self.estimates(x)
+        now = self.known(u)
+        past = self._past(x)
+        acting = [np.where(p.delay < p.memory_period, now[i], past.acting[i]) for i in range(len(model.inputs))]
+        moved = model.flow(z, vector(*acting) if acting else now)
+        error = model.measured(z) - self.sampled_part(x)
+        follows = model.measured(moved)
+        if not self.predicts_output:
+            follows = 0.0 * follows
+        return np.hstack([moved - self.correction(x, error, p), follows, *((now,) if acting else ())])
+
+    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """A packet sets the outputs of its node; a reading moves memory on."""
+        if event == "reading":
+            return self._read(t, x, u, p)
+        told, outputs = self.measured(u), self.sampled_part(x)
+        node = getattr(u, f"{event}_node")
+        after = [np.where(node * (node - float(of)) == 0.0, told[i], outputs[i]) for i, of in enumerate(self.node_of)]
+        n, q = self.model.order, self.outputs_count
+        return vector(*(x[i] for i in range(n)), *after, *(x[i] for i in range(n + q, self.own_count)))
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """The state now, the delayed one, and the time until the predictors are reached."""
+        names, z = [s.name for s in self.model.states], self.estimates(x)
+        delayed = {f"delayed_{name}": z[i] for i, name in enumerate(names)}
+        if not self.predictors:
+            return {name: z[i] for i, name in enumerate(names)} | delayed
+        past = self._past(x)
+        since = t - past.read_at
+        largest = 0.0
+        for root in (root for roots in past.roots for root in roots):
+            largest = np.maximum(largest, np.abs(root))
+        now = {name: z[i] + past.offset[i] + since * past.drift[i] for i, name in enumerate(names)}
+        return now | delayed | {"reaching_time": 2.0 * largest}
+
+    def _read(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """A period of the memory ends: the inputs are read, and all predictors move on by it."""
+        model, h = self.model, p.memory_period
+        n, q, m = model.order, self.outputs_count, len(model.inputs)
+        past, now = self._past(x), self.known(u)
+        first = past.begun < 0.5
+        means = []
+        for i in range(m):
+            mean = np.where(first, now[i], x[n + q + i] / h)
+            means.append([mean, *(np.where(first, now[i], old) for old in past.means[i][:-1])])
+        acting = [at_age(np.maximum(p.delay / h - 1.0, 0.0), means[i]) for i in range(m)]
+        estimates = [x[i] for i in range(n)]
+        kept = [*estimates, *(x[i] for i in range(n, n + q)), *(0.0 * x[0] for _ in range(m))]
+        if not self.predictors:
+            return vector(*kept, *_flat(means), *acting, t, 1.0)
+        share = p.delay / (self.predictors * h)  # of the delay, in places
+        weights = integral_weights(share, self.memory_places)
+        base, drift = estimates, [0.0 * value for value in estimates]
+        roots, predictions, rates = [], [], []
+        for j in range(self.predictors):
+            ahead = (self.predictors - 1 - j) * share - 0.5  # a mean stands for the middle of its period
+            known = vector(*(at_age(ahead, means[i]) for i in range(m))) if m else now
+            moved = _Moved(self, j, past, base, first, weights, p, known)
+            roots.append(moved.roots)
+            predictions.append(moved.state)
+            rates.append([[moved.rate[i], *moved.old[i][:-1]] for i in range(n)])
+            ago = [at_age(share, [moved.rate[i], *moved.old[i]]) for i in range(n)]
+            drift = [drift[i] + moved.rate[i] - ago[i] - moved.roots[i] for i in range(n)]
+            base = moved.state
+        offset = [base[i] - estimates[i] for i in range(n)]
+        memories = (*_flat(means), *acting, *_flat(roots), *_flat(predictions), *_flat(map(_flat, rates)))
+        return vector(*kept, *memories, *offset, *drift, t, 1.0)
+
+    def _past(self, x: Array) -> _Past:
+        n, m, k = self.model.order, len(self.model.inputs), self.predictors
+        cursor = n + self.outputs_count + m
+
+        def take(count: int) -> list[Array]:
+            nonlocal cursor
+            cursor += count
+            return [x[i] for i in range(cursor - count, cursor)]
+
+        means = [take(self.input_places) for _ in range(m)]
+        acting = take(m)
+        roots, predictions = [take(n) for _ in range(k)], [take(n) for _ in range(k)]
+        rates = [[take(self.memory_places) for _ in range(n)] for _ in range(k)]
+        offset, drift = (take(n), take(n)) if k else ([], [])
+        read_at, begun = take(2)
+        return _Past(means, acting, roots, predictions, rates, offset, drift, read_at, begun)
+
+    # -- certificate ------------------------------------------------------------------------------------------------
+
+    def vertex_error(self, drift: np.ndarray, p: Any) -> ImpulsiveError:
+        """Error of the delayed state, and of the outputs between packets that have all measurements.
+
+        A held output falls behind by what the plant does: a disturbance of the error, and no part of its equations.
+        """
+        n, q = self.model.order, self.outputs_count
+        reset = np.diag([1.0] * n + [0.0] * q)
+        return ImpulsiveError.of(self._generator(drift, p), reset, (*self.levels(), *(0,) * q))
+
+    def remark(self) -> str:
+        """What the certificate is about."""
+        return f"of the delayed state, all measurements in each packet; {super().remark()}"
+
+    def condition_of(self, p: Any) -> Condition:
+        """(1.51) and (1.52) for the delayed state, and the delay within the declared memory."""
+        found = super().condition_of(p)
+        longest = self.total_places * float(p.memory_period)
+        return Condition(
+            holds=found.holds and float(p.delay) <= longest,
+            values={**found.values, "delay": float(p.delay), "declared_memory": longest},
+            statement=f"{found.statement}; delay <= declared_memory [s]",
+            source=f"{found.source}; Hann 2014, (2.16)",
+        )
+
+    # -- limits -----------------------------------------------------------------------------------------------------
+
+    def network_bounds(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> NetworkBounds:
+        """Constants of Theorem 2.1 for the gains in use, the nodes sending in turn.
+
+        Args:
+            parameters: values by name that replace those of the preset. preset: to start from; None for the default.
+
+        Raises:
+            ValueError: a parameter or the preset is unknown, or the model gives no slopes.
+        """
+        p = self.unpack_parameters(parameter_values(self, parameters, preset, "to judge"))
+        return network_bounds(
+            self.model.drifts, self._drift(), self.gain_matrices(p)[0], self.model.C, len(self._order), self.predictors
+        )
+
+    def limits(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> tuple[Limit, ...]:
+        """Between two packets and in delay: (2.17) and (2.59) beside exact tests of the model linearised at its start,
+        and trials.
+
+        Args:
+            parameters: values by name that replace those of the preset. preset: to start from; None for the default.
+
+        Raises:
+            ValueError: as `network_bounds`.
+        """
+        values = parameter_values(self, parameters, preset, "to judge")
+        p, bounds = self.unpack_parameters(values), self.network_bounds(parameters, preset)
+        named, drift = self.named_values(values), self._drift()
+        where = "Hann 2014, (2.17)"
+        text = f"gamma = {bounds.gain:.3g}, N = {bounds.cycle}, L = {bounds.lipschitz:.3g} 1/s"
+        interval = exact_interval(self._generator(drift, p), self.model.C, self._order, LONGEST_INTERVAL)
+        nodes = len(self._order) if len(self._order) > 1 else 0
+        common = {"delay_parameter": "delay", "nodes": nodes}
+        high = min(2.0 * interval, LONGEST_INTERVAL)
+        packets = Limit(
+            "interval of the packets" + (", one node each" if nodes else ""),
+            printed=(
+                PrintedBound(bounds.longest_interval, f"tau_MATI < 1/(gamma |H| N L), {text}", where),
+                PrintedBound(
+                    bounds.strict_interval,
+                    f"gamma |H| N L tau exp(sigma N tau) < 1, the factor left out of (2.17) kept, sigma = "
+                    f"{bounds.decay:.3g} 1/s",
+                    "proof of (2.45)",
+                ),
+            ),
+            exact=interval,
+            exact_test="spectral radius over a period of the protocol, model linearised at its start",
+            trial=model_trial(
+                self, "period", high / 50.0, high, named, delayed=True, delay=min(float(p.delay), 0.05), **common
+            ),
+        )
+        if not self.predictors:
+            return (packets,)
+        exact = exact_predictor_delay(drift, self.predictors)
+        longest = min(1.5 * exact, LONGEST_INTERVAL * self.predictors)
+        places = int(np.ceil(longest / (max(self.predictors, 1) * float(p.memory_period)) - 1e-9))
+        observer = self.remembering(min(max(places, self.memory_places), MOST_PLACES))
+        stretched = named | {
+            "memory_period": max(float(p.memory_period), longest / observer.total_places),
+            **{f"prediction[{i + 1}]": v + WRONG_START for i, v in enumerate(observer.prediction_starts)},
+        }
+        period = min(self.model.sample_period, 0.5 * interval)
+        share = "" if self.predictors == 1 else f" / {self.predictors}"
+        delays = Limit(
+            f"delay, {self.predictors} predictor{'s' if self.predictors > 1 else ''}",
+            printed=(
+                PrintedBound(
+                    bounds.longest_delay,
+                    f"(L/sigma) (exp(sigma tau_MAD{share}) - 1) < 1, L = {bounds.lipschitz:.3g} 1/s, sigma = "
+                    f"{bounds.decay:.3g} 1/s",
+                    where if self.predictors == 1 else "Hann 2014, (2.59)",
+                ),
+            ),
+            exact=exact,
+            exact_test="roots of s = l (1 - exp(-s tau)), l the eigenvalues of the model linearised at its start",
+            trial=model_trial(observer, "delay", longest / 50.0, longest, stretched, period=period, **common),
+        )
+        return packets, delays
+
+    def remembering(self, memory_places: int) -> DelayedStateObserver:
+        """The same observer with another memory.
+
+        Args:
+            memory_places: see the class.
+        """
+        between: Between = "predicted" if self.predicts_output else "held"
+        return DelayedStateObserver(
+            self.model,
+            predictors=self.predictors,
+            memory_places=memory_places,
+            between_samples=between,
+            nodes=self.node_of,
+        )
+
+    @property
+    def prediction_starts(self) -> tuple[float, ...]:
+        """Starts of the predictions, predictor by predictor."""
+        return tuple(float(s.start_values[0]) for s in self.model.states) * self.predictors
+
+    def _drift(self) -> np.ndarray:
+        start = np.array([float(s.start_values[0]) for s in self.model.states])
+        return np.asarray(self.model.jacobian(start, np.zeros(len(self.model.inputs))), dtype=float)
+
+    def _generator(self, drift: np.ndarray, p: Any) -> np.ndarray:
+        """Of the errors of the estimate and of the kept outputs, shape (n + q, n + q)."""
+        gain, C, q = self.gain_matrices(p)[0], self.model.C, self.outputs_count
+        rates = C @ drift if self.predicts_output else 0.0 * C
+        return np.block([[drift - gain @ C, gain], [rates, np.zeros((q, q))]])
+
+    @cached_property
+    def _order(self) -> tuple[tuple[int, ...], ...]:
+        """Measurements of each node, from 0: the turns of a round."""
+        return tuple(tuple(i for i, of in enumerate(self.node_of) if of == node) for node in sorted(set(self.node_of)))
+
+    # -- internals --------------------------------------------------------------------------------------------------
+
+    def _events(self) -> tuple[Any, ...]:
+        reading = PeriodicEvent("reading", "memory_period", description="Inputs and rates are read into the memory")
+        return (*(self._numbered(event) for event in super()._events()), reading)
+
+    def _numbered(self, event: TriggeredEvent) -> TriggeredEvent:
+        node = input_signal(
+            f"{event.name}_node",
+            "1",
+            0.0,
+            "Node that the packet is from, from 1; 0: it has all measurements",
+            variability="discrete",
+        )
+        text = "A packet arrives, a delay after its measurement; tell it with late_policy = late"
+        return TriggeredEvent(event.name, (node, *event.payload), text, event.verdict)
+
+    @staticmethod
+    def _nodes(model: ObserverModel, nodes: Sequence[int]) -> tuple[int, ...]:
+        count = len(model.measurements)
+        if not nodes:
+            return tuple(range(1, count + 1))
+        require_whole("delayed_state_observer", **{f"nodes, entry {i}": node for i, node in enumerate(nodes, 1)})
+        if len(nodes) != count:
+            raise ValueError(
+                f"delayed_state_observer: nodes has {len(nodes)} entries; expected one for each of the {count} "
+                f"measurements of the model {model.name!r}: {', '.join(s.name for s in model.measurements)}."
+            )
+        return tuple(map(int, nodes))
+
+
+class _Moved:
+    """One predictor after a reading: its signed roots, its state, its rate there, and its older rates."""
+
+    def __init__(
+        self,
+        observer: DelayedStateObserver,
+        j: int,
+        past: _Past,
+        base: list[Array],
+        first: Array,
+        weights: list[Array],
+        p: Any,
+        known: Array,
+    ) -> None:
+        h, indices = p.memory_period, range(observer.model.order)
+        rate_at = lambda x: observer.model.flow(vector(*x), known)  # noqa: E731
+        before = past.predictions[j]
+        start = rate_at(before)
+        self.old = [[np.where(first, start[i], rate) for rate in past.rates[j][i]] for i in indices]
+        old = [h * weighted(weights[1:], self.old[i]) for i in indices]
+        share = p.delay / max(observer.predictors, 1)
+        distance = [before[i] - base[i] - share * start[i] for i in indices]  # of a constant past
+        now = [np.sign(d) * np.sqrt(np.abs(d)) for d in distance]
+        less = [np.sign(r) * np.maximum(np.abs(r) - 0.5 * h, 0.0) for r in past.roots[j]]
+        self.roots = [np.where(first, now[i], less[i]) for i in indices]
+        fixed = [base[i] + old[i] + self.roots[i] * np.abs(self.roots[i]) for i in indices]
+        x = [before[i] + h * self.old[i][0] for i in indices]
+        for _ in range(ITERATIONS):
+            rate = rate_at(x)
+            x = [fixed[i] + h * weights[0] * rate[i] for i in indices]
+        self.state = [np.where(first, before[i], x[i]) for i in indices]
+        self.rate = rate_at(self.state)
+
+
+def _flat(rows: Any) -> list[Array]:
+    return [value for row in rows for value in row]

@@ -1,0 +1,86 @@
+"""High-gain train observer for holes between balises: the innovation of the last one is held and decays to an end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from fmu_observer.certificates import Certificate, GapError, decaying_error
+from fmu_observer.design.certified_gains import certified_gains
+from fmu_observer.observers.innovation_decay import ELAPSED, decay_parameters, innovation_left
+from fmu_observer.observers.parameter_values import Value
+from fmu_observer.observers.train.high_gain import correction
+from fmu_observer.observers.train.high_gain_observer import HighGainTrainObserver
+from plant_models.hybrid import Signal, memory, vector
+from plant_models.hybrid.system import Array
+
+DECAY_OVER_THETA = 1.25  # [ours]; at a = 0.5 and K = (2, 1) 85 % of a position error seen is corrected
+
+
+class DecayingInnovationCdo(HighGainTrainObserver):
+    """High-gain observer of a train whose balise innovation decays by ``phi' = -eta phi^a``: Hann 2014, (3.72).
+
+    ``dp = v - theta K1 phi eps``, ``dv = (F - a sgn(v) - b v - c v|v|)/M - theta^2 K2 phi eps``, ``eps = p -
+    balise_position`` held from the balise, phi = 1 there. The applied effort stands for the adhesion force, so slip of
+    the wheels does not bias it. Of an innovation eps the position gets the share ``theta K1/((2 - a) eta)`` and the
+    speed ``theta^2 K2/((2 - a) eta)`` 1/s times it, and both are done ``1/((1 - a) eta)`` after the balise: in a hole
+    the train runs on the model, whatever the length of the hole. With a = 1 and ``eta = theta K1`` it is the correction
+    of the other high-gain observers, with ``eta = 0`` the constant gain of (3.112), for which holes may last ``1 /
+    theta`` only.
+
+    Preset `balise_holes` [ours]: for holes up to 32 s; the innovation ends 13 s after the balise.
+    """
+
+    name = "decaying_innovation_cdo"
+    description = "High-gain continuous-discrete observer, balise innovation held and decaying to an end"
+    source = "Hann 2014, (3.72)-(3.112), on the train of Bouchama 2024, (3.1)-(3.3)"
+    innovation_state = ELAPSED
+    estimator_memory = (memory("balise_innovation", "m", 0.0, "Position error seen at the last balise"),)
+    stability_parameters = ("theta", "high_gain", "decay_rate", "decay_exponent")
+    presets: Mapping[str, Mapping[str, Any]] = {
+        "dense_balises": {},
+        "balise_holes": {"theta": 0.12, "decay_rate": 0.15},
+    }
+    default_preset = "dense_balises"
+
+    def gain_parameters(self) -> tuple[Signal, ...]:
+        """Theta, the shape of the gain, rate and exponent of the decay."""
+        return (*super().gain_parameters(), *decay_parameters(10.0, 0.5))
+
+    def adhesion(self, x: Array, u: Any, p: Any) -> Array:
+        """The effort [N]."""
+        return u.effort
+
+    def first_stage_flow(self, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
+        """No first stage."""
+        return ()
+
+    def acting_innovation(self, x: Array, p: Any) -> Array:
+        """What is left of the innovation of the last balise [m]."""
+        return innovation_left(x[2], p.decay_rate, p.decay_exponent) * x[self.continuous_count]
+
+    def innovation_flow(self, x: Array, p: Any) -> Array:
+        """Time goes on, 1 s/s."""
+        return 1.0 + 0.0 * x[2]
+
+    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """At a balise the innovation is set anew; position and speed stay continuous."""
+        slip = [x[i] for i in range(3, self.continuous_count)]
+        return vector(x[0], x[1], 0.0 * x[2], *slip, x[0] - u.balise_position)
+
+    def alternative(self, max_gap: float, certify: Callable[[Mapping[str, Value]], Certificate]) -> str | None:
+        """The largest theta that is certified with a decay that fits it."""
+        rule = lambda theta: {self.theta_name: theta, "decay_rate": DECAY_OVER_THETA * theta}  # noqa: E731
+        gains = certified_gains(max_gap, rule, certify)
+        if gains is None:
+            return None
+        words = " and ".join(f"{name} = {value:g}" for name, value in gains.items())
+        return f"{words} are certified for {max_gap:.3g} s"
+
+    def vertex_error(self, drift: Sequence[Sequence[float]], p: Any) -> GapError:
+        """Error equations of position and speed between two balises, for one drag slope in `drift`, shape (2, 2)."""
+        gain = np.array(correction(float(p.theta), p.high_gain, 1.0), dtype=float)[:, None]
+        rate, exponent = float(p.decay_rate), float(p.decay_exponent)
+        return decaying_error(np.array(drift), gain, np.array([[1.0, 0.0]]), rate, exponent, (0, 1))
