@@ -10,6 +10,7 @@ import pytest
 from toys import STOP, run, scenario
 
 from cosim import Outcome, Scenario
+from cosim.errors import CosimError
 from cosim.results.packets_file import read_packets, write_packets
 
 ROUGH: dict[str, Any] = {
@@ -130,6 +131,14 @@ def test_all_versions_of_fmi_are_told_the_same(tmp_path: Path, *, together: bool
     np.testing.assert_allclose(of(runs[1], *names), of(runs[0], *names), atol=1e-12)
     told = [[p.outcomes for p in outcome.result.packets] for outcome in runs]
     assert told[0] == told[1]
+
+
+def test_what_was_received_can_be_expected_and_reported() -> None:
+    made = scenario(stop=0.5).expect("signal", signal="network.source.sine", max=3.0)
+    made.expect("difference", signal="network.source.cosine", reference="source.cosine", max=0.2)
+    assert [judged.passed for judged in made.run(warn=lambda _: None).expectations] == [True, True]
+    with pytest.raises(CosimError, match=r"network: no variable 'source.sin'.*source.sine"):
+        scenario(stop=0.5).expect("signal", signal="network.source.sin", max=3.0).run()
 
 
 def test_seeds_and_names_decide_and_the_order_of_components_does_not() -> None:
