@@ -275,6 +275,20 @@ def covariance_after(V: Array, C: Array, row: int, variance: Array, sizes: Sizes
     return jump @ V @ jump.T + variance * added
 
 
+def gentle_gain(R: Array, seen: Array, quickest: float) -> Array:
+    """R after a measurement, so that it moves no constant faster than `quickest`: ``inv(R) + chi' chi / quickest``.
+
+    Without it the first sample after long would make the adaptation stiff.
+
+    Args:
+        R: adaptation gain, shape (m, m). seen: row of chi that has just been set, shape (m,). quickest: rate [1/s].
+    """
+    moved = R @ seen
+    size = len(seen)
+    outer = np.reshape(moved, (size, 1)) @ np.reshape(moved, (1, size))
+    return R - outer / (quickest + seen @ moved)
+
+
 def told_excitation(E: Array, size: int) -> Array:
     """Excitation of each constant given the others, ``1 / diag(inv(E))``, shape (m,).
 
