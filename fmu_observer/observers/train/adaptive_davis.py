@@ -56,7 +56,7 @@ ADAPTIVE = (
     parameter("odometer_deviation", "m/s", 0.05, "Standard deviation of the noise of a reading", min=0.0),
     parameter("odometer_period", "s", 0.2, "Time between two readings", min=1e-4),
     parameter("reading_age", "s", 0.0, "Mean age of a reading at its sample", min=0.0),
-    parameter("unknown_acceleration", "m/s1.5", 0.0, "Root of the intensity of unknown acceleration", min=0.0),
+    parameter("unknown_acceleration", "m2/s3", 0.0, "Intensity of the unknown acceleration, white", min=0.0),
 )
 
 
@@ -141,7 +141,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
         slope = (p.davis_b + 2.0 * p.davis_c * x[V]) / p.mass
         drift = A - np.vstack([np.zeros((1, 2)), np.hstack([0.0, slope])])
         Phi = -np.vstack([np.zeros((1, 3)), regressor])
-        noise = p.unknown_acceleration**2 * np.outer(DISTURBED, DISTURBED)
+        noise = p.unknown_acceleration * np.outer(DISTURBED, DISTURBED)
         plant = Plant(drift, x[:2], Phi, C, noise)
         gains = self._gains(adaptation, x, p)
         c = C @ x[:2] - x[self.own_count - 5 : self.own_count - 3]
