@@ -116,8 +116,8 @@ def threshold_table(missed: Mapping[str, np.ndarray], false: Mapping[str, np.nda
 
 
 def ends(missed: np.ndarray, false: np.ndarray, chosen: float) -> tuple[float | None, float | None]:
-    """The largest threshold below the chosen one at which half of the detections are false, and the smallest above it at
-    which 99 % are missed.
+    """The largest threshold below the chosen one at which half of the detections are false, and the smallest above it
+    at which 99 % are missed.
     """
     noisy = [t for t, share in zip(THRESHOLDS, false, strict=True) if share >= 0.5 and t < chosen]
     blind = [t for t, share in zip(THRESHOLDS, missed, strict=True) if share >= 0.99 and t > chosen]

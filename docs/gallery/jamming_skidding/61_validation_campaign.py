@@ -23,14 +23,14 @@ RULES = (
     "end they wait for two samples that agree"
 )
 SEEDS_SAY = (
-    "synthetic data, more jams than in the thesis' runs: what is missed stays below the threshold or begins with the last "
-    "sample; what is called false are jams between two rows of 0.05 s, which the odometer counts and the record of the "
-    "truth does not show; each is traced on the page of the campaign"
+    "synthetic data, more jams than in the thesis' runs: what is missed stays below the threshold or begins with the "
+    "last sample; what is called false are jams between two rows of 0.05 s, which the odometer counts and the record "
+    "of the truth does not show; each is traced on the page of the campaign"
 )
 REASONS = (RULES, RULES, SEEDS_SAY, SEEDS_SAY, CONFIDENTIAL, CONFIDENTIAL)
 MICRO = (
-    "synthetic data, section 5.3.3.2 has no numbers: micro-jams are far shorter than the rows of 0.05 s, so that rates and "
-    "delays of the few that a row shows count nothing; the positions are those of a slow bias"
+    "synthetic data, section 5.3.3.2 has no numbers: micro-jams are far shorter than the rows of 0.05 s, so that rates "
+    "and delays of the few that a row shows count nothing; the positions are those of a slow bias"
 )
 
 

@@ -19,8 +19,9 @@ FREE = (
     "none and stand just before the next sample"
 )
 JAMS = (
-    "synthetic jams, and a detection that believes the odometer after two samples: the time without a reading is longer "
-    "for the same jam, and decides; the range of the reading, for DMO and CDO 1.7 m/s2 times that time, is not printed"
+    "synthetic jams, and a detection that believes the odometer after two samples: the time without a reading is "
+    "longer for the same jam, and decides; the range of the reading, for DMO and CDO 1.7 m/s2 times that time, "
+    "is not printed"
 )
 TIMES = "the time between the samples used before and after the jam; not printed"
 
