@@ -13,14 +13,14 @@ SPEEDS = {"HS": 45.0, "AS": 30.0, "LS": 17.0}
 
 def test_every_case_accelerates_holds_and_brakes() -> None:
     scenario = Scenario.load("validation_campaign")
-    assert len(scenario.cases) == 12
+    assert len(scenario.cases) == 13
     for run in scenario.vary({"case": list(scenario.cases)}).run().runs:
         assert run.outcome is not None
         assert run.failure is None
         speed, target = run.outcome["train.speed"], SPEEDS[run.settings["case"][:2]]
         held = run.outcome.result.time[abs(speed - target) < 0.1]
         assert speed.max() == pytest.approx(target, rel=0.01)
-        assert 50.0 < held[-1] - held[0] < 75.0  # about a minute
+        assert 30.0 < held[-1] - held[0] < 75.0  # about a minute; the pneumatic cases come nearer slowly
         assert 1.0 < speed[-1] < 4.0  # jams at a standstill could not be seen
         assert 3 < sum(event.kind == "true" for event in run.outcome.result.events) < 40
 

@@ -34,16 +34,20 @@ def short(name: str) -> Scenario:
 def assert_same(one: Result, other: Result) -> None:
     assert one.failure == other.failure
     np.testing.assert_array_equal(one.table.view(np.uint64), other.table.view(np.uint64))
-    assert one.events == other.events
+    assert repr(one.events) == repr(other.events)  # as texts: a reading that is not known is no number
 
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_a_seed_in_a_study_is_the_seed_alone(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scenario = short(name)
-    seeds = {"balises.seed": [4, 0]} if scenario.table().balises is not None else {"stop": [8.0, 7.5]}
-    together = [run.outcome.result for run in scenario.vary(seeds).each() if run.outcome is not None]
+    seeds: dict[str, list[float]] = {
+        "stop": [8.0, 7.5]
+    }  # a seed changes nothing where a scenario leaves nothing to chance
+    if scenario.table().balises is not None:
+        seeds["balises.seed"] = [4, 0]
+    together = [run.outcome.result for run in scenario.vary(seeds, "zip").each() if run.outcome is not None]
     monkeypatch.setattr(models, "load_shipped", load_fmu)
-    alone = [run.outcome.result for run in scenario.vary(seeds).each() if run.outcome is not None]
+    alone = [run.outcome.result for run in scenario.vary(seeds, "zip").each() if run.outcome is not None]
     assert len(together) == len(alone) == 2
     for one, other in zip(together, alone, strict=True):
         assert_same(one, other)
