@@ -60,11 +60,15 @@ class Chance:
         return fraction > 0.0 and uniform_pair(self._settings.seed, INSTANT, k)[1] < fraction
 
     def delay(self, k: int, *, second: bool = False) -> float:
-        """How long the packet of transmission `k` takes [s].
+        """How long after its measurement the packet of transmission `k` is delivered [s].
 
         Args:
             second: whether its duplicate is meant, which takes a way of its own.
         """
+        return max(self._way(k, second=second), self._settings.equalise)
+
+    def _way(self, k: int, *, second: bool) -> float:
+        """How long it is on its way [s]."""
         settings, signal = self._settings, SECOND_DELAY if second else DELAY
         if settings.delay_model == "recorded":
             return settings.delays[(k + second) % len(settings.delays)]

@@ -40,6 +40,7 @@ class NetworkSettings:
         delay_spread: width of ``uniform`` above `delay`; standard deviation of ``correlated`` [s].
         delay_correlation: of ``correlated``: from transmission to transmission, 0 to 1.
         delays: of ``recorded``: one after the other, and again from the first [s].
+        equalise: a packet that is faster than this waits until so long after its measurement [s].
         loss_fraction: share of the packets that is lost.
         loss_burst: mean number of packets lost in a row; None where losses are independent.
         duplicate_fraction: share of the packets that arrives twice.
@@ -59,6 +60,7 @@ class NetworkSettings:
     delay_spread: float = 0.0
     delay_correlation: float = 0.0
     delays: Sequence[float] = ()
+    equalise: float = 0.0
     loss_fraction: float = 0.0
     loss_burst: float | None = None
     duplicate_fraction: float = 0.0
@@ -78,13 +80,14 @@ class NetworkSettings:
     @property
     def delay_range(self) -> tuple[float, float]:
         """Shortest and longest delay [s]; the latter is infinite where it has no bound."""
+        shortest, longest = self.delay, self.delay
         if self.delay_model == "recorded":
-            return min(self.delays), max(self.delays)
-        if self.delay_model == "uniform":
-            return self.delay, self.delay + self.delay_spread
-        if self.delay_model == "correlated" and self.delay_spread > 0.0:
-            return 0.0, float("inf")
-        return self.delay, self.delay
+            shortest, longest = min(self.delays), max(self.delays)
+        elif self.delay_model == "uniform":
+            longest += self.delay_spread
+        elif self.delay_model == "correlated" and self.delay_spread > 0.0:
+            shortest, longest = 0.0, float("inf")
+        return max(shortest, self.equalise), max(longest, self.equalise)
 
 
 # IEC 61375-3-1 polls each process variable of the MVB at a period of its own, 1 ms to 1024 ms in powers of two.

@@ -35,6 +35,7 @@ class NetworkTable(Table):
     delay_spread: Annotated[float, Field(ge=0.0)] = 0.0
     delay_correlation: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
     delay_file: str | None = None
+    equalise: Annotated[float, Field(ge=0.0)] = 0.0
     loss_fraction: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
     loss_burst: Annotated[float, Field(ge=1.0)] | None = None
     duplicate_fraction: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
@@ -152,6 +153,7 @@ def network_settings(table: NetworkTable, folder: Path, where: str) -> NetworkSe
         jitter=table.jitter,
         delay_correlation=table.delay_correlation,
         delays=() if file is None else read_delays(file, f"{where}: network.delay_file"),
+        equalise=table.equalise,
         loss_fraction=table.loss_fraction,
         loss_burst=table.loss_burst,
         duplicate_fraction=table.duplicate_fraction,

@@ -10,6 +10,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from fmu_observer.certificates import ImpulsiveError, first_unstable_gap
+from fmu_observer.design.adaptive_bounds import adaptive_bounds, settled_gain
+from fmu_observer.limits import Limit, PrintedBound
 from fmu_observer.models import STATE_AFFINE_MODELS, StateAffineModel, find_state_affine_model
 from fmu_observer.models.model import stacked
 from fmu_observer.observers.adaptive_law import (
@@ -25,14 +28,18 @@ from fmu_observer.observers.adaptive_law import (
     gains_of,
     learnt_constants,
     packed,
+    seen_after,
     smallest_eigenvalue,
     start_covariance,
 )
+from fmu_observer.observers.adaptive_trial import adaptive_trial
 from fmu_observer.observers.gated_observer import GatedObserver
-from plant_models.hybrid import Signal, TriggeredEvent, input_signal, output_signal, parameter, state
+from fmu_observer.observers.parameter_values import Value, parameter_values
+from plant_models.hybrid import Signal, TriggeredEvent, input_signal, output_signal, parameter, scalar_names, state
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
+LONGEST_PERIOD = 1.0  # [s] up to which limits are looked for
 NOTHING_KNOWN = 100.0  # [ours] start value of every standard deviation
 LEAST_VARIANCE = 1e-30  # below it a standard deviation is told as 1e-15
 ADAPTIVE_PARAMETERS = (
@@ -51,13 +58,14 @@ class AdaptiveObserver(GatedObserver):
     keeps of the measurements, q numbers. Outputs are the estimates and the constants under their names, for each
     constant `<name>_deviation`, the standard deviation of its error, and `<name>_learnt`, 1 where it is learnt and 0
     where it is held for want of excitation; `smallest_excitation`, the smallest eigenvalue of the mean of
-    ``lambda' C' C lambda``; and `innovation`.
+    ``chi' chi``; and `innovation`.
 
     The covariance is exact for the model with white noise of `noise_deviation` at each measurement, whatever the
     instants: the errors obey a linear equation that the observer knows. It begins at `NOTHING_KNOWN` for all.
 
     Args:
-        model: a state-affine model or the name of one.
+        model: a state-affine model or the name of one. sampled: whether the sensitivity of the output is sampled like
+            it. options: of the subclass.
 
     Raises:
         ValueError: the model is unknown, or has more than three unknown constants.
@@ -67,9 +75,9 @@ class AdaptiveObserver(GatedObserver):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(STATE_AFFINE_MODELS)}
     predicts: ClassVar[bool]
 
-    def __init__(self, model: str | StateAffineModel = "time_varying_oscillator") -> None:
+    def __init__(self, model: str | StateAffineModel, sampled: bool, **options: Any) -> None:
         self.model = chosen = find_state_affine_model(model)
-        self.sizes = Sizes(chosen.order, len(chosen.unknowns), len(chosen.measurements))
+        self.sizes = Sizes(chosen.order, len(chosen.unknowns), len(chosen.measurements), sampled)
         if self.sizes.m not in (1, 2, 3):
             raise ValueError(
                 f"{self.name}: the model {chosen.name!r} has {self.sizes.m} unknown constants; 1 to 3 can be learnt."
@@ -92,7 +100,7 @@ class AdaptiveObserver(GatedObserver):
             for s in chosen.measurements
         )
         self.events = (TriggeredEvent(chosen.event, payload, "A measurement arrives, at its own time stamp"),)
-        super().__init__(model=chosen.name)
+        super().__init__(model=chosen.name, **options)
 
     # -- what a subclass writes -------------------------------------------------------------------------------------
 
@@ -130,7 +138,7 @@ class AdaptiveObserver(GatedObserver):
             -(gains.constants @ c),
             *adaptation_flow(adaptation, plant, gains, drift, p.mu, p, self.sizes),
         ]
-        return np.hstack([*flows, self.model.C @ predicted] if self.predicts else flows)
+        return np.hstack([*flows, self.model.C @ predicted - gains.output @ c] if self.predicts else flows)
 
     def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """What is kept is set by the measurements, and the covariance with it; all else stays continuous."""
@@ -140,11 +148,12 @@ class AdaptiveObserver(GatedObserver):
             V = covariance_after(V, self.model.C, row, variance, self.sizes, self.predicts)
         count = self.sizes.error * (self.sizes.error + 1) // 2
         before = self.own_count - self.sizes.q - count
-        return np.hstack([x[:before], packed(V, self.sizes.error), self.kept_after(x, y)])
+        own = seen_after(x[:before], self.sizes.n + self.sizes.m, self.model.C, self.sizes)
+        return np.hstack([own, packed(V, self.sizes.error), self.kept_after(x, y)])
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """Estimates, constants with their uncertainty, excitation and innovation."""
-        n, m, _ = self.sizes
+        n, m = self.sizes[:2]
         estimate, rho, adaptation = self._parts(x)
         learnt = learnt_constants(adaptation.excitation, p.least_excitation, m)
         found = {s.name: estimate[i] for i, s in enumerate(self.model.states)}
@@ -161,6 +170,45 @@ class AdaptiveObserver(GatedObserver):
             "innovation": innovation[0] if self.sizes.q == 1 else innovation,
         }
 
+    # -- limits -----------------------------------------------------------------------------------------------------
+
+    def limits(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> tuple[Limit, ...]:
+        """Between two samples: (4.63) beside the exact limit of the observer that knows the constants, and trials.
+
+        Args:
+            parameters: values by name that replace those of the preset. preset: to start from; None for the default.
+
+        Raises:
+            ValueError: a parameter or the preset is unknown, or has another size.
+        """
+        values = parameter_values(self, parameters, preset, "to judge")
+        p = self.unpack_parameters(values)
+        mu, model = float(p.mu), self.model
+        bounds = adaptive_bounds(model, mu)
+        K = settled_gain(model, mu)
+        decay = model.C @ K if self.predicts else np.zeros((self.sizes.q, self.sizes.q))
+        drift = np.asarray(model.drift(0.0, np.array([float(s.start_values[0]) for s in model.inputs])))
+        known = ImpulsiveError.with_innovation(drift, K, decay, model.C)
+        return (
+            Limit(
+                "period of the samples",
+                printed=(
+                    PrintedBound(
+                        bounds.longest_period,
+                        f"tau_MASP for a vanishing rate, {bounds.explain()}; from time 0 on, later alpha0 is smaller",
+                        "Hann 2014, (4.63)",
+                    ),
+                )
+                if self.predicts
+                else (),
+                exact=first_unstable_gap([known], LONGEST_PERIOD),
+                exact_test="the observer that knows the constants, its gain settled: no adaptation",
+                trial=adaptive_trial(
+                    self, dict(zip(scalar_names(self.parameter_signals), map(float, values), strict=True))
+                ),
+            ),
+        )
+
     # -- internals --------------------------------------------------------------------------------------------------
 
     def kept(self, x: Array) -> Array:
@@ -172,8 +220,8 @@ class AdaptiveObserver(GatedObserver):
         return x[: self.sizes.n]
 
     def _parts(self, x: Array) -> tuple[Array, Array, Adaptation]:
-        n, m, _ = self.sizes
-        return x[:n], x[n : n + m], adaptation_of(x[n + m :], self.sizes)[0]
+        n, m = self.sizes[:2]
+        return x[:n], x[n : n + m], adaptation_of(x[n + m :], self.model.C, self.sizes)[0]
 
     def _gains(self, adaptation: Adaptation, p: Any) -> Gains:
         learnt = learnt_constants(adaptation.excitation, p.least_excitation, self.sizes.m)
