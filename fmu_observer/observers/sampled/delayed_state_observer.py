@@ -244,8 +244,16 @@ class DelayedStateObserver(HighGainSampled):
         told, outputs = self.measured(u), self.sampled_part(x)
         node = getattr(u, f"{event}_node")
         after = [np.where(node * (node - float(of)) == 0.0, told[i], outputs[i]) for i, of in enumerate(self.node_of)]
+        return self.with_outputs(x, after)
+
+    def with_outputs(self, x: Array, outputs: Sequence[Array]) -> Array:
+        """The own states with other outputs a delay ago.
+
+        Args:
+            outputs: one a measurement.
+        """
         n, q = self.model.order, self.outputs_count
-        return vector(*(x[i] for i in range(n)), *after, *(x[i] for i in range(n + q, self.own_count)))
+        return vector(*(x[i] for i in range(n)), *outputs, *(x[i] for i in range(n + q, self.own_count)))
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """The state now, the delayed one, and the time until the predictors are reached."""
