@@ -147,9 +147,8 @@ class Before:
         """Whether an indicator's name tells its levels: of shipped models, and the slip indicator of what plays an
         observer.
         """
-        return self.table.components[component].fmu is None or (
-            signal == "slip_indicator" and component in self.observers
-        )
+        own = self.table.components.get(component)
+        return (own is not None and own.fmu is None) or (signal == "slip_indicator" and component in self.observers)
 
 
 @contextmanager

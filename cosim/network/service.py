@@ -76,7 +76,7 @@ class Listener:
     receiver: Receiver | None = field(default=None, repr=False)
 
 
-@dataclass
+@dataclass(slots=True)
 class Entry:
     """One packet in the log.
 
@@ -239,7 +239,8 @@ class NetworkService:
                 entry.deliveries[listener.component] = "dropped"
             else:
                 letter = self._letter(listener, packet)
-                entry.deliveries[listener.component] = listener.receiver.tell(t, letter)
+                delivery = entry.deliveries[listener.component] = listener.receiver.tell(t, letter)
+                delivery.before = delivery.after = None  # rows tell it; a log of a long run has no room for it
 
     def _letter(self, listener: Listener, packet: Packet) -> Letter:
         """What a listener is told: the values of the packet, and of other nodes what was last received."""

@@ -168,13 +168,14 @@ class _Setup:
         connections, routed = self._connect(pairs)
         self.connections = connections
         receivers, plant = self._balise_roles()
-        check_roles(table, self.components, self.where)
+        known = self._with_network()
+        check_roles(table, known, self.where)
         roles = inferred_roles(table, self.components, connections, plant)
         table = with_roles(table, roles)
         self.notes += (
             [f"Roles that the report was not told: {', '.join(map(' = '.join, roles.items()))}."] if roles else []
         )
-        table = self.table = check_expectations(table, self.components, receivers, self.where)
+        table = self.table = check_expectations(table, known, receivers, self.where)
         stepped = [c for c in routed if c.source[0] != NETWORK]
         groups = stepping_groups(table, self.components, stepped, plant, receivers)
         self.algorithm = choose_algorithm(table.master.algorithm, groups, self.components)
@@ -315,6 +316,10 @@ class _Setup:
             self._warn(warning)
         return found
 
+    def _with_network(self) -> dict[str, Component]:
+        """All that has outputs: the components, and the network where there is one."""
+        return self.components if self.network is None else {**self.components, NETWORK: self.network.outputs}
+
     def _make_plan(
         self, connections: Sequence[Connection], order: Sequence[str], clocks: Sequence[ClockConnection]
     ) -> Plan:
@@ -323,8 +328,7 @@ class _Setup:
             return make_plan(self.components, connections, order, extra, clocks)
         for name, signals in self.network.hidden(self.components).items():
             extra[name] += [signal for signal in signals if signal not in extra[name]]
-        components = {**self.components, NETWORK: self.network.outputs}
-        return make_plan(components, connections, order, extra, clocks, self.network.outputs)
+        return make_plan(self._with_network(), connections, order, extra, clocks, self.network.outputs)
 
     def _instantiate(self, starts: dict[str, dict[str, StartValue]], connections: list[Connection]) -> None:
         for name, component in self.components.items():

@@ -4,17 +4,23 @@ covariance of both errors. Pure functions after Hann 2014, section 4; covariance
 Sizes: n states, m unknown constants, q measurements. ``c`` is the innovation that acts, shape (q,), ``C xh - w`` with a
 predicted output w, or ``C xh(t_k) - y`` held. With it
 
-    ``d xh = A xh + B + Phi rhoh - inv(S) C' c + lambda d rhoh``, ``d rhoh = -H R H lambda' C' c``
+    ``d xh = A xh + B + Phi rhoh - inv(S) C' c + lambda d rhoh``, ``d rhoh = -H R H chi' c``
     ``d lambda = (A - inv(S) C' C) lambda + Phi``, ``d S = -mu S - S A - A' S + C' C``; what is carried is inv(S)
-    ``d R = -R (lambda' C' C lambda + forgetting floor I) R + forgetting R``
+    ``d R = -R (chi' chi + forgetting floor I) R + forgetting R``
 
-inv(R) is the filtered Gramian of ``C lambda``, plus the floor: without excitation R would grow without bound, with a
+chi is what the innovation depends on the constants by. Published it is ``C lambda``, as if measurements were there
+always. Sampled [ours], ``d chi = -C inv(S) C' chi``, ``chi = C lambda`` at a sample, lambda is driven by chi in place
+of ``C lambda``, and ``d w`` gets ``(C lambda - chi) d rhoh``. Then ``xh - x - lambda (rhoh - rho)`` obeys the equations
+of the observer that knows the constants, whatever the instants, and the constants those of least squares.
+
+inv(R) is the filtered Gramian of chi, plus the floor: without excitation R would grow without bound, with a
 floor it never exceeds ``1 / floor``. H has a 1 for each constant that is learnt and a 0 for each that is held.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,11 +34,14 @@ NEARLY_ONE = 1.0 - 1e-15
 
 
 class Sizes(NamedTuple):
-    """Numbers of states, unknown constants and measurements."""
+    """Numbers of states n, unknown constants m and measurements q, and whether the sensitivity of the output is sampled
+    like the output.
+    """
 
     n: int
     m: int
     q: int
+    sampled: bool = False
 
     @property
     def error(self) -> int:
@@ -44,13 +53,15 @@ class Adaptation(NamedTuple):
     """What an adaptive observer carries beside its estimates.
 
     Args:
-        R: adaptation gain, shape (m, m). sensitivity: lambda, shape (n, m). inverse_S: shape (n, n).
-        excitation: mean of ``lambda' C' C lambda`` over the excitation window, shape (m, m). covariance: of the error
+        R: adaptation gain, shape (m, m). sensitivity: lambda, shape (n, m). seen: chi, shape (q, m).
+        inverse_S: shape (n, n).
+        excitation: mean of ``chi' chi`` over the excitation window, shape (m, m). covariance: of the error
             of states, constants and predicted outputs (or held innovations), shape (n + m + q, n + m + q).
     """
 
     R: Array
     sensitivity: Array
+    seen: Array
     inverse_S: Array
     excitation: Array
     covariance: Array
@@ -72,11 +83,14 @@ class Plant(NamedTuple):
 
 
 class Gains(NamedTuple):
-    """What acts: ``inv(S) C'`` of shape (n, q), ``H R H lambda' C'`` of shape (m, q), and their sum for the state."""
+    """What acts on the state of the observer that knows the constants, ``inv(S) C'``, shape (n, q); on the constants,
+    ``H R H chi'``, shape (m, q); on the state in all, shape (n, q); on the predicted output, shape (q, q).
+    """
 
     state: Array
     constants: Array
     total: Array
+    output: Array
 
 
 def upper(size: int) -> list[tuple[int, int]]:
@@ -114,7 +128,7 @@ def start_covariance(C: np.ndarray, deviations: Sequence[float], sizes: Sizes, p
         C: shape (q, n). deviations: of states and constants, shape (n + m,). sizes: see there. predicts: whether the
             output is predicted; else the innovation is held.
     """
-    n, m, _q = sizes
+    n, m, _q = sizes[:3]
     spread = np.zeros((sizes.error, n + m))
     spread[: n + m] = np.eye(n + m)
     if predicts:
@@ -122,47 +136,48 @@ def start_covariance(C: np.ndarray, deviations: Sequence[float], sizes: Sizes, p
     return np.asarray(spread @ np.diag(np.square(deviations)) @ spread.T)
 
 
-def adaptation_states(sizes: Sizes, covariance: np.ndarray) -> tuple[Signal, ...]:
-    """The states of an `Adaptation`, in its order; R, S at identity, as published.
+def adaptation_states(
+    sizes: Sizes, covariance: np.ndarray, gain: float = 1.0, inverse_s: float = 1.0
+) -> tuple[Signal, ...]:
+    """The states of an `Adaptation`, in its order.
 
     Args:
-        sizes: see there. covariance: at the start, see `start_covariance`.
+        sizes: see there. covariance: at the start, see `start_covariance`. gain, inverse_s: R and
+            inv(S) at the start, times identity; 1 as published.
     """
-    n, m, _ = sizes
+    n, m, q = sizes[:3]
 
     def triangle(name: str, first: np.ndarray, description: str) -> Signal:
         start = tuple(float(first[i, j]) for i, j in upper(len(first)))
         return state(name, "1", start, f"{description}, upper triangle row by row", size=len(start))
 
+    sampled = state("seen_sensitivity", "1", (0.0,) * (q * m), "Sensitivity chi of the innovation", size=q * m)
     return (
-        triangle("adaptation_gain", np.eye(m), "Adaptation gain R"),
+        triangle("adaptation_gain", gain * np.eye(m), "Adaptation gain R"),
         state("sensitivity", "1", (0.0,) * (n * m), "Sensitivity lambda of the state, row by row", size=n * m),
-        triangle("inverse_s", np.eye(n), "Inverse of S, of which the state's gain is made"),
+        *((sampled,) if sizes.sampled else ()),
+        triangle("inverse_s", inverse_s * np.eye(n), "Inverse of S, of which the state's gain is made"),
         triangle("mean_excitation", np.zeros((m, m)), "Mean Gramian of the excitation over its window"),
         triangle("error_covariance", covariance, "Covariance of the errors of state, constants and outputs"),
     )
 
 
-def adaptation_of(x: Array, sizes: Sizes) -> tuple[Adaptation, int]:
+def adaptation_of(x: Array, C: Array, sizes: Sizes) -> tuple[Adaptation, int]:
     """An adaptation from its states, and how many they are.
 
     Args:
-        x: state of the observer from the first of these on. sizes: see there.
+        x: state of the observer from the first of these on. C: shape (q, n). sizes: see there.
     """
-    n, m, _ = sizes
-    ends = np.cumsum(
-        [m * (m + 1) // 2, n * m, n * (n + 1) // 2, m * (m + 1) // 2, sizes.error * (sizes.error + 1) // 2]
-    )
-    parts = [x[int(a) : int(b)] for a, b in zip([0, *ends[:-1]], ends, strict=True)]
-    sensitivity = _matrix([[parts[1][i * m + j] for j in range(m)] for i in range(n)])
+    n, m, q = sizes[:3]
+    widths = [_triangle(m), n * m, q * m if sizes.sampled else 0, _triangle(n), _triangle(m), _triangle(sizes.error)]
+    ends = [0, *(int(end) for end in np.cumsum(widths))]
+    gain, sensitivity, seen, inverse, excitation, covariance = (x[a:b] for a, b in pairwise(ends))
+    L = _matrix([[sensitivity[i * m + j] for j in range(m)] for i in range(n)])
+    chi = _matrix([[seen[i * m + j] for j in range(m)] for i in range(q)]) if sizes.sampled else C @ L
     adaptation = Adaptation(
-        unpacked(parts[0], m),
-        sensitivity,
-        unpacked(parts[2], n),
-        unpacked(parts[3], m),
-        unpacked(parts[4], sizes.error),
+        unpacked(gain, m), L, chi, unpacked(inverse, n), unpacked(excitation, m), unpacked(covariance, sizes.error)
     )
-    return adaptation, int(ends[-1])
+    return adaptation, ends[-1]
 
 
 def gains_of(adaptation: Adaptation, C: Array, learnt: Array) -> Gains:
@@ -172,10 +187,10 @@ def gains_of(adaptation: Adaptation, C: Array, learnt: Array) -> Gains:
         adaptation: see there. C: shape (q, n). learnt: 1 or 0 for each constant, shape (m,).
     """
     on_state = adaptation.inverse_S @ C.T
-    seen = C @ adaptation.sensitivity
     mask = np.reshape(learnt, (-1, 1))
-    on_constants = mask * (adaptation.R @ (mask * seen.T))
-    return Gains(on_state, on_constants, on_state + adaptation.sensitivity @ on_constants)
+    on_constants = mask * (adaptation.R @ (mask * adaptation.seen.T))
+    on_output = (C @ adaptation.sensitivity - adaptation.seen) @ on_constants
+    return Gains(on_state, on_constants, on_state + adaptation.sensitivity @ on_constants, on_output)
 
 
 def adaptation_flow(
@@ -187,17 +202,18 @@ def adaptation_flow(
         adaptation: see there. plant: matrices now. gains: in force. error_drift: see `error_drift`. mu: decay of S
             [1/s]. p: named tuple with `forgetting` [1/s], `gain_floor` and `excitation_time` [s]. sizes: see there.
     """
-    n, m, _ = sizes
-    R, L, Z, E, V = adaptation
+    n, m, q = sizes[:3]
+    R, L, seen, Z, E, V = adaptation
     A, C = plant.A, plant.C
-    seen = C @ L
     gramian = seen.T @ seen
     floor = p.forgetting * p.gain_floor * np.eye(m)
     dL = A @ L - gains.state @ seen + plant.Phi
+    dseen = -(C @ gains.state) @ seen
     FV = error_drift @ V
     return [
         packed(p.forgetting * R - R @ (gramian + floor) @ R, m),
         vector(*(dL[i, j] for i in range(n) for j in range(m))),
+        *([vector(*(dseen[i, j] for i in range(q) for j in range(m)))] if sizes.sampled else []),
         packed(mu * Z + A @ Z + Z @ A.T - gains.state @ gains.state.T, n),
         packed((gramian - E) / p.excitation_time, m),
         packed(FV + FV.T + plant.noise, sizes.error),
@@ -211,18 +227,34 @@ def error_drift(plant: Plant, gains: Gains, sizes: Sizes, predicts: bool) -> Arr
     Args:
         plant: matrices now. gains: in force. sizes: see there. predicts: whether the output is predicted.
     """
-    n, m, q = sizes
+    n, m, q = sizes[:3]
     model = np.hstack([plant.A, plant.Phi])
     none = np.zeros((m, n + m))
     if predicts:
         free = np.vstack([model, none, plant.C @ model])
         free = np.hstack([free, np.zeros((n + m + q, q))])
         reads = np.hstack([plant.C, np.zeros((q, m)), -np.eye(q)])
-        acts = np.vstack([gains.total, gains.constants, np.zeros((q, q))])
+        acts = np.vstack([gains.total, gains.constants, gains.output])
         return free - acts @ reads
     top = np.hstack([model, -gains.total])
     middle = np.hstack([none, -gains.constants])
     return np.vstack([top, middle, np.zeros((q, n + m + q))])
+
+
+def seen_after(before: Array, first: int, C: Array, sizes: Sizes) -> Array:
+    """States of an adaptation with chi at ``C lambda``, as at a sample.
+
+    Args:
+        before: states of the observer. first: place of the first of the adaptation. C: shape (q, n). sizes: see there.
+    """
+    if not sizes.sampled:
+        return before
+    n, m, q = sizes[:3]
+    at = first + _triangle(m)
+    L = _matrix([[before[at + i * m + j] for j in range(m)] for i in range(n)])
+    chi = C @ L
+    at += n * m
+    return np.hstack([before[:at], *(chi[i, j] for i in range(q) for j in range(m)), before[at + q * m :]])
 
 
 def covariance_after(V: Array, C: Array, row: int, variance: Array, sizes: Sizes, predicts: bool) -> Array:
@@ -232,7 +264,7 @@ def covariance_after(V: Array, C: Array, row: int, variance: Array, sizes: Sizes
         V: before it. C: shape (q, n). row: of the measurement. variance: of its noise, in units of its weight. sizes:
             see there. predicts: whether the output is predicted; else the innovation is held.
     """
-    n, m, _q = sizes
+    n, m, _q = sizes[:3]
     jump = np.eye(sizes.error)
     place = n + m + row
     jump[place, :] = 0.0
@@ -297,6 +329,10 @@ def smallest_eigenvalue(E: Array, size: int) -> Array:
     )
     angle = np.arccos(np.clip(half, -NEARLY_ONE, NEARLY_ONE)) / 3.0
     return mean + 2.0 * spread * np.cos(angle + 2.0 * np.pi / 3.0)
+
+
+def _triangle(size: int) -> int:
+    return size * (size + 1) // 2
 
 
 def _matrix(rows: list[list[Array]]) -> Array:

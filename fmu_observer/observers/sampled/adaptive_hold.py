@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from fmu_observer.models import StateAffineModel
 from fmu_observer.observers.sampled.adaptive_observer import AdaptiveObserver
 from fmu_observer.observers.sampled.adaptive_presets import ADAPTIVE_PRESETS
 from plant_models.hybrid import Signal, memory
@@ -17,6 +18,12 @@ class AdaptiveHold(AdaptiveObserver):
     The equations are those of `adaptive_law` with the innovation held, ``c = C xh(t_k) - y(t_k)``. The list (4.65a)
     leaves out ``lambda d rhoh``; the form (4.66) below it has it, and so has this observer.
 
+    Args:
+        model: a state-affine model or the name of one.
+
+    Raises:
+        ValueError: the model is unknown, or it has more than three unknown constants.
+
     Presets: those of `adaptive_predictor`. Use that one: on the printed example the longest period is 0.096 s here and
     0.12 s there.
     """
@@ -27,6 +34,9 @@ class AdaptiveHold(AdaptiveObserver):
     presets: Mapping[str, Mapping[str, Any]] = ADAPTIVE_PRESETS
     default_preset = "as_published"
     predicts = False
+
+    def __init__(self, model: str | StateAffineModel = "time_varying_oscillator") -> None:
+        super().__init__(model, False)
 
     def kept_signal(self) -> Signal:
         """The held innovations, memory."""

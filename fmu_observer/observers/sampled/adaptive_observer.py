@@ -25,6 +25,7 @@ from fmu_observer.observers.adaptive_law import (
     gains_of,
     learnt_constants,
     packed,
+    seen_after,
     smallest_eigenvalue,
     start_covariance,
 )
@@ -51,13 +52,14 @@ class AdaptiveObserver(GatedObserver):
     keeps of the measurements, q numbers. Outputs are the estimates and the constants under their names, for each
     constant `<name>_deviation`, the standard deviation of its error, and `<name>_learnt`, 1 where it is learnt and 0
     where it is held for want of excitation; `smallest_excitation`, the smallest eigenvalue of the mean of
-    ``lambda' C' C lambda``; and `innovation`.
+    ``chi' chi``; and `innovation`.
 
     The covariance is exact for the model with white noise of `noise_deviation` at each measurement, whatever the
     instants: the errors obey a linear equation that the observer knows. It begins at `NOTHING_KNOWN` for all.
 
     Args:
-        model: a state-affine model or the name of one.
+        model: a state-affine model or the name of one. sampled: whether the sensitivity of the output is sampled like
+            it. options: of the subclass.
 
     Raises:
         ValueError: the model is unknown, or has more than three unknown constants.
@@ -67,9 +69,9 @@ class AdaptiveObserver(GatedObserver):
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": tuple(STATE_AFFINE_MODELS)}
     predicts: ClassVar[bool]
 
-    def __init__(self, model: str | StateAffineModel = "time_varying_oscillator") -> None:
+    def __init__(self, model: str | StateAffineModel, sampled: bool, **options: Any) -> None:
         self.model = chosen = find_state_affine_model(model)
-        self.sizes = Sizes(chosen.order, len(chosen.unknowns), len(chosen.measurements))
+        self.sizes = Sizes(chosen.order, len(chosen.unknowns), len(chosen.measurements), sampled)
         if self.sizes.m not in (1, 2, 3):
             raise ValueError(
                 f"{self.name}: the model {chosen.name!r} has {self.sizes.m} unknown constants; 1 to 3 can be learnt."
@@ -92,7 +94,7 @@ class AdaptiveObserver(GatedObserver):
             for s in chosen.measurements
         )
         self.events = (TriggeredEvent(chosen.event, payload, "A measurement arrives, at its own time stamp"),)
-        super().__init__(model=chosen.name)
+        super().__init__(model=chosen.name, **options)
 
     # -- what a subclass writes -------------------------------------------------------------------------------------
 
@@ -130,7 +132,7 @@ class AdaptiveObserver(GatedObserver):
             -(gains.constants @ c),
             *adaptation_flow(adaptation, plant, gains, drift, p.mu, p, self.sizes),
         ]
-        return np.hstack([*flows, self.model.C @ predicted] if self.predicts else flows)
+        return np.hstack([*flows, self.model.C @ predicted - gains.output @ c] if self.predicts else flows)
 
     def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """What is kept is set by the measurements, and the covariance with it; all else stays continuous."""
@@ -140,11 +142,12 @@ class AdaptiveObserver(GatedObserver):
             V = covariance_after(V, self.model.C, row, variance, self.sizes, self.predicts)
         count = self.sizes.error * (self.sizes.error + 1) // 2
         before = self.own_count - self.sizes.q - count
-        return np.hstack([x[:before], packed(V, self.sizes.error), self.kept_after(x, y)])
+        own = seen_after(x[:before], self.sizes.n + self.sizes.m, self.model.C, self.sizes)
+        return np.hstack([own, packed(V, self.sizes.error), self.kept_after(x, y)])
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """Estimates, constants with their uncertainty, excitation and innovation."""
-        n, m, _ = self.sizes
+        n, m = self.sizes[:2]
         estimate, rho, adaptation = self._parts(x)
         learnt = learnt_constants(adaptation.excitation, p.least_excitation, m)
         found = {s.name: estimate[i] for i, s in enumerate(self.model.states)}
@@ -172,8 +175,8 @@ class AdaptiveObserver(GatedObserver):
         return x[: self.sizes.n]
 
     def _parts(self, x: Array) -> tuple[Array, Array, Adaptation]:
-        n, m, _ = self.sizes
-        return x[:n], x[n : n + m], adaptation_of(x[n + m :], self.sizes)[0]
+        n, m = self.sizes[:2]
+        return x[:n], x[n : n + m], adaptation_of(x[n + m :], self.model.C, self.sizes)[0]
 
     def _gains(self, adaptation: Adaptation, p: Any) -> Gains:
         learnt = learnt_constants(adaptation.excitation, p.least_excitation, self.sizes.m)

@@ -11,6 +11,8 @@ from typing import Any
 import pytest
 from small_scenarios import small
 
+import fmu_observer
+import plant_models
 from cosim import Scenario
 from cosim.cli import main
 from cosim.cli.scenarios import parse_setting
@@ -109,7 +111,7 @@ def test_list_groups_by_room_and_shows_what_options_may_be(capsys: pytest.Captur
     room = next(i for i, line in enumerate(lines) if line.startswith("  # What drives"))
     names = [line.split()[0] for line in lines[room + 1 :] if line.startswith("  ") and line[2].isalpha()]
     assert names[0] == "adrc_controller"
-    assert sum(line.startswith("  # ") for line in lines) == 9
+    assert sum(line.startswith("  # ") for line in lines) == len(plant_models.ROOMS) + len(fmu_observer.ROOMS)
     assert any(line.strip() == "options: order (0, 1, 2, 3, 4, 5)" for line in lines)
     assert any("wagons (1 to 20)" in line for line in lines)
 

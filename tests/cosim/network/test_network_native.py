@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from toys import run, scenario
 
-from cosim import Outcome
+from cosim import Outcome, Scenario
 
 NETWORKS: tuple[dict[str, Any], ...] = (
     {"period": 0.04},
@@ -48,3 +48,11 @@ def test_a_sweep_in_two_processes_is_that_in_one() -> None:
     alone = packets(1)
     assert len(set(alone)) == 4
     assert packets(2) == alone
+
+
+def test_the_shipped_scenario_meets_its_expectations() -> None:
+    outcome = Scenario.load("freight_over_network").run(warn=lambda _: None).check()
+    counts = next(c["events"] for c in outcome.result.summary["components"] if c["name"] == "remote")
+    assert counts["replayed"] == counts["accepted"] == sum(e.kind == "true" for e in outcome.result.events)
+    packets = outcome.result.summary["network"]["packets"]
+    assert packets["antenna"]["largest_age"] == pytest.approx(0.037, abs=1e-9)

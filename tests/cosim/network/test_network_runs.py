@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from toys import STOP, run, scenario
 
-from cosim import Outcome
+from cosim import Outcome, Scenario
+from cosim.errors import CosimError
 from cosim.results.packets_file import read_packets, write_packets
 
 ROUGH: dict[str, Any] = {
@@ -43,6 +44,23 @@ def test_the_communication_step_does_not_matter(network: dict[str, Any]) -> None
         for name, value in packet.values.items():
             exact = {"sine": 3.0 * np.sin(2.0 * packet.stamp), "cosine": np.cos(2.0 * packet.stamp)}
             assert value == pytest.approx(exact.get(name.partition(".")[2], packet.stamp), abs=1e-12)
+
+
+def test_an_observer_of_late_packets_does_not_see_the_communication_step() -> None:
+    estimates = []
+    for step in (0.005, 0.1):
+        made = Scenario(stop=3.0, step=step, certificates="ignore")
+        start = {"motor_angle": 1.0, "link_angle": 1.0}
+        made.add("arm", model="flexible_joint_arm", parameters=start, **{"as": "block3"})
+        settings: dict[str, Any] = {"options": {"model": "flexible_joint_arm"}, "parameters": {"delay": 0.15}}
+        made.add("observer", observer="delayed_state_observer", late_policy="late", **{"as": "block3"}, **settings)
+        made.connect(*(f"arm.{angle} -> observer.packet_{angle}" for angle in start))
+        made.network(nodes={"motor": ["arm.motor_angle"], "link": ["arm.link_angle"]}, period=0.1, delay=0.15)
+        outcome = made.run(warn=lambda _: None)
+        estimates.append(of(outcome, "observer.link_angle", "observer.motor_angle"))
+        assert abs(estimates[-1][0] - outcome["arm.link_angle"][-1]) < 0.1  # the drive is not told
+    # RK4 with internal steps of 5 ms, in parts: fourth order, (5e-3 * 8.3)^4 / 120 a step
+    np.testing.assert_allclose(estimates[1], estimates[0], rtol=0.0, atol=1e-6)
 
 
 def test_packets_arrive_a_delay_later_and_are_replayed() -> None:
@@ -113,6 +131,14 @@ def test_all_versions_of_fmi_are_told_the_same(tmp_path: Path, *, together: bool
     np.testing.assert_allclose(of(runs[1], *names), of(runs[0], *names), atol=1e-12)
     told = [[p.outcomes for p in outcome.result.packets] for outcome in runs]
     assert told[0] == told[1]
+
+
+def test_what_was_received_can_be_expected_and_reported() -> None:
+    made = scenario(stop=0.5).expect("signal", signal="network.source.sine", max=3.0)
+    made.expect("difference", signal="network.source.cosine", reference="source.cosine", max=0.2)
+    assert [judged.passed for judged in made.run(warn=lambda _: None).expectations] == [True, True]
+    with pytest.raises(CosimError, match=r"network: no variable 'source.sin'.*source.sine"):
+        scenario(stop=0.5).expect("signal", signal="network.source.sin", max=3.0).run()
 
 
 def test_seeds_and_names_decide_and_the_order_of_components_does_not() -> None:

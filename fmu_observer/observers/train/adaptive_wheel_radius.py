@@ -1,0 +1,206 @@
+"""Train observer that learns by how much the wheel radius is wrong, from the odometer and balises on the way."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampled_error
+from fmu_observer.observers.adaptive_law import (
+    Adaptation,
+    Gains,
+    Plant,
+    Sizes,
+    adaptation_flow,
+    adaptation_of,
+    adaptation_states,
+    covariance_after,
+    error_drift,
+    gains_of,
+    learnt_constants,
+    packed,
+    start_covariance,
+)
+from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.gated_observer import GatedObserver
+from fmu_observer.observers.train.train_observer import BALISE, POSITION
+from plant_models.hybrid import Signal, input_signal, memory, output_signal, parameter, state, vector
+from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid.system import Array
+
+SIZES = Sizes(1, 1, 1, sampled=True)
+C = np.ones((1, 1))
+MU, FORGETTING = 0.03, 0.003  # [1/s] [ours]
+FIRST_GAIN = 1e-4  # [1/(m2 s)] [ours], of R
+PRIOR = 0.02  # standard deviation of the wheel radius' error before any balise [ours]
+SPREADS = 3.0  # standard deviations that the gate grants the position
+QUICKEST = 50.0  # [1/s]: no balise moves the constant faster, which keeps explicit integration stable
+R, L, CHI, INVERSE_S, EXCITATION = range(2, 7)  # places of the adaptation
+ADAPTIVE = (
+    parameter("mu", "1/s", MU, "Rate at which the position forgets balises", min=1e-9),
+    parameter("forgetting", "1/s", FORGETTING, "Rate at which the wheel radius forgets balises", min=0.0),
+    parameter("gain_floor", "1", 0.0, "One over the largest adaptation gain; 0 for no limit", min=0.0),
+    parameter(
+        "least_excitation", "1", 0.25, "Mean square of the sensitivity [m2] below which the radius is held", min=0.0
+    ),
+    parameter("excitation_time", "s", 20.0, "Window of that mean", min=1e-9),
+    parameter("first_gain", "1", FIRST_GAIN, "Adaptation gain R at the first balise", min=0.0),
+    parameter("balise_deviation", "m", 0.5, "Standard deviation of the place of a balise as read", min=0.0),
+    parameter("odometer_deviation", "m/s", 0.05, "Standard deviation of the noise of a reading", min=0.0),
+    parameter("odometer_period", "s", 0.2, "Time between readings of independent noise", min=0.0),
+    parameter("reading_age", "s", 0.0, "Mean age of the reading that is held", min=0.0),
+)
+
+
+class AdaptiveWheelRadius(GatedObserver, GapCertified):
+    """Position, speed and relative error of the wheel radius: the adaptive observer (4.7) of Hann 2014 on a train.
+
+    An odometer that believes a wheel radius reads ``odometer = (1 + wheel_radius_error) v`` [ours: positive where the
+    wheel is worn, for it turns faster than believed]. So ``dp = odometer + odometer k`` with the unknown constant
+    ``k = 1 / (1 + wheel_radius_error) - 1``: affine in the state, without mass, effort or resistance. Measured is p, at
+    balises. With ``w`` the position predicted since the last balise and ``c = ph - w``
+
+    ``d ph = odometer (1 + kh) - mu c + lambda d kh``, ``d kh = -R chi c``,
+    ``d w = odometer (1 + kh) + (lambda - chi) d kh``, ``d lambda = odometer - mu chi``, ``d chi = -mu chi``,
+    ``d R = forgetting R - R^2 chi^2``, and at a balise ``w = p_B``, ``chi = lambda``: the sampled sensitivity of
+    `adaptive_law`, for balises are seconds apart. At the first balise the position is set, and the adaptation begins
+    anew. A reading that is held is late by half of its
+    period, one that was aggregated by a whole one: p is the position `reading_age` ago, and what a balise says, and
+    what is told, are moved by the way since.
+
+    `wheel_radius_error_deviation` is the standard deviation of its error, of white noise of the places of balises and
+    of the readings, carried exactly between them; `position_deviation` likewise. What is no noise is not in it: the
+    mean creep of a pulling or braking wheel counts as wheel radius, and a wheel that locks or spins spoils the
+    estimate (give an axle that does neither). At standstill nothing is learnt: below `least_excitation` the constant
+    is held and `wheel_radius_learnt` is 0. Without balises the standard deviations grow.
+
+    Gains [ours]: mu 0.03 1/s, forgetting 0.003 1/s. Errors of position and constant die out at any gaps.
+    """
+
+    name = "adaptive_wheel_radius"
+    description = "Train observer that learns the error of the wheel radius from balises"
+    source = "Hann 2014, (4.7); the train case, covariance and holding are ours"
+    internal_step = 1e-2
+    inputs: tuple[Signal, ...] = (input_signal("odometer", "m/s", 0.0, "Odometer speed, by the believed wheel radius"),)
+    outputs = (
+        output_signal("position", "m", "Estimated position"),
+        output_signal("speed", "m/s", "Odometer speed, corrected by the estimate", display_unit="km/h"),
+        output_signal("innovation", "m", "Estimated minus true position at the last balise", variability="discrete"),
+        output_signal("position_deviation", "m", "Standard deviation of the position's error"),
+        output_signal(
+            "wheel_radius_error", "1", "Estimate of odometer over true speed, minus 1; worn wheels: positive"
+        ),
+        output_signal("wheel_radius_error_deviation", "1", "Standard deviation of its error"),
+        output_signal("wheel_radius_learnt", "1", "1 where the wheel radius is learnt, 0 where it is held"),
+        output_signal("excitation", "m2", "Mean square of the sensitivity of the position to the wheel radius"),
+    )
+    parameters = ADAPTIVE
+    events = (BALISE,)
+
+    def __init__(self) -> None:
+        first = start_covariance(C, (100.0, PRIOR), SIZES, True)
+        adaptation = adaptation_states(SIZES, first, gain=FIRST_GAIN, inverse_s=MU)
+        self.states = (
+            POSITION,
+            state("estimated_scale", "1", 0.0, "Estimate of true speed over odometer, minus 1"),
+            *adaptation,
+            state("predicted_position", "m", 0.0, "Position predicted since the last balise"),
+            memory("balises_used", "1", 0.0, "Balises used so far"),
+            memory("last_innovation", "m", 0.0, "Position error seen at the last balise"),
+        )
+        super().__init__()
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """The parameters lie within their bounds."""
+        return super().requirements(p) | within_bounds(ADAPTIVE, p)
+
+    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Position, scale, adaptation and predicted position."""
+        adaptation = self._adaptation(x)
+        speed = u.odometer * (1.0 + x[1])
+        noise = p.odometer_deviation**2 * p.odometer_period * (1.0 + x[1]) ** 2
+        plant = Plant(np.zeros((1, 1)), u.odometer, np.reshape(u.odometer, (1, 1)), C, noise * DISTURBED)
+        gains = self._gains(adaptation, p)
+        c = x[0] - x[self.own_count - 3]
+        drift = error_drift(plant, gains, SIZES, True)
+        return np.hstack(
+            [
+                speed - gains.total[0, 0] * c,
+                -gains.constants[0, 0] * c,
+                *adaptation_flow(adaptation, plant, gains, drift, p.mu, p, SIZES),
+                speed - gains.output[0, 0] * c,
+            ]
+        )
+
+    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """The predicted position is that of the balise; the first one sets the position too."""
+        used = x[self.own_count - 2]
+        first = np.where(used > 0.0, 0.0, 1.0)
+        covariance, variance = self._adaptation(x).covariance, p.balise_deviation**2
+        told = u.balise_position - p.reading_age * u.odometer * (1.0 + x[1])
+        quickest = x[R] / (1.0 + x[R] * x[L] ** 2 / QUICKEST)
+        later = (x[0], x[1], quickest, x[L], x[L], x[INVERSE_S], x[EXCITATION])
+        begun = (told, x[1], p.first_gain, 0.0, 0.0, x[INVERSE_S], 0.0)
+        moved = packed(covariance_after(covariance, C, 0, variance, SIZES, True), SIZES.error)
+        known = packed(variance * SAME_PLACE + covariance[1, 1] * OF_SCALE, SIZES.error)
+        return vector(
+            *(np.where(first > 0.0, new, old) for new, old in zip(begun, later, strict=True)),
+            *(np.where(first > 0.0, known[i], moved[i]) for i in range(6)),
+            told,
+            used + 1.0,
+            x[0] - told,
+        )
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """Position, speed and wheel radius with their uncertainty."""
+        adaptation = self._adaptation(x)
+        V = adaptation.covariance
+        scale = 1.0 + x[1]
+        return {
+            "position": x[0] + p.reading_age * u.odometer * scale,
+            "speed": u.odometer * scale,
+            "innovation": x[self.own_count - 1],
+            "position_deviation": _root(V[0, 0]),
+            "wheel_radius_error": 1.0 / scale - 1.0,
+            "wheel_radius_error_deviation": _root(V[1, 1]) / scale**2,
+            "wheel_radius_learnt": learnt_constants(adaptation.excitation, p.least_excitation, 1)[0],
+            "excitation": adaptation.excitation[0, 0],
+        }
+
+    def odometer_of(self, u: Any) -> Array:
+        """The odometer [m/s]."""
+        return u.odometer
+
+    def own_bound(self, x: Array, p: Any) -> Array:
+        """Three standard deviations of the position [m]."""
+        return SPREADS * _root(self._adaptation(x).covariance[0, 0])
+
+    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+        """Certificate of the observer that knows the wheel radius, ``d e = -mu c``, ``d c = -mu c``, ``c = e`` at a
+        balise; what is learnt obeys least squares, which forget at any gaps.
+        """
+        mu = np.array([[float(p.mu)]])
+        error = ImpulsiveError.with_innovation(np.zeros((1, 1)), mu, mu, C, (0,))
+        model = (
+            "error of the position with the wheel radius known; that of the wheel radius obeys least squares at any "
+            "gaps, in cascade; noise, standstill and wheels that lock or spin are left out"
+        )
+        return certify_sampled_error((error,), max_gap, model)
+
+    # -- internals --------------------------------------------------------------------------------------------------
+
+    def _adaptation(self, x: Array) -> Adaptation:
+        return adaptation_of(x[2:], C, SIZES)[0]
+
+    def _gains(self, adaptation: Adaptation, p: Any) -> Gains:
+        return gains_of(adaptation, C, learnt_constants(adaptation.excitation, p.least_excitation, 1))
+
+
+DISTURBED = np.outer([1.0, 0.0, 1.0], [1.0, 0.0, 1.0])  # the odometer's noise moves position and predicted position
+SAME_PLACE = DISTURBED
+OF_SCALE = np.diag([0.0, 1.0, 0.0])
+
+
+def _root(variance: Array) -> Array:
+    return np.sqrt(np.maximum(variance, 1e-30))
