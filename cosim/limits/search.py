@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.limits import Trial
-from fmus.batch.members import Batch
+from fmus import Batch
 
 MEMBERS = 16
 LAST_PART = 0.8  # of a run; behind it the error counts

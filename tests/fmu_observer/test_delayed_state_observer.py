@@ -56,7 +56,7 @@ def packet(runtime: Runtime, node: int, values: np.ndarray) -> None:
     runtime.trigger("packet")
 
 
-# -- the memory ---------------------------------------------------------------------------------------------------------
+# -- the memory -----------------------------------------------------------------------------------------------------
 
 
 @settings(max_examples=30)
@@ -73,7 +73,7 @@ def test_a_value_of_a_fractional_age() -> None:
     assert float(at_age(-0.5, values)) == 4.0  # the first line goes on
 
 
-# -- the plant and the model --------------------------------------------------------------------------------------------
+# -- the plant and the model ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("gravity", "expected"), [("motor_speed", 0.67 + 8.43j), ("link_angle", -0.43 + 8.28j)])
@@ -93,7 +93,7 @@ def test_the_lipschitz_constants_of_the_specification() -> None:
     assert found == pytest.approx([74.1, 75.0], abs=0.06)
 
 
-# -- the observer -------------------------------------------------------------------------------------------------------
+# -- the observer ---------------------------------------------------------------------------------------------------
 
 
 def test_only_the_outputs_of_the_node_jump() -> None:
@@ -218,7 +218,7 @@ def test_memory_stays_flat() -> None:
     assert np.abs(runtime.x[:-2]).max() < 1e-12
 
 
-# -- limits -------------------------------------------------------------------------------------------------------------
+# -- limits ---------------------------------------------------------------------------------------------------------
 
 
 def test_the_exact_limit_of_a_predictor() -> None:
