@@ -16,7 +16,7 @@ NAMES = ("predicted", "delayed", "held")
 def errors(delay: float, interval: float) -> dict[str, tuple[float, float]]:
     """rms errors of position [m] and speed [m/s] by observer."""
     changes = {"network.period": interval, "network.delay": delay, "balises.latency": delay, "expect": []}
-    changes |= {f"components.{name}.parameters.delay": delay for name in NAMES}
+    changes |= {f"{name}.delay": delay for name in NAMES}
     outcome = run("freight_delayed", changes)
     hold = outcome["time"] > 25.0
     truth = {name: outcome[f"locomotive.{name}"][hold] for name in ("position", "speed")}

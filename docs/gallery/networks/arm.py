@@ -69,8 +69,12 @@ def arm_errors(
     variance: float = 0.0,
     start: Sequence[float] = PUBLISHED_START,
     at_once: bool = False,
+    beside: float = 0.0,
 ) -> Errors:
-    """Errors of the observer; nodes send in turn, or with `at_once` both in each packet."""
+    """Errors of the observer; nodes send in turn, or with `at_once` both in each packet.
+
+    The delayed state starts `beside` the truth.
+    """
     motion, count = arm_motion(model, stop), max(predictors, 1)
     observer = DelayedStateObserver(
         model, predictors=predictors, memory_places=round(SHARE / PERIOD), between_samples=between
@@ -79,6 +83,8 @@ def arm_errors(
     delays = np.array([cell.delay for cell in cells])
     for name, value in {"theta": theta, "delay": delays, "memory_period": PERIOD, "internal_step": PERIOD}.items():
         batch.set(name, value)
+    for name in STATES:
+        batch.set(f"estimated_{name}", beside)
     if predictors:
         batch.set("prediction", np.tile(np.asarray(start, dtype=float), count))
     members, stamps, nodes, values = [], [], [], []
