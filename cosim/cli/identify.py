@@ -100,6 +100,8 @@ def _identified(options: argparse.Namespace) -> DavisEstimate:
     chosen = (instants >= (options.begin if options.begin is not None else -np.inf)) & (
         instants <= (options.end if options.end is not None else np.inf)
     )
+    if not len(instants):
+        raise IdentificationError("the table has no rows: expected samples of time and speed.")
     if not chosen.any():
         raise IdentificationError(
             f"no sample between --from and --to; there are some from {instants[0]:g} to {instants[-1]:g} s."

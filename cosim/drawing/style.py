@@ -89,6 +89,8 @@ def styled(function: Callable[P, T]) -> Callable[P, T]:
 def observer_line(observers: Sequence[str], observer: str) -> dict[str, Any]:
     """Colour, dashes and width of an observer: by its place among all observers, the same in every figure.
 
+    Beyond the sixth observer colours come again, with other dashes.
+
     Args:
         observers: names of all observers of a run.
         observer: name of the one to draw.
@@ -96,7 +98,9 @@ def observer_line(observers: Sequence[str], observer: str) -> dict[str, Any]:
     Returns:
         Arguments of ``Axes.plot``.
     """
-    return dict(OBSERVER_LINES[list(observers).index(observer) % len(OBSERVER_LINES)])
+    index, count = list(observers).index(observer), len(OBSERVER_LINES)
+    dashed = OBSERVER_LINES[(index + index // count) % count]
+    return {**dashed, "color": OBSERVER_LINES[index % count]["color"]}
 
 
 def run_line(index: int) -> dict[str, Any]:

@@ -149,13 +149,20 @@ def network_warnings(
         ScenarioError: packets take longer than a receiver can go back.
     """
     shortest, longest = network.settings.delay_range
-    whole = sorted({name for name, _ in network.outputs.sources if not components[name].can_vary_step})
+    sources = sorted({name for name, _ in network.outputs.sources})
     warnings = [
-        f"{name} takes whole communication steps: packets sent between two points carry what it was at the earlier one."
-        for name in whole
+        f"{name} takes whole steps: packets sent between two of its points carry what it was at the earlier one."
+        for name in sources
+        if not components[name].can_vary_step or table.components[name].every > 1
     ]
     for name in sorted({listener.component for listener in network.listeners}):
         component, own = components[name], table.components[name]
+        one_a_step = component.event_needs_step and not component.can_vary_step
+        if one_a_step and network.settings.period < table.step:
+            warnings.append(
+                f"{name} takes whole communication steps and can be told of one packet in each: of packets every "
+                f"{network.settings.period:g} s ever more wait. Use a step that is no longer."
+            )
         sealed = component.kind == "FMU" and "late_policy" not in component.variables
         if sealed:
             if longest > 0.0:

@@ -143,6 +143,7 @@ class RuleMemory(NamedTuple):
     unchanged_time: Array
     refutations: Array
     samples: Array
+    effort_time: Array
 
 
 class RepairedRules:
@@ -154,17 +155,18 @@ class RepairedRules:
 
     1. where ``|r| <= eps + M delta T`` at `recover_samples` samples in a row, T the time held, and the wheel rolled
        between them: ``|y_k - y_{k-1}| <= a_max period + 2 noise``;
-    2. where a braked wheel is faster than the estimate by more than eps / M, or a driven one slower: a jam cannot be
-       the reason;
+    2. where a braked wheel is faster than the estimate by more than eps / M, or a driven one slower, and has been
+       braked, or driven, for `release_time`: neither a jam nor a skid can be the reason;
     3. where, from one balise to the next, the way of the odometer is the distance.
 
     If none of them has happened within `hold_limit` the speed is set to the odometer, which is followed again but stays
     *unconfirmed* (mode 2): `odometer_fault` stays 1. That ends when the wheel has rolled with a small residual for
     `trust_time`, or when a balise confirms the way.
 
-    Where a braked wheel is faster than a settled estimate by more than eps / M, a driven one slower, the speed is set
-    to the odometer while it is believed, too: it is the end of a jam that was too small to be seen, and counts as a
-    fault.
+    Where a braked wheel is faster than a settled estimate by more than eps / M, a driven one slower, again for
+    that time, the speed is set to the odometer while it is believed, too: it is the end of a jam that was too small to
+    be seen, and counts as a fault. A wheel that locked while braking may still be slow when it is driven: for
+    `release_time` after the sign of the effort has changed it counts as one that coasts.
 
     A fault begins where ``|r| > eps`` with the sign that the effort allows (a jam while braking, a skid while driving,
     either while coasting), in time to keep the very sample out; or where balises refute the way of an odometer that was
@@ -184,6 +186,7 @@ class RepairedRules:
         memory("unchanged_time", "s", 0.0, "Time since mode or rolling last changed"),
         memory("refutations", "1", 0.0, "Ways between balises in a row that the odometer had wrong"),
         memory("samples", "1", 0.0, "Readings since the start"),
+        memory("effort_time", "s", 0.0, "Samples in a row with one sign of the effort, times period and sign"),
     )
     parameters: tuple[Signal, ...] = (
         parameter(
@@ -197,6 +200,7 @@ class RepairedRules:
         parameter("settle_samples", "1", 5.0, "Samples with a small residual before faults are judged", min=1.0),
         parameter("fault_limit", "1", 3.0, "Faults in a row without a small residual between them", min=1.0),
         parameter("least_speed", "m/s", 0.5, "Estimated speed below which no fault begins", min=0.0),
+        parameter("release_time", "s", 1.0, "Longest time of a jam or skid after its effort has ended", min=0.0),
         parameter("sign_rule", "1", 1.0, "1: jams only while braking, skids only while driving", min=0.0, max=1.0),
         parameter("way_share", "1", 0.01, "Error of the odometer's way that a balise allows, a share of it", min=0.0),
         parameter("way_floor", "m", 1.0, "Error of the odometer's way that a balise always allows", min=0.0),
@@ -214,7 +218,11 @@ class RepairedRules:
         held, open_ = _is(m.mode == HELD), _is(m.mode == UNCONFIRMED)
         size = np.abs(told.residual)
         small = _is(size <= 0.5 * p.threshold)
-        impossible = _is(size > p.threshold) * _impossible(told, p)
+        sign = _is(told.effort > 0.0) - _is(told.effort < 0.0)
+        effort_time = np.where(sign * m.effort_time > 0.0, m.effort_time, 0.0) + sign * p.odometer_period
+        # Of a period in which the sign changes a part is unknown, and a reading tells of the period before it.
+        lasting = sign * _is(np.abs(effort_time) + ROUNDING >= p.release_time + p.odometer_period)
+        impossible = _is(size > p.threshold) * _impossible(told, lasting, p)
         # followed: when are faults judged, and does one begin
         settled = np.where(held > 0.0, 0.0, np.where(small > 0.0, m.settled + 1.0, 0.0))
         passed = _is((m.samples + ROUNDING) * p.odometer_period >= p.arming_delay)
@@ -249,6 +257,7 @@ class RepairedRules:
             np.where(changed > 0.0, 0.0, m.unchanged_time + p.odometer_period),
             m.refutations,
             m.samples + 1.0,
+            effort_time,
         )
         restart = np.maximum(np.maximum(believed, expired), np.maximum(jumped, over))
         return Judgement(tuple(after), restart, onset, 0.0 * size)
@@ -283,6 +292,7 @@ class RepairedRules:
             np.where(changed > 0.0, 0.0, m.unchanged_time),
             row,
             m.samples,
+            m.effort_time,
         )
         return Judgement(tuple(after), confirmed * held, begun, shift)
 
@@ -350,10 +360,14 @@ def way_limit(told: Passing, p: Any) -> Array:
     return p.way_floor + told.accuracy + p.way_share * np.abs(told.distance) + late
 
 
-def _impossible(told: Reading, p: Any) -> Array:
-    """1 where neither a jam nor a skid can be the reason: a braked wheel too fast, a driven one too slow."""
+def _impossible(told: Reading, sign: Array, p: Any) -> Array:
+    """1 where neither a jam nor a skid can be the reason: a braked wheel too fast, a driven one too slow.
+
+    Args:
+        told: the sample. sign: of the effort, 0 where it has changed of late. p: parameters.
+    """
     too_fast = _is(told.odometer > told.speed)
-    braked, driven = _is(told.effort < 0.0), _is(told.effort > 0.0)
+    braked, driven = _is(sign < 0.0), _is(sign > 0.0)
     return _is(p.sign_rule > 0.5) * (braked * too_fast + driven * (1.0 - too_fast))
 
 

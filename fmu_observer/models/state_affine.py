@@ -31,7 +31,8 @@ class StateAffineModel:
         drift: A, a function of t and u that returns shape (n, n). drive: B, likewise, shape (n,). regressor: Phi,
             likewise, shape (n, m); all in plain NumPy that can be traced.
         C: shape (q, n). event: name of the event at which a measurement arrives.
-        sample_period: sampling period [s] that suits it.
+        sample_period: sampling period [s] that suits it. example: a start and constants to be tried, shape (n + m,);
+            () for one beside what is believed first.
 
     Raises:
         ValueError: a shape does not fit the signals, or a name is no identifier or stands twice.
@@ -50,6 +51,7 @@ class StateAffineModel:
     C: np.ndarray
     event: str = "sample"
     sample_period: float = 0.1
+    example: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         where = f"State-affine model {self.name!r}"
@@ -60,6 +62,8 @@ class StateAffineModel:
         reason = f"{n} states, {q} measurements and {m} unknown constants"
         object.__setattr__(self, "C", checked_matrix(where, "C", self.C, (q, n), reason))
         u = np.array([float(s.start_values[0]) for s in self.inputs])
+        if len(self.example) not in (0, n + m):
+            raise ValueError(f"{where}: the example has {len(self.example)} numbers, expected {n + m} for {reason}.")
         for name, shape in {"drift": (n, n), "drive": (n,), "regressor": (n, m)}.items():
             found = np.shape(getattr(self, name)(0.0, u))
             if found != shape:

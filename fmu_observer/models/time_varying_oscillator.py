@@ -35,6 +35,7 @@ def time_varying_oscillator(excitation: str = "fading") -> StateAffineModel:
         drive=lambda t, u: vector(0.0, (2.0 + np.tanh(t)) * (DRIVE * np.sin(t) + u[0])),
         regressor=_fading if excitation == "fading" else _lasting,
         C=np.array([[1.0, 0.0]]),
+        example=(20.0, -40.0, 10.0, 20.0),
     )
 
 

@@ -13,6 +13,7 @@ import pytest
 from observer_bench import Bench
 from scipy.integrate import solve_ivp
 
+from fmu_observer.bounds.carried import unpacked
 from fmu_observer.observers.train import ContinuousDiscreteObserver, DiscreteMeasurementObserver
 from plant_models.hybrid.requirements import unfulfilled
 
@@ -157,6 +158,8 @@ def test_the_published_bound_starts_anew_at_each_sample() -> None:
 def test_a_sample_that_lies_is_not_used_and_the_bound_grows(make: Any, missing: str) -> None:
     speed = lambda t: 25.0 - 0.9 * t  # noqa: E731
     honest, jammed = Bench(make(missing=missing)), Bench(make(missing=missing))
+    for bench in (honest, jammed):
+        bench.runtime.x[1] = 25.0
     followed(honest, speed, -0.7 * 9e4, 6.0)
     followed(jammed, lambda t: speed(t) if t < 4.0 else 3.0, -0.7 * 9e4, 6.0, lambda t: t > 3.9)
     after, lost = honest.outputs(), jammed.outputs()
@@ -168,6 +171,84 @@ def test_a_sample_that_lies_is_not_used_and_the_bound_grows(make: Any, missing: 
     assert lost["speed"] > 15.0  # 3 m/s were told
     # held to an old reading it lags, predicted it goes on with the disturbance found before
     assert (abs(lost["speed"] - speed(t)) < 0.6) is (missing == "predicted")
+
+
+@BOTH
+def test_a_prediction_goes_on_by_a_disturbance_whose_rate_decays(make: Any) -> None:
+    """From the sample before on, with what is not measured limited, against closed form; the level by SciPy."""
+    bench = Bench(make(), disturbance_max=0.3, davis_a=0.0, davis_b=0.0, davis_c=0.0, odometer_error=0.0)
+    p = bench.system.unpack_parameters(bench.runtime.p)
+    bench.set("u", {"odometer": 40.0})
+    bench.runtime.x[1] = 40.0
+    bench.runtime.start(0.0)
+    bench.runtime.x[2:4] = 5.0, 3.0  # what a reading that lies has taught
+    bench.set("x", {"last_disturbance": 0.4, "last_disturbance_rate": -0.2})
+    bench.runtime.advance(0.199)
+    bench.set("u", {"odometer_fault": 1.0, "odometer": 3.0})
+    before, taught = bench.state("bound_level"), bench.runtime.x[2:4].copy()
+    bench.runtime.advance(0.2)
+    P, instants = unpacked(p.lyapunov_matrix), (0.5, 3.0, 34.8)
+    assert tuple(bench.runtime.x[2:4]) == (0.3, -0.2)
+    jump = np.array([0.0, *(taught - (0.3, -0.2))])
+    assert bench.state("bound_level") - before == pytest.approx(np.sqrt(jump @ P @ jump), rel=1e-2)  # of 1 ms
+    t0, v0, way0, level0 = bench.runtime.t, bench.runtime.x[1], bench.runtime.x[0], bench.state("bound_level")
+    levels = []
+    for s in instants:
+        bench.runtime.advance(t0 + s)
+        levels.append(bench.state("bound_level"))
+        T, left = float(p.rate_decay_time), 1.0 - np.exp(-s / float(p.rate_decay_time))
+        d = 0.3 - 0.2 * T * left
+        v = v0 - 0.3 * s + 0.2 * T * (s - T * left)
+        way = v0 * s - 0.15 * s * s + 0.2 * T * (0.5 * s * s - T * (s - T * left))
+        assert bench.runtime.x[2] == pytest.approx(d, rel=1e-9)
+        assert bench.runtime.x[1] == pytest.approx(v, rel=1e-9)
+        assert bench.runtime.x[0] - way0 == pytest.approx(way, rel=1e-9)
+    sizes = np.sqrt(np.diag(P)) @ (p.unknown_acceleration, p.unknown_jerk, p.unknown_jerk_rate)
+    gain = np.sqrt(np.asarray(p.gain) @ P @ np.asarray(p.gain))
+
+    def rate(s: float, W: np.ndarray) -> np.ndarray:
+        speed = v0 - 0.3 * s + 0.2 * (s - (1.0 - np.exp(-s)))
+        told = min(np.sqrt(np.linalg.inv(P)[0, 0]) * W[0], abs(40.0 - speed) + 1.7 * (s + 0.2))
+        own = np.sqrt(P[2, 2]) * 0.2 * np.exp(-s)
+        return np.array([gain * told + sizes + own - p.bound_decay * W[0]])
+
+    expected = solve_ivp(rate, (0.0, 34.8), [level0], t_eval=instants, rtol=1e-10, atol=1e-12).y[0]
+    np.testing.assert_allclose(levels, expected, rtol=1e-6)
+
+
+@BOTH
+def test_a_fault_told_for_long_loses_neither_speed_nor_bound(make: Any) -> None:
+    """A reading that lies is used once; then the detector says for 35 s that the odometer lies."""
+    bench, true = Bench(make()), lambda t: 22.0 + 0.05 * t
+    bench.runtime.x[1] = 22.0
+    followed(bench, lambda t: true(t) - 5.0 * (9.9 < t < 10.1), 900.0 + 0.05 * 9e4, 45.0, lambda t: t > 10.1)
+    out = bench.outputs()
+    assert abs(out["speed"] - true(45.0)) < min(out["error_bound"], 6.0)  # 4 m/s were taught by the lie
+    assert abs(out["disturbance"]) < 0.1
+
+
+@BOTH
+def test_a_disturbance_that_brakes_never_pushes_back(make: Any) -> None:
+    """The estimate stands while the train goes on at 3 m/s; what holds it, 1 m/s2, is carried by the bound."""
+    nothing = dict.fromkeys(("odometer_error", "unknown_acceleration", "unknown_jerk_rate"), 0.0)
+    bench = Bench(make(), davis_a=0.0, davis_b=0.0, davis_c=0.0, **nothing)
+    p = bench.system.unpack_parameters(bench.runtime.p)
+    bench.set("u", {"odometer": 3.0})
+    bench.runtime.start(0.0)
+    bench.runtime.x[1:4] = 0.0, 1.0, 0.0
+    bench.set("x", {"last_disturbance": 1.0, "bound_level": 0.1, "predicting": 1.0})
+    bench.set("u", {"odometer_fault": 1.0})
+    P = unpacked(p.lyapunov_matrix)
+    gain = np.sqrt(np.asarray(p.gain) @ P @ np.asarray(p.gain))
+
+    def rate(t: float, W: np.ndarray) -> np.ndarray:
+        told = min(np.sqrt(np.linalg.inv(P)[0, 0]) * W[0], 3.0 + 1.7 * t)
+        return np.array([gain * told + np.sqrt(P[0, 0]) * 1.0 - p.bound_decay * W[0]])
+
+    bench.runtime.advance(1.0)
+    assert bench.outputs()["speed"] == 0.0
+    expected = solve_ivp(rate, (0.0, 1.0), [0.1], rtol=1e-10, atol=1e-12).y[0, -1]
+    assert bench.state("bound_level") == pytest.approx(expected, rel=1e-6)
 
 
 @BOTH

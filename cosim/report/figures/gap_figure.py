@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from cosim.drawing.style import BLACK, GAP, MARK, axes_or_new, observer_line, styled
-from cosim.evaluation.balise_gaps import ENVELOPE, PLAIN_ODOMETER, gap_errors
+from cosim.evaluation.balise_gaps import PLAIN_ODOMETER, gap_errors
 from cosim.evaluation.event_counts import accepted_stamps
 from cosim.evaluation.facts import mapping_entry, number_entry
 from cosim.evaluation.numbers import number
@@ -22,6 +22,7 @@ from cosim.results.result import Result
 
 SMALLEST, LARGEST = 1e-2, 1e3  # [m]; errors beyond are drawn at the edge
 MARKERS = "os^Dv<>p"
+GRANTED = "SUBSET-041 (5 m + 5 %)"
 SHOWN = 3.0  # limits above this many largest gaps are named, not drawn
 
 
@@ -123,7 +124,7 @@ def gap_error_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -
         )
     order = np.argsort(lengths)
     granted = np.array([gap.envelope for gap in found.gaps])
-    ax.plot(lengths[order], granted[order], color=MARK, linewidth=1.2, label=ENVELOPE)
+    ax.plot(lengths[order], granted[order], color=MARK, linewidth=1.2, label=GRANTED)
     ax.set_yscale("log")
     ax.set_xlabel("Way since the last balise [m]")
     ax.set_ylabel("|Position error| at the end [m]")

@@ -25,7 +25,7 @@ from cosim.evaluation.roles import estimate, label, recorded
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.drawing import curve, is_noisy, is_wild, legend_above, shade_zones, time_axis
 from cosim.report.figures.panel import Panel, any_estimate
-from cosim.report.figures.scales import bounded, value_limits
+from cosim.report.figures.scales import bounded, slip_in_percent, value_limits
 from cosim.results.result import Result
 
 KMH = 3.6  # km/h in a m/s
@@ -106,6 +106,7 @@ def adhesion_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) ->
     if limits is not None:
         ax.set_ylim(*limits)
     ax.set_ylabel("Adhesion force [kN]")
+    ax.ticklabel_format(axis="y", useOffset=False)  # a force that does not change has no scale of its own
     time_axis(ax, result)
     legend_above(ax)
     return ax
@@ -122,7 +123,8 @@ def slip_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axe
         The axes.
     """
     ax = axes_or_new(ax, (8.2, 3.8))
-    true, estimates = _scaled(result, spec.true_slip, 100.0), _estimates(result, spec, "slip", 100.0)
+    true = [slip_in_percent(values) for values in _scaled(result, spec.true_slip, 1.0)]
+    estimates = {o: slip_in_percent(values) for o, values in _estimates(result, spec, "slip", 1.0).items()}
     settled = result.time >= spec.evaluate_after
     limits = value_limits([v[settled] for v in true], [v[settled] for v in estimates.values()])
     shade_zones(ax, spec)
@@ -178,7 +180,7 @@ class SlipPanel(Panel):
 
     name = "slip"
     title = "Slip"
-    caption = "True and estimated slip; bars where a slip indicator is on, in the legend's order."
+    caption = "True and estimated slip; bars where a slip indicator is on, in the legend's order. Locked wheel: -100 %."
     place = 4
 
     @staticmethod

@@ -11,6 +11,7 @@ OFF_SCALE_RATIO = 100.0  # a curve this much larger than the next smaller one is
 LOG_RATIO = 8.0  # sizes that differ by more than this need a logarithmic axis
 ROOM = 1.3
 PERCENTILE = 99.0
+SMALLEST_SPAN = 1e-3  # of an axis, by the size of its values: what rounding changes is no curve
 BOUND = 1e150  # what is larger is drawn as this, so that nothing overflows on the way to a picture
 
 
@@ -35,6 +36,15 @@ def bounded(values: np.ndarray) -> np.ndarray:
         values: values, shape (rows,).
     """
     return np.asarray(np.clip(values, -BOUND, BOUND))
+
+
+def slip_in_percent(values: np.ndarray) -> np.ndarray:
+    """Slip as it is drawn [%]: that of a locked wheel, which the ratio to the wheel's speed makes any size, is -100.
+
+    Args:
+        values: slip ratio [1], shape (rows,).
+    """
+    return np.asarray(100.0 * np.clip(values, -1.0, 1.0))
 
 
 def curve_size(values: np.ndarray) -> float:
@@ -110,7 +120,7 @@ def value_limits(anchors: Sequence[np.ndarray], others: Sequence[np.ndarray]) ->
     low, high = _range(anchors, 0.0) or _range(others, 1.0) or (np.nan, np.nan)
     if not np.isfinite(low):
         return None
-    span = max(high - low, 1e-9 * max(abs(low), abs(high)), 1e-12)
+    span = max(high - low, SMALLEST_SPAN * max(abs(low), abs(high)), 1e-12)
     wanted = [r for r in (_range([curve], 1.0) for curve in others) if r and r[0] >= low - span and r[1] <= high + span]
     low, high = min([low, *(r[0] for r in wanted)]), max([high, *(r[1] for r in wanted)])
     room = 0.06 * max(high - low, span)

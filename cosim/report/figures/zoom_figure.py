@@ -14,7 +14,7 @@ from cosim.drawing.style import ALARM, BAND, BLACK, MARK, TIME, WHITE, ZONE, new
 from cosim.evaluation.roles import estimate, estimation_error, label, recorded
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.drawing import FAR, legend_above
-from cosim.report.figures.scales import BOUND, bounded, error_scale
+from cosim.report.figures.scales import BOUND, bounded, error_scale, slip_in_percent
 from cosim.report.zoom_windows import ZoomWindow
 from cosim.results.result import BaliseRecord, Result
 
@@ -67,10 +67,10 @@ def zoom_figure(result: Result, spec: ReportSpec, window: ZoomWindow) -> Figure:
 def _panels(result: Result, spec: ReportSpec, window: ZoomWindow) -> list[tuple[str, Curves, np.ndarray | None]]:
     """Label, curves and true curve of each panel."""
     speed = ("Speed error [m/s]", _errors(result, spec, "speed"), None)
-    slip = {o: 100.0 * bounded(v) for o in spec.observers if (v := estimate(result, o, "slip")) is not None}
+    slip = {o: slip_in_percent(v) for o in spec.observers if (v := estimate(result, o, "slip")) is not None}
     true_slip = recorded(result, spec.true_slip)
     if window.view == "slip" and slip:
-        return [speed, ("Slip [%]", slip, None if true_slip is None else 100.0 * bounded(true_slip))]
+        return [speed, ("Slip [%]", slip, None if true_slip is None else slip_in_percent(true_slip))]
     return [speed, ("Position error [m]", _errors(result, spec, "position"), None)]
 
 

@@ -23,26 +23,31 @@ RULES = (
     "end they wait for two samples that agree"
 )
 SEEDS_SAY = (
-    "synthetic data, more jams than in the thesis' runs: what is missed is shorter than a sample; what is called false "
-    "are jams shorter than the recorded step of 0.05 s, which the odometer counts and the record of the truth does "
-    "not show"
+    "synthetic data, more jams than in the thesis' runs: what is missed stays below the threshold or begins with the "
+    "last sample; what is called false are jams between two rows of 0.05 s, which the odometer counts and the record "
+    "of the truth does not show; each is traced on the page of the campaign"
 )
 REASONS = (RULES, RULES, SEEDS_SAY, SEEDS_SAY, CONFIDENTIAL, CONFIDENTIAL)
+MICRO = (
+    "synthetic data, section 5.3.3.2 has no numbers: micro-jams are far shorter than the rows of 0.05 s, so that rates "
+    "and delays of the few that a row shows count nothing; the positions are those of a slow bias"
+)
 
 
 def main() -> None:
-    """Twelve cases, six drawings of the jams each; published beside measured."""
+    """Thirteen cases, six drawings of the jams each; published beside measured."""
     sheet = Sheet(__file__, "Validation campaign on synthetic data", "Aguiar Cota 2019, Tables 5.4 to 5.7")
     found = measured(SEEDS)
     figure, axis = plt.subplots(figsize=(7.5, 4), layout="constrained")
     for k, (case, published) in enumerate(PUBLISHED.items()):
         for i, (measure, factor) in enumerate(COLUMNS.values()):
-            spread = found[case][measure]
-            sheet.add(f"{case}: {QUANTITIES[i]}", UNITS[i], published[i], factor * spread.mean, REASONS[i])
+            spread, why = found[case][measure], MICRO if "micro" in case else REASONS[i]
+            sheet.add(f"{case}: {QUANTITIES[i]}", UNITS[i], published[i], factor * spread.mean, why)
         for i, colour in ((4, "tab:orange"), (5, "tab:blue")):
             measure, factor = list(COLUMNS.values())[i]
             axis.bar(k + 0.4 * (i - 4.5), factor * found[case][measure].mean, 0.38, color=colour)
-            axis.plot(k + 0.4 * (i - 4.5), published[i], "kx")
+            if published[i] is not None:
+                axis.plot(k + 0.4 * (i - 4.5), published[i], "kx")
     axis.set_xticks(range(len(PUBLISHED)), list(PUBLISHED), rotation=45, ha="right")
     axis.set(ylabel="largest error before a balise [coaches of 30 m]")
     axis.set_title("odometer (orange), observer (blue); x: published, of other jams", fontsize=9)

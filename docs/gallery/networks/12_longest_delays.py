@@ -15,7 +15,10 @@ SURVIVED = {1: (0.19, 0.20), 2: (0.36, 0.39), 3: (0.54, 0.57)}  # independent: l
 NOT_PRINTED = "the thesis prints no limit; the independent number is the last of a grid that works"
 GRIDS = {1: (0.185, 0.19, 0.195, 0.2), 2: (0.345, 0.36, 0.375, 0.39), 3: (0.525, 0.54, 0.555, 0.585)}
 LOST = 0.05  # [1]; largest error over the last 10 s of 60 s
-THEORY = "tau_MAD with sigma > 0, 1 / L without it; the bounds are sufficient: the delay of the example, 0.15 s, breaks its own eleven times over"
+THEORY = (
+    "tau_MAD with sigma > 0, 1 / L without it; the bounds are sufficient: the delay of the example, 0.15 s, breaks its "
+    "own eleven times over"
+)
 
 
 def longest(model: str, predictors: int) -> float:

@@ -10,6 +10,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from fmu_observer.certificates import ImpulsiveError, first_unstable_gap
+from fmu_observer.design.adaptive_bounds import adaptive_bounds, settled_gain
+from fmu_observer.limits import Limit, PrintedBound
 from fmu_observer.models import STATE_AFFINE_MODELS, StateAffineModel, find_state_affine_model
 from fmu_observer.models.model import stacked
 from fmu_observer.observers.adaptive_law import (
@@ -29,11 +32,14 @@ from fmu_observer.observers.adaptive_law import (
     smallest_eigenvalue,
     start_covariance,
 )
+from fmu_observer.observers.adaptive_trial import adaptive_trial
 from fmu_observer.observers.gated_observer import GatedObserver
-from plant_models.hybrid import Signal, TriggeredEvent, input_signal, output_signal, parameter, state
+from fmu_observer.observers.parameter_values import Value, parameter_values
+from plant_models.hybrid import Signal, TriggeredEvent, input_signal, output_signal, parameter, scalar_names, state
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
+LONGEST_PERIOD = 1.0  # [s] up to which limits are looked for
 NOTHING_KNOWN = 100.0  # [ours] start value of every standard deviation
 LEAST_VARIANCE = 1e-30  # below it a standard deviation is told as 1e-15
 ADAPTIVE_PARAMETERS = (
@@ -163,6 +169,45 @@ class AdaptiveObserver(GatedObserver):
             "smallest_excitation": smallest_eigenvalue(adaptation.excitation, m),
             "innovation": innovation[0] if self.sizes.q == 1 else innovation,
         }
+
+    # -- limits -----------------------------------------------------------------------------------------------------
+
+    def limits(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> tuple[Limit, ...]:
+        """Between two samples: (4.63) beside the exact limit of the observer that knows the constants, and trials.
+
+        Args:
+            parameters: values by name that replace those of the preset. preset: to start from; None for the default.
+
+        Raises:
+            ValueError: a parameter or the preset is unknown, or has another size.
+        """
+        values = parameter_values(self, parameters, preset, "to judge")
+        p = self.unpack_parameters(values)
+        mu, model = float(p.mu), self.model
+        bounds = adaptive_bounds(model, mu)
+        K = settled_gain(model, mu)
+        decay = model.C @ K if self.predicts else np.zeros((self.sizes.q, self.sizes.q))
+        drift = np.asarray(model.drift(0.0, np.array([float(s.start_values[0]) for s in model.inputs])))
+        known = ImpulsiveError.with_innovation(drift, K, decay, model.C)
+        return (
+            Limit(
+                "period of the samples",
+                printed=(
+                    PrintedBound(
+                        bounds.longest_period,
+                        f"tau_MASP for a vanishing rate, {bounds.explain()}; from time 0 on, later alpha0 is smaller",
+                        "Hann 2014, (4.63)",
+                    ),
+                )
+                if self.predicts
+                else (),
+                exact=first_unstable_gap([known], LONGEST_PERIOD),
+                exact_test="the observer that knows the constants, its gain settled: no adaptation",
+                trial=adaptive_trial(
+                    self, dict(zip(scalar_names(self.parameter_signals), map(float, values), strict=True))
+                ),
+            ),
+        )
 
     # -- internals --------------------------------------------------------------------------------------------------
 

@@ -9,6 +9,7 @@ import numpy as np
 from fmu_observer.certificates import DecayingError, ImpulsiveError, decaying_error
 from fmu_observer.condition import Condition
 from fmu_observer.design.sampled_gain_bounds import DecayBounds, decay_bounds
+from fmu_observer.limits import PrintedBound
 from fmu_observer.models import ObserverModel
 from fmu_observer.observers.innovation_decay import ELAPSED, decay_parameters, innovation_left
 from fmu_observer.observers.model_observer import as_matrix
@@ -85,6 +86,17 @@ class DecayingInnovation(HeldInnovation):
         model = self.model
         K = as_matrix(np.asarray(p.high_gain, dtype=float), model.order, self.outputs_count)
         return decay_bounds(model.A, K, model.C, float(p.theta), float(p.decay_rate), model.lipschitz)
+
+    def printed_bounds(self, p: Any) -> tuple[PrintedBound, ...]:
+        """(3.109), and (3.105) with the factor that it leaves out."""
+        bounds = self.bounds(p)
+        enough, sigma = float(p.theta) > max(1.0, bounds.smallest_theta), 0.25 * bounds.alpha
+        premise = "" if enough else f", if theta were above {bounds.smallest_theta:.3g} 1/s"
+        strict = f"sigma = {sigma:.3g} 1/s, the factor exp(sigma T) left out of (3.109) kept{premise}"
+        return (
+            PrintedBound(bounds.longest_gap, f"tau_MASP, sigma to zero{premise}", "Hann 2014, (3.109)"),
+            PrintedBound(bounds.strict_gap(sigma), f"gamma_0 < 1, {strict}", "Hann 2014, (3.105)"),
+        )
 
     def condition_of(self, p: Any) -> Condition:
         """Theorem 3.4: the smallest theta, and the longest gap, against the model's `sample_period`."""

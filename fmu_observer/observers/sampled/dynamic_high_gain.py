@@ -8,6 +8,7 @@ import numpy as np
 
 from fmu_observer.condition import Condition
 from fmu_observer.design.sampled_gain_bounds import DynamicThetaBounds, dynamic_theta_bounds
+from fmu_observer.limits import PrintedBound
 from fmu_observer.models import ObserverModel
 from fmu_observer.observers.model_observer import as_matrix
 from fmu_observer.observers.sampled.output_predictor import OutputPredictor
@@ -93,6 +94,17 @@ class DynamicHighGain(OutputPredictor):
         model = self.model
         K = as_matrix(np.asarray(p.high_gain, dtype=float), model.order, self.outputs_count)
         return dynamic_theta_bounds(model.A, K, model.C, model.lipschitz, self.settled_theta(p))
+
+    def printed_bounds(self, p: Any) -> tuple[PrintedBound, ...]:
+        """(3.8) with theta at its limit, and what it says at the limit that (3.7) prints."""
+        bounds, source = self.bounds(p), "Hann 2014, (3.8)"
+        model, printed = self.model, bounds.theta_limit
+        K = as_matrix(np.asarray(p.high_gain, dtype=float), model.order, self.outputs_count)
+        found = [PrintedBound(bounds.longest_gap, f"tau_MASP at theta = {self.settled_theta(p):.3g} 1/s", source)]
+        if np.isfinite(printed):
+            settled = dynamic_theta_bounds(model.A, K, model.C, model.lipschitz, printed).longest_gap
+            found.append(PrintedBound(settled, f"tau_MASP at theta_inf = {printed:.4g} 1/s of (3.7)", source))
+        return tuple(found)
 
     def condition_of(self, p: Any) -> Condition:
         """(3.7) and (3.8): the limit of theta, and the longest gap at it, against the model's `sample_period`."""

@@ -57,7 +57,7 @@ class SampledObserver(ModelObserver, GatedObserver, GapCertified):
         values = parameter_values(self, parameters, preset, "to judge")
         certificate = self.certify(self.model.sample_period, parameters, preset)
         longest = certificate.constant_limit
-        high = 2.0 * longest if np.isfinite(longest) else certificate.horizon
+        high = 4.0 * longest if np.isfinite(longest) else certificate.horizon
         return (
             Limit(
                 "period of the samples",

@@ -34,9 +34,9 @@ C = np.ones((1, 1))
 MU, FORGETTING = 0.03, 0.003  # [1/s] [ours]
 FIRST_GAIN = 1e-4  # [1/(m2 s)] [ours], of R
 PRIOR = 0.02  # standard deviation of the wheel radius' error before any balise [ours]
-SPREADS = 3.0  # standard deviations that the gate grants the position
 QUICKEST = 50.0  # [1/s]: no balise moves the constant faster, which keeps explicit integration stable
-R, L, CHI, INVERSE_S, EXCITATION = range(2, 7)  # places of the adaptation
+P, PREDICTED, SCALE, R, L, CHI, INVERSE_S, EXCITATION = range(8)  # places of the adaptation
+ADAPTATION = R
 ADAPTIVE = (
     parameter("mu", "1/s", MU, "Rate at which the position forgets balises", min=1e-9),
     parameter("forgetting", "1/s", FORGETTING, "Rate at which the wheel radius forgets balises", min=0.0),
@@ -103,9 +103,9 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
         adaptation = adaptation_states(SIZES, first, gain=FIRST_GAIN, inverse_s=MU)
         self.states = (
             POSITION,
+            state("predicted_position", "m", 0.0, "Position predicted since the last balise"),
             state("estimated_scale", "1", 0.0, "Estimate of true speed over odometer, minus 1"),
             *adaptation,
-            state("predicted_position", "m", 0.0, "Position predicted since the last balise"),
             memory("balises_used", "1", 0.0, "Balises used so far"),
             memory("last_innovation", "m", 0.0, "Position error seen at the last balise"),
         )
@@ -118,18 +118,18 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Position, scale, adaptation and predicted position."""
         adaptation = self._adaptation(x)
-        speed = u.odometer * (1.0 + x[1])
-        noise = p.odometer_deviation**2 * p.odometer_period * (1.0 + x[1]) ** 2
+        speed = u.odometer * (1.0 + x[SCALE])
+        noise = p.odometer_deviation**2 * p.odometer_period * (1.0 + x[SCALE]) ** 2
         plant = Plant(np.zeros((1, 1)), u.odometer, np.reshape(u.odometer, (1, 1)), C, noise * DISTURBED)
         gains = self._gains(adaptation, p)
-        c = x[0] - x[self.own_count - 3]
+        c = x[P] - x[PREDICTED]
         drift = error_drift(plant, gains, SIZES, True)
         return np.hstack(
             [
                 speed - gains.total[0, 0] * c,
+                speed - gains.output[0, 0] * c,
                 -gains.constants[0, 0] * c,
                 *adaptation_flow(adaptation, plant, gains, drift, p.mu, p, SIZES),
-                speed - gains.output[0, 0] * c,
             ]
         )
 
@@ -138,27 +138,26 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
         used = x[self.own_count - 2]
         first = np.where(used > 0.0, 0.0, 1.0)
         covariance, variance = self._adaptation(x).covariance, p.balise_deviation**2
-        told = u.balise_position - p.reading_age * u.odometer * (1.0 + x[1])
+        told = u.balise_position - p.reading_age * u.odometer * (1.0 + x[SCALE])
         quickest = x[R] / (1.0 + x[R] * x[L] ** 2 / QUICKEST)
-        later = (x[0], x[1], quickest, x[L], x[L], x[INVERSE_S], x[EXCITATION])
-        begun = (told, x[1], p.first_gain, 0.0, 0.0, x[INVERSE_S], 0.0)
+        later = (x[P], told, x[SCALE], quickest, x[L], x[L], x[INVERSE_S], x[EXCITATION])
+        begun = (told, told, x[SCALE], p.first_gain, 0.0, 0.0, x[INVERSE_S], 0.0)
         moved = packed(covariance_after(covariance, C, 0, variance, SIZES, True), SIZES.error)
         known = packed(variance * SAME_PLACE + covariance[1, 1] * OF_SCALE, SIZES.error)
         return vector(
             *(np.where(first > 0.0, new, old) for new, old in zip(begun, later, strict=True)),
             *(np.where(first > 0.0, known[i], moved[i]) for i in range(6)),
-            told,
             used + 1.0,
-            x[0] - told,
+            x[P] - told,
         )
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """Position, speed and wheel radius with their uncertainty."""
         adaptation = self._adaptation(x)
         V = adaptation.covariance
-        scale = 1.0 + x[1]
+        scale = 1.0 + x[SCALE]
         return {
-            "position": x[0] + p.reading_age * u.odometer * scale,
+            "position": x[P] + p.reading_age * u.odometer * scale,
             "speed": u.odometer * scale,
             "innovation": x[self.own_count - 1],
             "position_deviation": _root(V[0, 0]),
@@ -173,8 +172,8 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
         return u.odometer
 
     def own_bound(self, x: Array, p: Any) -> Array:
-        """Three standard deviations of the position [m]."""
-        return SPREADS * _root(self._adaptation(x).covariance[0, 0])
+        """One standard deviation of the position [m]; the gate adds three times the recent innovation."""
+        return _root(self._adaptation(x).covariance[0, 0])
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate of the observer that knows the wheel radius, ``d e = -mu c``, ``d c = -mu c``, ``c = e`` at a
@@ -191,7 +190,7 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
     # -- internals --------------------------------------------------------------------------------------------------
 
     def _adaptation(self, x: Array) -> Adaptation:
-        return adaptation_of(x[2:], C, SIZES)[0]
+        return adaptation_of(x[ADAPTATION:], C, SIZES)[0]
 
     def _gains(self, adaptation: Adaptation, p: Any) -> Gains:
         return gains_of(adaptation, C, learnt_constants(adaptation.excitation, p.least_excitation, 1))

@@ -7,15 +7,22 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.certificates import Certificate, GapError, decaying_error
+from fmu_observer.certificates import Certificate, GapError, decaying_error, first_unstable_gap
 from fmu_observer.design.certified_gains import certified_gains
+from fmu_observer.design.sampled_gain_bounds import decay_bounds
+from fmu_observer.limits import Limit, PrintedBound, Trial
+from fmu_observer.models.model import shift_matrix
 from fmu_observer.observers.innovation_decay import ELAPSED, decay_parameters, innovation_left
-from fmu_observer.observers.parameter_values import Value
+from fmu_observer.observers.parameter_values import Value, parameter_values
 from fmu_observer.observers.train.high_gain import correction
-from fmu_observer.observers.train.high_gain_observer import HighGainTrainObserver
-from plant_models.hybrid import Signal, memory, vector
+from fmu_observer.observers.train.high_gain_observer import TOP_SPEED, HighGainTrainObserver
+from fmu_observer.observers.train.train_observer import POSITION, SPEED
+from fmu_observer.observers.train.train_resistance import drag_slope_range
+from plant_models.hybrid import Signal, memory, scalar_names, vector
 from plant_models.hybrid.system import Array
 
+TRIAL_SPEED, TRIAL_ERROR = 20.0, 5.0  # [m/s], [m] of the start; a tenth of it in m/s
+LONGEST_HOLE = 100.0  # [s]
 DECAY_OVER_THETA = 1.25  # [ours]; at a = 0.5 and K = (2, 1) 85 % of a position error seen is corrected
 
 
@@ -84,3 +91,43 @@ class DecayingInnovationCdo(HighGainTrainObserver):
         gain = np.array(correction(float(p.theta), p.high_gain, 1.0), dtype=float)[:, None]
         rate, exponent = float(p.decay_rate), float(p.decay_exponent)
         return decaying_error(np.array(drift), gain, np.array([[1.0, 0.0]]), rate, exponent, (0, 1))
+
+    def limits(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> tuple[Limit, ...]:
+        """How long a hole may last: (3.109), the exact limit, and a trial beside a train at 20 m/s.
+
+        Args:
+            parameters: values by name that replace those of the preset. preset: to start from; None for the default.
+
+        Raises:
+            ValueError: a parameter is unknown, not finite or of another size, or the preset is unknown.
+        """
+        values = parameter_values(self, parameters, preset, "to judge")
+        p = self.unpack_parameters(values)
+        exact = first_unstable_gap(self.vertices(p), LONGEST_HOLE)
+        high = min(2.0 * exact, LONGEST_HOLE)
+        K, slope = np.array(p.high_gain, dtype=float)[:, None], float(max(drag_slope_range(p, 0.0, TOP_SPEED)))
+        printed = decay_bounds(shift_matrix(2), K, np.eye(1, 2), float(p.theta), float(p.decay_rate), slope).longest_gap
+        premise = f"tau_MASP, sigma to zero, if theta is above 1 1/s; L = {slope:.3g} 1/s, the steepest drag slope"
+        effort = float(p.davis_a + p.davis_b * TRIAL_SPEED + p.davis_c * TRIAL_SPEED**2)
+        known = dict(zip(scalar_names(self.parameter_signals), map(float, values), strict=True))
+        trial = Trial(
+            system=self,
+            varied="period",
+            low=high / 50.0,
+            high=high,
+            event="balise",
+            payload=lambda t: {"position": TRIAL_SPEED * t},
+            inputs=lambda t: {"effort": effort + 0.0 * t, "odometer": TRIAL_SPEED + 0.0 * t},
+            truth=lambda t: {"position": TRIAL_SPEED * t, "speed": TRIAL_SPEED + 0.0 * t},
+            settings={**known, POSITION.name: TRIAL_ERROR, SPEED.name: TRIAL_SPEED + 0.1 * TRIAL_ERROR},
+            stop=30.0 * high,
+        )
+        return (
+            Limit(
+                "gap between balises",
+                printed=(PrintedBound(printed, premise, "Hann 2014, (3.109)"),),
+                exact=exact,
+                exact_test="first gap at which the error grows from balise to balise, at the drag slope of one speed",
+                trial=trial,
+            ),
+        )

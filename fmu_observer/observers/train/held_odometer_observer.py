@@ -14,7 +14,15 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from fmu_observer.bounds import ErrorBounds
-from fmu_observer.bounds.carried import PACKED, decay_proven, first_component, level_of_box, level_squared, unpacked
+from fmu_observer.bounds.carried import (
+    PACKED,
+    decay_proven,
+    first_component,
+    level,
+    level_of_box,
+    level_squared,
+    unpacked,
+)
 from fmu_observer.bounds.formulas import improved_dmo_bound
 from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampled_error, with_switching_noted
 from fmu_observer.observers.parameter_values import Value, parameter_values
@@ -29,7 +37,7 @@ Missing = Literal["predicted", "held"]
 
 # own states: estimates and bounds, filtered slip, memory
 LEVEL, POSITION_BOUND = 4, 5
-HELD_SPEED, HELD_TIME, HELD_ERROR, STARTED, PREDICTING, LAST_INNOVATION = 7, 8, 9, 10, 11, 12
+HELD_SPEED, HELD_TIME, HELD_ERROR, STARTED, PREDICTING, LAST_INNOVATION, LAST_D, LAST_RATE = range(7, 15)
 
 REPAIRED = HELD_ODOMETER_PRESETS["repaired"]
 PROOF = (
@@ -45,6 +53,8 @@ class HeldOdometerObserver(TrainObserver):
     ``y_k`` of the last sample, held, and ``w`` the Davis resistance, ``k1 = gain[1] + gain_schedule (b + c z) / m`` and
     z the speed that a subclass gives. The position is the integral of the speed; at a balise it is set to that of the
     balise. A sample at which the input `odometer_fault` is 1 is not used, and the option `missing` says what then.
+    A disturbance that brakes is dry friction on the speed, as the Davis constant and the brake are: it stops the
+    observed train and never pushes it back. For a speed above zero that is the equation above.
 
     The error obeys ``de = (A - K C) e + K (v(t) - y_k) + w``: the motion since the sample drives it, so it does not
     vanish while the train accelerates, and three bounds of it run as outputs.
@@ -52,7 +62,8 @@ class HeldOdometerObserver(TrainObserver):
     1. `published_bound`: i-DMO or i-CDO, from each sample on, with the error there stated by `published_sample_error`.
     2. `carried_bound` [ours]: the level ``W = sqrt(e' P e)``, carried over samples, no sample needs a statement of its
        own. It covers accelerations up to `acceleration_max`, readings wrong by `odometer_error`, unknown parts of the
-       acceleration up to `unknown_acceleration`, of its rate and of the rate of that.
+       acceleration up to `unknown_acceleration`, of its rate and of the rate of that. What the observer itself does
+       to its estimate beside the equation above is known, and is added to the level.
     3. `error_bound` [ours]: the lesser of the carried bound and of the reading itself, which is
        ``|y_k - v_estimated| + odometer_error + acceleration_max (t - t_k)`` and needs neither model nor gain. Where the
        train may stand still only the latter counts, for there the disturbance jumps by the brake's effort.
@@ -63,6 +74,9 @@ class HeldOdometerObserver(TrainObserver):
         missing: what becomes of the estimate after a sample that is not used, until the next one that is: ``predicted``
             by the model and the disturbance alone [ours], ``held`` to the last reading that was used, as in the thesis.
             Held, the estimate is drawn to an old speed; predicted, it goes on, and `published_bound` does not apply.
+            To predict, d and d' are set back to the sample before, for the last reading that was used may have lied
+            already, and limited to `disturbance_max` and `disturbance_rate_max`; from there on d' decays,
+            ``d d' = -d' / rate_decay_time``, so that d goes on by ``d' rate_decay_time`` at most, however long.
 
     Raises:
         ValueError: another word for `missing`.
@@ -104,6 +118,8 @@ class HeldOdometerObserver(TrainObserver):
         memory("sampled_once", "1", 0.0, "1 after the first sample"),
         memory("predicting", "1", 0.0, "1 while no reading acts on the estimate"),
         memory("last_innovation", "m", 0.0, "Position error seen at the last balise"),
+        memory("last_disturbance", "m/s2", 0.0, "Disturbance at the last sample that was used"),
+        memory("last_disturbance_rate", "m/s3", 0.0, "Its rate then"),
     )
     estimator_parameters = (
         parameter("odometer_period", "s", 0.2, "Sampling period of the odometer", min=1e-4),
@@ -114,8 +130,9 @@ class HeldOdometerObserver(TrainObserver):
         parameter("unknown_acceleration", "m/s2", 0.05, "Largest unknown part of the acceleration", min=0.0),
         parameter("unknown_jerk", "m/s3", 0.0, "Largest unknown part of the disturbance's rate", min=0.0),
         parameter("unknown_jerk_rate", "m/s4", 0.05, "Largest second derivative of the disturbance", min=0.0),
-        parameter("disturbance_max", "m/s2", 2.0, "Largest disturbance, for the level at the start", min=0.0),
-        parameter("disturbance_rate_max", "m/s3", 1.0, "Largest rate of it, for the level at the start", min=0.0),
+        parameter("disturbance_max", "m/s2", 2.0, "Largest disturbance, at the start and to predict with", min=0.0),
+        parameter("disturbance_rate_max", "m/s3", 1.0, "Largest rate of it, likewise", min=0.0),
+        parameter("rate_decay_time", "s", 1.0, "Time in which the rate decays while speed is predicted", min=1e-3),
         parameter("start_speed_error", "m/s", 50.0, "Largest speed error before the first sample", min=0.0),
         parameter("start_position_error", "m", 0.0, "Largest position error at the start", min=0.0),
         parameter("lyapunov_matrix", "1", REPAIRED["lyapunov_matrix"], "P: 11, 12, 13, 22, 23, 33", size=PACKED),
@@ -159,19 +176,29 @@ class HeldOdometerObserver(TrainObserver):
         speed, predicting = x[1], x[PREDICTING] > 0.0
         residual = np.where(predicting, 0.0, x[HELD_SPEED] - speed)
         traction = np.maximum(u.effort, 0.0)  # a negative effort is a brake: see friction
-        acceleration = (traction - rolling_drag(speed, p)) / p.mass - x[2]
+        free = (traction - rolling_drag(speed, p)) / p.mass - np.minimum(x[2], 0.0)  # what brakes: see friction
+        acceleration = free + first_gain(self.scheduling_speed(x), p) * residual
         told = self.error_bound(t, x, p)
         # Without a reading it is the error itself that K is missing: (A) e = (A - K C) e + K C e.
         driving = np.where(predicting, told, self._since_reading(t, x, p))
         reading = self.largest_gain_level(x, p) * driving
+        decay = np.where(predicting, x[3] / p.rate_decay_time, 0.0)
+        # What holds an estimate at standstill, beyond what stops it, is no part of the equations of the error.
+        holding = np.maximum(self.friction(t, x, u, p)[0] - acceleration, 0.0)
+        own = level(p.lyapunov_matrix, np.where(speed > 0.0, 0.0, holding), 0.0, 0.0)
+        own = own + level(p.lyapunov_matrix, 0.0, 0.0, decay)
         return (
             speed,
-            acceleration + first_gain(self.scheduling_speed(x), p) * residual,
+            acceleration,
             x[3] + p.gain[1] * residual,
-            p.gain[2] * residual,
-            reading + _unknown_level(p) - p.bound_decay * x[LEVEL],
+            p.gain[2] * residual - decay,
+            reading + _unknown_level(p) + own - p.bound_decay * x[LEVEL],
             told,
         )
+
+    def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Davis constant, brake, and a disturbance that brakes [m/s2], shape (1,)."""
+        return super().friction(t, x, u, p) + np.maximum(x[2], 0.0)
 
     def estimate(self, x: Array, u: Any, p: Any) -> Estimate:
         """Position, speed, the effort in place of the adhesion force, and the innovation of the last balise."""
@@ -208,26 +235,36 @@ class HeldOdometerObserver(TrainObserver):
             kept = (x[i] for i in range(1, POSITION_BOUND))
             rest = (x[i] for i in range(POSITION_BOUND + 1, LAST_INNOVATION))
             accuracy = np.maximum(u.balise_location_accuracy, 0.0)
-            return vector(u.balise_position, *kept, accuracy, *rest, x[0] - u.balise_position)
+            return vector(u.balise_position, *kept, accuracy, *rest, x[0] - u.balise_position, x[LAST_D], x[LAST_RATE])
         first = 1.0 - x[STARTED]
         usable = np.where(u.odometer_fault > 0.5, 0.0, 1.0)
         taken = np.maximum(usable, first)
         # Without any reading the estimate stands for it, wrong by as much as is stated for the start.
         reading = np.where(usable > 0.0, u.odometer, x[1])
         wrong = np.where(usable > 0.0, p.odometer_error, p.start_speed_error)
-        disturbance, rate = np.abs(x[2]) + p.disturbance_max, np.abs(x[3]) + p.disturbance_rate_max
-        assumed = level_of_box(p.lyapunov_matrix, np.abs(reading - x[1]) + wrong, disturbance, rate)
+        box = (np.abs(x[2]) + p.disturbance_max, np.abs(x[3]) + p.disturbance_rate_max)
+        assumed = level_of_box(p.lyapunov_matrix, np.abs(reading - x[1]) + wrong, *box)
         carries = (1.0 - first) * self._moves(t, x, p)
         known = np.where(carries > 0.0, np.minimum(x[LEVEL], assumed), assumed)
         held = (reading, t, wrong, 1.0)
+        predicts = (1.0 - usable) if self.missing == "predicted" else 0.0 * usable
+        begins = predicts * x[STARTED] * (1.0 - x[PREDICTING])
+        d = np.where(begins > 0.0, np.clip(x[LAST_D], -p.disturbance_max, p.disturbance_max), x[2])
+        rate = np.where(begins > 0.0, np.clip(x[LAST_RATE], -p.disturbance_rate_max, p.disturbance_rate_max), x[3])
+        moved = level(p.lyapunov_matrix, 0.0, d - x[2], rate - x[3])
         return vector(
-            *(x[i] for i in range(LEVEL)),
-            np.where(taken > 0.0, known, x[LEVEL]),
+            x[0],
+            x[1],
+            d,
+            rate,
+            np.where(taken > 0.0, known, x[LEVEL] + moved),
             np.where(first > 0.0, p.start_position_error, x[POSITION_BOUND]),
             x[POSITION_BOUND + 1],
             *(np.where(taken > 0.0, new, x[HELD_SPEED + i]) for i, new in enumerate(held)),
-            (1.0 - usable) if self.missing == "predicted" else 0.0 * usable,
+            predicts,
             x[LAST_INNOVATION],
+            np.where(usable > 0.0, d, x[LAST_D]),
+            np.where(usable > 0.0, rate, x[LAST_RATE]),
         )
 
     def requirements(self, p: Any) -> dict[str, Array]:

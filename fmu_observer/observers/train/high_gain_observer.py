@@ -79,6 +79,10 @@ class HighGainTrainObserver(TrainObserver):
         theta = float(getattr(p, self.theta_name))
         return SampledError.of(drift, correction(theta, p.high_gain, 1.0), theta * float(p.high_gain[0]))
 
+    def vertices(self, p: Any) -> tuple[GapError, ...]:
+        """Error equations at the smallest and the largest drag slope of the speed range."""
+        return tuple(self.vertex_error([[0.0, 1.0], [0.0, -s]], p) for s in drag_slope_range(p, 0.0, TOP_SPEED))
+
     def estimator_flow(self, t: Array, x: Array, u: Any, p: Any) -> tuple[Array, ...]:
         """Derivatives of position, speed, innovation and first stage."""
         theta = self.theta_in_force(x, p)
@@ -115,8 +119,7 @@ class HighGainTrainObserver(TrainObserver):
         """Certificate of ``de = [[0, 1], [0, -s]] e - theta inv(Delta) K eta`` for all drag slopes s of the speed
         range.
         """
-        slopes = drag_slope_range(p, 0.0, TOP_SPEED)
-        vertices = tuple(self.vertex_error([[0.0, 1.0], [0.0, -s]], p) for s in slopes)
+        vertices = self.vertices(p)
         model = (
             f"position and speed error with the drag slope (b + 2 c v)/M at 0 and {TOP_SPEED:g} m/s, constant over a "
             f"gap; "

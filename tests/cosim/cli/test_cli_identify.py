@@ -87,3 +87,10 @@ def test_a_table_without_a_speed_and_an_fmu_without_an_input(
     assert "Say --speed NAME; there are: b, c" in capsys.readouterr().err
     assert main(["identify", "davis", str(tmp_path / "x.fmu")]) == 2
     assert "say by which input and how hard" in capsys.readouterr().err
+
+
+def test_a_table_without_rows_is_told_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "head.csv"
+    path.write_text("time [s],speed [m/s]\n")
+    assert main(["identify", "davis", str(path)]) == 2
+    assert "has no rows" in capsys.readouterr().err

@@ -32,9 +32,9 @@ SIGNALS = ("listener.estimate", "listener.first", "listener.second", "listener.p
 
 @pytest.mark.parametrize("network", [{"delay": 0.05}, {}, ROUGH | {"duplicate_fraction": 0.3}])
 def test_the_communication_step_does_not_matter(network: dict[str, Any]) -> None:
-    runs = [run(step, **network) for step in (0.001, 0.01, 0.1)]
+    runs = [run(step, stop=0.8, **network) for step in (0.001, 0.01, 0.1)]
     values = [of(outcome, *SIGNALS) for outcome in runs]
-    # the ramp is integrated in parts of other lengths: rounding, of some 2000 additions
+    # the ramp is integrated in parts of other lengths: rounding, of some 1000 additions
     np.testing.assert_allclose(values[1:], [values[0]] * 2, rtol=0.0, atol=1e-12)
     packets = [outcome.result.packets for outcome in runs]
     assert [(p.stamp, p.node, p.kind, p.outcomes) for p in packets[0]] == [
@@ -172,6 +172,24 @@ def test_steps_that_are_done_again_send_the_same_packets() -> None:
         (p.stamp, p.delivered_at, p.kind) for p in once.result.packets
     ]
     np.testing.assert_allclose(of(halved, *SIGNALS), of(once, *SIGNALS), atol=1e-12)
+
+
+@pytest.mark.parametrize("master", [{"algorithm": "jacobi"}, {"inputs": "interpolate"}, {"events": "local"}])
+def test_every_master_gives_the_same(master: dict[str, str]) -> None:
+    other = scenario(0.02, stop=0.5, **ROUGH).master(**master).run(warn=lambda _: None)
+    usual = run(0.02, stop=0.5, **ROUGH)
+    np.testing.assert_allclose(of(other, *SIGNALS), of(usual, *SIGNALS), atol=1e-12)
+    assert [repr(p) for p in other.result.packets] == [repr(p) for p in usual.result.packets]
+
+
+def test_a_source_with_steps_of_its_own_is_told_of() -> None:
+    slow = scenario(0.02, stop=0.5)
+    slow._data["components"]["source"]["every"] = 5
+    said: list[str] = []
+    outcome = slow.run(warn=said.append)
+    assert any("source takes whole steps: packets sent between two of its points" in text for text in said)
+    late = [p.stamp - p.values["source.ramp_value"] for p in outcome.result.packets if p.node == "rear"]
+    assert 0.0 <= min(late) <= max(late) <= 0.1  # at most a step of its own old
 
 
 @pytest.mark.parametrize("protocol", ["round-robin", "try-once-discard"])

@@ -20,6 +20,7 @@ from cosim.evaluation.fault_detection import (
 )
 from cosim.evaluation.fault_table import HEADINGS, cells, fault_text
 from cosim.evaluation.spec import ReportSpec
+from cosim.report.figures.fault_figure import BoundsPanel, FaultsPanel
 from cosim.report.page.run_tables import faults_table
 from cosim.results.result import BaliseRecord, Result
 from cosim.scenario.outcome import Outcome
@@ -131,3 +132,32 @@ def test_they_are_measures_of_a_sweep() -> None:
     assert measures["alone.balise_error"] == pytest.approx(3.0)
     assert "alone.missed_faults" not in measures
     assert (measure_unit("o.detection_delay"), measure_unit("o.missed_faults")) == ("s", "1")
+
+
+def test_figure_of_faults_has_a_row_for_the_truth_and_one_for_each_observer_that_tells() -> None:
+    result = made([(10.0, 13.0)], [(10.4, 13.2), (60.0, 61.0)])
+    assert FaultsPanel.available(result, SPEC)
+    assert not FaultsPanel.available(result, replace(SPEC, true_fault=None))
+    axes = FaultsPanel.draw(result, replace(SPEC, labels={"o": "Ours"}), None)
+    assert [text.get_text() for text in axes.get_yticklabels()] == ["odometer lies", "Ours"]
+    truth, told = (path.get_paths() for path in axes.collections)
+    assert [(p.vertices[:, 0].min(), p.vertices[:, 0].max()) for p in truth] == [(10.0, 13.0)]
+    assert [(p.vertices[:, 0].min(), p.vertices[:, 0].max()) for p in told] == [(10.4, 13.2), (60.0, 61.0)]
+    assert axes.get_xlabel() == "Time [s]"
+
+
+def test_figure_of_bounds_holds_error_and_bound_of_observers_that_tell_one() -> None:
+    t = np.arange(0.0, 10.0, 0.5)
+    names = ("time", "train.speed", "o.speed", "o.error_bound", "alone.speed")
+    table = np.zeros(len(t), [(name, "f8") for name in names])
+    table["time"], table["train.speed"], table["alone.speed"] = t, 10.0, 99.0
+    table["o.speed"], table["o.error_bound"] = 10.0 - 0.1 * t, 0.2 + 0.1 * t
+    result, spec = Result(table, [], []), replace(SPEC, true_speed="train.speed", labels={"o": "Ours"})
+    assert BoundsPanel.available(result, spec)
+    assert not BoundsPanel.available(result, SPEC)
+    axes = BoundsPanel.draw(result, spec, None)
+    curves = {str(line.get_label()): line.get_ydata() for line in axes.get_lines()}
+    assert set(curves) == {"Ours: error", "Ours: bound"}
+    np.testing.assert_allclose(np.asarray(curves["Ours: error"], float), 0.1 * t, atol=1e-12)
+    assert axes.get_ylim() == pytest.approx((1.15e-3, 1.3 * 1.15))
+    assert axes.get_ylabel() == "|Speed error| [m/s]"

@@ -27,13 +27,14 @@ from cosim.report.figures.gap_figure import GapErrorsPanel, GapsPanel, certified
 from cosim.report.figures.main_picture import main_picture
 from cosim.report.figures.panel import Panel
 from cosim.report.figures.panels import draw_all, panels
+from cosim.report.figures.run_figures import adhesion_figure, slip_figure
 from cosim.report.figures.zooms import ZOOM_KEYS
 from cosim.report.page.render import first_sentence
 from cosim.report.page.report import report_page, write_report
 from cosim.results.folder import read_results, write_results
 from cosim.results.result import Result
 
-PANELS = panels()
+PANELS = [panel for panel in panels() if panel.available(synthetic_result(), synthetic_spec())]
 VOID = {"meta", "img", "br", "hr", "link", "input"}
 
 
@@ -162,6 +163,35 @@ def test_observers_differ_in_colour_and_in_dashes() -> None:
         == len({str(line["linestyle"]) for line in lines})
         == len(OBSERVERS)
     )
+
+
+def test_more_observers_than_colours_still_look_different() -> None:
+    names = [f"observer_{i}" for i in range(12)]
+    lines = [observer_line(names, name) for name in names]
+    assert len({(to_hex(line["color"]), str(line["linestyle"])) for line in lines}) == len(names)
+    colours = [to_hex(line["color"]) for line in lines]
+    assert colours[:6] == colours[6:]
+
+
+def test_a_locked_wheel_does_not_squash_the_slip_of_the_others() -> None:
+    wild = synthetic_result()
+    for observer in OBSERVERS:
+        wild.table[f"{observer}.slip"][len(wild.table) // 2 :] = -43.0
+    low, high = slip_figure(wild, replace(synthetic_spec(), true_slip=None)).get_ylim()
+    assert -150.0 < low < high < 150.0
+
+
+def test_a_force_that_does_not_change_is_drawn_without_an_offset() -> None:
+    """Rounding of 1e-13 is no curve."""
+    still = synthetic_result()
+    for name in still.table.dtype.names or ():
+        if name.endswith("adhesion_force"):
+            still.table[name] = -0.8 + 1e-13 * np.sin(still.time)
+    axes = adhesion_figure(still, synthetic_spec())
+    low, high = axes.get_ylim()
+    assert high - low > 1e-8
+    png(axes.figure)
+    assert axes.yaxis.get_offset_text().get_text() == ""
 
 
 def test_equal_runs_give_equal_bytes(result: Result) -> None:

@@ -13,7 +13,7 @@ SPEEDS = {"HS": 45.0, "AS": 30.0, "LS": 17.0}
 
 def test_every_case_accelerates_holds_and_brakes() -> None:
     scenario = Scenario.load("validation_campaign")
-    assert len(scenario.cases) == 12
+    assert len(scenario.cases) == 13
     for run in scenario.vary({"case": list(scenario.cases)}).run().runs:
         assert run.outcome is not None
         assert run.failure is None

@@ -1,0 +1,110 @@
+"""Figures of the faults of the odometer: when it lies and who says so, and speed errors beside their bounds."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from cosim.drawing.style import MARK, axes_or_new, observer_line, styled
+from cosim.evaluation.fault_detection import DETECTION, intervals
+from cosim.evaluation.roles import estimate, label, recorded
+from cosim.evaluation.spec import ReportSpec
+from cosim.report.figures.drawing import curve, legend_above, time_axis
+from cosim.report.figures.panel import Panel, any_estimate
+from cosim.report.figures.scales import bounded
+from cosim.results.result import Result
+
+BOUND = "error_bound"
+ROW, REST = 0.38, 0.9  # height of the row of an observer, and of all that is not a row [inch]
+DECADES = 1e3  # from the bottom of the axis to the largest error or bound
+FILLED = 0.7  # share of a row that its bar fills
+
+
+@styled
+def fault_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
+    """Bars against time where the odometer lies, and below them one row an observer where it says so.
+
+    Args:
+        result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
+
+    Returns:
+        The axes.
+    """
+    told = {o: v for o in spec.observers if (v := estimate(result, o, DETECTION)) is not None}
+    true = recorded(result, spec.true_fault)
+    rows = [("odometer lies", MARK, true)] if true is not None else []
+    rows += [(label(spec, o), observer_line(spec.observers, o)["color"], v) for o, v in told.items()]
+    ax = axes_or_new(ax, (8.2, REST + ROW * len(rows)))
+    for place, (_, colour, values) in enumerate(rows):
+        bars = [(start, end - start) for start, end in intervals(result.time, values)]
+        ax.broken_barh(bars, (place - FILLED / 2, FILLED), facecolor=colour, edgecolor=colour, linewidth=0.6)
+    ax.set_yticks(range(len(rows)), [text for text, _, _ in rows])
+    ax.set_ylim(max(len(rows), 1) - 0.5, -0.5)  # the first row on top
+    time_axis(ax, result)
+    return ax
+
+
+@styled
+def bound_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
+    """Magnitude of the speed error in m/s and the bound that its observer tells, against time,
+    on a logarithmic axis.
+
+    Args:
+        result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
+
+    Returns:
+        The axes.
+    """
+    ax = axes_or_new(ax)
+    true = recorded(result, spec.true_speed)
+    largest = 0.0
+    for observer in spec.observers:
+        bound, speed = estimate(result, observer, BOUND), estimate(result, observer, "speed")
+        if bound is None or speed is None or true is None:
+            continue
+        line, text = observer_line(spec.observers, observer), label(spec, observer)
+        thin = line | {"linewidth": 0.8, "alpha": 0.6}
+        for kind, values, look in (("error", np.abs(speed - true), line), ("bound", bound, thin)):
+            curve(ax, result.time, bounded(values), None, label=f"{text}: {kind}", **look)
+            largest = max(largest, float(np.max(bounded(values[np.isfinite(values)]), initial=0.0)))
+    if largest > 0.0:
+        ax.set_yscale("log")
+        ax.set_ylim(largest / DECADES, 1.3 * largest)
+    ax.set_ylabel("|Speed error| [m/s]")
+    time_axis(ax, result)
+    legend_above(ax)
+    return ax
+
+
+class FaultsPanel(Panel):
+    """Faults of the odometer."""
+
+    name = "faults"
+    title = "Faults of the odometer"
+    caption = "When the odometer lies, and when each observer says so."
+    place = 3.4
+
+    @staticmethod
+    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
+        return fault_figure(result, spec, ax)
+
+    @staticmethod
+    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
+        return any_estimate(result, spec, DETECTION) and recorded(result, spec.true_fault) is not None
+
+
+class BoundsPanel(Panel):
+    """Bounds of the speed error."""
+
+    name = "bounds"
+    title = "Speed error and its bound"
+    caption = "Magnitude of the speed error (thick), and the bound that the observer tells at each instant (thin)."
+    place = 3.6
+
+    @staticmethod
+    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
+        return bound_figure(result, spec, ax)
+
+    @staticmethod
+    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
+        return any_estimate(result, spec, BOUND) and recorded(result, spec.true_speed) is not None
