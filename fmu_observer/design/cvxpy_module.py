@@ -1,7 +1,8 @@
-"""The one place where cvxpy, the extra `lmi`, is loaded: by designs by linear matrix inequalities, when they solve."""
+"""The one place where cvxpy, the extra `lmi`, is loaded and run: by designs by linear matrix inequalities."""
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 
@@ -19,3 +20,18 @@ def load_cvxpy(purpose: str) -> Any:
     except ImportError as error:
         raise ImportError(f"{purpose} needs cvxpy: pip install 'fmu-observer[lmi]'.") from error
     return cvxpy
+
+
+def solved(cp: Any, question: Any, **settings: float) -> bool:
+    """Whether the cone solver left numbers behind; whoever asks recomputes them.
+
+    Args:
+        cp: the module cvxpy. question: a problem of it. settings: of the solver.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # "may be inaccurate": every number is checked anyway
+        try:
+            question.solve(solver="CLARABEL", **settings)
+        except cp.error.SolverError:
+            return False
+    return question.status in ("optimal", "optimal_inaccurate")

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
-from scipy.integrate import solve_ivp
+from shared.sampled_braking import W1, W2, braking
 from shared.sheet import Sheet
 
-from fmu_observer.bounds import improved_dmo_bound
 from fmu_observer.design.proposition_4_1 import InfeasibleDesign, design_proposition_4_1, train_vertices
 from fmu_observer.observers.train import DiscreteMeasurementObserver
-from plant_models.hybrid import Runtime, scalar_names
 
-W0, W1, W2, C = 0.0852, 0.04, -5e-5, (1.0, 0.0, 0.0)  # set C
-TAU, XI, SLOWEST = 0.2, 1.7, 1.0
+C = (1.0, 0.0, 0.0)
 TABLE = {  # m, alpha: beta, average bound e_v of the DMO; None without a solution
     (0.1, 100): (1.91, 0.59),
     (0.1, 10): (1.9, 0.44),
@@ -57,48 +54,20 @@ def designs(sheet: Sheet) -> None:
 
 def averages(sheet: Sheet) -> None:
     """Mean of the i-DMO bound at the end of each period, with the error of its sample known, and of the estimates."""
+    observer = DiscreteMeasurementObserver()
     for (m, alpha), cell in TABLE.items():
         if cell is not None:
-            bound, _, _ = braking(preset(m, alpha))
+            bound = float(braking(observer, preset(m, alpha)).bounds.mean())
             words = f"average bound, m {m:g} 1/s, alpha {alpha:g}, brake -1 m/s2"
             sheet.add(words, "m/s", cell[1], bound, PROFILE, independent=AVERAGE[m, alpha])
-    bound, estimate, unknown = braking(preset(0.1, 4))
+    found = braking(observer, preset(0.1, 4))
+    estimate, unknown = float(found.speed[1:].mean()), float(found.disturbance[1:].mean())
     sheet.add("relative error of the speed, m 0.1 1/s, alpha 4", "1", 0.04, estimate, PROFILE, independent=0.03)
     sheet.add("relative error of the disturbance, m 0.1 1/s, alpha 4", "1", 2.0, unknown, PROFILE)
 
 
 def preset(m: float, alpha: float) -> str:
     return f"m_{m:g}_alpha_{alpha:g}".replace(".", "_")
-
-
-def braking(name: str, brake: float = -1.0) -> tuple[float, float, float]:
-    """Average bound [m/s], relative error of speed and of disturbance [1], from 14 m/s down to 1 m/s (4.3.4)."""
-    observer = DiscreteMeasurementObserver()
-    numbers = observer.error_bounds(preset=name)
-    runtime = Runtime(observer)
-    runtime.p[:] = observer.start_parameters(name)
-    names = scalar_names(observer.input_signals)
-    motion = solve_ivp(
-        lambda _, v: brake - W0 - W1 * v - W2 * v * v, (0.0, 20.0), [14.0], rtol=1e-9, atol=1e-10, dense_output=True
-    )
-    runtime.x[1:4] = 14.1, 0.0, 0.0
-    runtime.u[names.index("effort")] = brake
-    bounds, estimate, unknown = [], [], []
-    for k in range(100):
-        v = float(motion.sol(TAU * k)[0])
-        d, rate = W0 + W2 * v * v, 2.0 * W2 * v * (brake - W0 - W1 * v - W2 * v * v)
-        if v < SLOWEST:
-            break
-        runtime.u[names.index("odometer")] = v
-        if k:
-            runtime.advance(TAU * k)
-            estimate.append(abs(runtime.x[1] - v) / v)
-            unknown.append(abs(runtime.x[2] - d) / abs(d))
-        else:
-            runtime.start(0.0)
-        error = np.linalg.norm(np.array([v, d, rate]) - runtime.x[1:4])
-        bounds.append(improved_dmo_bound(TAU, error, numbers.beta, numbers.m, numbers.gain, XI))
-    return float(np.mean(bounds)), float(np.mean(estimate)), float(np.mean(unknown))
 
 
 def main() -> None:

@@ -5,14 +5,13 @@ The only file of this room that uses cvxpy, the extra `lmi`.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from fmu_observer.design.cvxpy_module import load_cvxpy
+from fmu_observer.design.cvxpy_module import load_cvxpy, solved
 from fmu_observer.design.proposition_4_1.inequalities import Proposition41Problem, inequalities
 
 STRICTNESS = (1e-8, 1e-7, 1e-6)  # asked of every inequality, the least first: what is recomputed must be positive
@@ -96,7 +95,7 @@ def sharpest(drifts: np.ndarray, gain: np.ndarray, m: float) -> Iterator[tuple[n
         constraints.append(-(moved + moved.T) - 2.0 * m * P >> strict * np.eye(n))
     question = cp.Problem(cp.Minimize(cp.matrix_frac(np.eye(1, n)[0], P)), constraints)
     for strict.value in STRICTNESS:
-        if _run(cp, question):
+        if solved(cp, question):
             yield 0.5 * (P.value + P.value.T), str(question.status)
 
 
@@ -131,7 +130,7 @@ class _Question:
 
         def solve() -> Iterator[Candidate]:
             for self.strict.value in STRICTNESS:
-                if _run(cp, posed):
+                if solved(cp, posed):
                     matrix = 0.5 * (self.P.value + self.P.value.T)
                     found = self.gains
                     if found is None:
@@ -139,14 +138,3 @@ class _Question:
                     yield Candidate(matrix, found, float(goal.value), str(posed.status))
 
         return solve
-
-
-def _run(cp: Any, question: Any) -> bool:
-    """Whether the solver left numbers behind."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # "may be inaccurate": every number is checked anyway
-        try:
-            question.solve(solver="CLARABEL")
-        except cp.error.SolverError:
-            return False
-    return question.status in ("optimal", "optimal_inaccurate")

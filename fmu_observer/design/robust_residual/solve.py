@@ -5,15 +5,14 @@ The only file of this folder that uses cvxpy, the extra `lmi`.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import sqrt
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
-from fmu_observer.design.cvxpy_module import load_cvxpy
+from fmu_observer.design.cvxpy_module import load_cvxpy, solved
 from fmu_observer.design.robust_residual.inequalities import robustness, sensitivity
 from fmu_observer.design.robust_residual.problem import ResidualProblem
 
@@ -111,18 +110,3 @@ def sensitivity_candidates(problem: ResidualProblem, gains: np.ndarray) -> Itera
     for strict.value in (0.0, *STRICT):
         if solved(cp, question) and np.all(np.isfinite(P.value)):
             yield 0.5 * weight * (P.value + P.value.T), float(gamma2.value) * weight
-
-
-def solved(cp: Any, question: Any) -> bool:
-    """Whether the solver left numbers behind.
-
-    Args:
-        cp: the module cvxpy. question: a problem of it.
-    """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # "may be inaccurate": every number is checked anyway
-        try:
-            question.solve(solver="CLARABEL")
-        except cp.error.SolverError:
-            return False
-    return question.status in ("optimal", "optimal_inaccurate")

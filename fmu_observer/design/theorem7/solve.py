@@ -5,14 +5,13 @@ The only file that uses cvxpy, the extra `lmi`.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from fmu_observer.design.cvxpy_module import load_cvxpy
+from fmu_observer.design.cvxpy_module import load_cvxpy, solved
 from fmu_observer.design.theorem7.inequalities import Theorem7Problem, Unknowns, inequalities
 
 Gains = tuple[np.ndarray, np.ndarray]
@@ -68,7 +67,7 @@ def candidates(problem: Theorem7Problem, performance: bool, gains: Gains | None 
     else:
         question = cp.Problem(cp.Maximize(margin), [*constraints, cp.trace(unknowns.P) == problem.order])
     for strict.value, settings in ATTEMPTS if performance else ATTEMPTS[:1]:
-        if _run(cp, question, settings):
+        if solved(cp, question, **settings):
             candidate = _candidate(unknowns, gains, str(question.status))
             if candidate is not None:
                 yield candidate
@@ -88,17 +87,6 @@ def _unknowns(cp: Any, problem: Theorem7Problem, gains: Gains | None) -> Unknown
     return Unknowns(
         cp.Variable((n, n), **symmetric), cp.Variable((n, n), **symmetric), M, N, w1, w2, cp.Variable(), cp.Variable()
     )
-
-
-def _run(cp: Any, question: Any, settings: dict[str, float]) -> bool:
-    """Whether the solver left numbers behind."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # "may be inaccurate": every number is checked anyway
-        try:
-            question.solve(solver="CLARABEL", **settings)
-        except cp.error.SolverError:
-            return False
-    return question.status in ("optimal", "optimal_inaccurate")
 
 
 def _candidate(unknowns: Unknowns, gains: Gains | None, status: str) -> Candidate | None:

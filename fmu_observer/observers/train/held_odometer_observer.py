@@ -185,8 +185,8 @@ class HeldOdometerObserver(TrainObserver):
         decay = np.where(predicting, x[3] / p.rate_decay_time, 0.0)
         # What holds an estimate at standstill, beyond what stops it, is no part of the equations of the error.
         holding = np.maximum(self.friction(t, x, u, p)[0] - acceleration, 0.0)
-        own = level(p.lyapunov_matrix, np.where(speed > 0.0, 0.0, holding), 0.0, 0.0)
-        own = own + level(p.lyapunov_matrix, 0.0, 0.0, decay)
+        P = p.lyapunov_matrix
+        own = np.sqrt(P[0]) * np.where(speed > 0.0, 0.0, holding) + np.sqrt(P[5]) * np.abs(decay)
         return (
             speed,
             acceleration,
