@@ -149,6 +149,8 @@ def recording_scenario(scenario: Scenario, sides: Sides) -> Scenario:
     data |= {"certificates": "ignore", "expect": []}
     if sides.table.balises is not None and sides.table.balises.receivers is not None:
         data["balises"]["receivers"] = [name for name in sides.table.balises.receivers if name in sides.plant]
+    if sides.table.network is not None and sides.table.network.receivers is not None:
+        data["network"]["receivers"] = [name for name in sides.table.network.receivers if name in sides.plant]
     data["report"] = _roles(sides.table, sides.in_loop)
     return _scenario(scenario, data)
 
@@ -168,6 +170,9 @@ def playback_scenario(
     used = [link[0] for link in sources.values()] + [value for value in report.values() if isinstance(value, str)]
     watched = {} if balises is None else {k: v for k in ("position", "speed") if (v := getattr(balises, k)) is not None}
     used += watched.values()
+    network = table.network
+    travels = network is not None and (network.receivers is None or name in network.receivers)
+    used += network.signals if network is not None and travels else []
     wanted = dict.fromkeys(signal.partition(".")[0] for signal in used)
     if name in wanted and name in sides.in_loop:
         raise ScenarioError(f"{name}: listens to itself; a recording cannot take its place.")
@@ -193,6 +198,8 @@ def playback_scenario(
             "layout": "recorded",
             "file": str(folder.resolve()),
         }
+    if travels:
+        data["network"] = {**_table(network), "receivers": [name]}
     return _scenario(scenario, data)
 
 

@@ -82,7 +82,7 @@ class DecayingError(GapError):
     def transition(self, gap: float) -> np.ndarray:
         """Error just before the next sample from the error just before this one, Phi(gap), shape (n, n)."""
         with np.errstate(over="ignore", invalid="ignore"):  # an unstable error may leave the range of numbers
-            return self._closed(np.array([gap]), small_exponential(self.generator * gap)[None])[0]
+            return np.asarray(self._closed(np.array([gap]), small_exponential(self.generator * gap)[None])[0])
 
     def transitions(self, longest: float, count: int) -> tuple[np.ndarray, np.ndarray]:
         """Transitions at `count` equidistant gaps in (0, longest]: gaps of shape (count,), matrices of shape (count, n,

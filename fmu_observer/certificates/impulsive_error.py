@@ -90,11 +90,8 @@ class ImpulsiveError(GeneratorError):
         """zeta within a gap from what the reset before it read, at `count` + 1 instants from 0, shape (count + 1, N,
         n).
         """
-        start = np.eye(len(self.generator))[None]
-        return (
-            np.concatenate([start, matrix_powers(small_exponential(self.generator * longest / count), count)])
-            @ self.spread
-        )
+        powers = matrix_powers(small_exponential(self.generator * longest / count), count)
+        return np.asarray(np.concatenate([np.eye(len(self.generator))[None], powers]) @ self.spread)
 
     @property
     def size(self) -> int:

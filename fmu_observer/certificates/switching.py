@@ -53,7 +53,9 @@ class SwitchingError:
             )
         generators = np.stack([vertex.generator for vertex in known])
         middle = 0.5 * (generators.min(axis=0) + generators.max(axis=0))
-        return cls(known[0].moved(middle), generators - middle)
+        centre = known[0].moved(middle)
+        assert isinstance(centre, ImpulsiveError | DecayingError)
+        return cls(centre, generators - middle)
 
     def growth(self, P: np.ndarray, longest: float, gaps: np.ndarray) -> np.ndarray:
         """What changes within the gap add to ``V+ / V`` at most, V the quadratic function of `P`, over the gap [1/s].

@@ -195,6 +195,7 @@ def test_the_certified_function_falls_at_every_admissible_gap(
     assert certificate.holds
     P = np.array(certificate.lyapunov_matrix)
     error = observer.vertex_error(MODEL.drifts[0], observer.unpack_parameters(observer.start_parameters()))
+    assert isinstance(error, ImpulsiveError)
     zeta = np.r_[np.array(start), 0.0]
     levels = []
     for gap in relative:
@@ -208,6 +209,7 @@ def test_the_error_equations_are_those_of_the_observer_that_runs(name: str) -> N
     """On a linear model: the runtime's error before every sample against SciPy's exponential of generator and reset."""
     observer = LINEAR[name]
     error = observer.vertex_error(MODEL.drifts[0], observer.unpack_parameters(observer.start_parameters()))
+    assert isinstance(error, ImpulsiveError)
     motion = true_motion(MODEL, (1.0, -0.5, 0.3), (), 4.0)
     bench = SampledBench(observer, motion, ())
     bench.sample(0.0)

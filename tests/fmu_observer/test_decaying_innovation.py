@@ -12,10 +12,12 @@ from hypothesis import strategies as st
 from observer_bench import SteadyMotion
 from sampled_bench import Motion, SampledBench, chain, true_motion
 from scipy.integrate import quad, solve_ivp
+from scipy.linalg import solve_continuous_lyapunov
 
 from fmu_observer.certificates import certify_sampled_error, decaying_error, first_unstable_gap
 from fmu_observer.certificates.aperiodic import common_decrease
 from fmu_observer.certificates.decaying_error import DecayingError
+from fmu_observer.certificates.switching import SwitchingError
 from fmu_observer.design.sampled_gain_bounds import decay_bounds, dynamic_theta_bounds
 from fmu_observer.models import find_model, tanh_system
 from fmu_observer.models.model import shift_matrix
@@ -147,6 +149,19 @@ def test_slopes_that_change_within_a_gap_do_not_break_what_is_certified_for_them
 
         after = solve_ivp(flow, (0.0, gap), e, rtol=1e-7, atol=1e-9, max_step=0.1 * gap).y[:, -1]
         assert after @ found.P @ after < e @ found.P @ e
+
+
+def test_changes_within_a_gap_add_what_they_add_to_an_exponential_that_is_nearly_the_same() -> None:
+    """``(1 - s/50)^50`` against ``exp(-s)``: another code, the same growth to what the two differ by."""
+    gaps = np.linspace(0.0, 0.5, 6)
+    gain, growth = np.array([[10.0], [25.0]]), []
+    for exponent in (0.98, 1.0):
+        errors = [
+            decaying_error(np.array([[0.0, 1.0], [s, -0.2]]), gain, C, 10.0, exponent, (0, 1)) for s in (-1.0, 1.0)
+        ]
+        growth.append(SwitchingError.between(errors).growth(np.array([[1.0, -0.2], [-0.2, 0.1]]), 0.5, gaps))
+    assert growth[1].min() > 0.1
+    np.testing.assert_allclose(growth[0], growth[1], rtol=0.05)
 
 
 # -- one design, written several ways ---------------------------------------------------------------------------------
@@ -315,10 +330,29 @@ def test_theorems_as_numbers(K: tuple[float, float], L: float, theta_inf: float,
     assert dynamic_theta_bounds(SHIFT, k, C, L, limit).longest_gap == pytest.approx(masp, rel=4e-2)
     bounds = decay_bounds(SHIFT, k, C, 5.0 if K[0] == 2.0 else 10.0, 10.0, L)
     assert bounds.longest_gap == pytest.approx(decaying, rel=1e-2)
+    P = solve_continuous_lyapunov((SHIFT - k @ C).T, -np.eye(2))
+    condition = np.linalg.cond(P, 2)
+    assert bounds.smallest_theta == pytest.approx(condition * bounds.printed_smallest_theta, rel=1e-9)
     assert bounds.small_gain(bounds.longest_gap, 0.0) == pytest.approx(1.0)
     sigma = 0.49 * bounds.alpha
     assert bounds.small_gain(bounds.strict_gap(sigma), sigma) == pytest.approx(1.0)
     assert bounds.strict_gap(sigma) < bounds.longest_gap == bounds.strict_gap(0.0)
+
+
+def test_limits_stand_beside_what_is_exact() -> None:
+    (held,) = DecayingInnovation(chain(2)).limits()
+    assert held.exact == pytest.approx(1.7, rel=1e-6)  # (4 - 2 g1 I0 + 2 g2 I1)/(g2 I0), g = (10, 25), a = 0.5
+    bounds = decay_bounds(SHIFT, np.array([[2.0], [1.0]]), C, 5.0, 10.0, 0.0)
+    assert [b.value for b in held.printed] == [bounds.longest_gap, bounds.strict_gap(0.25 * bounds.alpha)]
+    (settling,) = DynamicHighGain(chain(2)).limits()
+    assert settling.exact == pytest.approx(1.0, rel=1e-3)  # 5/theta
+    limit = dynamic_theta_bounds(SHIFT, np.array([[2.0], [1.0]]), C, 0.0, 5.0)
+    assert settling.printed[0].value == limit.longest_gap
+    assert settling.printed[1].value < settling.printed[0].value
+    (hole,) = DecayingInnovationCdo().limits(preset="balise_holes")
+    assert hole.exact is not None
+    assert 32.0 < hole.exact < 100.0
+    assert hole.printed[0].value < 0.1
 
 
 def test_a_shape_that_does_not_stabilise_has_no_bounds() -> None:

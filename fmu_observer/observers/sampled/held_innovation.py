@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.certificates import ImpulsiveError, certify_sampled_error
+from fmu_observer.certificates import GapError, ImpulsiveError, certify_sampled_error
 from fmu_observer.condition import Condition
 from fmu_observer.models import ObserverModel
 from fmu_observer.observers.sampled.high_gain_sampled import HighGainSampled
@@ -46,7 +46,7 @@ class HeldInnovation(HighGainSampled):
         """The innovation is set anew; the estimates stay continuous, shape (n + q,)."""
         return np.hstack([self.estimates(x), self.innovation(x, u)])
 
-    def vertex_error(self, drift: np.ndarray, p: Any) -> ImpulsiveError:
+    def vertex_error(self, drift: np.ndarray, p: Any) -> GapError:
         """``de = drift e - theta inv(Delta) K c``, ``dc = 0``, ``c = C e`` at a sample."""
         gain, decay = self.gain_matrices(p)
         return ImpulsiveError.with_innovation(drift, gain, 0.0 * decay, self.model.C, self.levels())

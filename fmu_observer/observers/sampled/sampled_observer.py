@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampled_error, with_switching_noted
+from fmu_observer.certificates import Certificate, GapError, certify_sampled_error, with_switching_noted
 from fmu_observer.limits import Limit, PrintedBound
 from fmu_observer.models import ObserverModel
 from fmu_observer.models.model import shift_matrix
@@ -36,7 +36,7 @@ class SampledObserver(ModelObserver, GatedObserver, GapCertified):
     internal_step = 5e-3
 
     @abstractmethod
-    def vertex_error(self, drift: np.ndarray, p: Any) -> ImpulsiveError:
+    def vertex_error(self, drift: np.ndarray, p: Any) -> GapError:
         """Error equations where the model's flow has the Jacobian `drift`, shape (n, n)."""
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
