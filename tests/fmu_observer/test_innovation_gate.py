@@ -215,7 +215,7 @@ def test_a_start_50_m_off_is_no_reason_to_doubt(name: str) -> None:
         bench = Bench(system, preset=PRESETS.get(name), gate=gate)
         fed = {"effort": effort_for(system), "odometer": MOTION.speed}
         bench.set("u", {n: value for n, value in fed.items() if n in scalar_names(system.input_signals)})
-        bench.set("x", {n: MOTION.speed for n in {TOLD_BY_PACKETS} & set(scalar_names(system.states))})
+        bench.set("x", dict.fromkeys({TOLD_BY_PACKETS} & set(scalar_names(system.states)), MOTION.speed))
         bench.runtime.x[:2] = -50.0, MOTION.speed
         bench.runtime.start(0.0)
         assert run(bench, 30) == [USED] * 30
