@@ -30,6 +30,7 @@ from plant_models.hybrid.system import Array
 
 LARGEST_CLOSED = 3  # sizes whose smallest eigenvalue is given in closed form
 TINY = 1e-60  # keeps quotients and slopes finite where there is nothing yet
+GUARD = 1e-3  # of the least excitation
 NEARLY_ONE = 1.0 - 1e-15
 
 
@@ -275,20 +276,36 @@ def covariance_after(V: Array, C: Array, row: int, variance: Array, sizes: Sizes
     return jump @ V @ jump.T + variance * added
 
 
-def told_excitation(E: Array, size: int) -> Array:
+def gentle_gain(R: Array, seen: Array, quickest: float) -> Array:
+    """R after a measurement, so that it moves no constant faster than `quickest`: ``inv(R) + chi' chi / quickest``.
+
+    Without it the first sample after long would make the adaptation stiff.
+
+    Args:
+        R: adaptation gain, shape (m, m). seen: row of chi that has just been set, shape (m,). quickest: rate [1/s].
+    """
+    moved = R @ seen
+    size = len(seen)
+    outer = np.reshape(moved, (size, 1)) @ np.reshape(moved, (1, size))
+    return R - outer / (quickest + seen @ moved)
+
+
+def told_excitation(E: Array, size: int, guard: Array = TINY) -> Array:
     """Excitation of each constant given the others, ``1 / diag(inv(E))``, shape (m,).
 
     Args:
-        E: mean Gramian, shape (m, m). size: m, 1 to 3.
+        E: mean Gramian, shape (m, m). size: m, 1 to 3. guard: added to the diagonal for the others, so that rounding
+            does not decide where they cannot be told apart.
     """
     if size == 1:
         return vector(E[0, 0])
+    own = [E[i, i] + guard for i in range(size)]
     if size == 2:
-        return vector(*(E[i, i] - E[0, 1] ** 2 / np.maximum(E[1 - i, 1 - i], TINY) for i in range(2)))
+        return vector(*(E[i, i] - E[0, 1] ** 2 / np.maximum(own[1 - i], TINY) for i in range(2)))
     told = []
     for i, j, k in ((0, 1, 2), (1, 0, 2), (2, 0, 1)):
-        others = np.maximum(E[j, j] * E[k, k] - E[j, k] ** 2, TINY)
-        shared = E[i, j] ** 2 * E[k, k] - 2.0 * E[i, j] * E[i, k] * E[j, k] + E[i, k] ** 2 * E[j, j]
+        others = np.maximum(own[j] * own[k] - E[j, k] ** 2, TINY)
+        shared = E[i, j] ** 2 * own[k] - 2.0 * E[i, j] * E[i, k] * E[j, k] + E[i, k] ** 2 * own[j]
         told.append(E[i, i] - shared / others)
     return vector(*told)
 
@@ -299,7 +316,7 @@ def learnt_constants(E: Array, least: Array, size: int) -> Array:
     Args:
         E: mean Gramian, shape (m, m). least: excitation below which a constant is held; 0 for never. size: m.
     """
-    told = told_excitation(E, size)
+    told = told_excitation(E, size, GUARD * least + TINY)
     return vector(*(np.where(least > 0.0, np.where(told[i] >= least, 1.0, 0.0), 1.0) for i in range(size)))
 
 
