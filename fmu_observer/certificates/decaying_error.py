@@ -76,7 +76,11 @@ class DecayingError(GapError):
         return isinstance(other, DecayingError) and self.C_rows == other.C_rows
 
     def moved(self, generator: np.ndarray) -> DecayingError:
-        """The same correction with another drift, shape (n, n)."""
+        """The same correction with another drift.
+
+        Args:
+            generator: the drift, shape (n, n) [1/s].
+        """
         return replace(self, drift_rows=rows_of(generator))
 
     def transition(self, gap: float) -> np.ndarray:
@@ -94,8 +98,10 @@ class DecayingError(GapError):
             return gaps, self._closed(gaps, powers)
 
     def courses(self, longest: float, count: int) -> np.ndarray:
-        """Error within a gap from the error before its sample, at `count` + 1 instants from 0, shape (count + 1, n,
-        n).
+        """Error within a gap from the error before its sample, shape (count + 1, n, n).
+
+        Args:
+            longest: end of the gap [s]. count: equidistant instants after 0.
         """
         return np.concatenate([np.eye(self.size)[None], self.transitions(longest, count)[1]])
 

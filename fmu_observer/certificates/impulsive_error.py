@@ -87,8 +87,10 @@ class ImpulsiveError(GeneratorError):
         return ImpulsiveError.of(generator, self.reset)
 
     def courses(self, longest: float, count: int) -> np.ndarray:
-        """zeta within a gap from what the reset before it read, at `count` + 1 instants from 0, shape (count + 1, N,
-        n).
+        """zeta within a gap from what the reset before it read, shape (count + 1, N, n).
+
+        Args:
+            longest: end of the gap [s]. count: equidistant instants after 0.
         """
         powers = matrix_powers(small_exponential(self.generator * longest / count), count)
         return np.asarray(np.concatenate([np.eye(len(self.generator))[None], powers]) @ self.spread)

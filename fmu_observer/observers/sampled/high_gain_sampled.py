@@ -25,6 +25,9 @@ class HighGainSampled(SampledObserver):
     ``Delta = diag(I, I/theta, ..., I/theta^(n/q - 1))``, so the i-th block of the correction carries theta^i. The model
     must be in chain form. Default K: all poles of ``A - K C`` at -1, so (2, 1) for two states, as in the thesis, (4, 6,
     4, 1) for four.
+
+    Args:
+        model: a chain, or the name of one. options: of the subclass.
     """
 
     theta_start: ClassVar[float] = THETA
