@@ -15,8 +15,8 @@ STEADY = (
 )
 NOISE = 1e-4  # [rad2], a hundredth of a radian
 MAP = (
-    "not printed: rms of the error of the link's angle now, sin(x2), theta = 5, measurements with noise of 0.01 rad; held "
-    "means not predicted either"
+    "not printed: rms of the error of the link's angle now, sin(x2), theta = 5, measurements with noise of 0.01 rad; "
+    "held means not predicted either"
 )
 
 
