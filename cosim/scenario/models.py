@@ -44,9 +44,14 @@ def model_of(table: ComponentTable, where: str) -> Any:
     Raises:
         ScenarioError: there is no such model, or it cannot be loaded.
     """
-    if table.model is not None:
-        return table.model.load(plant_models.PLANTS, "model", where)
-    return None if table.observer is None else table.observer.load(fmu_observer.OBSERVERS, "observer", where)
+    rooms = {"model": plant_models.PLANTS, "observer": fmu_observer.OBSERVERS}
+    for kind, other in (("model", "observer"), ("observer", "model")):
+        name = getattr(table, kind)
+        if name is not None:
+            if name.given is None and str(name) not in rooms[kind] and str(name) in rooms[other]:
+                raise ScenarioError(f"{where}: {str(name)!r} is no {kind}; write {other} = {str(name)!r}.")
+            return name.load(rooms[kind], kind, where)
+    return None
 
 
 def make_system(table: ComponentTable, where: str) -> HybridSystem | None:

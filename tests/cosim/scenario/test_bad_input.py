@@ -345,3 +345,12 @@ def test_what_a_failing_fmu_logged_is_part_of_the_message(backend: str) -> None:
     assert "Component 'driver' at t = " in outcome.failure
     assert "The FMU says: " in outcome.failure
     assert "not a finite number" in outcome.failure
+
+
+@pytest.mark.parametrize(
+    ("written", "meant", "name"), [("model", "observer", "threshold_detector"), ("observer", "model", "wheel_fault")]
+)
+def test_a_name_under_the_wrong_key_is_told_the_right_one(written: str, meant: str, name: str) -> None:
+    scenario = Scenario(stop=1.0, step=0.1)
+    with pytest.raises(CosimError, match=f"write {meant} = '{name}'"):
+        (scenario.add("part", model=name) if written == "model" else scenario.add("part", observer=name)).run()
