@@ -264,7 +264,7 @@ def _variables(
     for i, event in enumerate(system.triggered_events):
         variables += _event_variables(event, table.events + 2 * i, fmi_version, protocol.counts(fmi_version))
     if system.triggered_events:
-        variables += _protocol_variables(protocol, table.protocol, real)
+        variables += _protocol_variables(protocol, protocol.policy_number(system.late_policy), table.protocol, real)
         variables += _outcome_variables(table.outcomes, "Integer" if fmi_version == 2 else "Int32")
     if not protocol.counts(fmi_version):
         _assign_clocks(system, variables)
@@ -302,8 +302,7 @@ def _event_variables(
     return [counter, stamp]
 
 
-def _protocol_variables(protocol: EventProtocol, reference: int, real: str) -> list[ModelVariable]:
-    number = LATE_POLICIES.index(protocol.late_policy) + 1
+def _protocol_variables(protocol: EventProtocol, number: int, reference: int, real: str) -> list[ModelVariable]:
     text = "What to do with an event stamped before the current time"
     policy = _variable("late_policy", reference, "Enumeration", "parameter", "fixed", "exact", None, number, text)
     policy.declaredType = _late_policy_type()

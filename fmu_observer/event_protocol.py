@@ -45,8 +45,9 @@ class EventProtocol:
         announcement: by ``clocks`` (FMI 3 only: a triggered input clock, set in event mode) or by ``counts`` (an input
             ``<event>_count`` that is raised by one before the step; for masters that know no event mode); None for what
             is usual in the FMI version: clocks in FMI 3, counts in FMI 2.
-        late_policy: what to do with an event stamped before the current time: ``replay``, ``reject`` or ``late``. In an
-            FMU it is the start value of the parameter ``late_policy``.
+        late_policy: what to do with an event stamped before the current time: ``replay``, ``reject`` or ``late``;
+            None for what the model declares, usually ``replay``. In an FMU it is the start value of the parameter
+            ``late_policy``.
         replay_horizon: how far back ``replay`` can go [s]; the start value of the parameter ``replay_horizon``.
 
     Raises:
@@ -54,16 +55,24 @@ class EventProtocol:
     """
 
     announcement: Announcement | None = None
-    late_policy: LatePolicy = "replay"
+    late_policy: LatePolicy | None = None
     replay_horizon: float = DEFAULT_REPLAY_HORIZON
 
     def __post_init__(self) -> None:
         if self.announcement not in (None, "clocks", "counts"):
             raise ValueError(f"announcement {self.announcement!r} is unknown; use 'clocks' or 'counts'.")
-        if self.late_policy not in LATE_POLICIES:
+        if self.late_policy not in (None, *LATE_POLICIES):
             raise ValueError(f"late_policy {self.late_policy!r} is unknown; use one of {', '.join(LATE_POLICIES)}.")
         if not (isfinite(self.replay_horizon) and self.replay_horizon >= 0.0):
             raise ValueError(f"replay_horizon = {self.replay_horizon!r} s; expected zero or more seconds.")
+
+    def policy_number(self, declared: LatePolicy) -> int:
+        """Number of the late policy in an FMU, from one.
+
+        Args:
+            declared: by the model, for where none is asked for.
+        """
+        return LATE_POLICIES.index(self.late_policy or declared) + 1
 
     def counts(self, fmi_version: int) -> bool:
         """Whether events are announced by counts in this FMI version.

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.limits import Trial
-from fmus.batch.members import Batch
+from fmus import Batch
 
 MEMBERS = 16
 LAST_PART = 0.8  # of a run; behind it the error counts
@@ -29,8 +29,7 @@ def survives(trial: Trial, values: Any) -> np.ndarray:
         batch.set(name, value)
     if trial.delay_parameter:
         batch.set(trial.delay_parameter, delays)
-    for i, (period, delay) in enumerate(zip(periods, delays, strict=True)):
-        _tell(batch, trial, i, float(period), float(delay))
+    _tell(batch, trial, periods, delays)
     instants = COMMUNICATION_STEP * np.arange(round(trial.stop / COMMUNICATION_STEP) + 1)
     batch.start(0.0)
     middles = np.minimum(instants + 0.5 * COMMUNICATION_STEP, trial.stop)
@@ -67,13 +66,15 @@ def practical_limit(trial: Trial, members: int = MEMBERS) -> float:
     return high
 
 
-def _tell(batch: Batch, trial: Trial, member: int, period: float, delay: float) -> None:
-    numbers = np.arange(int((trial.stop - delay) / period) + 1)
-    stamps = numbers * period
+def _tell(batch: Batch, trial: Trial, periods: np.ndarray, delays: np.ndarray) -> None:
+    numbers = [np.arange(int((trial.stop - delay) / period) + 1) for period, delay in zip(periods, delays, strict=True)]
+    members = np.repeat(np.arange(len(periods)), [len(own) for own in numbers])
+    turn = np.concatenate(numbers)
+    stamps = turn * periods[members]
     payload = dict(trial.payload(stamps))
     if trial.nodes:
-        payload["node"] = numbers % trial.nodes + 1.0
-    batch.notify(trial.event, member, stamps + delay, **payload)
+        payload["node"] = turn % trial.nodes + 1.0
+    batch.notify(trial.event, members, stamps + delays[members], **payload)
 
 
 def _error(trial: Trial, names: list[str], instants: np.ndarray, found: np.ndarray, delay: float) -> np.ndarray:

@@ -190,7 +190,8 @@ def _version(kind: Backend) -> Literal[2, 3]:
 
 
 def _block_arguments(table: ComponentTable) -> dict[str, Any]:
-    return {"preset": table.preset, "late_policy": table.late_policy, "replay_horizon": table.replay_horizon}
+    policy = table.late_policy if "late_policy" in table.model_fields_set else None
+    return {"preset": table.preset, "late_policy": policy, "replay_horizon": table.replay_horizon}
 
 
 def _made(model: type[HybridSystem], options: Mapping[str, Any], where: str) -> HybridSystem:

@@ -49,7 +49,7 @@ class Events:
     """
 
     def __init__(self, system: HybridSystem, runtime: Runtime, protocol: EventProtocol) -> None:
-        self._start = [LATE_POLICIES.index(protocol.late_policy) + 1.0, protocol.replay_horizon]
+        self._start = [float(protocol.policy_number(system.late_policy)), protocol.replay_horizon]
         self.payloads = _payload_positions(system)
         self._names = tuple(self.payloads)
         self._runtime, self._given = runtime, _given_positions(system, runtime)

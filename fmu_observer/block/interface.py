@@ -82,7 +82,7 @@ class FMIInterface:
         preset: preset whose values are the start values.
         instance_name: name used in messages; the system's name by default.
         late_policy: what to do with events stamped in the past: ``replay``, ``reject`` or ``late``; the start value of
-            the parameter of that name.
+            the parameter of that name. None for what the system declares.
         replay_horizon: how far back ``replay`` can go [s]; the start value of the parameter of that name.
         announcement: how events are announced, ``clocks`` (FMI 3 only) or ``counts``; None for what is usual in the
             version.
@@ -100,7 +100,7 @@ class FMIInterface:
         *,
         preset: str | None = None,
         instance_name: str | None = None,
-        late_policy: LatePolicy = "replay",
+        late_policy: LatePolicy | None = None,
         replay_horizon: float = DEFAULT_REPLAY_HORIZON,
         announcement: Announcement | None = None,
     ) -> None:

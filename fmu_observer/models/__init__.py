@@ -6,6 +6,7 @@ from fmu_observer.models.flexible_joint_arm import flexible_joint_arm, flexible_
 from fmu_observer.models.freight_train import freight_train
 from fmu_observer.models.linear_pendulum import linear_pendulum
 from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.networked_train import networked_train
 from fmu_observer.models.pendulum import pendulum
 from fmu_observer.models.registry import MODELS, find_model
 from fmu_observer.models.sector_nonlinearity import sector_nonlinearity
@@ -32,6 +33,7 @@ __all__ = [
     "flexible_joint_arm_as_printed",
     "freight_train",
     "linear_pendulum",
+    "networked_train",
     "pendulum",
     "sector_nonlinearity",
     "tanh_system",

@@ -10,6 +10,7 @@ from fmu_observer.models.flexible_joint_arm import flexible_joint_arm, flexible_
 from fmu_observer.models.freight_train import freight_train
 from fmu_observer.models.linear_pendulum import linear_pendulum
 from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.networked_train import networked_train
 from fmu_observer.models.pendulum import pendulum
 from fmu_observer.models.tanh_system import tanh_system
 
@@ -17,6 +18,7 @@ MODELS: dict[str, Callable[[], ObserverModel]] = {
     "pendulum": pendulum,
     "linear_pendulum": linear_pendulum,
     "freight_train": freight_train,
+    "networked_train": networked_train,
     "braked_train": braked_train,
     "coupled_vehicles": coupled_vehicles,
     "flexible_joint_arm": flexible_joint_arm,

@@ -84,8 +84,8 @@ def register(commands: Any) -> None:
     parser.add_argument(
         "--late-policy",
         choices=LATE_POLICIES,
-        default=LATE_POLICIES[0],
-        help="what to do with late events; start value of the parameter late_policy (default replay)",
+        help="what to do with late events; start value of the parameter late_policy (default: as the model declares, "
+        "usually replay)",
     )
     parser.add_argument(
         "--hosted", action="store_true", help="FMI 2.0 with Python inside, for a model that cannot be traced"

@@ -65,7 +65,9 @@ class HybridSystem:
        step keeps its order; with all states that carry a conserved sum among them, momentum say, it stays conserved.
     10. Time does not run with parameters that break one of the `requirements`: bounds to be kept (`within_bounds`), or
         what several must fulfil together. They are checked before time runs, so they are about fixed parameters.
-    11. A system that cannot be traced says ``traceable = False`` and may then use any Python.
+    11. `late_policy` is what an event stamped in the past means unless it is told otherwise: to be replayed at its
+        stamp, to be rejected, or, for equations that count with the delay, to act when it arrives (``late``).
+    12. A system that cannot be traced says ``traceable = False`` and may then use any Python.
     """
 
     name: str = ""
@@ -83,6 +85,7 @@ class HybridSystem:
     presets: Mapping[str, Mapping[str, Any]] = {}
     default_preset: str | None = None
     method: Method = "rk4"
+    late_policy: Literal["replay", "reject", "late"] = "replay"
     internal_step: float = 1e-3
     traceable: bool = True
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {}

@@ -78,8 +78,8 @@ class DelayedStateObserver(HighGainSampled):
     end. The declared memory is ``predictors * memory_places * memory_period``; a longer delay is refused. Between two
     readings the prediction goes on along its rate. A delay below one `memory_period` takes inputs as they are now.
 
-    Packets act when they arrive: tell them with ``late_policy = "late"``, not to be replayed at their stamps. A packet
-    that was faster than `delay` has to wait for it, which the network does (`equalise`).
+    Packets act when they arrive, and are not replayed at their stamps: the late policy is ``late``. One that was faster
+    than `delay` has to wait for it, which the network of a scenario does (`equalise`).
 
     Presets, for chains of two blocks: `as_published` (theta = 1), `repaired` (theta = 5, which the published variances
     imply). The model must be a chain with its first block measured.
@@ -99,6 +99,8 @@ class DelayedStateObserver(HighGainSampled):
     description = "Observer of late measurements node by node, with finite-time predictors of the state now"
     source = "Hann 2014, (2.16), (2.57), Theorem 2.1"
     theta_start = THETA_REPAIRED
+    internal_step = 2.5e-3  # four to a reading
+    late_policy = "late"
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
         "model": tuple(MODELS),
         "predictors": (1, 0, 2, 3),
@@ -242,8 +244,16 @@ class DelayedStateObserver(HighGainSampled):
         told, outputs = self.measured(u), self.sampled_part(x)
         node = getattr(u, f"{event}_node")
         after = [np.where(node * (node - float(of)) == 0.0, told[i], outputs[i]) for i, of in enumerate(self.node_of)]
+        return self.with_outputs(x, after)
+
+    def with_outputs(self, x: Array, outputs: Sequence[Array]) -> Array:
+        """The own states with other outputs a delay ago.
+
+        Args:
+            outputs: one a measurement.
+        """
         n, q = self.model.order, self.outputs_count
-        return vector(*(x[i] for i in range(n)), *after, *(x[i] for i in range(n + q, self.own_count)))
+        return vector(*(x[i] for i in range(n)), *outputs, *(x[i] for i in range(n + q, self.own_count)))
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """The state now, the delayed one, and the time until the predictors are reached."""
@@ -464,7 +474,7 @@ class DelayedStateObserver(HighGainSampled):
             "Node that the packet is from, from 1; 0: it has all measurements",
             variability="discrete",
         )
-        text = "A packet arrives, a delay after its measurement; tell it with late_policy = late"
+        text = "A packet arrives, a delay after its measurement"
         return TriggeredEvent(event.name, (node, *event.payload), text, event.verdict)
 
     @staticmethod

@@ -1,0 +1,95 @@
+"""The command and the search for practical limits, against limits that are known exactly."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from cosim.cli import main
+from cosim.limits import limit_rows, limit_text, practical_limit, survives
+from fmu_observer.limits import Trial
+from fmu_observer.observers.sampled import OutputPredictor
+from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, output_signal, parameter, state, vector
+
+
+class Relaxation(HybridSystem):
+    """``x -> x - gain * period * (x - y)`` at a packet: lost from ``gain period = 2`` on."""
+
+    name = "relaxation"
+    description = "One state that is corrected by its own gain times the period"
+    states = (state("x", "1", 1.0, "Estimate"),)
+    outputs = (output_signal("value", "1", "Estimate"),)
+    parameters = (parameter("period", "s", 0.1, "Period"), parameter("gain", "1/s", 4.0, "Gain"))
+    events = (TriggeredEvent("packet", (input_signal("packet_y", "1", 0.0, "Measured", variability="discrete"),)),)
+
+    def jump(self, event, t, x, u, p):  # type: ignore[no-untyped-def]
+        return vector(x[0] - p.gain * p.period * (x[0] - u.packet_y))
+
+    def output(self, t, x, u, p):  # type: ignore[no-untyped-def]
+        return {"value": x[0]}
+
+
+def trial(**changes: object) -> Trial:
+    zero = lambda t: {"y": 0.0 * np.asarray(t)}  # noqa: E731
+    usual = {
+        "system": Relaxation(),
+        "varied": "period",
+        "low": 0.05,
+        "high": 0.9,
+        "event": "packet",
+        "payload": zero,
+        "inputs": lambda _t: {},
+        "truth": lambda t: {"value": 0.0 * np.asarray(t)},
+        "delay_parameter": "",
+        "stop": 30.0,
+    }
+    return Trial(**{**usual, **changes})  # type: ignore[arg-type]
+
+
+def test_a_limit_is_found_by_runs() -> None:
+    """With the period told by the trial's delay: the limit is where ``gain period`` is 2, 0.5 s."""
+    told = trial(varied="delay", delay_parameter="period", low=0.05, high=0.9, period=0.2)
+    assert practical_limit(told) == pytest.approx(0.5, abs=0.85 / 15**2 + 0.01)  # a slow end within 30 s
+    assert survives(told, [0.1, 0.45, 0.55]).tolist() == [True, True, False]
+
+
+def test_ends_of_the_range() -> None:
+    told = trial(varied="delay", delay_parameter="period", period=0.2)
+    assert practical_limit(trial(varied="delay", delay_parameter="period", period=0.2, high=0.4)) == np.inf
+    assert practical_limit(trial(varied="delay", delay_parameter="period", period=0.2, low=0.6)) == 0.6
+    assert not survives(told, 40.0)[0]  # what grows beyond all numbers is lost, and no error
+
+
+def test_every_sampled_observer_has_limits() -> None:
+    """Exact and practical agree, where the model is nearly linear; the printed bound is far below."""
+    rows = limit_rows(OutputPredictor("pendulum").limits({"theta": 4.0}))
+    assert rows[0].practical == pytest.approx(rows[0].exact, rel=0.1)  # at rest against the worst slope
+    assert rows[0].printed[0][0] < 0.1 * rows[0].practical
+    assert "period of the samples" in limit_text("output_predictor", rows)
+
+
+def test_the_command(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["limits", "delayed_state_observer", "--option", "model=flexible_joint_arm", "--option", "predictors=3"]
+    assert main([*words, "--no-runs"]) == 0
+    assert "delay, 3 predictors" in capsys.readouterr().out
+    assert main([*words, "--no-runs", "--json", "--set", "theta=1"]) == 0
+    rows = json.loads(capsys.readouterr().out)
+    assert rows[1]["exact"] == pytest.approx(3 * 0.19595, rel=1e-3)
+    assert [row["practical"] for row in rows] == [None, None]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["nobody"], "There is no observer 'nobody'"),
+        (["jam_detector"], "tells no limits"),
+        (["output_predictor", "--set", "speed=3"], "unknown parameter 'speed'"),
+        (["output_predictor", "--members", "1"], "expected 4 values or more"),
+        (["delayed_state_observer", "--option", "predictors=12"], "choose from 1, 0, 2, 3"),
+    ],
+)
+def test_mistakes_are_explained(words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["limits", *words]) == 2
+    assert said in capsys.readouterr().err
