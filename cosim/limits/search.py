@@ -39,7 +39,8 @@ def survives(trial: Trial, values: Any) -> np.ndarray:
         errors = np.stack([_error(trial, names, instants, found[i], delay) for i, delay in enumerate(delays)])
     late = instants >= LAST_PART * trial.stop
     first = np.maximum(errors[:, 0], 1e-300)
-    return np.all(np.isfinite(errors), axis=1) & (errors[:, late].max(axis=1) < trial.left * first)
+    kept = errors[:, late].max(axis=1) < trial.left * first
+    return np.asarray(np.all(np.isfinite(errors), axis=1) & kept)
 
 
 def practical_limit(trial: Trial, members: int = MEMBERS) -> float:

@@ -14,6 +14,7 @@ from sampled_bench import Motion, SampledBench, chain, true_motion
 from scipy.integrate import quad, solve_ivp
 from scipy.linalg import solve_continuous_lyapunov
 
+from fmu_observer.block import make_block
 from fmu_observer.certificates import certify_sampled_error, decaying_error, first_unstable_gap
 from fmu_observer.certificates.aperiodic import common_decrease
 from fmu_observer.certificates.decaying_error import DecayingError
@@ -220,6 +221,33 @@ def test_two_outputs_are_two_observers() -> None:
         for i in range(2):
             one = followed(make(narrow), true_motion(narrow, starts[:, i], (), 2.0), gaps)
             np.testing.assert_allclose(both[i::2], one, atol=1e-10)
+
+
+@pytest.mark.parametrize("make", [DecayingInnovation, DynamicHighGain])
+def test_the_communication_step_does_not_matter(make: Any) -> None:
+    """Steps of 1, 10 and 100 ms, samples every 137 ms told at their stamps: the same numbers but for rounding.
+
+    Internal steps of 1 ms; longer ones are cut by the shortest communication steps.
+    """
+    ends = []
+    for milliseconds in (1, 10, 100):
+        block: Any = make_block(make("tanh_system"), 2)
+        at = {v.name: v.valueReference for v in block.model_description.modelVariables}
+        block.instantiate()
+        block.setupExperiment(startTime=0.0)
+        block.setReal([at["internal_step"]], [1e-3])
+        block.enterInitializationMode()
+        block.exitInitializationMode()
+        told = 0
+        for k in range(2000 // milliseconds):
+            if 0.137 * (told + 1) <= 1e-3 * milliseconds * (k + 1) + 1e-12:
+                told += 1
+                block.setReal([at["sample_time"], at["sample_x1"]], [0.137 * told, float(np.cos(told))])
+                block.setInteger([at["sample_count"]], [told])
+            block.doStep(1e-3 * milliseconds * k, 1e-3 * milliseconds)
+        assert told == 14
+        ends.append(block.getReal([at["x1"], at["x2"]]))
+    np.testing.assert_allclose(ends[1:], [ends[0]] * 2, rtol=1e-11, atol=1e-11)
 
 
 # -- published limits -------------------------------------------------------------------------------------------------

@@ -378,7 +378,7 @@ class DelayedStateObserver(HighGainSampled):
         text = f"gamma = {bounds.gain:.3g}, N = {bounds.cycle}, L = {bounds.lipschitz:.3g} 1/s"
         interval = exact_interval(self._generator(drift, p), self.model.C, self._order, LONGEST_INTERVAL)
         nodes = len(self._order) if len(self._order) > 1 else 0
-        common = {"delay_parameter": "delay", "nodes": nodes}
+        common: dict[str, Any] = {"delay_parameter": "delay", "nodes": nodes}
         high = min(2.0 * interval, LONGEST_INTERVAL)
         packets = Limit(
             "interval of the packets" + (", one node each" if nodes else ""),
@@ -506,7 +506,10 @@ class _Moved:
         known: Array,
     ) -> None:
         h, indices = p.memory_period, range(observer.model.order)
-        rate_at = lambda x: observer.model.flow(vector(*x), known)  # noqa: E731
+
+        def rate_at(x: list[Array]) -> Array:
+            return observer.model.flow(vector(*x), known)
+
         before = past.predictions[j]
         start = rate_at(before)
         self.old = [[np.where(first, start[i], rate) for rate in past.rates[j][i]] for i in indices]
