@@ -73,7 +73,7 @@ def mean_of(values: Sequence[float]) -> Spread:
     return Spread(mean, mean - half, mean + half, len(numbers))
 
 
-def groups(result: SweepResult, by: str) -> dict[Any, dict[str, Spread]]:
+def grouped(result: SweepResult, by: str) -> dict[Any, dict[str, Spread]]:
     """For each value of a setting the measures over the runs that have it, in order of appearance.
 
     Shares and rates (`cosim.studies.measures.SHARES`, `RATES`) are of what was counted in all runs together, with exact
@@ -113,7 +113,7 @@ def groups_text(result: SweepResult, by: str) -> str:
     columns = result.columns
     rows = [[by, "runs", *(column.heading for column in columns)]]
     counts = _runs(result, by)
-    for key, measures in groups(result, by).items():
+    for key, measures in grouped(result, by).items():
         rows.append([key, str(counts[key]), *(measures[c.measure].text(c.factor) for c in columns)])
     note = "Means of the runs, and shares and rates of what was counted in all of them, with 95 % intervals."
     return "\n".join([*text_table(rows, left=(0,), heading=True), "", note, *result.troubles()])
@@ -144,7 +144,7 @@ def write_groups(result: SweepResult, by: str, directory: Path) -> Path:
         with path.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow([by, "measure", "unit", "mean", "low", "high", "count"])
-            for key, measures in groups(result, by).items():
+            for key, measures in grouped(result, by).items():
                 for name, spread in measures.items():
                     cells = ["" if not isfinite(v) else repr(v) for v in (spread.mean, spread.low, spread.high)]
                     writer.writerow([key, name, result.unit(name) or "", *cells, spread.count])

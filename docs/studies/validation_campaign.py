@@ -15,7 +15,7 @@ import numpy as np
 
 from cosim import Scenario
 from cosim.evaluation.numbers import number
-from cosim.studies.groups import Spread, groups
+from cosim.studies.groups import Spread, grouped
 
 PAGE = Path(__file__).parents[1] / "validation_campaign.md"
 PART = r"(<!-- study: {name} -->\n)(.*?)(<!-- end -->)"
@@ -70,7 +70,7 @@ def main() -> None:
 def measured(seeds: Iterable[int], cases: Iterable[str] = tuple(PUBLISHED)) -> dict[Any, dict[str, Spread]]:
     """Spreads of all measures by case, over drawings of the jams."""
     sweep = Scenario.load("validation_campaign").vary({"case": list(cases), "wheel.seed": list(seeds)})
-    return groups(sweep.run(keep=False), "case")
+    return grouped(sweep.run(keep=False), "case")
 
 
 def campaign_table(found: Mapping[str, Mapping[str, Spread]]) -> str:
@@ -94,7 +94,7 @@ def threshold_shares(
     missed, false = ({case: np.full(len(THRESHOLDS), np.nan) for case in cases} for _ in range(2))
     for k, threshold in enumerate(THRESHOLDS):
         values = {"case": list(cases), f"{OBSERVER}.threshold": [threshold], "wheel.seed": list(seeds)}
-        found = groups(Scenario.load("validation_campaign").vary(values).run(keep=False), "case")
+        found = grouped(Scenario.load("validation_campaign").vary(values).run(keep=False), "case")
         for case, spreads in found.items():
             missed[case][k] = spreads[f"{OBSERVER}.missed_share"].mean
             false[case][k] = spreads[f"{OBSERVER}.false_share"].mean

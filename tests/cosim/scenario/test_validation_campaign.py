@@ -9,7 +9,7 @@ from types import ModuleType
 import pytest
 
 from cosim import Scenario
-from cosim.studies.groups import groups
+from cosim.studies.groups import grouped
 
 pytestmark = pytest.mark.compiler
 STUDIES = Path(__file__).resolve().parents[3] / "docs" / "studies"
@@ -40,7 +40,7 @@ def test_without_jams_there_are_no_alarms_in_braking_or_before() -> None:
     scenario = Scenario.load("validation_campaign").set("wheel.jam_rate", 0.0)
     cases = list(scenario.cases)
     variations = {"case": cases, "wheel.jam_rate": [0.0], "report.evaluate_after": [6.0]}
-    found = groups(scenario.vary(variations).run(keep=False), "case")
+    found = grouped(scenario.vary(variations).run(keep=False), "case")
     alarms = {case: found[case]["quasi_lpv_uio.false_alarms"].mean for case in cases}
     assert alarms == dict.fromkeys(cases, 0.0)
 
@@ -48,7 +48,7 @@ def test_without_jams_there_are_no_alarms_in_braking_or_before() -> None:
 def test_the_observer_knows_its_position_better_than_the_odometer_in_jams() -> None:
     """Over three drawings and the deepest jams: by half at least."""
     sweep = Scenario.load("validation_campaign").vary({"case": ["HS EBA", "AS EBA"], "wheel.seed": range(3)})
-    for spreads in groups(sweep.run(keep=False), "case").values():
+    for spreads in grouped(sweep.run(keep=False), "case").values():
         ours, sensor = (spreads[f"{name}.balise_error_max"].mean for name in ("quasi_lpv_uio", "odometer_reset"))
         assert ours < 0.5 * sensor
         assert spreads["quasi_lpv_uio.missed_share"].mean < 0.15

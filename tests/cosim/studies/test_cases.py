@@ -14,7 +14,7 @@ from scipy import stats
 from cosim import Scenario
 from cosim.cli import main
 from cosim.errors import CosimError, ScenarioError
-from cosim.studies.groups import groups, groups_text, mean_of
+from cosim.studies.groups import grouped, groups_text, mean_of
 from cosim.studies.sweep_journal import JOURNAL
 from cosim.studies.sweep_result import SweepResult, SweepRun
 
@@ -82,7 +82,7 @@ def swept(tmp_path: Path) -> SweepResult:
 
 
 def test_groups_are_means_with_the_interval_of_student(swept: SweepResult) -> None:
-    found = groups(swept, "case")
+    found = grouped(swept, "case")
     ways = [run.measures["way"] for run in swept.runs[2:]]
     low, high = stats.t.interval(0.95, 1, loc=np.mean(ways), scale=stats.sem(ways))
     spread = found["heavy, long"]["way"]
@@ -104,7 +104,7 @@ def test_shares_and_rates_are_of_all_that_was_counted() -> None:
         counted("a", **dict(zip(names, (9.0, 9.0, 1.0, 0.0, 2700.0, 0.0), strict=True))),
         counted("a", **dict.fromkeys(names, nan)),
     ]
-    found = groups(SweepResult(family(), ["case"], runs), "case")["a"]
+    found = grouped(SweepResult(family(), ["case"], runs), "case")["a"]
     exact = stats.binomtest(9, 10).proportion_ci(0.95, "exact")
     share = found["o.missed_share"]
     assert (share.mean, share.low, share.high) == pytest.approx((0.9, exact.low, exact.high))
