@@ -167,11 +167,11 @@ def minimum_fault(threshold: float, gamma: float) -> float:
 def sudden_fault(channel: ResidualChannel, threshold: float, length: float = inf) -> float:
     """Smallest fault of constant size, beginning at once, whose residual reaches a threshold at some instant [ours].
 
-    What a threshold on |r| really sees, without noise and disturbance: the peak of the residual, not its energy. A
-    fault of the sensor shows at its first instant with the whole feedthrough D.
+    What a threshold on the size of r really sees, without noise and disturbance: the peak of the residual, not its
+    energy. A fault of the sensor shows at its first instant with the whole feedthrough D.
 
     Args:
-        channel: from one fault to one residual, stable. threshold: of |r|. length: of the fault [s].
+        channel: from one fault to one residual, stable. threshold: of the size of r. length: of the fault [s].
 
     Returns:
         The fault, in its unit; inf where it does not show.

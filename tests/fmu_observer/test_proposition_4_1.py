@@ -10,7 +10,7 @@ import pytest
 from scipy.linalg import expm
 
 from fmu_observer.design.proposition_4_1 import (
-    InfeasibleDesign,
+    InfeasibleBounds,
     Proposition41Design,
     bound_matrix,
     design_proposition_4_1,
@@ -80,7 +80,7 @@ def test_beta_bounds_the_transition() -> None:
 @pytest.mark.parametrize(("m", "alpha"), INFEASIBLE)
 def test_infeasible_cells_of_table_4_1(m: float, alpha: float) -> None:
     with pytest.raises(
-        InfeasibleDesign, match=r"the gain would have to be larger than alpha allows, \(4\.42\)"
+        InfeasibleBounds, match=r"the gain would have to be larger than alpha allows, \(4\.42\)"
     ) as told:
         design_proposition_4_1(train_vertices([W1]), C, m, alpha)
     near_alpha, near_m = told.value.nearest_alpha, told.value.nearest_m
@@ -91,18 +91,18 @@ def test_infeasible_cells_of_table_4_1(m: float, alpha: float) -> None:
     assert near_m < m
     assert designed(m, 1.01 * near_alpha).margin > 0.0  # what is told is feasible, and not by far
     assert designed(0.99 * near_m, alpha).margin > 0.0
-    with pytest.raises(InfeasibleDesign):
+    with pytest.raises(InfeasibleBounds):
         design_proposition_4_1(train_vertices([W1]), C, m, 0.99 * near_alpha)
 
 
 def test_a_decay_that_given_gains_do_not_have() -> None:
-    with pytest.raises(InfeasibleDesign, match=r"cannot decay so fast, \(4\.41\)\. Feasible: m = 0\.9921") as told:
+    with pytest.raises(InfeasibleBounds, match=r"cannot decay so fast, \(4\.41\)\. Feasible: m = 0\.9921") as told:
         design_proposition_4_1(train_vertices([W1]), C, 1.5, gains=(2.94, -5.5, -3.5))
     assert (told.value.constraint, told.value.nearest_alpha) == ("(4.41)", None)
 
 
 def test_a_mode_that_is_not_measured() -> None:
-    with pytest.raises(InfeasibleDesign, match="a mode that the measurement does not show is slower"):
+    with pytest.raises(InfeasibleBounds, match="a mode that the measurement does not show is slower"):
         design_proposition_4_1([[-1.0, 0.0], [0.0, -0.2]], (1.0, 0.0), 0.5)
     assert largest_decay([[-1.0, 0.0], [0.0, -0.2]], (1.0, 0.0), 0.5) == pytest.approx(0.2, rel=1e-3)  # bisection
 
@@ -119,7 +119,7 @@ def test_the_printed_gain_of_4_3_4_does_not_belong_to_the_printed_beta() -> None
     found = design_proposition_4_1(train_vertices([W1]), C, 0.1, gains=printed)
     assert found.beta == pytest.approx(2.248, abs=5e-4)
     np.testing.assert_allclose(printed, designed(1.0, 100).gains[0], atol=0.021)  # it is that of another row
-    with pytest.raises(InfeasibleDesign):
+    with pytest.raises(InfeasibleBounds):
         design_proposition_4_1(train_vertices([W1]), C, 0.1, 4.0, gains=printed)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from shared.sampled_braking import W1, W2, braking
 from shared.sheet import Sheet
 
-from fmu_observer.design.proposition_4_1 import InfeasibleDesign, design_proposition_4_1, train_vertices
+from fmu_observer.design.proposition_4_1 import InfeasibleBounds, design_proposition_4_1, train_vertices
 from fmu_observer.observers.train import DiscreteMeasurementObserver
 
 C = (1.0, 0.0, 0.0)
@@ -43,7 +43,7 @@ def designs(sheet: Sheet) -> None:
         words = f"m {m:g} 1/s, alpha {alpha:g}"
         try:
             found = design_proposition_4_1(train_vertices([W1]), C, m, alpha)
-        except InfeasibleDesign as told:
+        except InfeasibleBounds as told:
             sheet.add(f"beta, {words}", "1", "infeasible", "infeasible", independent="infeasible")
             sheet.add(f"least alpha that is feasible, {words}", "1", None, told.nearest_alpha or 0.0, NEAREST)
             sheet.add(f"largest m that is feasible, {words}", "1/s", None, told.nearest_m or 0.0, NEAREST)

@@ -3,7 +3,7 @@ matrix inequalities. Solving needs the extra `lmi`.
 """
 
 from fmu_observer.design.proposition_4_1.design import (
-    InfeasibleDesign,
+    InfeasibleBounds,
     Proposition41Design,
     design_proposition_4_1,
     largest_decay,
@@ -14,7 +14,7 @@ from fmu_observer.design.proposition_4_1.sharpest import BoundMatrix, bound_matr
 
 __all__ = [
     "BoundMatrix",
-    "InfeasibleDesign",
+    "InfeasibleBounds",
     "Proposition41Design",
     "Proposition41Problem",
     "bound_matrix",

@@ -59,7 +59,7 @@ class Proposition41Design:
         )
 
 
-class InfeasibleDesign(ValueError):  # noqa: N818 - what it is, not an "Error" of the program
+class InfeasibleBounds(ValueError):  # noqa: N818 - what it is, not an "Error" of the program
     """Proposition 4-1 has no solution for what was asked.
 
     Args:
@@ -95,7 +95,7 @@ def design_proposition_4_1(
         unique: compare designs by beta.
 
     Raises:
-        InfeasibleDesign: there is no solution; the message says which inequality cannot be kept, the least alpha and
+        InfeasibleBounds: there is no solution; the message says which inequality cannot be kept, the least alpha and
             the largest m that can.
         ValueError: an argument is not legal.
         ImportError: cvxpy (extra `lmi`) is not installed.
@@ -193,7 +193,7 @@ def _largest_decay(problem: Proposition41Problem, gains: np.ndarray | None) -> f
     return low
 
 
-def _infeasible(problem: Proposition41Problem, gains: np.ndarray | None) -> InfeasibleDesign:
+def _infeasible(problem: Proposition41Problem, gains: np.ndarray | None) -> InfeasibleBounds:
     alpha, m = _smallest_alphas(problem, gains)(problem.m), _largest_decay(problem, gains)
     asked = "" if problem.alpha is None else f" and alpha = {problem.alpha:g}"
     of = "free gains" if gains is None else "the gains given"
@@ -204,7 +204,7 @@ def _infeasible(problem: Proposition41Problem, gains: np.ndarray | None) -> Infe
         why = f"the error cannot decay so fast, {DECAY}"
         if gains is None:
             why += ", whatever the gain: a mode that the measurement does not show is slower"
-        return InfeasibleDesign(f"{text}: {why}. Feasible: {slower}{at}.", DECAY, None, m)
+        return InfeasibleBounds(f"{text}: {why}. Feasible: {slower}{at}.", DECAY, None, m)
     why = f"the gain would have to be larger than alpha allows, {GAIN}"
     near = f"alpha = {alpha:.4g} at least at this m; {slower}{at}"
-    return InfeasibleDesign(f"{text}: {why}. Feasible: {near}.", GAIN, alpha, m)
+    return InfeasibleBounds(f"{text}: {why}. Feasible: {near}.", GAIN, alpha, m)
