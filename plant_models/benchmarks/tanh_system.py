@@ -14,7 +14,7 @@ Reading = Literal["minus", "as_published", "product"]
 
 
 class TanhSystem(HybridSystem):
-    """``dx1 = x2``, ``dx2 = -0.1 x1 - tanh(x1) x2``, x1 is measured: Hann 2014, (3.110).
+    """Oscillator ``dx1 = x2``, ``dx2 = -0.1 x1 - tanh(x1) x2``, x1 is measured: Hann 2014, (3.110).
 
     Printed is ``+ tanh(x1) x2``, and printed so the plant leaves every bound from its own start (5, 3): x1 is 2e4 after
     10 s. With the minus it stays on a closed orbit, ``|x1| <= 6.9``, and gives the published tables; so does

@@ -14,7 +14,8 @@ DRIVE = 10.0  # size of the printed drive sin t
 
 
 class TimeVaryingOscillator(HybridSystem):
-    """``dx1 = x2 + sin(w1 t) rho1``, ``dx2 = -x1 + g(t) rho2 + (2 + tanh t) u``, ``y = x1``: Hann 2014, (4.64).
+    """Oscillator ``dx1 = x2 + sin(w1 t) rho1``, ``dx2 = -x1 + g(t) rho2 + (2 + tanh t) u``, ``y = x1``: Hann 2014,
+    (4.64).
 
     ``g = cos(w1 t + phase) / (1 + fading t^2)``; driven by the printed ``u = 10 sin t``, plus the input `drive`. The
     drive is in resonance, so that the state grows: |x1| reaches 639 at 45 s.

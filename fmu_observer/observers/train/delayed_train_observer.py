@@ -17,7 +17,7 @@ from plant_models.hybrid.system import Array
 
 
 class DelayedTrainObserver(DelayedStateObserver):
-    """`delayed_state_observer` of a train with two nodes, told of each by an event of its own: the odometer by
+    """The `delayed_state_observer` of a train with two nodes, told of each by an event of its own: the odometer by
     `packet`, balises by `balise`, all a constant `delay` after their measurement.
 
     Both act when they arrive, not at their stamps; a balise passes the gate of all train observers, against the
