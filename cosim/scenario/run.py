@@ -251,7 +251,8 @@ class _Setup:
         changed_in_steps = surroundings.finish()
         if master.ended_early is not None:
             self._warn(master.ended_early)
-        premises, left = premise_findings(self._as_recorded(), self.table.components, self.connections)
+        recorded = self._as_recorded()  # before a stream is finished: to ask for its rows again would reserve more
+        premises, left = premise_findings(recorded, self.table.components, self.connections)
         for warning in (*master.control.warnings(), *left):
             self._warn(warning)
         summary = run_summary(self.name, self.table, self.plan, master, self.setup_seconds)
@@ -259,7 +260,7 @@ class _Setup:
         spec, (table, signals) = self._report_spec(), self._in_si()
         for warning in result_warnings(Result(table, signals, failure=failure), spec):
             self._warn(warning)
-        for warning in warnings_after(self.components, events, changed_in_steps, self._as_recorded()):
+        for warning in warnings_after(self.components, events, changed_in_steps, recorded):
             self._warn(warning)
         if self.call_log is not None and self.call_log.broken is not None:
             self._warn(self.call_log.broken)
