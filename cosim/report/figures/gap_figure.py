@@ -18,6 +18,7 @@ from cosim.evaluation.roles import label
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.drawing import legend_above, shade_zones, time_axis
 from cosim.report.figures.panel import Panel
+from cosim.report.figures.scales import bounded
 from cosim.results.result import Result
 
 SMALLEST, LARGEST = 1e-2, 1e3  # [m]; errors beyond are drawn at the edge
@@ -107,7 +108,7 @@ def gap_error_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -
     """
     ax = axes_or_new(ax, (8.2, 3.8))
     found = gap_errors(result, spec)
-    lengths = np.array([gap.length for gap in found.gaps])
+    lengths = bounded(np.array([gap.length for gap in found.gaps]))
     for i, (name, errors) in enumerate(found.errors.items()):
         plain = name == PLAIN_ODOMETER
         colour = BLACK if plain else observer_line(spec.observers, name)["color"]
@@ -123,7 +124,7 @@ def gap_error_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -
             label=found.labels[name],
         )
     order = np.argsort(lengths)
-    granted = np.array([gap.envelope for gap in found.gaps])
+    granted = np.clip([gap.envelope for gap in found.gaps], SMALLEST, LARGEST)
     ax.plot(lengths[order], granted[order], color=MARK, linewidth=1.2, label=GRANTED)
     ax.set_yscale("log")
     ax.set_xlabel("Way since the last balise [m]")

@@ -20,7 +20,7 @@ def gaps_table(found: GapErrors) -> Table:
         The table; without rows where there are no gaps.
     """
     headings = ["Gap", "Way [m]", "Time [s]", "Speed at its end [km/h]", "SUBSET-041 [m]"]
-    headings += [f"{found.labels[name]} [m / s]" for name in found.errors]
+    headings += [f"{found.labels[name]} [m]\nrunning time [s]" for name in found.errors]
     seconds = {name: found.running_time(name) for name in found.errors}
     rows = []
     for i in found.longest():
@@ -28,7 +28,7 @@ def gaps_table(found: GapErrors) -> Table:
         row = [f"{gap.origin} to {gap.target}", number(gap.length), number(gap.seconds), number(KMH * gap.speed)]
         row += [number(gap.envelope)]
         row += [
-            f"{error_number(float(found.errors[n][i]))} / {error_number(float(seconds[n][i]))}" for n in found.errors
+            f"{error_number(float(found.errors[n][i]))}\n{error_number(float(seconds[n][i]))}" for n in found.errors
         ]
         rows.append(row)
     if rows:
