@@ -19,6 +19,9 @@ FAULT_OUTPUTS = (
     output_signal("recovering", "1", "1 while it begins to be believed again, else 0", variability="discrete"),
     output_signal("residual_limit", "m/s", "Size of the residual at which the verdict changes", variability="discrete"),
 )
+SETTLED_TIME = output_signal(
+    "settled_time", "s", "Time with a small residual; without any no fault is ever judged", variability="discrete"
+)
 ODOMETER_SAMPLE = PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read")
 
 
@@ -79,7 +82,7 @@ class JamDetector(HybridSystem):
         input_signal("estimated_speed", "m/s", 0.0, "Train speed that the observer estimates"),
         input_signal("effort", "N", 0.0, "Effort at the wheel rim: traction positive, brake negative"),
     )
-    outputs = FAULT_OUTPUTS
+    outputs = (*FAULT_OUTPUTS, SETTLED_TIME)
     events = (ODOMETER_SAMPLE,)
     presets: Mapping[str, Mapping[str, Any]] = {
         "as_published": {"threshold": 0.9, "residual_gain": 2.3},
@@ -100,9 +103,9 @@ class JamDetector(HybridSystem):
         return vector(*self.rules.at_sample(self._memory(x), told, p).memory)
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
-        """Verdict and recovery."""
+        """Verdict, recovery, and how long the residual has been small."""
         memory = self._memory(x)
-        return verdict(self.rules, memory, p)
+        return {**verdict(self.rules, memory, p), "settled_time": self.rules.settled_time(memory, p)}
 
     def _memory(self, x: Array) -> tuple[Array, ...]:
         return tuple(x[i] for i in range(self.state_count))

@@ -329,6 +329,15 @@ class RepairedRules:
         """
         return agreement_limit(RuleMemory(*memory).hold_time, p)
 
+    def settled_time(self, memory: tuple[Array, ...], p: Any) -> Array:
+        """Time for which the residual of an odometer that was followed has been small [s]; `settle_samples` periods of
+        it are needed before faults are judged.
+
+        Args:
+            memory: in the order of the signals. p: parameters.
+        """
+        return RuleMemory(*memory).settled * p.odometer_period
+
 
 def agreement_limit(hold_time: Array, p: Any) -> Array:
     """Residual within which a held odometer agrees [m/s]: ``eps + M delta T``.

@@ -116,6 +116,14 @@ class PrintedRules:
         """
         return p.threshold + 0.0 * memory[0]
 
+    def settled_time(self, memory: tuple[Array, ...], p: Any) -> Array:
+        """Time since the start [s]: `arming_delay` is all that the printed rules wait for.
+
+        Args:
+            memory: in the order of the signals. p: parameters.
+        """
+        return PrintedMemory(*memory).samples * p.odometer_period
+
 
 def _is(condition: Array) -> Array:
     return np.where(condition, 1.0, 0.0)

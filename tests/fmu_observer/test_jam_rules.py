@@ -338,6 +338,7 @@ def test_the_block_tells_a_jam(rules: Any) -> None:
     runtime = Runtime(JamDetector(rules))
     runtime.start(0.0)
     told = []
+    settled = [s.name for s in runtime.system.outputs].index("settled_time")
     for k in range(1, 100):
         t = k * PERIOD
         v = 40.0 - 0.9 * t
@@ -345,6 +346,8 @@ def test_the_block_tells_a_jam(rules: Any) -> None:
         runtime.u[:4] = 2.3 * (y - v), y, v, -0.9
         runtime.advance(t)
         told.append(float(runtime.update_outputs()[0]))
+        if k == 40:  # samples from 0 s on, all of them with a residual of zero
+            assert runtime.update_outputs()[settled] == pytest.approx(41 * PERIOD)
     on = PERIOD * (1 + np.flatnonzero(told))
     late = PERIOD if rules == "printed" else 0.0
     assert on[0] == pytest.approx(10.2 + late)

@@ -47,3 +47,11 @@ def test_wrong_derivatives_fail(name: str, at: float, factor: float) -> None:
 )
 def test_at_a_kink_every_slope_between_is_right(slope: float, verdict: str | None) -> None:
     assert compared(abs, slope, 0.0).verdict == verdict
+
+
+@pytest.mark.parametrize("at", [0.0, 1.0, 7.3])
+def test_what_is_rounded_away_inside_is_no_mistake(at: float) -> None:
+    """Terms of 1e4 that cancel leave multiples of 1.8e-12, which a slope of 4e-6 over a step of 1e-6 hardly fills."""
+    curve = lambda x: (1e4 - 4e-6 * x) - 1e4  # noqa: E731
+    assert compared(curve, -4e-6, at).verdict is Verdict.PASS
+    assert compared(curve, -4e-4, at).verdict is None

@@ -136,7 +136,7 @@ def test_fmpy_simulates_it_in_model_exchange(name: str, version: int, reference:
         fmu,
         fmi_type="ModelExchange",
         solver="CVode",
-        relative_tolerance=1e-9,
+        relative_tolerance=1e-11,  # at 1e-9 CVode, restarted at every event, is further off than the stepped run
         output=outputs,
         record_events=False,
         **common,
@@ -145,7 +145,7 @@ def test_fmpy_simulates_it_in_model_exchange(name: str, version: int, reference:
     stepped = simulate_fmu(fmu, fmi_type="CoSimulation", output=outputs, **common)
     np.testing.assert_allclose(solved["time"], stepped["time"], rtol=0.0, atol=1e-12)
     for output in outputs:
-        # CVode with tolerance 1e-9 adds up a hundred local errors
+        # CVode adds up its local errors over a hundred restarts
         atol = ROUGH.get(name, 3e-7) * max(np.abs(solved[output]).max(), 1.0)
         np.testing.assert_allclose(solved[output], stepped[output], rtol=0.0, atol=atol, err_msg=output)
 
