@@ -25,8 +25,10 @@ rounding.
 """
 
 
-SCATTERED = np.linspace(0.5, 1.5, 8)
-"""Steps, as multiples of that of the differences, at which the rounding of a column is looked at."""
+SCATTERED = 0.5 + np.sqrt(np.arange(2.0, 10.0)) % 1.0
+"""Steps, as multiples of that of the differences, at which the rounding of a column is looked at: unevenly spaced, for
+steps that fall on the grid of what is rounded show nothing.
+"""
 
 
 def compare(
