@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 from urllib.parse import unquote
 
 from cosim.results.data import BaliseRecord
+
+Record = TypeVar("Record")
 
 EVENTS_SUFFIX = ".events.csv"
 """Ending of the file of telegrams beside a table without room for them."""
@@ -95,14 +97,30 @@ def read_events(path: str | Path) -> list[BaliseRecord]:
         ValueError: the file is not such a table; the message names the line.
         OSError: the file cannot be read.
     """
+    return read_rows(path, COLUMNS, "an event table", record_from_row)
+
+
+def read_rows(
+    path: str | Path, columns: Sequence[str], what: str, from_row: Callable[[Mapping[str, str]], Record]
+) -> list[Record]:
+    """Read a CSV file with a row for each record.
+
+    Args:
+        path: the file. columns: that it must have. what: what such a file is, for the message. from_row: makes a record
+            of the cells by column.
+
+    Raises:
+        ValueError: the file has other columns, or a row cannot be read; the message names the line.
+        OSError: the file cannot be read.
+    """
     with Path(path).open(encoding="utf-8", newline="") as file:
         reader = csv.DictReader(file)
-        if tuple(reader.fieldnames or ()) != COLUMNS:
-            raise ValueError(f"{path} is not an event table: expected the columns {', '.join(COLUMNS)}.")
-        events = []
+        if tuple(reader.fieldnames or ()) != tuple(columns):
+            raise ValueError(f"{path} is not {what}: expected the columns {', '.join(columns)}.")
+        records = []
         for row in reader:
             try:
-                events.append(record_from_row(row))
-            except ValueError as error:
+                records.append(from_row(row))
+            except (TypeError, ValueError) as error:  # a row that is too short holds None
                 raise ValueError(f"{path}, line {reader.line_num}: {error}") from error
-        return events
+        return records

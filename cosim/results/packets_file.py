@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from cosim.results.data import PacketRecord
-from cosim.results.events_file import outcomes_text, parse_outcomes
+from cosim.results.events_file import outcomes_text, parse_outcomes, read_rows
 
 Kind = Literal["sent", "lost", "duplicate"]
 KINDS: Mapping[str, Kind] = {"sent": "sent", "lost": "lost", "duplicate": "duplicate"}
@@ -76,14 +76,4 @@ def read_packets(path: str | Path) -> list[PacketRecord]:
         ValueError: the file is not such a table; the message names the line.
         OSError: the file cannot be read.
     """
-    with Path(path).open(encoding="utf-8", newline="") as file:
-        reader = csv.DictReader(file)
-        if tuple(reader.fieldnames or ()) != COLUMNS:
-            raise ValueError(f"{path} is not a table of packets: expected the columns {', '.join(COLUMNS)}.")
-        packets = []
-        for row in reader:
-            try:
-                packets.append(packet_from_row(row))
-            except (TypeError, ValueError) as error:
-                raise ValueError(f"{path}, line {reader.line_num}: {error}") from error
-        return packets
+    return read_rows(path, COLUMNS, "a table of packets", packet_from_row)

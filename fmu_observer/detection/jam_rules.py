@@ -130,6 +130,13 @@ class Rules(Protocol):
             memory: in the order of the signals. p: parameters.
         """
 
+    def settled_time(self, memory: tuple[Array, ...], p: Any) -> Array:
+        """Time that counts towards judging faults at all [s].
+
+        Args:
+            memory: in the order of the signals. p: parameters.
+        """
+
 
 class RuleMemory(NamedTuple):
     """Memory of `RepairedRules`, in the order of their signals."""

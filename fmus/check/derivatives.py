@@ -79,4 +79,4 @@ def _scatter(values: Sequence[np.ndarray]) -> np.ndarray:
     if not np.isfinite(seen).all():
         return np.zeros(seen.shape[1])
     line = np.polynomial.polynomial.polyfit(SCATTERED, seen, 1)
-    return np.max(np.abs(seen - np.polynomial.polynomial.polyval(SCATTERED, line).T), axis=0)
+    return np.asarray(np.max(np.abs(seen - np.polynomial.polynomial.polyval(SCATTERED, line).T), axis=0))

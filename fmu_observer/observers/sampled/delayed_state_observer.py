@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from fmu_observer.certificates import ImpulsiveError
 from fmu_observer.condition import Condition
-from fmu_observer.design.network_bounds import NetworkBounds, exact_interval, exact_predictor_delay, network_bounds
-from fmu_observer.limits import Limit, PrintedBound
+from fmu_observer.design.network_bounds import NetworkBounds, network_bounds
+from fmu_observer.limits import Limit
 from fmu_observer.models import MODELS, ObserverModel, find_model
-from fmu_observer.observers.delay_memory import at_age, integral_weights, weighted
-from fmu_observer.observers.model_trial import WRONG_START, model_trial
+from fmu_observer.observers.delay_memory import at_age, integral_weights
+from fmu_observer.observers.delayed_limits import delay_limit, packet_limit
+from fmu_observer.observers.finite_time_predictor import Prediction, moved_on
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from fmu_observer.observers.sampled.high_gain_sampled import HighGainSampled
 from fmu_observer.observers.sampled.sampled_observer import per_measurement
@@ -37,10 +38,7 @@ BETWEEN: tuple[Between, ...] = ("predicted", "held")
 
 DELAY, MEMORY_PERIOD, MEMORY_PLACES = 0.1, 0.01, 20  # [s], [s], [1] [ours]: one predictor remembers 0.2 s
 THETA_PUBLISHED, THETA_REPAIRED = 1.0, 5.0  # [1/s]
-ITERATIONS = 3  # of the implicit end of the trapezoidal rule; each wins a factor of 2 / (period Lipschitz)
 MOST_PREDICTORS = 8
-MOST_PLACES = 60  # of a trial
-LONGEST_INTERVAL = 2.0  # [s] to which limits are looked for, each predictor its own share
 
 
 class _Past(NamedTuple):
@@ -291,16 +289,22 @@ class DelayedStateObserver(HighGainSampled):
         for j in range(self.predictors):
             ahead = (self.predictors - 1 - j) * share - 0.5  # a mean stands for the middle of its period
             known = vector(*(at_age(ahead, means[i]) for i in range(m))) if m else now
-            moved = _Moved(self, j, past, base, first, weights, p, known)
+            before = Prediction(past.predictions[j], past.rates[j], past.roots[j])
+            moved = moved_on(
+                before, base, partial(self._rate, known=known), first, weights, h, p.delay / self.predictors
+            )
             roots.append(moved.roots)
             predictions.append(moved.state)
-            rates.append([[moved.rate[i], *moved.old[i][:-1]] for i in range(n)])
-            ago = [at_age(share, [moved.rate[i], *moved.old[i]]) for i in range(n)]
-            drift = [drift[i] + moved.rate[i] - ago[i] - moved.roots[i] for i in range(n)]
+            rates.append([moved.rates[i][:-1] for i in range(n)])
+            ago = [at_age(share, moved.rates[i]) for i in range(n)]
+            drift = [drift[i] + moved.rates[i][0] - ago[i] - moved.roots[i] for i in range(n)]
             base = moved.state
         offset = [base[i] - estimates[i] for i in range(n)]
         memories = (*_flat(means), *acting, *_flat(roots), *_flat(predictions), *_flat(map(_flat, rates)))
         return vector(*kept, *memories, *offset, *drift, t, 1.0)
+
+    def _rate(self, x: list[Array], known: Array) -> Array:
+        return self.model.flow(vector(*x), known)
 
     def _past(self, x: Array) -> _Past:
         n, m, k = self.model.order, len(self.model.inputs), self.predictors
@@ -328,7 +332,7 @@ class DelayedStateObserver(HighGainSampled):
         """
         n, q = self.model.order, self.outputs_count
         reset = np.diag([1.0] * n + [0.0] * q)
-        return ImpulsiveError.of(self._generator(drift, p), reset, (*self.levels(), *(0,) * q))
+        return ImpulsiveError.of(self.error_generator(drift, p), reset, (*self.levels(), *(0,) * q))
 
     def remark(self) -> str:
         """What the certificate is about."""
@@ -358,7 +362,12 @@ class DelayedStateObserver(HighGainSampled):
         """
         p = self.unpack_parameters(parameter_values(self, parameters, preset, "to judge"))
         return network_bounds(
-            self.model.drifts, self._drift(), self.gain_matrices(p)[0], self.model.C, len(self._order), self.predictors
+            self.model.drifts,
+            self.linearised_drift(),
+            self.gain_matrices(p)[0],
+            self.model.C,
+            len(self.turns),
+            self.predictors,
         )
 
     def limits(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> tuple[Limit, ...]:
@@ -372,58 +381,10 @@ class DelayedStateObserver(HighGainSampled):
             ValueError: as `network_bounds`.
         """
         values = parameter_values(self, parameters, preset, "to judge")
-        p, bounds = self.unpack_parameters(values), self.network_bounds(parameters, preset)
-        named, drift = self.named_values(values), self._drift()
-        where = "Hann 2014, (2.17)"
-        text = f"gamma = {bounds.gain:.3g}, N = {bounds.cycle}, L = {bounds.lipschitz:.3g} 1/s"
-        interval = exact_interval(self._generator(drift, p), self.model.C, self._order, LONGEST_INTERVAL)
-        nodes = len(self._order) if len(self._order) > 1 else 0
-        common: dict[str, Any] = {"delay_parameter": "delay", "nodes": nodes}
-        high = min(2.0 * interval, LONGEST_INTERVAL)
-        packets = Limit(
-            "interval of the packets" + (", one node each" if nodes else ""),
-            printed=(
-                PrintedBound(bounds.longest_interval, f"tau_MATI < 1/(gamma |H| N L), {text}", where),
-                PrintedBound(
-                    bounds.strict_interval,
-                    f"gamma |H| N L tau exp(sigma N tau) < 1, the factor left out of (2.17) kept, sigma = "
-                    f"{bounds.decay:.3g} 1/s",
-                    "proof of (2.45)",
-                ),
-            ),
-            exact=interval,
-            exact_test="spectral radius over a period of the protocol, model linearised at its start",
-            trial=model_trial(
-                self, "period", high / 50.0, high, named, delayed=True, delay=min(float(p.delay), 0.05), **common
-            ),
-        )
-        if not self.predictors:
-            return (packets,)
-        exact = exact_predictor_delay(drift, self.predictors)
-        longest = min(1.5 * exact, LONGEST_INTERVAL * self.predictors)
-        places = int(np.ceil(longest / (max(self.predictors, 1) * float(p.memory_period)) - 1e-9))
-        observer = self.remembering(min(max(places, self.memory_places), MOST_PLACES))
-        stretched = named | {
-            "memory_period": max(float(p.memory_period), longest / observer.total_places),
-            **{f"prediction[{i + 1}]": v + WRONG_START for i, v in enumerate(observer.prediction_starts)},
-        }
-        period = min(self.model.sample_period, 0.5 * interval)
-        share = "" if self.predictors == 1 else f" / {self.predictors}"
-        delays = Limit(
-            f"delay, {self.predictors} predictor{'s' if self.predictors > 1 else ''}",
-            printed=(
-                PrintedBound(
-                    bounds.longest_delay,
-                    f"(L/sigma) (exp(sigma tau_MAD{share}) - 1) < 1, L = {bounds.lipschitz:.3g} 1/s, sigma = "
-                    f"{bounds.decay:.3g} 1/s",
-                    where if self.predictors == 1 else "Hann 2014, (2.59)",
-                ),
-            ),
-            exact=exact,
-            exact_test="roots of s = l (1 - exp(-s tau)), l the eigenvalues of the model linearised at its start",
-            trial=model_trial(observer, "delay", longest / 50.0, longest, stretched, period=period, **common),
-        )
-        return packets, delays
+        p, named = self.unpack_parameters(values), self.named_values(values)
+        bounds = self.network_bounds(parameters, preset)
+        packets = packet_limit(self, p, named, bounds)
+        return (packets, delay_limit(self, p, named, bounds)) if self.predictors else (packets,)
 
     def remembering(self, memory_places: int) -> DelayedStateObserver:
         """The same observer with another memory.
@@ -445,18 +406,23 @@ class DelayedStateObserver(HighGainSampled):
         """Starts of the predictions, predictor by predictor."""
         return tuple(float(s.start_values[0]) for s in self.model.states) * self.predictors
 
-    def _drift(self) -> np.ndarray:
+    def linearised_drift(self) -> np.ndarray:
+        """Jacobian of the model at its start, shape (n, n)."""
         start = np.array([float(s.start_values[0]) for s in self.model.states])
         return np.asarray(self.model.jacobian(start, np.zeros(len(self.model.inputs))), dtype=float)
 
-    def _generator(self, drift: np.ndarray, p: Any) -> np.ndarray:
-        """Of the errors of the estimate and of the kept outputs, shape (n + q, n + q)."""
+    def error_generator(self, drift: np.ndarray, p: Any) -> np.ndarray:
+        """Generator of the errors of the estimate and of the kept outputs, shape (n + q, n + q).
+
+        Args:
+            drift: Jacobian of the model, shape (n, n). p: parameters, as in `HybridSystem.flow`.
+        """
         gain, C, q = self.gain_matrices(p)[0], self.model.C, self.outputs_count
         rates = C @ drift if self.predicts_output else 0.0 * C
         return np.block([[drift - gain @ C, gain], [rates, np.zeros((q, q))]])
 
     @cached_property
-    def _order(self) -> tuple[tuple[int, ...], ...]:
+    def turns(self) -> tuple[tuple[int, ...], ...]:
         """Measurements of each node, from 0: the turns of a round."""
         return tuple(tuple(i for i, of in enumerate(self.node_of) if of == node) for node in sorted(set(self.node_of)))
 
@@ -489,43 +455,6 @@ class DelayedStateObserver(HighGainSampled):
                 f"measurements of the model {model.name!r}: {', '.join(s.name for s in model.measurements)}."
             )
         return tuple(map(int, nodes))
-
-
-class _Moved:
-    """One predictor after a reading: its signed roots, its state, its rate there, and its older rates."""
-
-    def __init__(
-        self,
-        observer: DelayedStateObserver,
-        j: int,
-        past: _Past,
-        base: list[Array],
-        first: Array,
-        weights: list[Array],
-        p: Any,
-        known: Array,
-    ) -> None:
-        h, indices = p.memory_period, range(observer.model.order)
-
-        def rate_at(x: list[Array]) -> Array:
-            return observer.model.flow(vector(*x), known)
-
-        before = past.predictions[j]
-        start = rate_at(before)
-        self.old = [[np.where(first, start[i], rate) for rate in past.rates[j][i]] for i in indices]
-        old = [h * weighted(weights[1:], self.old[i]) for i in indices]
-        share = p.delay / max(observer.predictors, 1)
-        distance = [before[i] - base[i] - share * start[i] for i in indices]  # of a constant past
-        now = [np.sign(d) * np.sqrt(np.abs(d)) for d in distance]
-        less = [np.sign(r) * np.maximum(np.abs(r) - 0.5 * h, 0.0) for r in past.roots[j]]
-        self.roots = [np.where(first, now[i], less[i]) for i in indices]
-        fixed = [base[i] + old[i] + self.roots[i] * np.abs(self.roots[i]) for i in indices]
-        x = [before[i] + h * self.old[i][0] for i in indices]
-        for _ in range(ITERATIONS):
-            rate = rate_at(x)
-            x = [fixed[i] + h * weights[0] * rate[i] for i in indices]
-        self.state = [np.where(first, before[i], x[i]) for i in indices]
-        self.rate = rate_at(self.state)
 
 
 def _flat(rows: Any) -> list[Array]:
