@@ -17,10 +17,9 @@ from cosim.evaluation.roles import Quantity, estimation_error, label
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.drawing import balise_ticks, curve, legend_above, mark_evaluation, shade_zones, time_axis
 from cosim.report.figures.panel import Panel
-from cosim.report.figures.scales import ErrorScale, error_scale, running_maximum
+from cosim.report.figures.scales import ErrorScale, error_scale, running_maximum, window_length
 from cosim.results.result import Result
 
-WINDOWS = 180  # of the logarithmic figure in a run
 SPIKE = 3.0  # a curve that leaves the scale by this factor is named
 FAR = 1e3  # sizes are cut this many times beyond a logarithmic axis
 
@@ -75,7 +74,7 @@ def draw_errors(ax: Axes, curves: Sequence[ErrorCurve], quantity: Quantity, unit
         ax: the axes. curves: what to draw. quantity, unit: of the error.
     """
     scale = error_scale([c.error[c.settled] for c in curves])
-    window = _window([c.time for c in curves])
+    window = window_length([c.time for c in curves])
     for c in curves:
         largest = error_size(c.time[c.settled], c.error[c.settled]).max_abs
         wild = largest > SPIKE * scale.limit
@@ -111,12 +110,6 @@ def _error_figure(result: Result, spec: ReportSpec, ax: Axes, quantity: Quantity
 def _off_scale(largest: float, unit: str) -> str:
     size = error_number(largest, 2)
     return size if size == "diverged" else f"off scale: {size} {unit}"
-
-
-def _window(times: Sequence[np.ndarray]) -> float:
-    """Length of a window of the logarithmic figure: a round time [s], some hundred in a run."""
-    duration = max((float(time[-1] - time[0]) for time in times if len(time)), default=0.0)
-    return float(f"{max(duration / WINDOWS, 1e-6):.0e}")
 
 
 def _absolute(ax: Axes, c: ErrorCurve, scale: ErrorScale, line: dict[str, Any], window: float) -> None:

@@ -9,14 +9,14 @@ from cosim.drawing.style import MARK, axes_or_new, observer_line, styled
 from cosim.evaluation.fault_detection import DETECTION, intervals
 from cosim.evaluation.roles import estimate, label, recorded
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.figures.drawing import curve, legend_above, time_axis
+from cosim.report.figures.drawing import legend_above, time_axis
 from cosim.report.figures.panel import Panel, any_estimate
-from cosim.report.figures.scales import bounded
+from cosim.report.figures.scales import bounded, running_maximum, window_length
 from cosim.results.result import Result
 
 BOUND = "error_bound"
 ROW, REST = 0.38, 0.9  # height of the row of an observer, and of all that is not a row [inch]
-DECADES = 1e3  # from the bottom of the axis to the largest error or bound
+DECADES = 1e3  # from the bottom of the axis to the bound
 FILLED = 0.7  # share of a row that its bar fills
 
 
@@ -46,8 +46,8 @@ def fault_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Ax
 
 @styled
 def bound_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
-    """Magnitude of the speed error in m/s and the bound that its observer tells, against time,
-    on a logarithmic axis.
+    """Magnitude of the speed error as a share of the bound that its observer tells at the same instant, the largest in
+    each window of time, on a logarithmic axis; above 1 the bound is broken.
 
     Args:
         result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
@@ -57,20 +57,21 @@ def bound_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Ax
     """
     ax = axes_or_new(ax)
     true = recorded(result, spec.true_speed)
-    largest = 0.0
+    window, largest = window_length([result.time]), 1.0
     for observer in spec.observers:
         bound, speed = estimate(result, observer, BOUND), estimate(result, observer, "speed")
         if bound is None or speed is None or true is None:
             continue
-        line, text = observer_line(spec.observers, observer), label(spec, observer)
-        thin = line | {"linewidth": 0.8, "alpha": 0.6}
-        for kind, values, look in (("error", np.abs(speed - true), line), ("bound", bound, thin)):
-            curve(ax, result.time, bounded(values), None, label=f"{text}: {kind}", **look)
-            largest = max(largest, float(np.max(bounded(values[np.isfinite(values)]), initial=0.0)))
-    if largest > 0.0:
-        ax.set_yscale("log")
-        ax.set_ylim(largest / DECADES, 1.3 * largest)
-    ax.set_ylabel("|Speed error| [m/s]")
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            share = np.where(speed == true, 0.0, np.abs(speed - true) / bound)
+        middles, sizes = running_maximum(result.time, share, window)
+        sizes = bounded(np.nan_to_num(sizes, posinf=np.inf))
+        ax.plot(middles, sizes, label=label(spec, observer), **observer_line(spec.observers, observer))
+        largest = max(largest, float(np.max(sizes, initial=0.0)))
+    ax.axhline(1.0, color=MARK, linewidth=1.2, label="bound")
+    ax.set_yscale("log")
+    ax.set_ylim(1.0 / DECADES, 1.5 * largest)
+    ax.set_ylabel("|Speed error| / bound [1]")
     time_axis(ax, result)
     legend_above(ax)
     return ax
@@ -97,8 +98,8 @@ class BoundsPanel(Panel):
     """Bounds of the speed error."""
 
     name = "bounds"
-    title = "Speed error and its bound"
-    caption = "Magnitude of the speed error (thick), and the bound that the observer tells at each instant (thin)."
+    title = "Speed error as a share of its bound"
+    caption = "Largest in each window of time; above the line the bound that the observer told was broken."
     place = 3.6
 
     @staticmethod

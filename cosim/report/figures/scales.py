@@ -12,6 +12,7 @@ LOG_RATIO = 8.0  # sizes that differ by more than this need a logarithmic axis
 ROOM = 1.3
 PERCENTILE = 99.0
 SMALLEST_SPAN = 1e-3  # of an axis, by the size of its values: what rounding changes is no curve
+WINDOWS = 180  # of the logarithmic figure in a run
 BOUND = 1e150  # what is larger is drawn as this, so that nothing overflows on the way to a picture
 
 
@@ -83,6 +84,16 @@ def error_scale(curves: Sequence[np.ndarray]) -> ErrorScale:
     if kept[-1] <= LOG_RATIO * kept[0]:
         return ErrorScale(limit)
     return ErrorScale(limit, max(0.1 * kept[0], 1e-8 * limit))
+
+
+def window_length(times: Sequence[np.ndarray]) -> float:
+    """Length of a window of the logarithmic figure: a round time [s], some hundred in a run.
+
+    Args:
+        times: instants of the curves [s], shape (rows,) each.
+    """
+    duration = max((float(time[-1] - time[0]) for time in times if len(time)), default=0.0)
+    return float(f"{max(duration / WINDOWS, 1e-6):.0e}")
 
 
 def running_maximum(time: np.ndarray, values: np.ndarray, window: float) -> tuple[np.ndarray, np.ndarray]:

@@ -146,18 +146,23 @@ def test_figure_of_faults_has_a_row_for_the_truth_and_one_for_each_observer_that
     assert axes.get_xlabel() == "Time [s]"
 
 
-def test_figure_of_bounds_holds_error_and_bound_of_observers_that_tell_one() -> None:
+def test_figure_of_bounds_holds_the_share_of_observers_that_tell_one() -> None:
     t = np.arange(0.0, 10.0, 0.5)
     names = ("time", "train.speed", "o.speed", "o.error_bound", "alone.speed")
     table = np.zeros(len(t), [(name, "f8") for name in names])
     table["time"], table["train.speed"], table["alone.speed"] = t, 10.0, 99.0
-    table["o.speed"], table["o.error_bound"] = 10.0 - 0.1 * t, 0.2 + 0.1 * t
+    table["o.speed"], table["o.error_bound"] = 10.0 - 0.1 * t, 0.2
     result, spec = Result(table, [], []), replace(SPEC, true_speed="train.speed", labels={"o": "Ours"})
     assert BoundsPanel.available(result, spec)
     assert not BoundsPanel.available(result, SPEC)
     axes = BoundsPanel.draw(result, spec, None)
-    curves = {str(line.get_label()): line.get_ydata() for line in axes.get_lines()}
-    assert set(curves) == {"Ours: error", "Ours: bound"}
-    np.testing.assert_allclose(np.asarray(curves["Ours: error"], float), 0.1 * t, atol=1e-12)
-    assert axes.get_ylim() == pytest.approx((1.15e-3, 1.3 * 1.15))
-    assert axes.get_ylabel() == "|Speed error| [m/s]"
+    curves = {str(line.get_label()): np.asarray(line.get_ydata(), float) for line in axes.get_lines()}
+    assert set(curves) == {"Ours", "bound"}
+    np.testing.assert_allclose(curves["Ours"], 0.5 * t, atol=1e-12)
+    assert set(curves["bound"]) == {1.0}
+    assert axes.get_ylim() == pytest.approx((1e-3, 1.5 * 4.75))
+    assert axes.get_ylabel() == "|Speed error| / bound [1]"
+    table["o.error_bound"][4], table["o.speed"][6] = 0.0, np.nan  # a bound of nothing, an estimate that is none
+    curves = {str(line.get_label()): line.get_ydata() for line in BoundsPanel.draw(result, spec, None).get_lines()}
+    assert np.isfinite(np.asarray(curves["Ours"], float)).all()
+    assert min(curves["Ours"][4], curves["Ours"][6]) > 1e100
