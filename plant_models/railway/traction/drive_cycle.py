@@ -19,8 +19,8 @@ class DriveCycle(HybridSystem):
     """Speed reference and load torque of a drive, as functions of time.
 
     The reference is `speed`, turned round every `reversal_period` from that instant on (0: never). The load is
-    `load_torque_after` from `load_time` on, and `load_torque_before` until then. It acts against positive rotation and does
-    not turn round with the speed.
+    `load_torque_after` from `load_time` on, and `load_torque_before` until then. It acts against positive rotation, and
+    does not turn round with the speed.
 
     Presets: `load_step` (S1, default): 1000 rpm, 0.05 N.m at 0.5 s; `reversal` (S2): 1000 rpm, turned round at 0.5 s,
     under 0.05 N.m; `low_speed` (S3): 100 rpm, turned round every 0.25 s, under 0.05 N.m.
