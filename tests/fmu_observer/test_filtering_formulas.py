@@ -41,15 +41,17 @@ def test_short_and_joseph_forms_agree() -> None:
         np.testing.assert_allclose(short, joseph, rtol=0.0, atol=1e-12)  # rounding of numbers of size 10
 
 
+def smallest_variance(form: kalman.Form) -> float:
+    """Over 200 readings in random directions, 1e9 times more precise than the start."""
+    generator, x, P, smallest = np.random.default_rng(0), np.zeros(3), np.eye(3), 1.0
+    for _ in range(200):
+        P = kalman.correct(x, P, x[:1], generator.normal(size=(1, 3)), np.array([[1e-18]]), form=form).covariance
+        smallest = min(smallest, float(np.linalg.eigvalsh(P)[0]))
+    return smallest
+
+
 def test_the_joseph_form_stays_positive_where_the_short_one_does_not() -> None:
-    """100 corrections by two measurements that are 1e14 times better than the estimate."""
-    smallest: dict[kalman.Form, list[float]] = {"short": [], "joseph": []}
-    for seed in range(100):
-        c = case(seed, 3)
-        for form, found in smallest.items():
-            after = kalman.correct(c["x"], c["P"], c["innovation"], c["H"], 1e-14 * np.eye(2), form=form)
-            found.append(float(np.linalg.eigvalsh(after.covariance)[0]))
-    assert min(smallest["joseph"]) > 0.0 > min(smallest["short"])
+    assert smallest_variance("joseph") > 0.0 > smallest_variance("short")
 
 
 def test_noise_that_is_not_additive_by_hand() -> None:
