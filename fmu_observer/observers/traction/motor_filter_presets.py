@@ -29,7 +29,7 @@ ROWS: Mapping[str, tuple[float, float, float, float, float, float]] = {
     "true_noise": (1e-3, 1e-3, 1e-3, 1e-3, 0.1, 0.1),
 }
 """Rows by preset. `hand_repaired` has 0.01 in place of the printed 0.02 of current d, `ga_20_repaired` 1.347 in place
-of 0.347 of current q: conjectures, which reproduce the printed errors. `true_noise` are the variances of the noise itself.
+of 0.347 of current q: conjectures, which reproduce the printed errors. `true_noise` holds the variances of the noise.
 """
 
 
