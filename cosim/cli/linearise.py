@@ -29,7 +29,7 @@ def register(commands: Any) -> None:
         commands: subparsers of the program.
     """
     text = (
-        "Linearise an FMU, a plant or an observer at a point. A model exchange FMU and a model of ours give matrices of "
+        "Linearise an FMU, a plant or an observer at a point. Model exchange and models of ours give matrices of "
         "continuous time, an FMU with co-simulation only those from one communication step to the next."
     )
     epilog = "Exit codes: 0 done, 2 error."

@@ -36,7 +36,8 @@ class SealedModel(ABC):
     """One instance of an FMU whose states are written by start values.
 
     Args:
-        instance: loaded, not yet instantiated. folder: of its files, removed at the end. path: of the FMU, for messages.
+        instance: loaded, not yet instantiated. folder: of its files, removed at the end.
+        path: of the FMU, for messages.
         states: names of the states; None for those that the model description declares by their derivatives.
         outputs: names of what is read; None for all real outputs.
         inputs: names of what is written; None for all real inputs.
