@@ -1,4 +1,4 @@
-"""Inputs that are not connected: no shipped scenario is warned of one that is meant to be free, each of one forgotten."""
+"""Inputs without a connection: shipped scenarios are warned of none that is meant to be free, and of each forgotten."""
 
 from __future__ import annotations
 
