@@ -24,6 +24,7 @@ COMMANDS = (
     Command("run", "cosim.cli.run", "run a scenario"),
     Command("rerun", "cosim.cli.rerun", "run results again and compare"),
     Command("sweep", "cosim.cli.sweep", "run a scenario with varied values"),
+    Command("tune", "cosim.cli.tune", "search parameters for the smallest cost over several seeds"),
     Command("compare", "cosim.cli.compare", "compare a result with a reference"),
     Command("baseline", "cosim.cli.baseline", "make, check and update baselines"),
     Command("benchmark-observers", "cosim.cli.benchmark_observers", "compare observers on one recorded run"),
