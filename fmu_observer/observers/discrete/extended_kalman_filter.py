@@ -48,7 +48,9 @@ class ExtendedKalmanFilter(ModelObserver):
     timing = "periodic"
     discrete = True
     internal_step = 0.1  # nothing flows between samples
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": ("pendulum", "linear_pendulum", "freight_train")}
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "model": ("pendulum", "linear_pendulum", "freight_train", "cart_pendulum", "cart_double_pendulum")
+    }
 
     def __init__(self, model: str | ObserverModel = "pendulum") -> None:
         chosen = find_model(model)
