@@ -177,7 +177,7 @@ def test_standard_deviations_are_outputs() -> None:
         "angle_std": 2.0,
         "rate_std": 3.0,
         "innovation_angle": 0.3,
-        "innovation_angle_std": 4.0,
+        "innovation_covariance": [16.0],
         "nis": 5.0,
         "innovation_likelihood": 6.0,
     }

@@ -21,6 +21,10 @@ class Arrivals:
         who: name of the filter, for messages. model: whose measurements they are.
         arrival: ``periodic``, or the name of an event, for all measurements or for each in a list.
 
+    Attributes:
+        names: of the events, one a measurement. timed: whether one arrives by an event from outside.
+        apart: whether they arrive at more than one event.
+
     Raises:
         ValueError: a list has another length, a name is no identifier, or the model moves at its own period only.
     """
@@ -41,6 +45,7 @@ class Arrivals:
             )
         self.names = tuple(names)
         self.signals = model.measurements
+        self.apart = len(set(names)) > 1
         self.timed = any(name != PERIODIC for name in names)
         if self.timed and not model.any_period:
             raise ValueError(

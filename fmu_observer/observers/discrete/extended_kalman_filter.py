@@ -28,6 +28,9 @@ class ExtendedKalmanFilter(GaussianFilter):
     Options and signals are those of `GaussianFilter`. Defaults [ours]: QN of white noise of density 0.01 in every
     state, RN = 1e-4, P = I at the start.
 
+    Args:
+        model: name of an observer model or of a plant, or one itself. options: those of `GaussianFilter`.
+
     Raises:
         ValueError: the model is unknown, or a mode of an observer model does not decay and is not measured.
     """

@@ -12,18 +12,20 @@ from typing import Any, ClassVar, Literal, NamedTuple
 import numpy as np
 
 from fmu_observer.condition import Condition
-from fmu_observer.filtering.kalman import Corrected, flattened, log_likelihood, normalised_square, symmetric
-from fmu_observer.filtering.square_root import factor
-from fmu_observer.models.filter_model import FilterModel, Known
+from fmu_observer.filtering.kalman import Corrected, flattened, log_likelihood, normalised_square
+from fmu_observer.models.filter_model import Known
 from fmu_observer.models.model import stacked
+from fmu_observer.models.process_noise import noise_over
 from fmu_observer.models.system_model import SUBSTEPS, Source, find_filter_model
 from fmu_observer.observers.discrete.arrivals import PERIODIC, Arrivals
+from fmu_observer.observers.discrete.covariance_requirements import positive
 from fmu_observer.observers.discrete.filter_condition import steady_condition
+from fmu_observer.observers.discrete.filter_signals import SignalsOf
 from fmu_observer.observers.discrete.sampling import PRIMED
 from fmu_observer.observers.gated_observer import GATED_EVENT, GatedObserver
 from fmu_observer.observers.model_observer import as_matrix
 from fmu_observer.observers.parameter_values import Value, parameter_values
-from plant_models.hybrid import Signal, memory, output_signal, parameter, vector, width
+from plant_models.hybrid import Signal, parameter, vector, width
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
@@ -69,7 +71,7 @@ class GaussianFilter(GatedObserver):
         model: name of an observer model or of a plant, ``file.py:Class``, or a model or system itself.
         outputs, inputs, process_noises, measurement_noises, substeps: of a plant, see `models.system_model`.
         arrival: see above. form: of the covariance equations, one of `forms`.
-        covariances: whether the covariances of estimate and innovation are outputs, `P` and `S`, row by row.
+        covariances: whether the whole covariance of the estimate is an output, `covariance`, row by row.
         options: of the subclass.
 
     Raises:
@@ -213,6 +215,7 @@ class GaussianFilter(GatedObserver):
             kept["log_likelihood"] = kept["log_likelihood"] + log_likelihood(error, after.innovation_covariance)
             e, S = _replaced(e, S, rows, error, after.innovation_covariance)
         timed = (t + 0.0 * kept["primed"],) if self.arrivals.timed else ()
+        counted = ((float(len(rows)) if rows else kept["last_count"]),) if self.arrivals.apart else ()
         return vector(
             *(belief.estimate[i] for i in range(self.model.order)),
             *flattened(belief.spread),
@@ -220,6 +223,7 @@ class GaussianFilter(GatedObserver):
             *flattened(S),
             kept["last_nis"],
             kept["log_likelihood"],
+            *counted,
             *timed,
             1.0 + 0.0 * kept["primed"],
         )
@@ -233,10 +237,12 @@ class GaussianFilter(GatedObserver):
         values |= {f"{s.name}_std": np.sqrt(np.maximum(P[i, i], 0.0)) for i, s in enumerate(self.model.states)}
         for i, s in enumerate(self.model.measurements):
             values[f"innovation_{s.name}"] = x[first + i]
-            values[f"innovation_{s.name}_std"] = np.sqrt(np.maximum(x[second + i * (q + 1)], 0.0))
+        values["innovation_covariance"] = x[second : second + q * q]
         values |= {"nis": x[places["last_nis"]], "innovation_likelihood": x[places["log_likelihood"]]}
+        if self.arrivals.apart:
+            values["nis_degrees"] = x[places["last_count"]]
         if self.covariances:
-            values |= {"P": np.reshape(P, (n * n,)), "S": x[second : second + q * q]}
+            values["covariance"] = np.reshape(P, (n * n,))
         return values
 
     def requirements(self, p: Any) -> dict[str, Array]:
@@ -295,59 +301,18 @@ class GaussianFilter(GatedObserver):
 
     def _declare(self) -> None:
         """Signals and events, from the model and the way its measurements arrive."""
-        model, n, q = self.model, self.model.order, len(self.model.measurements)
-        estimates = tuple(
-            memory(f"estimated_{s.name}", s.unit, s.start, f"Estimate: {s.description}") for s in model.states
-        )
-        name = "covariance_factor" if self.rooted else "covariance"
-        text = "Lower factor of the covariance P(k|k)" if self.rooted else "Covariance P(k|k)"
-        unit = tuple(map(float, np.eye(n).ravel()))
-        own = [
-            memory(name, "1", unit, f"{text}, row by row, SI units", size=n * n),
-            memory("last_innovation", "1", 0.0, "Measured minus predicted at the last readings, SI units", size=q),
-            memory("last_innovation_covariance", "1", 0.0, "Covariance of it, row by row, SI units", size=q * q),
-            memory("last_nis", "1", 0.0, "Last innovation squared over its covariance, one reading"),
-            memory("log_likelihood", "1", 0.0, "Logarithm of the likelihood of all innovations so far"),
-        ]
-        if self.arrivals.timed:
-            own.append(memory("last_time", "s", 0.0, "Time of the estimate"))
-        self.states = (*estimates, *own, PRIMED)
+        model = self.model
+        told = SignalsOf(model, self.arrivals, rooted=self.rooted, covariances=self.covariances)
+        self.states = (*told.memory(), PRIMED)
         self._places = {s.name: width(self.states[:i]) for i, s in enumerate(self.states)}
         self.inputs = (*model.inputs, *self.arrivals.inputs)
         self.events = self.arrivals.events
-        self.outputs = self._declared_outputs()
+        self.outputs = told.outputs()
         self.parameters = (*self._declared_noise(), *self.own_parameters, *model.parameters)
         period = "Period of the prediction" if self.arrivals.timed else "Sampling period of the measurements"
         self.parameters += (parameter("sample_period", "s", model.sample_period, period, min=1e-6),)
         if GATED_EVENT in self.arrivals.names:
             self.position_state = self._position_state()
-
-    def _declared_outputs(self) -> tuple[Signal, ...]:
-        model, n, q = self.model, self.model.order, len(self.model.measurements)
-        found = [
-            output_signal(s.name, s.unit, f"Estimate: {s.description}", variability="discrete") for s in model.states
-        ]
-        for s in model.states:
-            text = f"Standard deviation of the estimate: {s.description}"
-            found.append(output_signal(f"{s.name}_std", s.unit, text))
-        for s in model.measurements:
-            text = f"Last measured minus predicted: {s.description}"
-            found.append(output_signal(f"innovation_{s.name}", s.unit, text, variability="discrete"))
-            text = f"Standard deviation of the innovation: {s.description}"
-            found.append(output_signal(f"innovation_{s.name}_std", s.unit, text))
-        found += [
-            output_signal("nis", "1", "Normalised innovation squared of the last readings", variability="discrete"),
-            output_signal(
-                "innovation_likelihood",
-                "1",
-                "Logarithm of the likelihood of all innovations so far",
-                variability="discrete",
-            ),
-        ]
-        if self.covariances:
-            found.append(output_signal("P", "1", "Covariance of the estimate, row by row, SI units", size=n * n))
-            found.append(output_signal("S", "1", "Covariance of the innovation, row by row, SI units", size=q * q))
-        return tuple(found)
 
     def _declared_noise(self) -> tuple[Signal, ...]:
         r, s = self.model.noise_count, self.model.reading_noise_count
@@ -378,71 +343,6 @@ class GaussianFilter(GatedObserver):
         inputs = np.array([float(s.start_values[0]) for s in self.model.inputs])
         H, _ = self.model.measurement_jacobians(self.model.start, Known(0.0, inputs, parameters))
         return int(np.argmax(np.abs(np.asarray(H)[names.index("position")])))
-
-
-def noise_over(model: FilterModel, x: Array, known: Known, period: Array, density: Array) -> Array:
-    """Covariance that white noise on the states leaves after a period, by Simpson's rule of its integral.
-
-    Exact for chains of up to two integrators; positive for any period.
-
-    Args:
-        model: holds for any period. x: state at the start, shape (n,). known: time, inputs and parameters.
-        period: [s]. density: spectral density, shape (n, n) [x2/s].
-
-    Returns:
-        ``integral of F(s) density F(s)'`` over the period, shape (n, n).
-    """
-    half, _ = model.transition_jacobians(x, known, 0.5 * period)
-    whole, _ = model.transition_jacobians(x, known, period)
-    middle = half @ density @ half.T
-    return symmetric((period / 6.0) * (density + 4.0 * middle + whole @ density @ whole.T))
-
-
-def positive(name: str, flat: Array, size: int, *, definite: bool) -> dict[str, Array]:
-    """Requirements that a covariance is one: symmetric, and positive, entry by entry.
-
-    Args:
-        name: of the parameter. flat: its values row by row, shape (size * size,). size: rows.
-        definite: whether variances of zero are refused too.
-
-    Returns:
-        By text, which names the entry: 1 where it is fulfilled, else 0.
-    """
-    needed: dict[str, Array] = {}
-    matrix = as_matrix(flat, size, size)
-    for i in range(size):
-        for j in range(i):
-            one, other = i * size + j + 1, j * size + i + 1
-            text = f"{name}[{one}] and {name}[{other}] must be equal: a covariance is symmetric"
-            needed[text] = np.where(matrix[i, j] == matrix[j, i], 1.0, 0.0)
-    for i in range(size):
-        entry = f"{name}[{i * (size + 1) + 1}]" if size > 1 else f"{name}[1]"
-        value = matrix[i, i]
-        legal = value > 0.0 if definite else value >= 0.0
-        needed[f"{entry} must be {'positive' if definite else 'zero or more'}: it is a variance"] = np.where(
-            legal, 1.0, 0.0
-        )
-    if size == 1:
-        return needed
-    lower = factor(matrix)
-    rest = matrix - lower @ lower.T
-    largest = np.maximum(*_two([matrix[i, i] for i in range(size)]))
-    off = np.sum(np.abs(rest))
-    text = f"{name} must be positive {'' if definite else 'semi'}definite: no combination of its noises has a negative "
-    text += "variance"
-    fits = np.where(off <= 1e-9 * largest * size * size, 1.0, 0.0)
-    if definite:
-        for i in range(size):
-            fits = fits * np.where(lower[i, i] > 0.0, 1.0, 0.0)
-    needed[text] = fits
-    return needed
-
-
-def _two(values: list[Array]) -> tuple[Array, Array]:
-    largest = values[0]
-    for value in values[1:]:
-        largest = np.maximum(largest, value)
-    return largest, largest
 
 
 def _matrix(name: str, values: np.ndarray, text: str) -> Signal:

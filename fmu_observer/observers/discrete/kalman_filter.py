@@ -16,6 +16,9 @@ class KalmanFilter(ExtendedKalmanFilter):
     are those of the extended filter, whose Jacobian is A_d here. Its condition is exact: with a stabilising solution of
     the Riccati equation P converges to it from any start.
 
+    Args:
+        model: name of an observer model or of a plant, or one itself. options: those of `GaussianFilter`.
+
     Raises:
         ValueError: the model is nonlinear, or a mode of it does not decay and is not measured.
     """
