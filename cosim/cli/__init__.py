@@ -30,6 +30,7 @@ COMMANDS = (
     Command("benchmark-observers", "cosim.cli.benchmark_observers", "compare observers on one recorded run"),
     Command("identify", "cosim.cli.identify", "identify parameters of a train from a measured run"),
     Command("linearise", "cosim.cli.linearise", "linearise an FMU or a model at a point"),
+    Command("calibrate", "cosim.cli.calibrate", "fit parameters of an FMU or a scenario to a recording"),
     Command("bound", "cosim.cli.bound", "bounds of an observer's error between samples"),
     Command("limits", "cosim.cli.limits", "gaps and delays that an observer survives"),
     Command("report", "cosim.cli.report", "report of results, or of several laid over each other"),
