@@ -8,7 +8,7 @@ from fmu_observer.filtering.square_root import factor
 from fmu_observer.observers.model_observer import as_matrix
 from plant_models.hybrid.system import Array
 
-ROUNDING = 1e-9  # share of the sum of the variances that a factor may leave
+ROUNDING = 1e-9  # share of the product of two deviations that is taken for zero
 
 
 def positive(name: str, flat: Array, size: int, *, definite: bool) -> dict[str, Array]:
@@ -27,7 +27,7 @@ def positive(name: str, flat: Array, size: int, *, definite: bool) -> dict[str, 
         for j in range(i):
             one, other = i * size + j + 1, j * size + i + 1
             text = f"{name}[{one}] and {name}[{other}] must be equal: a covariance is symmetric"
-            needed[text] = np.where(matrix[i, j] == matrix[j, i], 1.0, 0.0)
+            needed[text] = _small(matrix[i, j] - matrix[j, i], matrix, i, j)
     for i in range(size):
         entry = f"{name}[{i * (size + 1) + 1}]" if size > 1 else f"{name}[1]"
         value = matrix[i, i]
@@ -39,12 +39,17 @@ def positive(name: str, flat: Array, size: int, *, definite: bool) -> dict[str, 
         return needed
     lower = factor(matrix)
     rest = matrix - lower @ lower.T
-    off, largest = np.sum(np.abs(rest)), np.trace(matrix)
-    text = f"{name} must be positive {'' if definite else 'semi'}definite: no combination of its noises has a negative "
-    text += "variance"
-    fits = np.where(off <= ROUNDING * largest, 1.0, 0.0)
-    if definite:
-        for i in range(size):
+    fits: Array = 1.0
+    for i in range(size):
+        for j in range(i + 1):
+            fits = fits * _small(rest[i, j], matrix, i, j)
+        if definite:
             fits = fits * np.where(lower[i, i] > 0.0, 1.0, 0.0)
-    needed[text] = fits
+    kind = "definite" if definite else "semidefinite"
+    needed[f"{name} must be positive {kind}: no combination of its noises has a negative variance"] = fits
     return needed
+
+
+def _small(value: Array, matrix: Array, i: int, j: int) -> Array:
+    """1 where a value is rounding beside the deviations of two entries, else 0."""
+    return np.where(value * value <= ROUNDING * ROUNDING * np.abs(matrix[i, i] * matrix[j, j]), 1.0, 0.0)
