@@ -109,6 +109,16 @@ class SealedModel(ABC):
             self._write_inputs()
         self._enter(t)
 
+    def set_inputs(self, u: Array) -> None:
+        """Write the inputs where the instance stands.
+
+        Args:
+            u: inputs, shape (m,).
+        """
+        if len(self.inputs):
+            self._inputs[:] = u
+            self._told(self._write_inputs)
+
     def values_at(self, t: float, x: Array, u: Array) -> tuple[Array, Array]:
         """States and outputs just after a restart.
 
