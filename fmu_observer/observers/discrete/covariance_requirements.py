@@ -39,14 +39,13 @@ def positive(name: str, flat: Array, size: int, *, definite: bool) -> dict[str, 
         return needed
     lower = factor(matrix)
     rest = matrix - lower @ lower.T
-    fits: Array = 1.0
-    for i in range(size):
+    kind = "definite" if definite else "semidefinite"
+    for i in range(1, size):
+        fits: Array = np.where(lower[i, i] > 0.0, 1.0, 0.0) if definite else 1.0
         for j in range(i + 1):
             fits = fits * _small(rest[i, j], matrix, i, j)
-        if definite:
-            fits = fits * np.where(lower[i, i] > 0.0, 1.0, 0.0)
-    kind = "definite" if definite else "semidefinite"
-    needed[f"{name} must be positive {kind}: no combination of its noises has a negative variance"] = fits
+        entry = f"{name}[{i * (size + 1) + 1}]"
+        needed[f"{entry} is too small beside the covariances of its row: {name} must be positive {kind}"] = fits
     return needed
 
 
