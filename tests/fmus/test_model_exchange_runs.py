@@ -52,7 +52,7 @@ GAIN = 0.55
 """Share of the asymptotic gain of a halved step that must be seen: events cut internal steps, and the cuts fall
 elsewhere. More than half tells an order from the one below."""
 
-INPUTS = {"effort": 2.0e4, "force": 4.0}
+INPUTS = {"effort": 2.0e4, "force": 4.0, "load_torque": 0.02}
 STARTS: Mapping[str, Mapping[str, float]] = {
     "locomotive": {"train_speed": 10.0, "wheel_rate": 20.2},
     "train": {"brake_demand": 0.4, "elongation[1]": 0.002, **Train().rolling(10.0)},
