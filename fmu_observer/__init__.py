@@ -19,6 +19,7 @@ ROOMS = (
     "fmu_observer.observers.sampled",
     "fmu_observer.observers.continuous",
     "fmu_observer.observers.discrete",
+    "fmu_observer.observers.traction",
     "fmu_observer.detection",
 )
 

@@ -28,8 +28,8 @@ from fmpy.model_description import (
     Unknown,
 )
 
+from fmu_observer.annotated_variable import AnnotatedVariable
 from fmu_observer.event_protocol import JOURNAL_CAPACITY, LATE_POLICIES, OUTCOME_TEXTS, OUTCOME_VARIABLES, EventProtocol
-from fmu_observer.warning_variable import WarningVariable
 from plant_models import hybrid
 from plant_models.disk_cache.entries import remembered
 from plant_models.disk_cache.identity import identity
@@ -282,7 +282,8 @@ def _signal_variable(signal: Signal, name: str, reference: int, real: str, start
     variable.displayUnit = signal.display_unit or DISPLAY_UNITS.get(signal.unit)
     variable.min = None if signal.min is None else repr(float(signal.min))
     variable.max = None if signal.max is None else repr(float(signal.max))
-    return variable if signal.warning is None else WarningVariable.of(variable, signal.warning)
+    annotated = signal.warning is not None or signal.optional
+    return AnnotatedVariable.of(variable, signal.warning, signal.optional) if annotated else variable
 
 
 def _event_variables(

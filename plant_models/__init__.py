@@ -22,6 +22,7 @@ ROOMS = (
     "plant_models.railway.vehicle",
     "plant_models.railway.sensors",
     "plant_models.railway.faults",
+    "plant_models.railway.traction",
     "plant_models.railway.network",
     "plant_models.railway.control",
     "plant_models.benchmarks",

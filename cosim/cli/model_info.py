@@ -55,5 +55,5 @@ def _variable(signal: Signal) -> dict[str, Any]:
         "type": "Float64" if signal.size is None else f"Float64[{signal.size}]",
         "unit": signal.unit,
         "start": signal.start if signal.causality != "output" else None,
-        "description": signal.description,
+        "description": f"{signal.description} (optional)" if signal.optional else signal.description,
     }

@@ -14,6 +14,7 @@ from fmpy.model_description import ModelVariable
 from cosim.components.component import Component
 from cosim.coupling.transformation import Transformation
 from cosim.errors import CouplingError, nearest
+from fmu_observer.annotated_variable import is_optional
 from fmus.fmi.elements import Element, described, elements_of
 from fmus.fmi.types import FLOATING_TYPES, NUMERIC_TYPES, getter_type
 from plant_models.hybrid.units import UnitError, conversion
@@ -219,6 +220,8 @@ def unconnected_inputs(
 ) -> list[str]:
     """Names of inputs, and of elements of arrays, without a source; they keep their start values.
 
+    Those that are declared optional are left out: there the start value is meant.
+
     Args:
         connections: checked. components: all of them.
         given: by component the names whose values were given on purpose; they are not told.
@@ -226,15 +229,12 @@ def unconnected_inputs(
     set_by_hand = {(name, signal) for name, signals in (given or {}).items() for signal in signals}
     taken = {c.target for c in connections} | set_by_hand
     return [
-        f"{c.name}.{name}"
-        for c in components
-        for v in _free_to_connect(c, taken)
-        for name in _without_source(c, v, taken)
+        f"{c.name}.{name}" for c in components for v in _to_connect(c, taken) for name in _without_source(c, v, taken)
     ]
 
 
-def _free_to_connect(component: Component, taken: set[tuple[str, str]]) -> list[ModelVariable]:
-    """The inputs that may be connected; an FMI 3 alias is its variable, and one that is taken takes it."""
+def _to_connect(component: Component, taken: set[tuple[str, str]]) -> list[ModelVariable]:
+    """The inputs that are to be connected; an FMI 3 alias is its variable, and one that is taken takes it."""
     hidden = component.event_references()
     inputs = [
         v
@@ -242,7 +242,7 @@ def _free_to_connect(component: Component, taken: set[tuple[str, str]]) -> list[
         if v.causality == "input" and v.type != "Clock" and v.alias is None
     ]
     by_alias = {v.name for v in inputs if any((component.name, alias.name) in taken for alias in v.aliases)}
-    return [v for v in inputs if v.valueReference not in hidden and v.name not in by_alias]
+    return [v for v in inputs if v.valueReference not in hidden and v.name not in by_alias and not is_optional(v)]
 
 
 def _without_source(component: Component, variable: ModelVariable, taken: set[tuple[str, str]]) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from cosim.components.component import Component
 from cosim.results.result import BaliseRecord
-from fmu_observer.warning_variable import declared_warnings
+from fmu_observer.annotated_variable import declared_warnings
 from plant_models.hybrid.output_warning import OutputWarning
 
 DOUBTS = {"doubted": "used what it doubted", "ignored": "ignored what it doubted"}

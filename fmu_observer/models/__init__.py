@@ -1,6 +1,8 @@
 """What an observer believes of its plant: equations, signals, constants. No observer and no gain lives here."""
 
 from fmu_observer.models.braked_train import braked_train
+from fmu_observer.models.cart_double_pendulum import cart_double_pendulum
+from fmu_observer.models.cart_pendulum import cart_pendulum
 from fmu_observer.models.coupled_vehicles import coupled_vehicles
 from fmu_observer.models.flexible_joint_arm import flexible_joint_arm, flexible_joint_arm_as_printed
 from fmu_observer.models.freight_train import freight_train
@@ -25,6 +27,8 @@ __all__ = [
     "StateAffineModel",
     "TakagiSugenoModel",
     "braked_train",
+    "cart_double_pendulum",
+    "cart_pendulum",
     "coupled_vehicles",
     "find_model",
     "find_state_affine_model",

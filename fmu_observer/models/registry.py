@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from fmu_observer.models.braked_train import braked_train
+from fmu_observer.models.cart_double_pendulum import cart_double_pendulum
+from fmu_observer.models.cart_pendulum import cart_pendulum
 from fmu_observer.models.coupled_vehicles import coupled_vehicles
 from fmu_observer.models.flexible_joint_arm import flexible_joint_arm, flexible_joint_arm_as_printed
 from fmu_observer.models.freight_train import freight_train
@@ -24,6 +26,8 @@ MODELS: dict[str, Callable[[], ObserverModel]] = {
     "flexible_joint_arm": flexible_joint_arm,
     "flexible_joint_arm_as_printed": flexible_joint_arm_as_printed,
     "tanh_system": tanh_system,
+    "cart_pendulum": cart_pendulum,
+    "cart_double_pendulum": cart_double_pendulum,
 }
 
 

@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from fmpy.model_description import BaseUnit, ModelDescription, ModelVariable, Unit, Unknown
 
-from fmu_observer.warning_variable import WarningVariable
+from fmu_observer.annotated_variable import OPTIONAL_ANNOTATION, OPTIONAL_ELEMENT, AnnotatedVariable
 from fmus.content.characters import check_text, number_text
 from plant_models.hybrid.output_warning import ANNOTATION, ELEMENT
 
@@ -179,8 +179,7 @@ def _variable_2(parent: Element, variable: ModelVariable, exchanged: bool) -> No
     # its index, see FIRST_REFERENCE
     derivative = None if variable.derivative is None else variable.derivative.valueReference
     _element(element, variable.type, _values(variable, exchanged) | {"derivative": derivative})
-    if isinstance(variable, WarningVariable):
-        _warning(SubElement(SubElement(element, "Annotations"), "Tool", name=ANNOTATION), variable)
+    _annotations(element, variable, "Tool", "name")
 
 
 def _variable_3(parent: Element, variable: ModelVariable, exchanged: bool) -> None:
@@ -194,16 +193,23 @@ def _variable_3(parent: Element, variable: ModelVariable, exchanged: bool) -> No
         derivative = None if variable.derivative is None else variable.derivative.valueReference
         attributes |= {"initial": variable.initial, **_values(variable, exchanged), "derivative": derivative}
     element = _element(parent, variable.type, attributes)
-    if isinstance(variable, WarningVariable):
-        _warning(SubElement(SubElement(element, "Annotations"), "Annotation", type=ANNOTATION), variable)
+    _annotations(element, variable, "Annotation", "type")
 
 
-def _warning(parent: Element, variable: WarningVariable) -> None:
-    """What an output warns of, see `plant_models.hybrid.output_warning`."""
+def _annotations(element: Element, variable: ModelVariable, tag: str, key: str) -> None:
+    """What an output warns of, and that an input is optional; `tag` and `key`: how the version of FMI names who says
+    it.
+    """
+    if not isinstance(variable, AnnotatedVariable):
+        return
+    annotations = SubElement(element, "Annotations")
+    if variable.optional:
+        SubElement(SubElement(annotations, tag, {key: OPTIONAL_ANNOTATION}), OPTIONAL_ELEMENT)
     warning = variable.warning
-    check_text(warning.text, f"modelDescription.xml: the warning of {variable.name!r}")
-    attributes = {"shows": " ".join(warning.shows) or None, "atEnd": "true" if warning.at_end else None}
-    _element(parent, ELEMENT, attributes).text = warning.text
+    if warning is not None:
+        check_text(warning.text, f"modelDescription.xml: the warning of {variable.name!r}")
+        attributes = {"shows": " ".join(warning.shows) or None, "atEnd": "true" if warning.at_end else None}
+        _element(SubElement(annotations, tag, {key: ANNOTATION}), ELEMENT, attributes).text = warning.text
 
 
 def _values(variable: ModelVariable, exchanged: bool) -> dict[str, object]:

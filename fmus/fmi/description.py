@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 from fmpy import read_model_description
 from fmpy.model_description import ModelDescription, ModelVariable, Unknown, ValidationError
 
-from fmu_observer.warning_variable import WarningVariable
+from fmu_observer.annotated_variable import OPTIONAL_ANNOTATION, OPTIONAL_ELEMENT, AnnotatedVariable
 from fmus.fmi.standard import OWN_TOOL
 from plant_models.hybrid.output_warning import ANNOTATION, ELEMENT, OutputWarning
 
@@ -70,7 +70,7 @@ def read_description(source: Path) -> ModelDescription:
         for entry in root.iterfind("ModelVariables/Clock"):
             _complete_clock(variables[entry.get("name")], entry)
     if description.generationTool == OWN_TOOL:
-        _complete_warnings(description, ElementTree.fromstring(_text(source)))
+        _complete_annotations(description, ElementTree.fromstring(_text(source)))
     return description
 
 
@@ -102,21 +102,29 @@ def _complete_clock(clock: ModelVariable, entry: ElementTree.Element) -> None:
             setattr(clock, name, convert(text))
 
 
-def _complete_warnings(description: ModelDescription, root: ElementTree.Element) -> None:
-    """What outputs warn of, which the FMUs of this package say in annotations."""
-    warnings = {}
-    for entry in root.iterfind("ModelVariables/*"):
-        for place in (f"Tool[@name='{ANNOTATION}']", f"Annotation[@type='{ANNOTATION}']"):
-            found = entry.find(f"Annotations/{place}/{ELEMENT}")
-            if found is not None and found.text:
-                shows, at_end = tuple(found.get("shows", "").split()), found.get("atEnd") in TRUE
-                warnings[entry.get("name")] = OutputWarning(found.text, shows, at_end)
-    for i, variable in enumerate(description.modelVariables):
-        if variable.name in warnings:
-            description.modelVariables[i] = made = WarningVariable.of(variable, warnings[variable.name])
-            for unknown in (*description.outputs, *description.initialUnknowns):
-                if unknown.variable is variable:
-                    unknown.variable = made
+def _complete_annotations(description: ModelDescription, root: ElementTree.Element) -> None:
+    """What outputs warn of and which inputs are optional, which the FMUs of this package say in annotations."""
+    made = {}
+    entries = {entry.get("name"): entry for entry in root.iterfind("ModelVariables/*")}
+    for variable in description.modelVariables:
+        entry = entries[variable.name]
+        told = _annotation(entry, ANNOTATION, ELEMENT)
+        optional = _annotation(entry, OPTIONAL_ANNOTATION, OPTIONAL_ELEMENT) is not None
+        warning = None
+        if told is not None and told.text:
+            warning = OutputWarning(told.text, tuple(told.get("shows", "").split()), told.get("atEnd") in TRUE)
+        if warning is not None or optional:
+            made[variable.name] = AnnotatedVariable.of(variable, warning, optional)
+    description.modelVariables = [made.get(v.name, v) for v in description.modelVariables]
+    for unknown in (*description.outputs, *description.derivatives, *description.initialUnknowns):
+        unknown.variable = made.get(unknown.variable.name, unknown.variable)
+        unknown.dependencies = [made.get(v.name, v) for v in unknown.dependencies or ()] or unknown.dependencies
+
+
+def _annotation(entry: ElementTree.Element, name: str, element: str) -> ElementTree.Element | None:
+    """An annotation of a variable as FMI 2 or FMI 3 writes it."""
+    places = (f"Tool[@name='{name}']", f"Annotation[@type='{name}']")
+    return next((f for p in places if (f := entry.find(f"Annotations/{p}/{element}")) is not None), None)
 
 
 def declared_tolerance(description: ModelDescription) -> float | None:

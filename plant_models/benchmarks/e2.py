@@ -23,7 +23,7 @@ class NonTriangularisablePlant(HybridSystem):
     source = "Bouchama 2024, section 2.5.2"
     internal_step = 1e-3
     states = tuple(state(f"state_{i}", "1", 0.0, f"State {i}") for i in (1, 2, 3, 4, 5))
-    inputs = (input_signal("drive", "1", 0.0, "Added to the printed drive"),)
+    inputs = (input_signal("drive", "1", 0.0, "Added to the printed drive", optional=True),)
     outputs = (
         *(output_signal(f"x{i}", "1", f"State {i}") for i in (1, 2, 3, 4, 5)),
         output_signal("total_drive", "1", "Drive u that acts"),

@@ -47,7 +47,7 @@ class FlexibleJointArm(HybridSystem):
         state("motor_speed", "rad/s", 0.0, "Angular speed of the motor"),
         state("link_speed", "rad/s", 0.0, "Angular speed of the link"),
     )
-    inputs = (input_signal("drive", "1", 0.0, "Added to the printed drive"),)
+    inputs = (input_signal("drive", "1", 0.0, "Added to the printed drive", optional=True),)
     outputs = (
         output_signal("measured_motor_angle", "rad", "Angle of the motor"),
         output_signal("measured_link_angle", "rad", "Angle of the link"),

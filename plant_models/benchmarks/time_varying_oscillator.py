@@ -30,7 +30,7 @@ class TimeVaryingOscillator(HybridSystem):
     source = "Hann 2014, (4.64)"
     internal_step = 1e-3
     states = (state("state_1", "1", 20.0, "First state"), state("state_2", "1", -40.0, "Second state"))
-    inputs = (input_signal("drive", "1", 0.0, "Added to the printed drive"),)
+    inputs = (input_signal("drive", "1", 0.0, "Added to the printed drive", optional=True),)
     outputs = (
         output_signal("x1", "1", "First state, which is measured"),
         output_signal("x2", "1", "Second state"),

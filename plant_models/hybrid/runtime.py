@@ -16,7 +16,7 @@ from plant_models.hybrid.integration import effective_flow
 from plant_models.hybrid.kernel import Kernel, make_kernel
 from plant_models.hybrid.noise import standard_normal
 from plant_models.hybrid.requirements import unfulfilled
-from plant_models.hybrid.signal import scalar_names
+from plant_models.hybrid.signal import scalar_names, width
 from plant_models.hybrid.system import HybridSystem
 
 GRID_TOLERANCE = 1e-9  # of an internal step: closer to a grid point than this is on it
@@ -188,12 +188,12 @@ class Runtime:
         position = self._noise_offset
         for i, event in enumerate(self.system.periodic_events):
             if self._instant(i) <= self.t + self._tolerance(self.t):
-                for j, _noise in enumerate(event.noises):
+                for j in range(width(event.noises)):
                     signal = position - self._noise_offset + j
                     self.u[position + j] = standard_normal(int(self._timing("seed")), signal, self.ticks[i])
                 self._kernel.jump(event.name, self.t)
                 self.ticks[i] += 1
-            position += len(event.noises)
+            position += width(event.noises)
         self._due = self._next_due()
 
     def _integrate(self, target: float, tolerance: float) -> None:

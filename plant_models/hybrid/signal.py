@@ -35,11 +35,11 @@ class Signal:
         display_unit: unit to show at the user's edge, e.g. ``km/h``.
         integer: a whole number to the outside; only a discrete output can be one.
         warning: what is told after a run in which the value was not zero; of scalar outputs only.
+        optional: an input that keeps its start value on purpose where nothing is connected to it: nobody is warned.
 
     Raises:
         ValueError: the name is not an identifier or is a keyword, the start does not fit the size, an integer is no
-        discrete
-            output, or something else than a scalar output warns.
+            discrete output, something else than a scalar output warns, or something else than an input is optional.
     """
 
     name: str
@@ -54,12 +54,15 @@ class Signal:
     display_unit: str | None = None
     integer: bool = False
     warning: OutputWarning | None = None
+    optional: bool = False
 
     def __post_init__(self) -> None:
         if self.integer and (self.causality, self.variability) != ("output", "discrete"):
             raise ValueError(f"Signal {self.name!r} is an integer; only a discrete output can be one.")
         if self.warning is not None and (self.causality != "output" or self.size is not None):
             raise ValueError(f"Signal {self.name!r} has a warning; only a scalar output can have one.")
+        if self.optional and self.causality != "input":
+            raise ValueError(f"Signal {self.name!r} is optional; only an input can be.")
         if not self.name.isidentifier():
             raise ValueError(f"Signal name {self.name!r} is not a legal identifier: use letters, digits and '_'.")
         if iskeyword(self.name) or self.name.startswith("_"):  # it becomes a field of the named tuples `u` and `p`
@@ -127,6 +130,7 @@ def input_signal(
     size: int | None = None,
     variability: Variability = "continuous",
     display_unit: str | None = None,
+    optional: bool = False,
 ) -> Signal:
     """An input; `start` is used while nothing is connected to it.
 
@@ -134,8 +138,11 @@ def input_signal(
         name: of the signal. unit: SI, as FMI writes units (``m/s2``).
         description: one line. size: number of elements of a vector, None for a scalar.
         variability: FMI's word, ``continuous`` or ``discrete``. display_unit: for the user's edge, such as ``km/h``.
+        optional: not connected means `start` on purpose, and nobody is warned. For what is absent in most systems (a
+            disturbance, a fault, the verdict of another component), not for what the equations live on.
     """
-    return Signal(name, unit, "input", variability, start, None, None, description, size, display_unit)
+    kept = (None, None, description, size, display_unit)
+    return Signal(name, unit, "input", variability, start, *kept, optional=optional)
 
 
 def output_signal(

@@ -560,5 +560,5 @@ def _inputs(one: Component | Reference, t: float) -> dict[str, float]:
 
 
 def _value(name: str, i: int, t: float) -> float:
-    size = {"effort": 2.0e4, "force": 4.0}.get(name, 5.0)
+    size = {"effort": 2.0e4, "force": 4.0, "load_torque": 0.02}.get(name, 5.0)
     return size * (1.0 + np.sin(1.7 * t + i) * 1.3)

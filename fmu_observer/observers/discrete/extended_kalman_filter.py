@@ -11,11 +11,12 @@ from fmu_observer.condition import Condition
 from fmu_observer.design.discretisation import process_covariance
 from fmu_observer.design.pole_placement import observability_matrix
 from fmu_observer.design.riccati import steady_filter
+from fmu_observer.filtering.kalman import correct as corrected
+from fmu_observer.filtering.kalman import flattened, predicted_covariance
 from fmu_observer.models import ObserverModel, find_model
 from fmu_observer.models.discretisation import transition, transition_jacobian
 from fmu_observer.models.linearisation import linear_part, start_of
 from fmu_observer.observability import require_detectable_model
-from fmu_observer.observers.discrete.covariance import corrected, flattened, predicted
 from fmu_observer.observers.discrete.sampling import at_sample, primed_memory
 from fmu_observer.observers.model_observer import ModelObserver, as_matrix
 from plant_models.hybrid import memory, output_signal, vector
@@ -47,7 +48,9 @@ class ExtendedKalmanFilter(ModelObserver):
     timing = "periodic"
     discrete = True
     internal_step = 0.1  # nothing flows between samples
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"model": ("pendulum", "linear_pendulum", "freight_train")}
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "model": ("pendulum", "linear_pendulum", "freight_train", "cart_pendulum", "cart_double_pendulum")
+    }
 
     def __init__(self, model: str | ObserverModel = "pendulum") -> None:
         chosen = find_model(model)
@@ -81,12 +84,14 @@ class ExtendedKalmanFilter(ModelObserver):
         def advance(values: Array) -> Array:
             F = self._jacobian(values[:n], known, p.sample_period)
             moved = transition(self.model, values[:n], known, p.sample_period)
-            return vector(*(moved[i] for i in range(n)), *flattened(predicted(as_matrix(values[n:], n, n), F, QN)))
+            return vector(
+                *(moved[i] for i in range(n)), *flattened(predicted_covariance(as_matrix(values[n:], n, n), F, QN))
+            )
 
         def correct(values: Array) -> Array:
             innovation = self.measured(u) - self.model.measured(values[:n])
-            estimate, P = corrected(values[:n], as_matrix(values[n:], n, n), innovation, self.model.C, RN)
-            return vector(*(estimate[i] for i in range(n)), *flattened(P))
+            after = corrected(values[:n], as_matrix(values[n:], n, n), innovation, self.model.C, RN)
+            return vector(*(after.estimate[i] for i in range(n)), *flattened(after.covariance))
 
         return at_sample(x, advance, correct)
 

@@ -87,7 +87,7 @@ class AugmentedTrainObserver(TrainObserver):
     own_events: tuple[PeriodicEvent, ...] = ()
     inputs = (
         *TrainObserver.inputs,
-        input_signal("gradient", "1", 0.0, "Sine of the slope angle, uphill positive, where known"),
+        input_signal("gradient", "1", 0.0, "Sine of the slope angle, uphill positive, where known", optional=True),
     )
     outputs = (
         *(s for s in TrainObserver.outputs if s.name != "innovation"),

@@ -87,7 +87,11 @@ class HeldOdometerObserver(TrainObserver):
     inputs = (
         *TrainObserver.inputs,
         input_signal(
-            "odometer_fault", "1", 0.0, "1 where a detector says that the odometer lies: its sample is not used"
+            "odometer_fault",
+            "1",
+            0.0,
+            "1 where a detector says that the odometer lies: its sample is not used",
+            optional=True,
         ),
     )
     outputs = (

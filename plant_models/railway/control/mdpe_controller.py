@@ -140,8 +140,12 @@ class MdpeController(HybridSystem):
         input_signal("slip", "1", 0.0, "Estimated slip ratio"),
         input_signal("adhesion_condition", "1", 1.0, "Adhesion as detected: 1 nominal, 2 degraded"),
         input_signal("coupler_force", "N", 0.0, "Estimated force in the first coupler, tension > 0"),
-        input_signal("disturbance_force", "N", 0.0, "Estimated force that resists beyond mass times acceleration"),
-        input_signal("slope", "1", 0.0, "Gradient of the track from the track data, uphill > 0; sine of the angle"),
+        input_signal(
+            "disturbance_force", "N", 0.0, "Estimated force that resists beyond mass times acceleration", optional=True
+        ),
+        input_signal(
+            "slope", "1", 0.0, "Gradient of the track from the track data, uphill > 0; sine of the angle", optional=True
+        ),
         input_signal("speed_reference", "m/s", 0.0, "Speed to be driven", display_unit="km/h"),
         input_signal("acceleration_reference", "m/s2", 0.0, "Acceleration of the reference"),
     )

@@ -100,10 +100,20 @@ class StoppingController(HybridSystem):
     inputs = (
         input_signal("estimated_position", "m", 0.0, "Estimated position of the train"),
         input_signal("estimated_speed", "m/s", 0.0, "Estimated speed of the train", display_unit="km/h"),
-        input_signal("disturbance", "m/s2", 0.0, "Estimated acceleration that the model does not know, forward > 0"),
-        input_signal("odometer_fault", "1", 0.0, "1 while a jam is detected"),
-        input_signal("plan_request", "1", 0.0, "Whenever it changes the plan is renewed: a count of balises, say"),
-        input_signal("enabled", "1", 1.0, "1 while the train is to be stopped; 0: no effort, and no plan"),
+        input_signal(
+            "disturbance",
+            "m/s2",
+            0.0,
+            "Estimated acceleration that the model does not know, forward > 0",
+            optional=True,
+        ),
+        input_signal("odometer_fault", "1", 0.0, "1 while a jam is detected", optional=True),
+        input_signal(
+            "plan_request", "1", 0.0, "Whenever it changes the plan is renewed: a count of balises, say", optional=True
+        ),
+        input_signal(
+            "enabled", "1", 1.0, "1 while the train is to be stopped; 0: no effort, and no plan", optional=True
+        ),
     )
     outputs = (
         output_signal("effort", "N", "Effort: traction > 0, brake < 0", variability="discrete"),

@@ -152,7 +152,7 @@ _SHARED = (
 _INPUTS = (
     input_signal("speed", "m/s", 0.0, "Circumferential speed of the wheel without the fault", display_unit="km/h"),
     input_signal("effort", "N", 0.0, "Effort demanded of the train: traction > 0, brake < 0"),
-    input_signal("adhesion_limit", "N", UNLIMITED, "Largest force that the rails can take"),
-    input_signal("brake_released", "1", 0.0, "1 while the brake is released because of a fault"),
+    input_signal("adhesion_limit", "N", UNLIMITED, "Largest force that the rails can take", optional=True),
+    input_signal("brake_released", "1", 0.0, "1 while the brake is released because of a fault", optional=True),
 )
 _POSITION = input_signal("position", "m", 0.0, "Position of the train")

@@ -6,6 +6,7 @@ A sensor as a hybrid system of its own; knows the hybrid foundation and the coun
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -93,7 +94,7 @@ class PulseOdometer(HybridSystem):
         if count_from not in self.option_choices["count_from"]:
             raise ValueError(f"Unknown count_from {count_from!r}; choose one of: wheel_speed, wheel_distance.")
         self.count_from = count_from
-        self.inputs = (_SPEED,) if count_from == "wheel_speed" else (_SPEED, _DISTANCE)
+        self.inputs = (_SPEED,) if count_from == "wheel_speed" else (_FIRST_SPEED, _DISTANCE)
         self.states = (*((_INTEGRAL,) if count_from == "wheel_speed" else ()), *_MEMORY)
         super().__init__(count_from=count_from)
 
@@ -137,6 +138,7 @@ class PulseOdometer(HybridSystem):
 
 
 _SPEED = input_signal("wheel_speed", "m/s", 0.0, "Circumferential speed of the wheel", display_unit="km/h")
+_FIRST_SPEED = replace(_SPEED, optional=True)  # of the first reading only; a train mostly starts from rest
 _DISTANCE = input_signal("wheel_distance", "m", 0.0, "Distance run by the wheel's rim")
 _INTEGRAL = state("rim_distance", "m", 0.0, "Distance run by the wheel's rim at start")
 _MEMORY = (

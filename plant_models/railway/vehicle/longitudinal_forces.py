@@ -52,8 +52,8 @@ class LongitudinalForces(HybridSystem):
 
     inputs = (
         input_signal("effort", "N", 0.0, "Effort demanded: traction > 0, brake < 0"),
-        input_signal("effort_loss", "1", 0.0, "Share of the effort that is lost, 0 to 1"),
-        input_signal("disturbance_force", "N", 0.0, "Unknown force along increasing position"),
+        input_signal("effort_loss", "1", 0.0, "Share of the effort that is lost, 0 to 1", optional=True),
+        input_signal("disturbance_force", "N", 0.0, "Unknown force along increasing position", optional=True),
     )
     outputs = (
         output_signal("position", "m", "Position of the train"),

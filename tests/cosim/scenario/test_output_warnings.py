@@ -1,4 +1,4 @@
-"""Outputs that warn: declared once, told after a run of block and FMU alike, with instant and values."""
+"""Outputs that warn, inputs that are optional: declared once, in block and FMU alike; told with instant and values."""
 
 from __future__ import annotations
 
@@ -11,12 +11,21 @@ import pytest
 from fmpy.validation import validate_fmu
 
 import cosim
+from fmu_observer.annotated_variable import declared_warnings, is_optional
 from fmu_observer.description import describe
-from fmu_observer.warning_variable import declared_warnings
 from fmus import cached_fmu
 from fmus.fmi.description import read_description
 from plant_models import PLANTS
-from plant_models.hybrid import HybridSystem, OutputWarning, Signal, output_signal, parameter, state, vector
+from plant_models.hybrid import (
+    HybridSystem,
+    OutputWarning,
+    Signal,
+    input_signal,
+    output_signal,
+    parameter,
+    state,
+    vector,
+)
 
 
 class Kettle(HybridSystem):
@@ -25,6 +34,7 @@ class Kettle(HybridSystem):
     name = "kettle"
     states = (state("warmth", "K", 0.0),)
     parameters = (parameter("alarm_at", "K", 2.0), parameter("empty_at", "K", 5.0))
+    inputs = (input_signal("draught", "K/s", optional=True), input_signal("sun", "K/s"))
     outputs = (
         output_signal("temperature", "K"),
         output_signal("hot", warning=OutputWarning("is hot & boils", ("temperature",)), unit="1"),
@@ -32,7 +42,7 @@ class Kettle(HybridSystem):
     )
 
     def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        return vector(1.0 + 0.0 * x[0])
+        return vector(1.0 + u.sun - u.draught + 0.0 * x[0])
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         hot, empty = np.where(x[0] > p.alarm_at, 1.0, 0.0), np.where(x[0] > p.empty_at, 1.0, 0.0)
@@ -46,6 +56,7 @@ def _warnings(scenario: cosim.Scenario) -> list[str]:
 
 
 HOT = "kettle: is hot & boils; first at 2.5 s (temperature = 2.5), for 1.5 s in all."
+FORGOTTEN = "Unconnected inputs keep their start values: kettle.sun."
 EMPTY = "kettle: is empty < at the end; seen at the end, 6 s."
 
 
@@ -64,7 +75,11 @@ def test_an_exported_fmu_carries_its_warnings(version: int) -> None:
     assert declared_warnings(description) == declared_warnings(describe(Kettle(), version))  # type: ignore[arg-type]
     assert declared_warnings(deepcopy(description)) == declared_warnings(description)
     assert [u.variable.name for u in description.outputs] == ["temperature", "hot", "empty"]
-    assert _warnings(cosim.Scenario(stop=4.0, step=0.5).add("kettle", fmu=str(path))) == [HOT]
+    assert [v.name for v in deepcopy(description).modelVariables if is_optional(v)] == ["draught"]
+    assert all(known in description.modelVariables for u in description.outputs for known in u.dependencies)
+    scenario = cosim.Scenario(stop=4.0, step=0.5).add("kettle", fmu=str(path))
+    assert _warnings(scenario) == [HOT]
+    assert [text for text in scenario.run().warnings if text.startswith("Unconnected")] == [FORGOTTEN]
 
 
 def test_a_davis_set_beyond_its_speeds_and_a_jam_longer_than_the_run_are_told() -> None:
@@ -86,6 +101,9 @@ def test_only_scalar_outputs_warn_and_what_they_show_are_outputs() -> None:
         Signal("speed", "m/s", "input", warning=OutputWarning("is fast"))
     with pytest.raises(ValueError, match="has no text"):
         OutputWarning(" ")
+
+    with pytest.raises(ValueError, match="'speed' is optional; only an input can be"):
+        Signal("speed", "m/s", "output", optional=True)
 
     class Vague(Kettle):
         outputs = (output_signal("hot", "1", warning=OutputWarning("is hot", ("colour",))),)

@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
-from fmu_observer.warning_variable import WarningVariable
+from fmu_observer.annotated_variable import AnnotatedVariable
 from plant_models.hybrid.output_warning import OutputWarning
 
 
 @pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, lambda v: pickle.loads(pickle.dumps(v))])
 def test_a_copy_warns_too(again: Callable[[Any], Any]) -> None:
-    made = again(WarningVariable(OutputWarning("leaves its range"), name="outside", valueReference=7))
+    made = again(AnnotatedVariable(OutputWarning("leaves its range"), name="outside", valueReference=7))
     assert made.warning == OutputWarning("leaves its range")
     assert (made.name, made.valueReference) == ("outside", 7)

@@ -1,0 +1,136 @@
+"""``cosim linearise FMU|MODEL``: matrices A, B, C, D at a point, with eigenvalues and what is seen and reached."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+import fmu_observer
+import plant_models
+from cosim.cli.scenarios import parse_setting
+from cosim.components.loading import describe_fmu
+from cosim.errors import ScenarioError, nearest
+from cosim.fmu_model.linearisation import Linearisation
+from cosim.fmu_model.linearise import linearise_fmu, linearise_system
+from cosim.fmu_model.sealed import declared_states
+from cosim.results.summary_file import jsonable
+from cosim.scenario.models import make_declared
+from cosim.scenario.tables import ComponentTable
+from plant_models.hybrid import HybridSystem
+from plant_models.user_file import names_code
+
+
+def register(commands: Any) -> None:
+    """Add the command to the parser.
+
+    Args:
+        commands: subparsers of the program.
+    """
+    text = (
+        "Linearise an FMU, a plant or an observer at a point. Model exchange and models of ours give matrices of "
+        "continuous time, an FMU with co-simulation only those from one communication step to the next."
+    )
+    epilog = "Exit codes: 0 done, 2 error."
+    parser = commands.add_parser("linearise", description=text, epilog=epilog)
+    parser.add_argument(
+        "model", metavar="FMU|MODEL", help="an .fmu file; or a plant or observer by name, file.py:Class"
+    )
+    parser.add_argument(
+        "--at",
+        type=float,
+        default=0.0,
+        metavar="SECONDS",
+        help="instant; an FMU is run up to it (default: 0, its start)",
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        dest="settings",
+        help="a state, an input or a parameter; a state that is set is not taken from the run",
+    )
+    parser.add_argument("--preset", metavar="NAME", help="of a model of ours: values to start from")
+    parser.add_argument("--inputs", nargs="+", metavar="NAME", help="inputs of B and D (default: all)")
+    parser.add_argument("--outputs", nargs="+", metavar="NAME", help="outputs of C and D (default: all)")
+    parser.add_argument(
+        "--interface",
+        choices=("model-exchange", "co-simulation"),
+        help="of an FMU that has both (default: model exchange)",
+    )
+    parser.add_argument(
+        "--step",
+        type=float,
+        default=0.01,
+        metavar="SECONDS",
+        help="communication step of a co-simulation (default: 0.01)",
+    )
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write .json, .npz or .mat")
+    parser.add_argument("--json", action="store_true", help="print the data as JSON instead of the tables")
+    parser.set_defaults(execute=execute)
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Linearise, print and write.
+
+    Args:
+        options: of the command line.
+
+    Raises:
+        CosimError: the model cannot be linearised, or the file cannot be written.
+    """
+    settings = {name: _number(name, value) for name, value in map(parse_setting, options.settings)}
+    is_file = str(options.model).lower().endswith(".fmu")
+    found = _of_fmu(options, settings) if is_file else _of_model(options, settings)
+    if options.output is not None:
+        found.save(options.output)
+    print(json.dumps(jsonable(found.to_dict()), indent=2) if options.json else found.text())
+    return 0
+
+
+def _of_fmu(options: argparse.Namespace, settings: dict[str, float]) -> Linearisation:
+    if options.preset is not None:
+        raise ScenarioError("--preset belongs to models of ours; set the parameters of an FMU by --set NAME=VALUE.")
+    described = describe_fmu(options.model, Path(options.model).stem)
+    states, inputs = set(declared_states(described)), set(described.names("input"))
+    return linearise_fmu(
+        options.model,
+        t=options.at,
+        states={name: value for name, value in settings.items() if name in states},
+        inputs={name: value for name, value in settings.items() if name in inputs},
+        parameters={name: value for name, value in settings.items() if name not in states | inputs},
+        by_inputs=options.inputs,
+        outputs=options.outputs,
+        interface=options.interface,
+        step=options.step,
+    )
+
+
+def _of_model(options: argparse.Namespace, settings: dict[str, float]) -> Linearisation:
+    name, rooms = options.model, {"model": plant_models.PLANTS, "observer": fmu_observer.OBSERVERS}
+    kind = next((kind for kind, room in rooms.items() if name in room), "model" if names_code(name) else None)
+    if kind is None:
+        known = [*plant_models.PLANTS, *fmu_observer.OBSERVERS]
+        raise ScenarioError(f"There is no plant or observer {name!r}, and it is no .fmu file; {nearest(name, known)}")
+    system = make_declared(ComponentTable.model_validate({kind: name}), "linearise")
+    if not isinstance(system, HybridSystem):
+        raise ScenarioError(f"{name}: plain Python has no equations that could be linearised.")
+    states = {n for signal in system.states for n in signal.scalar_names}
+    inputs = {n for signal in system.inputs for n in signal.scalar_names}
+    found = linearise_system(
+        system,
+        t=options.at,
+        states={n: value for n, value in settings.items() if n in states},
+        inputs={n: value for n, value in settings.items() if n in inputs},
+        parameters={n: value for n, value in settings.items() if n not in states | inputs},
+        preset=options.preset,
+    )
+    return found.part(options.inputs, options.outputs)
+
+
+def _number(name: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ScenarioError(f"--set {name}={value}: expected a number.")
+    return float(value)

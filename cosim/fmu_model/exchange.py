@@ -1,0 +1,104 @@
+"""A model exchange FMU as a model: its states are set, its derivatives integrated here. Touches one instance.
+
+Between two restarts no event happens: what the FMU decided at the restart (a contact that sticks, a zone that is
+degraded) stays so. That is what a linearisation and one step of a filter need.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import ceil
+
+from cosim.fmu_model.sealed import Array, FmuModelError, SealedModel, declared_states
+
+
+class ExchangeModel(SealedModel):
+    """A model exchange FMU; arguments as for `SealedModel`. Its states are those that it declares, in its own order.
+
+    Attributes:
+        internal_step: longest step of the fourth-order Runge-Kutta method [s].
+    """
+
+    way = "exchange"
+    internal_step = 1e-3
+
+    @property
+    def directional(self) -> bool:
+        """Whether the FMU declares directional derivatives."""
+        return bool(self.instance.capabilities.providesDirectionalDerivatives)
+
+    @property
+    def derivative_names(self) -> list[str]:
+        """Names of the derivatives of the states, in the order of the states."""
+        instance = self.instance
+        return [e.name for d in instance.description.derivatives for e in instance.variables.expanded(d.variable.name)]
+
+    def derivatives(self) -> Array:
+        """Derivatives of the states where the instance stands, shape (n,)."""
+        found: Array = self._told(self.instance.derivatives)
+        return found
+
+    def move(self, t: float, x: Array, u: Array) -> None:
+        """Set time, states and inputs in Continuous-Time Mode: no event is looked for.
+
+        Args:
+            t: instant [s]. x: states, shape (n,). u: inputs, shape (m,).
+        """
+
+        def move() -> None:
+            self.instance.set_time(t)
+            self.instance.set_states(x)
+            if len(self.inputs):
+                self._inputs[:] = u
+                self._write_inputs()
+
+        self._told(move)
+
+    def advance(self, t: float, h: float) -> None:
+        """Integrate from where the instance stands by Runge-Kutta steps of fourth order, inputs held.
+
+        Args:
+            t: instant [s]. h: how far [s].
+
+        Raises:
+            FmuModelError: the FMU refuses.
+        """
+        x, u = self._told(self.instance.states), self._inputs.copy()
+        count = max(1, ceil(h / self.internal_step - 1e-9))
+        for k in range(count):
+            x = self._runge_kutta(t + h * k / count, h / count, x, u)
+        self.move(t + h, x, u)
+
+    def _runge_kutta(self, t: float, h: float, x: Array, u: Array) -> Array:
+        rates: list[Array] = []
+        for share in (0.0, 0.5, 0.5, 1.0):
+            self.move(t + share * h, x + share * h * rates[-1] if rates else x, u)
+            rates.append(self.derivatives())
+        return x + h / 6.0 * (rates[0] + 2.0 * rates[1] + 2.0 * rates[2] + rates[3])
+
+    def _own_states(self, given: Sequence[str] | None) -> Sequence[str]:
+        own = declared_states(self.instance)
+        if given is not None and not given:
+            return ()  # it starts where the FMU itself does
+        if given is not None and set(given) != set(own):
+            raise FmuModelError(
+                f"{self.path}: in model exchange all states are set at once: {', '.join(own)}; given are: "
+                f"{', '.join(given)}."
+            )
+        return super()._own_states(None)
+
+    def _demand_settable(self) -> None:
+        """States that have no start of their own are set after initialisation: every state can be moved."""
+        self._set_afterwards = not all(self._has_start(name) for name in self.states)
+
+    def _restart(self, t: float, x: Array, u: Array) -> None:
+        super()._restart(t, x, u)
+        if self._set_afterwards:
+            instance = self.instance
+            instance.guard("enterEventMode", instance.slave.enterEventMode)
+            instance.set_states(x)
+            instance.settle()
+            instance.guard("enterContinuousTimeMode", instance.slave.enterContinuousTimeMode)
+
+    def _enter(self, t: float) -> None:
+        self.instance.initialize(t)

@@ -1,0 +1,273 @@
+"""Linearising: an FMU at a point, by its directional derivatives where they are right, else by central differences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import fmpy
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.errors import nearest
+from cosim.fmu_model.exchange import ExchangeModel
+from cosim.fmu_model.linearisation import Linearisation, Method
+from cosim.fmu_model.opening import Interface, open_model
+from cosim.fmu_model.sealed import FmuModelError, SealedModel
+from fmus.check.derivatives import RELATIVE_STEP, compare
+from fmus.check.findings import Verdict
+from plant_models.hybrid import HybridSystem
+from plant_models.interop.continuous_part import ContinuousPart, filled, left_out
+from plant_models.interop.to_control import jacobians
+
+Array = NDArray[np.float64]
+Function = Callable[[Array, Array], tuple[Array, Array]]  # (states, inputs) -> (rates or next states, outputs)
+
+
+def linearise_fmu(
+    path: str | Path,
+    *,
+    t: float = 0.0,
+    states: Mapping[str, float] | None = None,
+    inputs: Mapping[str, float] | None = None,
+    parameters: Mapping[str, float] | None = None,
+    simulate: bool = True,
+    by_inputs: list[str] | None = None,
+    outputs: list[str] | None = None,
+    interface: Interface | None = None,
+    step: float = 0.01,
+) -> Linearisation:
+    """Matrices A, B, C, D of an FMU at a point.
+
+    A model exchange FMU gives those of continuous time. An FMU with co-simulation only gives those from one
+    communication step to the next: its derivatives are not to be had.
+
+    Args:
+        path: the ``.fmu`` file. t: instant [s].
+        states: values by name; those left out are where a run from time zero arrives at `t`, or at their starts.
+        inputs: values by name; those left out at their starts. Held during the run to `t`.
+        parameters: start values by name.
+        simulate: whether states come from a run to `t`; else from their starts.
+        by_inputs: inputs of B and D; None for all real ones. outputs: those of C and D; None for all real ones.
+        interface: ``model-exchange`` or ``co-simulation``; None for model exchange where the FMU has it.
+        step: communication step of a co-simulation [s].
+
+    Returns:
+        The linearisation.
+
+    Raises:
+        FmuLoadError: the FMU cannot be opened. FmuModelError: it has no states, or a name is unknown.
+    """
+    model = _opened(path, interface, outputs, parameters)
+    try:
+        u = _filled(model, "input", model.inputs, model.start_inputs, inputs or {})
+        x = model.start.copy()
+        if simulate and t > 0.0 and set(states or {}) != set(model.states):
+            x = _simulated(model, t, u, step)
+        x = _filled(model, "state", model.states, x, states or {})
+        return linearise(model, t, x, u, step).part(by_inputs, None)
+    finally:
+        model.close()
+
+
+def linearise(model: SealedModel, t: float, x: Array, u: Array, step: float) -> Linearisation:
+    """Matrices of an open model at a point.
+
+    Args:
+        model: the FMU. t: instant [s]. x: states, shape (n,). u: inputs, shape (m,).
+        step: of a co-simulation [s].
+
+    Returns:
+        The linearisation.
+
+    Raises:
+        FmuModelError: the FMU refuses the point.
+    """
+    n, remarks = len(model.states), list[str]()
+    method: Method = "central differences"
+    if isinstance(model, ExchangeModel):
+        model.restart(t, x, u)
+        function, length = _continuous(model, t), 0.0
+    else:
+        function, length = _sampled(model, t, step), step
+    rates, y = function(x, u)
+    whole = None
+    if isinstance(model, ExchangeModel) and model.directional:
+        whole, doubt = _directional(model, function, x, u)
+        remarks += [doubt] if doubt else []
+    if whole is None:
+        whole = _differences(model, function, x, u)
+        remarks.append(
+            f"Central differences with steps of {RELATIVE_STEP:g} of the value or the nominal size, the larger of both."
+        )
+    else:
+        method = "directional derivatives"
+    names = (*model.states, *model.inputs, *model.outputs)
+    return Linearisation(
+        Path(model.path).stem,
+        *(whole[:n, :n], whole[:n, n:], whole[n:, :n], whole[n:, n:]),
+        states=model.states,
+        inputs=model.inputs,
+        outputs=model.outputs,
+        units={name: model.unit(name) for name in names},
+        t=t,
+        x=x,
+        u=u,
+        y=y,
+        rates=rates,
+        step=length,
+        method=method,
+        remarks=tuple(remarks),
+    )
+
+
+def linearise_system(
+    system: HybridSystem,
+    *,
+    t: float = 0.0,
+    states: Mapping[str, float] | None = None,
+    inputs: Mapping[str, float] | None = None,
+    parameters: Mapping[str, float] | None = None,
+    preset: str | None = None,
+) -> Linearisation:
+    """Matrices of a system of ours by its exact traced Jacobians.
+
+    Args:
+        system: a traceable hybrid system. t: instant [s]. states, inputs, parameters: values by name; those left out
+            at their starts. preset: of the parameters; None for the default one.
+
+    Returns:
+        The linearisation.
+
+    Raises:
+        FmuModelError: a name is unknown, or nothing in it is continuous.
+    """
+    try:
+        part = ContinuousPart(system, preset, parameters)
+        x = filled(dict(zip(part.states, part.start_state, strict=True)), states, f"{system.name}: state")
+        u = filled(dict(zip(part.inputs, part.start_inputs, strict=True)), inputs, f"{system.name}: input")
+    except ValueError as error:
+        raise FmuModelError(str(error)) from error
+    signals = (*system.states, *system.inputs, *system.outputs)
+    return Linearisation(
+        system.name,
+        *jacobians(part, x, u, t),
+        states=tuple(part.states),
+        inputs=tuple(part.inputs),
+        outputs=tuple(part.outputs),
+        units={name: signal.unit for signal in signals for name in signal.scalar_names},
+        t=t,
+        x=x,
+        u=u,
+        y=np.asarray(part.output(t, x, u, part.parameters), dtype=float),
+        rates=np.asarray(part.derivative(t, x, u, part.parameters), dtype=float),
+        step=0.0,
+        method="exact Jacobians",
+        remarks=() if not system.events else (left_out(system),),
+    )
+
+
+def _opened(
+    path: str | Path, interface: Interface | None, outputs: list[str] | None, parameters: Mapping[str, float] | None
+) -> SealedModel:
+    """The model by the interface asked for; model exchange where there is a choice."""
+    if interface is not None:
+        return open_model(path, interface, outputs=outputs, parameters=parameters)
+    try:
+        return open_model(path, "model-exchange", outputs=outputs, parameters=parameters)
+    except FmuModelError as error:
+        if "it has no model-exchange" not in str(error):
+            raise
+    return open_model(path, "co-simulation", outputs=outputs, parameters=parameters)
+
+
+def _continuous(model: ExchangeModel, t: float) -> Function:
+    def function(x: Array, u: Array) -> tuple[Array, Array]:
+        model.move(t, x, u)
+        return model.derivatives(), model.read()[1]
+
+    return function
+
+
+def _sampled(model: SealedModel, t: float, step: float) -> Function:
+    """The states a step later, and the outputs before it."""
+
+    def function(x: Array, u: Array) -> tuple[Array, Array]:
+        _, y = model.values_at(t, x, u)
+        model.advance(t, step)
+        return model.read()[0], y
+
+    return function
+
+
+def _differences(model: SealedModel, function: Function, x: Array, u: Array) -> Array:
+    """Jacobian of rates and outputs by states and inputs, shape (n + q, n + m)."""
+    at, n = np.concatenate([x, u]), len(x)
+    columns = []
+    for i, name in enumerate((*model.states, *model.inputs)):
+        size = RELATIVE_STEP * max(abs(at[i]), model.nominal(name))
+        above, below = at.copy(), at.copy()
+        above[i] += size
+        below[i] -= size
+        ends = [np.concatenate(function(z[:n], z[n:])) for z in (above, below)]
+        columns.append((ends[0] - ends[1]) / (above[i] - below[i]))
+    function(x, u)
+    return np.array(columns).T.reshape(n + len(model.outputs), len(at))
+
+
+def _directional(model: ExchangeModel, function: Function, x: Array, u: Array) -> tuple[Array | None, str]:
+    """The Jacobian that the FMU tells, shape (n + q, n + m), and what stands against it in words."""
+    knowns, unknowns = (*model.states, *model.inputs), (*model.derivative_names, *model.outputs)
+    values, at, n = dict(zip(knowns, np.concatenate([x, u]).tolist(), strict=True)), np.concatenate([x, u]), len(x)
+
+    def evaluate(name: str, value: float) -> Array:
+        z = at.copy()
+        z[knowns.index(name)] = value
+        return np.concatenate(function(z[:n], z[n:]))
+
+    told: dict[str, Array] = {}
+
+    def directional(name: str) -> Array:
+        function(x, u)
+        told[name] = model.instance.directional_derivative(list(unknowns), [name], [1.0])
+        return told[name]
+
+    try:
+        outcome = compare(evaluate, directional, values, unknowns, {name: model.nominal(name) for name in knowns})
+    except RuntimeError as error:
+        return None, f"Its directional derivatives are not used: {error}."
+    if outcome.verdict is not Verdict.PASS:
+        return None, f"Its directional derivatives are wrong and not used: {outcome.detail}."
+    return np.array([told[name] for name in knowns]).T, ""
+
+
+def _simulated(model: SealedModel, t: float, u: Array, step: float) -> Array:
+    """States at an instant [s] after a run from zero under held inputs."""
+    if not isinstance(model, ExchangeModel):
+        model.restart(0.0, model.start, u)
+        count = max(1, round(t / step))
+        for k in range(count):
+            model.advance(k * t / count, t / count)
+        return model.read()[0]
+    inputs = dict(zip(model.inputs, u.tolist(), strict=True))
+    try:
+        rows = fmpy.simulate_fmu(
+            model.path,
+            stop_time=t,
+            fmi_type="ModelExchange",
+            start_values=model.parameters | inputs,
+            output=list(model.states),
+            validate=False,
+        )
+    except Exception as error:  # whatever the FMU or its solver throws
+        raise FmuModelError(f"{model.path}: the run to {t:g} s failed: {error}. Give the states by --set.") from error
+    return np.array([float(rows[name][-1]) for name in model.states])
+
+
+def _filled(model: SealedModel, what: str, names: tuple[str, ...], values: Array, given: Mapping[str, float]) -> Array:
+    found = dict(zip(names, values.tolist(), strict=True))
+    for name, value in given.items():
+        if name not in found:
+            raise FmuModelError(f"{model.path}: no {what} {name!r}; {nearest(name, found)}")
+        found[name] = float(value)
+    return np.array(list(found.values()), dtype=float)

@@ -1,0 +1,78 @@
+"""Opening an FMU as a model: which interface serves, and an instance of it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+from cosim.components.description import open_fmu
+from cosim.components.unpacking import unpack
+from cosim.errors import FmuLoadError
+from cosim.fmu_model.co_simulation import CoSimulationModel
+from cosim.fmu_model.exchange import ExchangeModel
+from cosim.fmu_model.sealed import FmuModelError, SealedModel
+from fmus.check.instance import SlaveError
+from fmus.check.model import make_model
+from fmus.check.slave import make_slave
+from fmus.fmi.archive import NotAnFmuError
+from fmus.fmi.standard import CO_SIMULATION, MODEL_EXCHANGE, fmi_version
+
+Interface = Literal["co-simulation", "model-exchange"]
+INTERFACES: dict[Interface, str] = {"co-simulation": CO_SIMULATION, "model-exchange": MODEL_EXCHANGE}
+
+
+def open_model(
+    path: str | Path,
+    interface: Interface | None = None,
+    *,
+    states: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+    inputs: Sequence[str] | None = None,
+    parameters: Mapping[str, float] | None = None,
+) -> SealedModel:
+    """Open an FMU as a model whose states can be written.
+
+    Args:
+        path: the ``.fmu`` file.
+        interface: ``co-simulation`` or ``model-exchange``; None for co-simulation where the FMU has it.
+        states: names of the states; None for the continuous states that it declares.
+        outputs: names of what is read; None for all real outputs.
+        inputs: names of what is written; None for all real inputs.
+        parameters: start values by name.
+
+    Returns:
+        The model; `close` it at the end.
+
+    Raises:
+        FmuLoadError: the file is missing or broken, or cannot run here.
+        FmuModelError: it has no such interface, no states, unknown names, or states that cannot be set.
+    """
+    path = Path(path)
+    archive = open_fmu(path, path.name)
+    chosen = INTERFACES[interface] if interface is not None else None
+    offered = [kind for kind in INTERFACES.values() if getattr(archive.description, kind) is not None]
+    if fmi_version(archive.description) == 1:
+        raise FmuModelError(f"{path}: FMI 1.0 has no way to reset or to set states. Export it as FMI 2.0 or 3.0.")
+    if chosen is None:
+        chosen = offered[0] if offered else CO_SIMULATION
+    if chosen not in offered:
+        raise FmuModelError(f"{path}: it has no {interface or 'co-simulation'}; it offers: {', '.join(offered)}.")
+    try:
+        archive.demand_this_platform(chosen)
+    except NotAnFmuError as error:
+        raise FmuLoadError(f"{path.name}: {error}") from error
+    here, folder = Path.cwd(), unpack(archive)
+    make: Any = make_slave if chosen == CO_SIMULATION else make_model
+    face: Any = CoSimulationModel if chosen == CO_SIMULATION else ExchangeModel
+    more: dict[str, Any] = {"states": states, "outputs": outputs, "inputs": inputs, "parameters": parameters}
+    try:
+        model: SealedModel = face(make(folder, archive.description, path.stem), folder, str(path), **more)
+    except SlaveError as error:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise FmuLoadError(f"{path}: {error}.") from error
+    finally:
+        os.chdir(here)  # fmpy changes it while it loads
+    return model

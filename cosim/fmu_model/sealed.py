@@ -1,0 +1,267 @@
+"""A sealed FMU as a model with a state: what co-simulation and model exchange have in common. Touches one instance.
+
+The state goes in by start values: the instance is reset, its parameters and states are set, and it is initialised at
+the instant asked for. FMI allows that for every state whose start is exact, in co-simulation and in model exchange.
+"""
+
+from __future__ import annotations
+
+import shutil
+import weakref
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.errors import CosimError, nearest
+from fmus.check.instance import SlaveError
+from fmus.fmi.instance import Instance
+
+Array = NDArray[np.float64]
+Way = Literal["restart", "exchange"]
+REALS = ("Real", "Float64", "Float32")
+FAR = 1e6
+"""End of the experiment that is announced, after the instant of a restart [s]."""
+
+
+class FmuModelError(CosimError, ValueError):
+    """An FMU cannot serve as a model; the message says which finding stands against it, and what to do."""
+
+
+class SealedModel(ABC):
+    """One instance of an FMU whose states are written by start values.
+
+    Args:
+        instance: loaded, not yet instantiated. folder: of its files, removed at the end.
+        path: of the FMU, for messages.
+        states: names of the states; None for those that the model description declares by their derivatives.
+        outputs: names of what is read; None for all real outputs.
+        inputs: names of what is written; None for all real inputs.
+        parameters: start values by name.
+
+    Raises:
+        FmuModelError: a name is unknown, there are no states, or a state cannot be set.
+    """
+
+    way: Way
+    """How states are written."""
+
+    def __init__(
+        self,
+        instance: Any,
+        folder: Path,
+        path: str,
+        *,
+        states: Sequence[str] | None = None,
+        outputs: Sequence[str] | None = None,
+        inputs: Sequence[str] | None = None,
+        parameters: Mapping[str, float] | None = None,
+    ) -> None:
+        self.instance, self.path = instance, path
+        self._finalizer = weakref.finalize(self, _put_away, instance, folder)
+        self.states = tuple(self._own_states(states))
+        self.outputs = tuple(self._chosen(outputs, real_names(instance, "output"), "output"))
+        self.inputs = tuple(self._chosen(inputs, real_names(instance, "input"), "input"))
+        self.parameters = dict(parameters or {})
+        self._chosen(list(self.parameters), [], "parameter")
+        self._demand_settable()
+        self._told(instance.instantiate)
+        names = [*self.parameters, *(self.states if all(map(self._has_start, self.states)) else ())]
+        self._write_starts, self._starts = instance.writer(names)
+        self._write_inputs, self._inputs = instance.writer(list(self.inputs))
+        self._states_read, self._outputs_read = np.zeros(len(self.states)), np.zeros(len(self.outputs))
+        self._read_states = instance.reader(list(self.states), self._states_read)
+        self._read_outputs = instance.reader(list(self.outputs), self._outputs_read)
+        self.start_inputs = self._told(lambda: instance.read(list(self.inputs)))
+        for name, value in self.parameters.items():
+            self._told(lambda n=name, v=value: instance.set_start(n, float(v)))  # type: ignore[misc]
+        self.start = self._told(lambda: instance.read(list(self.states)))
+        self._fresh = True
+
+    # -- one point ----------------------------------------------------------------------------------------------------
+
+    def restart(self, t: float, x: Array, u: Array) -> None:
+        """Stand at a state, at an instant, under inputs.
+
+        Args:
+            t: instant [s]. x: states, shape (n,). u: inputs, shape (m,).
+
+        Raises:
+            FmuModelError: the FMU refuses.
+        """
+        self._told(lambda: self._restart(t, x, u))
+
+    def _restart(self, t: float, x: Array, u: Array) -> None:
+        instance = self.instance
+        if not self._fresh:
+            instance.reset()
+        self._fresh = False
+        count = len(self.parameters)
+        self._starts[:count] = list(self.parameters.values())
+        self._starts[count:] = x[: len(self._starts) - count]
+        self._write_starts()
+        if len(self.inputs):
+            self._inputs[:] = u
+            self._write_inputs()
+        self._enter(t)
+
+    def set_inputs(self, u: Array) -> None:
+        """Write the inputs where the instance stands.
+
+        Args:
+            u: inputs, shape (m,).
+        """
+        if len(self.inputs):
+            self._inputs[:] = u
+            self._told(self._write_inputs)
+
+    def values_at(self, t: float, x: Array, u: Array) -> tuple[Array, Array]:
+        """States and outputs just after a restart.
+
+        Args:
+            t: instant [s]. x: states, shape (n,). u: inputs, shape (m,).
+
+        Returns:
+            The states as they are read back, shape (n,), and the outputs, shape (q,).
+        """
+        self.restart(t, x, u)
+        return self.read()
+
+    def read(self) -> tuple[Array, Array]:
+        """States, shape (n,), and outputs, shape (q,), where the instance stands."""
+
+        def read() -> None:
+            self._read_states()
+            if len(self.outputs):
+                self._read_outputs()
+
+        self._told(read)
+        return self._states_read.copy(), self._outputs_read.copy()
+
+    @abstractmethod
+    def advance(self, t: float, h: float) -> None:
+        """Go on from where the instance stands, inputs held.
+
+        Args:
+            t: instant [s]. h: how far [s].
+        """
+
+    def transition(self, t: float, h: float, x: Array, u: Array) -> tuple[Array, Array]:
+        """States and outputs after a step from any state.
+
+        Args:
+            t: begin of the step [s]. h: its length [s]. x: states, shape (n,). u: inputs, held, shape (m,).
+
+        Returns:
+            States, shape (n,), and outputs, shape (q,), at its end.
+        """
+        self.restart(t, x, u)
+        self.advance(t, h)
+        return self.read()
+
+    @abstractmethod
+    def _enter(self, t: float) -> None:
+        """Through initialisation at an instant [s]."""
+
+    # -- names --------------------------------------------------------------------------------------------------------
+
+    def unit(self, name: str) -> str:
+        """Unit of a variable as its description names it, ``1`` where there is none.
+
+        Args:
+            name: of the variable.
+        """
+        return str(getattr(self.instance.variables[name], "unit", None) or "1")
+
+    def nominal(self, name: str) -> float:
+        """Nominal size of a variable, 1 where none is declared.
+
+        Args:
+            name: of the variable.
+        """
+        declared = getattr(self.instance.variables[name], "nominal", None)
+        return abs(float(declared)) if declared else 1.0
+
+    def close(self) -> None:
+        """End the instance and remove its files."""
+        self._finalizer()
+
+    def _chosen(self, given: Sequence[str] | None, own: Sequence[str], what: str) -> Sequence[str]:
+        if given is None:
+            if what == "state" and not own:
+                raise FmuModelError(
+                    f"{self.path}: its description declares no continuous state (no derivative of a variable). Name "
+                    "the variables that hold its state; an FMU without any has no memory that a filter could estimate."
+                )
+            return own
+        for name in given:
+            try:
+                self.instance.variables.element(name)
+            except KeyError as error:
+                hint = nearest(name, own or [v.name for v in self.instance.description.modelVariables])
+                raise FmuModelError(f"{self.path}: no {what} {name!r}; {hint}") from error
+        return given
+
+    def _own_states(self, given: Sequence[str] | None) -> Sequence[str]:
+        return self._chosen(given, declared_states(self.instance), "state")
+
+    def _has_start(self, name: str) -> bool:
+        """Whether a start value of a state may be set."""
+        variable = self.instance.variables.element(name).variable
+        return variable.causality in ("parameter", "input") or (
+            variable.initial in ("exact", "approx") and variable.variability != "constant"
+        )
+
+    def _demand_settable(self) -> None:
+        """Refuse states that no start value moves."""
+        for name in self.states:
+            if not self._has_start(name):
+                variable = self.instance.variables.element(name).variable
+                raise FmuModelError(
+                    f"{self.path}: the state {name!r} has no start value that can be set (causality "
+                    f"{variable.causality}, initial {variable.initial or 'not declared'}), so no filter can move it. "
+                    "Name states whose start is exact, use the model exchange of the FMU where it has one, or a "
+                    "particle filter over saved states, which selects and moves nothing."
+                )
+
+    def _told(self, call: Callable[[], Any]) -> Any:
+        """What a call of the FMU gives; its failure in words with the file."""
+        try:
+            return call()
+        except SlaveError as error:
+            raise FmuModelError(f"{self.path}: {error}.") from error
+
+
+def real_names(instance: Instance, causality: str) -> list[str]:
+    """Names of the continuous real scalars and elements of one causality.
+
+    Args:
+        instance: of the FMU. causality: in the words of FMI.
+    """
+    return [n for n in instance.names(causality) if instance.variables.element(n).variable.type in REALS]
+
+
+def declared_states(instance: Instance) -> list[str]:
+    """Names of the continuous states that a model description declares: variables that have a derivative.
+
+    Args:
+        instance: of the FMU.
+    """
+    names: list[str] = []
+    for variable in instance.description.modelVariables:
+        state = variable.derivative
+        if state is not None:
+            found = [element.name for element in instance.variables.expanded(state.name)]
+            names += [name for name in found if name not in names]
+    return names
+
+
+def _put_away(instance: Instance, folder: Path) -> None:
+    with suppress(Exception):  # an FMU that fails at its end changes nothing any more
+        instance.terminate()
+        instance.free()
+    shutil.rmtree(folder, ignore_errors=True)

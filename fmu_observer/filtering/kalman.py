@@ -1,0 +1,123 @@
+"""The equations of the Kalman filter: prediction and correction of an estimate and its covariance. Pure functions that
+trace.
+
+They serve the linear and the extended filter alike: what the matrices are Jacobians of is the caller's business.
+"""
+
+from __future__ import annotations
+
+from math import log, pi
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from plant_models.hybrid.system import Array
+
+Form = Literal["joseph", "short"]
+
+
+class Corrected(NamedTuple):
+    """What a measurement makes of a prediction.
+
+    Attributes:
+        estimate: shape (n,). covariance: of it, shape (n, n), exactly symmetric; a lower factor of it from
+            `square_root`. gain: K, shape (n, q). innovation_covariance: S, shape (q, q).
+    """
+
+    estimate: Array
+    covariance: Array
+    gain: Array
+    innovation_covariance: Array
+
+
+def symmetric(matrix: Array) -> Array:
+    """Half the sum of a matrix and its mirror.
+
+    Args:
+        matrix: shape (n, n).
+    """
+    return 0.5 * (matrix + matrix.T)
+
+
+def flattened(matrix: Array) -> list[Array]:
+    """Entries row by row, as scalars.
+
+    Args:
+        matrix: shape (n, m).
+    """
+    rows, columns = matrix.shape
+    return [matrix[i, j] for i in range(rows) for j in range(columns)]
+
+
+def through(noise: Array, entry: Array | None) -> Array:
+    """Covariance of a noise after the matrix by which it enters: ``W Q W'``, or Q where it is additive.
+
+    Args:
+        noise: Q, shape (r, r). entry: W, shape (n, r); None for the identity.
+
+    Returns:
+        Shape (n, n).
+    """
+    return noise if entry is None else entry @ noise @ entry.T
+
+
+def predicted_covariance(P: Array, F: Array, QN: Array, W: Array | None = None) -> Array:
+    """Covariance one transition later, ``F P F' + W QN W'``: Allaoui 2024, (2.19) and section II.5.
+
+    Args:
+        P: covariance before, shape (n, n). F: Jacobian of the transition by the state, shape (n, n).
+        QN: covariance of the process noise, shape (r, r). W: Jacobian of the transition by that noise, shape (n, r);
+            None for additive noise.
+
+    Returns:
+        Shape (n, n), exactly symmetric.
+    """
+    return symmetric(F @ P @ F.T) + through(QN, W)
+
+
+def correct(
+    x: Array, P: Array, innovation: Array, H: Array, RN: Array, V: Array | None = None, form: Form = "joseph"
+) -> Corrected:
+    """Estimate and covariance after a measurement: Allaoui 2024, (2.12), (2.22)-(2.24) and section II.5.
+
+    ``S = H P H' + V RN V'``, ``K = P H' inv(S)``, ``x + K innovation``. The Joseph form
+    ``(I - K H) P (I - K H)' + K V RN V' K'`` stays positive for any rounding of the gain, the short form
+    ``P - K H P`` costs a third. A smaller set of measurements takes its rows of H and V and its part of RN.
+
+    Args:
+        x: prediction, shape (n,). P: its covariance, shape (n, n).
+        innovation: measurement less its prediction, shape (q,).
+        H: Jacobian of the measurement by the state at the prediction, shape (q, n).
+        RN: covariance of the measurement noise, shape (r, r). V: Jacobian of the measurement by that noise, shape
+            (q, r); None for additive noise.
+        form: ``joseph`` or ``short``.
+
+    Returns:
+        Estimate, covariance, gain and covariance of the innovation.
+    """
+    noise = through(RN, V)
+    spread = H @ P
+    S = symmetric(spread @ H.T) + noise
+    K = np.linalg.solve(S, spread).T
+    if form == "short":
+        return Corrected(x + K @ innovation, symmetric(P - K @ spread), K, S)
+    rest = np.eye(P.shape[0]) - K @ H
+    return Corrected(x + K @ innovation, symmetric(rest @ P @ rest.T + K @ noise @ K.T), K, S)
+
+
+def normalised_square(error: Array, covariance: Array) -> Array:
+    """``e' inv(P) e``: NEES of an error and its covariance, NIS of an innovation and its own; chi-square distributed.
+
+    Args:
+        error: shape (k,). covariance: of it, shape (k, k).
+    """
+    return error @ np.linalg.solve(covariance, error)
+
+
+def log_likelihood(innovation: Array, S: Array) -> Array:
+    """Logarithm of the Gaussian density of an innovation, ``-(q log 2 pi + log det S + e' inv(S) e) / 2``.
+
+    Args:
+        innovation: shape (q,). S: its covariance, shape (q, q).
+    """
+    return -0.5 * (innovation.shape[0] * log(2.0 * pi) + np.log(np.linalg.det(S)) + normalised_square(innovation, S))

@@ -1,0 +1,45 @@
+"""The cart with an inverted double pendulum as its filters see it. Data only."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fmu_observer.models.model import ObserverModel
+from plant_models.benchmarks.cart_double_pendulum import SECTION_IV_2_2_3, double_pendulum_flow
+from plant_models.hybrid import input_signal, state
+from plant_models.hybrid.system import Array, vector
+
+CHAINS = np.kron(np.eye(3), np.array([[0.0, 1.0], [0.0, 0.0]]))  # position and speed, each angle and its rate
+
+
+def cart_double_pendulum() -> ObserverModel:
+    """Position and both angles measured, the force known: Allaoui 2024, (4.12) to (4.18), signs repaired."""
+    return ObserverModel(
+        name="cart_double_pendulum",
+        description="Cart with an inverted double pendulum, position and both angles measured",
+        source="Allaoui 2024, (4.12) to (4.18), section IV.2.2.3, signs repaired",
+        states=(
+            state("position", "m", 0.0, "Position of the cart"),
+            state("speed", "m/s", 0.0, "Speed of the cart"),
+            state("first_angle", "rad", 0.0, "Angle of the lower rod from upright"),
+            state("first_rate", "rad/s", 0.0, "Angular speed of the lower rod"),
+            state("second_angle", "rad", 0.0, "Angle of the upper rod from upright"),
+            state("second_rate", "rad/s", 0.0, "Angular speed of the upper rod"),
+        ),
+        inputs=(input_signal("force", "N", 0.0, "Force on the cart"),),
+        measurements=(
+            input_signal("position", "m", 0.0, "Measured position of the cart"),
+            input_signal("first_angle", "rad", 0.0, "Measured angle of the lower rod"),
+            input_signal("second_angle", "rad", 0.0, "Measured angle of the upper rod"),
+        ),
+        A=CHAINS,
+        B=np.zeros((6, 1)),
+        C=np.eye(6)[[0, 2, 4]],
+        phi=_remainder,
+        sample_period=1e-3,
+    )
+
+
+def _remainder(x: Array, u: Array) -> Array:
+    rates = double_pendulum_flow(x, u[0], SECTION_IV_2_2_3)
+    return vector(0.0 * x[0], rates[1], 0.0 * x[0], rates[3], 0.0 * x[0], rates[5])

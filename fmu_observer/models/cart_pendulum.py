@@ -1,0 +1,42 @@
+"""The cart with an inverted pendulum as its filters see it. Data only."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fmu_observer.models.model import ObserverModel
+from plant_models.benchmarks.cart_pendulum import TABLE_4_1, cart_pendulum_flow
+from plant_models.hybrid import input_signal, state
+from plant_models.hybrid.system import Array, vector
+
+CHAINS = np.kron(np.eye(2), np.array([[0.0, 1.0], [0.0, 0.0]]))  # position and speed, angle and rate
+
+
+def cart_pendulum() -> ObserverModel:
+    """Position and angle measured, the force known: Allaoui 2024, (4.6) to (4.10), constants of Table 4.1."""
+    return ObserverModel(
+        name="cart_pendulum",
+        description="Cart with an inverted pendulum, position and angle measured",
+        source="Allaoui 2024, (4.6) to (4.10), Table 4.1",
+        states=(
+            state("position", "m", 0.0, "Position of the cart"),
+            state("speed", "m/s", 0.0, "Speed of the cart"),
+            state("angle", "rad", 0.0, "Angle of the pendulum from upright"),
+            state("rate", "rad/s", 0.0, "Angular speed of the pendulum"),
+        ),
+        inputs=(input_signal("force", "N", 0.0, "Force on the cart"),),
+        measurements=(
+            input_signal("position", "m", 0.0, "Measured position of the cart"),
+            input_signal("angle", "rad", 0.0, "Measured angle of the pendulum"),
+        ),
+        A=CHAINS,
+        B=np.zeros((4, 1)),
+        C=np.eye(4)[[0, 2]],
+        phi=_remainder,
+        sample_period=1e-3,
+    )
+
+
+def _remainder(x: Array, u: Array) -> Array:
+    rates = cart_pendulum_flow(x, u[0], TABLE_4_1)
+    return vector(0.0 * x[0], rates[1], 0.0 * x[0], rates[3])

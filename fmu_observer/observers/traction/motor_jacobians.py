@@ -1,0 +1,78 @@
+"""Jacobians of the motor's Euler step and of its measured currents. Pure functions that trace."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from plant_models.hybrid import vector
+from plant_models.hybrid.system import Array
+
+
+def rotor_jacobian(current_d: Array, current_q: Array, speed: Array, period: Array, p: Any) -> list[list[Array]]:
+    """Rows of ``F = d x(k+1) / d x(k)`` with voltages given in the rotor frame, 4 by 4.
+
+    Args:
+        current_d: along d [A]. current_q: along q [A]. speed: of the shaft [rad/s]. period: T_s [s].
+        p: parameters of the motor.
+
+    Returns:
+        Four rows of four entries.
+
+    Source: Allaoui 2024, "3.42" (4.42), repaired: current q in the first row, minus in the second, L_q under R_s.
+    """
+    electrical, saliency = p.pole_pairs * speed, p.inductance_d - p.inductance_q
+    share_d, share_q = period / p.inductance_d, period / p.inductance_q
+    torque = period * 1.5 * p.pole_pairs / p.inertia
+    return [
+        [
+            1.0 - share_d * p.stator_resistance,
+            share_d * p.inductance_q * electrical,
+            share_d * p.inductance_q * p.pole_pairs * current_q,
+            0.0,
+        ],
+        [
+            -share_q * p.inductance_d * electrical,
+            1.0 - share_q * p.stator_resistance,
+            -share_q * p.pole_pairs * (p.inductance_d * current_d + p.rotor_flux),
+            0.0,
+        ],
+        [
+            torque * saliency * current_q,
+            torque * (saliency * current_d + p.rotor_flux),
+            1.0 - period * p.viscous_friction / p.inertia,
+            0.0,
+        ],
+        [0.0, 0.0, period * p.pole_pairs, 1.0],
+    ]
+
+
+def printed_jacobian(current_d: Array, current_q: Array, speed: Array, period: Array, p: Any) -> list[list[Array]]:
+    """Rows of F as they are printed: current d in place of q in the first row, plus in place of minus in the second,
+    L_d under R_s in the second.
+
+    Args:
+        current_d: along d [A]. current_q: along q [A]. speed: of the shaft [rad/s]. period: T_s [s].
+        p: parameters of the motor.
+
+    Returns:
+        Four rows of four entries.
+
+    Source: Allaoui 2024, "3.42" (4.42), as printed.
+    """
+    rows = rotor_jacobian(current_d, current_q, speed, period, p)
+    share_d, share_q = period / p.inductance_d, period / p.inductance_q
+    rows[0][2] = share_d * p.inductance_q * p.pole_pairs * current_d
+    rows[1][1] = 1.0 - share_d * p.stator_resistance
+    rows[1][2] = share_q * p.pole_pairs * (p.inductance_d * current_d - p.rotor_flux)
+    return rows
+
+
+def as_array(rows: list[list[Array]]) -> Array:
+    """Rows of numbers and symbols as a matrix, shape (rows, columns).
+
+    Args:
+        rows: of equal length.
+    """
+    return np.stack([vector(*row) for row in rows])

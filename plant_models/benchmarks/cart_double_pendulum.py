@@ -1,0 +1,190 @@
+"""A cart with an inverted double pendulum, without friction, in its repaired and its printed equations. Knows only the
+hybrid foundation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from plant_models.benchmarks.noisy_plant import NoisyPlant, solved_3
+from plant_models.hybrid import input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid.system import Array
+
+Equations = Literal["repaired", "as_printed_4_13", "as_printed_4_11"]
+EQUATIONS: tuple[Equations, ...] = ("repaired", "as_printed_4_13", "as_printed_4_11")
+
+
+@dataclass(frozen=True)
+class DoublePendulumConstants:
+    """Constants of section IV.2.2.3.
+
+    Attributes:
+        cart_mass: M [kg]. first_mass: m1 [kg]. second_mass: m2 [kg]. first_length: l1, joint to mass centre [m].
+        second_length: l2 [m]. gravity: g [m/s2].
+    """
+
+    cart_mass: float = 1.5
+    first_mass: float = 0.5
+    second_mass: float = 0.75
+    first_length: float = 0.5
+    second_length: float = 0.75
+    gravity: float = 9.81
+
+
+SECTION_IV_2_2_3 = DoublePendulumConstants()
+
+
+class CartDoublePendulum(NoisyPlant):
+    """Cart and inverted double pendulum of uniform rods: Allaoui 2024, (4.12) to (4.18), signs repaired.
+
+    ``A(q) [x'', a1'', a2''] = [b1, b2, b3]``, angles absolute from upright, l1 and l2 to the mass centres. Repaired are
+    the signs of the centrifugal terms with ``sin(a2 - a1)`` in b2 and b3: as printed in (4.14) the energy, 14.78 J, is
+    26.17 J after 3 s of free fall. In (4.11) the signs of the coupling to the cart are those of angles that count
+    towards -x, and the centrifugal terms of b1 those of angles that count towards +x: 335.2 J. The thesis prints no
+    start, input or noise: (0.3, -0.2) rad at rest and no noise are ours.
+
+    Presets: `free_fall` (default); `annex_c`, with m1 = 0.2 kg as the annex has it; `noisy`, with noise of variance
+    1e-6 on each state and 1e-2 on each measurement [ours]; `upright`, at rest.
+
+    Args:
+        equations: ``repaired``; ``as_printed_4_13``, which is (4.13) with (4.14); ``as_printed_4_11``.
+
+    Raises:
+        ValueError: another word.
+    """
+
+    name = "cart_double_pendulum"
+    description = "Cart with an inverted double pendulum, driven by a force"
+    source = "Allaoui 2024, (4.11) to (4.18), section IV.2.2.3"
+    internal_step = 1e-3
+    moving = (
+        state("cart_position", "m", 0.0, "Position of the cart"),
+        state("cart_speed", "m/s", 0.0, "Speed of the cart"),
+        state("lower_angle", "rad", 0.3, "Angle of the lower rod from upright"),
+        state("lower_rate", "rad/s", 0.0, "Angular speed of the lower rod"),
+        state("upper_angle", "rad", -0.2, "Angle of the upper rod from upright"),
+        state("upper_rate", "rad/s", 0.0, "Angular speed of the upper rod"),
+    )
+    inputs = (input_signal("force", "N", 0.0, "Force on the cart"),)
+    plain_outputs = (
+        output_signal("position", "m", "Position of the cart"),
+        output_signal("speed", "m/s", "Speed of the cart", display_unit="km/h"),
+        output_signal("first_angle", "rad", "Angle of the lower rod from upright"),
+        output_signal("first_rate", "rad/s", "Angular speed of the lower rod"),
+        output_signal("second_angle", "rad", "Angle of the upper rod from upright"),
+        output_signal("second_rate", "rad/s", "Angular speed of the upper rod"),
+        output_signal("energy", "J", "Kinetic and potential energy; zero height is that of the lower joint"),
+    )
+    presets: Mapping[str, Mapping[str, Any]] = {
+        "free_fall": {},
+        "annex_c": {"first_mass": 0.2},
+        "noisy": {"process_noise": 1e-3, "measurement_noise": 0.1},
+        "upright": {"lower_angle": 0.0, "upper_angle": 0.0},
+    }
+    default_preset = "free_fall"
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"equations": EQUATIONS}
+
+    def __init__(self, equations: Equations = "repaired") -> None:
+        if equations not in EQUATIONS:
+            raise ValueError(f"{self.name}: unknown equations {equations!r}; choose one of: {', '.join(EQUATIONS)}.")
+        self.equations = equations
+        values = SECTION_IV_2_2_3
+        self.declare(
+            (
+                output_signal("measured_position", "m", "Measured position of the cart", variability="discrete"),
+                output_signal("measured_first_angle", "rad", "Measured angle of the lower rod", variability="discrete"),
+                output_signal(
+                    "measured_second_angle", "rad", "Measured angle of the upper rod", variability="discrete"
+                ),
+            ),
+            (
+                parameter("cart_mass", "kg", values.cart_mass, "Mass M of the cart", min=1e-3),
+                parameter("first_mass", "kg", values.first_mass, "Mass m1 of the lower rod", min=1e-3),
+                parameter("second_mass", "kg", values.second_mass, "Mass m2 of the upper rod", min=1e-3),
+                parameter("first_length", "m", values.first_length, "Half length l1 of the lower rod", min=1e-3),
+                parameter("second_length", "m", values.second_length, "Half length l2 of the upper rod", min=1e-3),
+                parameter("gravity", "m/s2", values.gravity, "Acceleration of gravity", min=0.0),
+            ),
+            period=1e-3,
+        )
+        super().__init__(equations=equations)
+
+    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Derivatives of the six states, shape (6,) or (6, members)."""
+        return double_pendulum_flow(x, u.force, p, self.equations)
+
+    def measured(self, x: Array) -> tuple[Array, ...]:
+        """Position and both angles: (4.18)."""
+        return x[0], x[2], x[4]
+
+    def plain(self, x: Array, p: Any) -> dict[str, Array]:
+        """The states and the energy, as the mass matrix in use has it."""
+        a11, a12, a13, a22, a23, a33 = mass_matrix(x, p, self.equations)
+        kinetic = 0.5 * (a11 * x[1] ** 2 + a22 * x[3] ** 2 + a33 * x[5] ** 2)
+        coupled = a12 * x[1] * x[3] + a13 * x[1] * x[5] + a23 * x[3] * x[5]
+        heights = both_masses(p) * p.first_length * np.cos(x[2]) + p.second_mass * p.second_length * np.cos(x[4])
+        names = [s.name for s in self.plain_outputs[:6]]
+        return dict(zip(names, (x[i] for i in range(6)), strict=True)) | {
+            "energy": kinetic + coupled + p.gravity * heights
+        }
+
+
+def both_masses(p: Any) -> Array:
+    """What the lower joint carries, ``m1 + 2 m2`` [kg].
+
+    Args:
+        p: constants by the names of `DoublePendulumConstants`.
+    """
+    return p.first_mass + 2.0 * p.second_mass
+
+
+def mass_matrix(x: Array, p: Any, equations: Equations = "repaired") -> tuple[Array, ...]:
+    """Entries 11, 12, 13, 22, 23, 33 of the symmetric matrix A(q): (4.13).
+
+    Args:
+        x: state, shape (6,) or (6, members). p: constants by the names of `DoublePendulumConstants`. equations: see
+            `CartDoublePendulum`.
+    """
+    towards = -1.0 if equations == "as_printed_4_11" else 1.0
+    lower, upper = both_masses(p) * p.first_length, p.second_mass * p.second_length
+    return (
+        p.cart_mass + p.first_mass + p.second_mass,
+        towards * lower * np.cos(x[2]),
+        towards * upper * np.cos(x[4]),
+        4.0 * (p.first_mass / 3.0 + p.second_mass) * p.first_length**2,
+        2.0 * upper * p.first_length * np.cos(x[4] - x[2]),
+        4.0 / 3.0 * upper * p.second_length,
+    )
+
+
+def right_hand_side(x: Array, force: Array, p: Any, equations: Equations = "repaired") -> tuple[Array, Array, Array]:
+    """b1, b2 and b3: (4.14), with its signs repaired or not.
+
+    Args:
+        x: state, shape (6,) or (6, members). force: on the cart [N]. p: constants by the names of
+            `DoublePendulumConstants`. equations: see `CartDoublePendulum`.
+    """
+    lower, upper = both_masses(p) * p.first_length, p.second_mass * p.second_length
+    sign = -1.0 if equations == "as_printed_4_13" else 1.0
+    centrifugal = sign * 2.0 * upper * p.first_length * np.sin(x[4] - x[2])
+    return (
+        force + lower * x[3] ** 2 * np.sin(x[2]) + upper * x[5] ** 2 * np.sin(x[4]),
+        lower * p.gravity * np.sin(x[2]) + centrifugal * x[5] ** 2,
+        upper * p.gravity * np.sin(x[4]) - centrifugal * x[3] ** 2,
+    )
+
+
+def double_pendulum_flow(x: Array, force: Array, p: Any, equations: Equations = "repaired") -> Array:
+    """Derivatives of position, speed, both angles and their rates, shape (6,) or (6, members): (4.12) solved.
+
+    Args:
+        x: state, shape (6,) or (6, members). force: on the cart [N]. p: constants by the names of
+            `DoublePendulumConstants`. equations: see `CartDoublePendulum`.
+    """
+    matrix, right = mass_matrix(x, p, equations), right_hand_side(x, force, p, equations)
+    acceleration, lower, upper = solved_3(matrix, right)
+    return vector(x[1], acceleration, x[3], lower, x[5], upper)

@@ -1,0 +1,119 @@
+"""Base of benchmark plants with process noise and sampled, noisy measurements. Knows only the hybrid foundation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from plant_models.hybrid import (
+    HybridSystem,
+    PeriodicEvent,
+    Signal,
+    input_signal,
+    memory,
+    parameter,
+    vector,
+)
+from plant_models.hybrid.system import Array
+
+
+class NoisyPlant(HybridSystem):
+    """Base of plants ``x(k+1) = F(x(k), u(k)) + w(k)``, ``y(k) = h(x(k)) + v(k)`` whose F is the flow over a period.
+
+    A subclass sets `moving` (continuous states) and `plain_outputs`, writes `flow`, `measured` and `plain`, and calls
+    `declare` before ``super().__init__``. At each sampling instant the states jump by ``process_noise`` times standard
+    normal numbers, and what is measured then is held with ``measurement_noise`` added. Both are zero unless set, so
+    that the plant is the plain differential equation.
+    """
+
+    moving: tuple[Signal, ...] = ()
+    plain_outputs: tuple[Signal, ...] = ()
+
+    def measured(self, x: Array) -> tuple[Array, ...]:
+        """What is measured without noise, one scalar a measurement.
+
+        Args:
+            x: state, shape (n,) or (n, members).
+        """
+        raise NotImplementedError
+
+    def plain(self, x: Array, p: Any) -> dict[str, Array]:
+        """Values of `plain_outputs` by name.
+
+        Args:
+            x: state, shape (n,) or (n, members). p: parameters.
+        """
+        raise NotImplementedError
+
+    def declare(self, measurements: Sequence[Signal], parameters: Sequence[Signal], period: float) -> None:
+        """Set states, outputs, parameters and the sampling event.
+
+        Args:
+            measurements: outputs ``measured_<y>``. parameters: of the equations. period: between two samples [s].
+        """
+        n, q = len(self.moving), len(measurements)
+        held = tuple(memory(f"held_{s.name}", s.unit, 0.0, f"{s.description}, held") for s in measurements)
+        self.states = (*self.moving, *held)
+        self.outputs = (*self.plain_outputs, *measurements)
+        self.parameters = (
+            *parameters,
+            parameter("sample_period", "s", period, "Time between two samples", min=1e-6),
+            parameter(
+                "process_noise",
+                "1",
+                0.0,
+                "Standard deviation of what is added to each state at a sample, in its unit",
+                min=0.0,
+                size=n,
+            ),
+            parameter(
+                "measurement_noise",
+                "1",
+                0.0,
+                "Standard deviation of the noise of each measurement, in its unit",
+                min=0.0,
+                size=q,
+            ),
+        )
+        noises = (
+            input_signal("process_normal", "1", 0.0, "Standard normal numbers", variability="discrete", size=n),
+            input_signal("measurement_normal", "1", 0.0, "Standard normal numbers", variability="discrete", size=q),
+        )
+        self.events = (PeriodicEvent("sampling", "sample_period", noises=noises, description="A sample is taken"),)
+
+    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Disturb the states, then measure, shape (n + q,) or (n + q, members)."""
+        n = len(self.moving)
+        moved = vector(*(x[i] + p.process_noise[i] * u.process_normal[i] for i in range(n)))
+        seen = (y + p.measurement_noise[j] * u.measurement_normal[j] for j, y in enumerate(self.measured(moved)))
+        return vector(*(moved[i] for i in range(n)), *seen)
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """The plain outputs and the held measurements."""
+        n = len(self.moving)
+        held = {s.name: x[n + j] for j, s in enumerate(self.outputs[len(self.plain_outputs) :])}
+        return self.plain(x, p) | held
+
+
+def solved_2(matrix: tuple[Array, Array, Array], right: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Solution of a symmetric linear system of two equations.
+
+    Args:
+        matrix: entries 11, 12, 22. right: right-hand side. Scalars or arrays of shape (members,).
+    """
+    a, b, c = matrix
+    determinant = a * c - b * b
+    return (c * right[0] - b * right[1]) / determinant, (a * right[1] - b * right[0]) / determinant
+
+
+def solved_3(matrix: tuple[Array, ...], right: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
+    """Solution of a symmetric positive definite system of three equations, the first eliminated, then `solved_2`.
+
+    Args:
+        matrix: entries 11, 12, 13, 22, 23, 33. right: right-hand side. Scalars or arrays of shape (members,).
+    """
+    a11, a12, a13, a22, a23, a33 = matrix
+    second, third = a12 / a11, a13 / a11
+    rest = (a22 - second * a12, a23 - second * a13, a33 - third * a13)
+    y, z = solved_2(rest, (right[1] - second * right[0], right[2] - third * right[0]))
+    return (right[0] - a12 * y - a13 * z) / a11, y, z

@@ -1,0 +1,130 @@
+"""Field-oriented control of a synchronous motor: PI of the speed, PI of both currents, decoupling, limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, vector
+from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid.system import Array
+from plant_models.railway.traction.motor_equations import AXES, FRAMES, MOTOR_PARAMETERS, TRACTION_200_KW, Frame
+from plant_models.railway.traction.transforms import to_rotor, to_stator
+
+
+class FieldOrientedControl(HybridSystem):
+    """Control with ``i_d* = 0``: a PI of the speed asks for ``i_q*``, PIs of both currents for voltages.
+
+    At each `control_period`, with ``e = w* - w``: ``i_q* = kp e + I`` within `current_limit`;
+    ``v_d = kc (0 - i_d) + I_d - p w L_q i_q``, ``v_q = kc (i_q* - i_q) + I_q + p w (L_d i_d + phi)``, the vector
+    shortened to `voltage_limit`. What a limit cuts off is taken back from the integral. Gains follow from two
+    bandwidths: ``kc = wc L``, ``ki = wc R`` (pole and zero cancel), ``kp = ws J / K_t``, ``ki = kp ws / 5``.
+
+    Speed and angle come from sensors, or from an observer: then the drive is sensorless. The voltages are put out in
+    both frames; those of the stator frame by the angle of the control instant.
+
+    Args:
+        frame: of the measured currents: ``rotor`` (d, q), or ``stator`` (alpha, beta), turned by the angle.
+
+    Raises:
+        ValueError: the frame is unknown.
+
+    Source: Allaoui 2024, section IV.2.3.8 and Fig. 4.15; no gains, limits and references are printed, all are ours.
+    """
+
+    name = "field_oriented_control"
+    description = "Field-oriented control of a synchronous motor, speed and currents"
+    source = "Allaoui 2024, section IV.2.3.8, Fig. 4.15; gains and limits are ours"
+    internal_step = 1e-2  # nothing flows
+    states = (
+        memory("speed_integral", "A", 0.0, "Integral of the speed control"),
+        memory("integral_d", "V", 0.0, "Integral of the current control along d"),
+        memory("integral_q", "V", 0.0, "Integral of the current control along q"),
+        memory("held_voltage_d", "V", 0.0, "Voltage of this period along d"),
+        memory("held_voltage_q", "V", 0.0, "Voltage of this period along q"),
+        memory("held_angle", "rad", 0.0, "Electrical angle at the control instant"),
+        memory("held_reference", "A", 0.0, "Current asked for along q"),
+    )
+    outputs = (
+        output_signal("voltage_d", "V", "Voltage along d", variability="discrete"),
+        output_signal("voltage_q", "V", "Voltage along q", variability="discrete"),
+        output_signal("voltage_alpha", "V", "Voltage along alpha", variability="discrete"),
+        output_signal("voltage_beta", "V", "Voltage along beta", variability="discrete"),
+        output_signal("current_reference", "A", "Current asked for along q", variability="discrete"),
+    )
+    parameters = (
+        parameter("control_period", "s", 1e-4, "Control period", min=1e-7),
+        parameter("current_bandwidth", "rad/s", 2.0 * float(np.pi) * 300.0, "Bandwidth wc of the currents", min=1e-3),
+        parameter("speed_bandwidth", "rad/s", 2.0 * float(np.pi) * 60.0, "Bandwidth ws of the speed", min=1e-6),
+        parameter("current_limit", "A", 8.0, "Largest current along q", min=0.0),
+        parameter("voltage_limit", "V", 28.0 / float(np.sqrt(3.0)), "Longest voltage vector", min=1e-9),
+        *(s for s in MOTOR_PARAMETERS if s.name != "viscous_friction"),
+    )
+    events = (PeriodicEvent("control", "control_period", description="Speed and current control"),)
+    presets: Mapping[str, Mapping[str, Any]] = {
+        "drive_100w": {},
+        "traction_200kw": {
+            **{name: value for name, value in TRACTION_200_KW.items() if name != "viscous_friction"},
+            "speed_bandwidth": 30.0,
+            "current_limit": 350.0,
+            "voltage_limit": 1500.0 / float(np.sqrt(3.0)),
+        },
+    }
+    default_preset = "drive_100w"
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"frame": FRAMES}
+
+    def __init__(self, *, frame: Frame = "rotor") -> None:
+        if frame not in FRAMES:
+            raise ValueError(f"Unknown frame {frame!r}; choose one of: {', '.join(FRAMES)}.")
+        self.frame = frame
+        self.inputs = (
+            input_signal("speed_reference", "rad/s", 0.0, "Speed asked for", display_unit="rpm"),
+            input_signal("speed", "rad/s", 0.0, "Speed of the shaft, measured or estimated", display_unit="rpm"),
+            input_signal("angle", "rad", 0.0, "Electrical angle, measured or estimated"),
+            *(input_signal(f"current_{axis}", "A", 0.0, f"Current along {axis}") for axis in AXES[frame]),
+        )
+        super().__init__(frame=frame)
+
+    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Voltages of the coming period from the signals of this instant, shape (7,) or (7, members)."""
+        first, second = (getattr(u, f"current_{axis}") for axis in AXES[self.frame])
+        current_d, current_q = (first, second) if self.frame == "rotor" else to_rotor(first, second, u.angle)
+        error = u.speed_reference - u.speed
+        gain = p.speed_bandwidth * p.inertia / (1.5 * p.pole_pairs * p.rotor_flux)
+        asked = gain * error + x[0]
+        reference = np.minimum(np.maximum(asked, -p.current_limit), p.current_limit)
+        # Both integrals go back by what the limit cuts off, with the time constant of their own PI.
+        speed_integral = x[0] + p.control_period * p.speed_bandwidth / 5.0 * (gain * error + reference - asked)
+
+        electrical, rate = p.pole_pairs * u.speed, p.current_bandwidth
+        errors = (-current_d, reference - current_q)
+        inductances = (p.inductance_d, p.inductance_q)
+        wanted_d = rate * p.inductance_d * errors[0] + x[1] - electrical * p.inductance_q * current_q
+        wanted_q = rate * p.inductance_q * errors[1] + x[2] + electrical * (p.inductance_d * current_d + p.rotor_flux)
+        length = np.sqrt(wanted_d * wanted_d + wanted_q * wanted_q)
+        share = np.minimum(1.0, p.voltage_limit / np.maximum(length, p.voltage_limit))
+        voltages = (share * wanted_d, share * wanted_q)
+        integrals = [
+            integral + p.control_period * p.stator_resistance * (rate * e + (limited - wanted) / inductance)
+            for integral, e, limited, wanted, inductance in zip(
+                (x[1], x[2]), errors, voltages, (wanted_d, wanted_q), inductances, strict=True
+            )
+        ]
+        return vector(speed_integral, *integrals, *voltages, u.angle, reference)
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """The voltages of this period in both frames, and the current asked for."""
+        alpha, beta = to_stator(x[3], x[4], x[5])
+        return {
+            "voltage_d": x[3],
+            "voltage_q": x[4],
+            "voltage_alpha": alpha,
+            "voltage_beta": beta,
+            "current_reference": x[6],
+        }
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """Parameters keep their bounds."""
+        return within_bounds(self.parameters, p)

@@ -1,0 +1,112 @@
+"""The permanent-magnet synchronous motor in its phases: three windings in star, smooth poles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state, vector
+from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid.system import Array
+from plant_models.railway.traction.motor_equations import MOTOR_PARAMETERS
+from plant_models.railway.traction.transforms import park
+
+THIRD = 2.0 * float(np.pi) / 3.0
+PHASES = ("a", "b", "c")
+
+
+class ThreePhaseMotor(HybridSystem):
+    """Motor with phase currents as states: ``v = R i + d(L_ss i + phi)/dt``, ``phi_k = phi_sf cos(theta - 2 pi k/3)``.
+
+    The torque follows from the co-energy: ``C_em = p sum i_k dphi_k/dtheta``, in the same angle. Smooth poles:
+    ``L_s - M_s = L_d = L_q = cyclic_inductance``. The star point is not connected [ours], so the currents add up to
+    zero, two of them are states, and what the phase voltages have in common acts on nothing.
+
+    Under `inverse_park` voltages it is `synchronous_motor` in other coordinates.
+
+    Source: Allaoui 2024, (4.22)-(4.26); the third flux is printed as ``cos(theta + 4 pi/3)``, which is the second one.
+    """
+
+    name = "three_phase_motor"
+    description = "Permanent-magnet synchronous motor in its three phases"
+    source = "Allaoui 2024, (4.22)-(4.26)"
+    internal_step = 1e-4
+    states = (
+        state("phase_current_a", "A", 0.0, "Current of phase a"),
+        state("phase_current_b", "A", 0.0, "Current of phase b"),
+        state("shaft_speed", "rad/s", 0.0, "Speed of the shaft"),
+        state("electrical_angle", "rad", 0.0, "Electrical angle of the rotor"),
+    )
+    inputs = (
+        *(input_signal(f"voltage_{phase}", "V", 0.0, f"Voltage of phase {phase}") for phase in PHASES),
+        input_signal("load_torque", "N.m", 0.0, "Torque of the load against the rotation, C_r"),
+    )
+    outputs = (
+        *(output_signal(f"current_{phase}", "A", f"Current of phase {phase}") for phase in PHASES),
+        output_signal("current_d", "A", "Current along d"),
+        output_signal("current_q", "A", "Current along q"),
+        output_signal("speed", "rad/s", "Speed of the shaft", display_unit="rpm"),
+        output_signal("angle", "rad", "Electrical angle of the rotor, not wrapped"),
+        output_signal("torque", "N.m", "Electromagnetic torque C_em"),
+    )
+    parameters = (
+        parameter("cyclic_inductance", "H", 0.0121, "L_s - M_s", min=1e-9),
+        *(s for s in MOTOR_PARAMETERS if not s.name.startswith("inductance")),
+    )
+    presets: Mapping[str, Mapping[str, Any]] = {"annex_c": {}}
+    default_preset = "annex_c"
+
+    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Derivatives of two phase currents, speed and angle, shape (4,) or (4, members)."""
+        currents = _currents(x)
+        slopes = _flux_slopes(x[3], p)
+        electrical = p.pole_pairs * x[2]
+        driving = [
+            voltage - p.stator_resistance * current - electrical * slope
+            for voltage, current, slope in zip((u.voltage_a, u.voltage_b, u.voltage_c), currents, slopes, strict=True)
+        ]
+        star = (driving[0] + driving[1] + driving[2]) / 3.0  # voltage of the star point
+        return vector(
+            (driving[0] - star) / p.cyclic_inductance,
+            (driving[1] - star) / p.cyclic_inductance,
+            (_torque(currents, slopes, p) - u.load_torque - p.viscous_friction * x[2]) / p.inertia,
+            electrical,
+        )
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """Currents in phases and in the rotor frame, speed, angle and torque."""
+        currents = _currents(x)
+        current_d, current_q = park(*currents, x[3])
+        return {
+            **{f"current_{phase}": current for phase, current in zip(PHASES, currents, strict=True)},
+            "current_d": current_d,
+            "current_q": current_q,
+            "speed": x[2],
+            "angle": x[3],
+            "torque": _torque(currents, _flux_slopes(x[3], p), p),
+        }
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """Parameters keep their bounds."""
+        return within_bounds(self.parameters, p)
+
+
+def _currents(x: Array) -> tuple[Array, Array, Array]:
+    return x[0], x[1], -(x[0] + x[1])
+
+
+def _flux_slopes(angle: Array, p: Any) -> tuple[Array, Array, Array]:
+    """Derivatives of the rotor fluxes of the phases by the electrical angle [Wb]."""
+    return (
+        -p.rotor_flux * np.sin(angle),
+        -p.rotor_flux * np.sin(angle - THIRD),
+        -p.rotor_flux * np.sin(angle + THIRD),
+    )
+
+
+def _torque(currents: tuple[Array, Array, Array], slopes: tuple[Array, Array, Array], p: Any) -> Array:
+    """Electromagnetic torque [N.m], from the co-energy."""
+    work = currents[0] * slopes[0] + currents[1] * slopes[1] + currents[2] * slopes[2]
+    return p.pole_pairs * work
