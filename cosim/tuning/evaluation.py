@@ -181,7 +181,7 @@ class Evaluator:
         """Answers as they come: of replays first, all candidates of a seed together."""
         others = list(range(len(jobs)))
         for seed, replays in self._replays.items():
-            mine = [n for n in others if jobs[n].seed == seed and jobs[n].settings]
+            mine = [n for n in others if jobs[n].seed == seed]
             others = [n for n in others if n not in set(mine)]
             for place, outcome in zip(mine, replays.outcomes([jobs[n].settings for n in mine]), strict=True):
                 self.runs += 1

@@ -43,12 +43,18 @@ class Replays:
         Args:
             candidates: settings by name, of parameters of the observer.
         """
+        varied = self._varied([candidate for candidate in candidates if candidate])
+        for candidate in candidates:
+            yield next(varied) if candidate else self.outcome  # without settings: the run that is there
+
+    def _varied(self, candidates: Sequence[Mapping[str, Any]]) -> Iterator[Outcome | str]:
+        """Outcomes of candidates that change something, all of them the same parameters."""
         table = self.outcome.result.table.copy()
         result = replace(self.outcome.result, table=table)
         size = max(1, VALUES // (len(table) * len(self._names)))
         for first in range(0, len(candidates), size):
             part = candidates[first : first + size]
-            columns = {n.partition(".")[2]: np.array([c[n] for c in part], float) for n in (part[0] if part else {})}
+            columns = {n.partition(".")[2]: np.array([c[n] for c in part], float) for n in part[0]}
             try:
                 found = self.replay.run(self._names, columns, members=len(part))
             except BatchError as error:
