@@ -53,7 +53,9 @@ class PrintedRules:
     )
     parameters: tuple[Signal, ...] = (
         parameter("rule_4", "1", 1.0, "1 where rule 4 is applied", min=0.0, max=1.0),
-        parameter("rule_delay", "1", 1.0, "Samples from a verdict to its effect: 1 as printed, 0 at once", min=0.0, max=1.0),
+        parameter(
+            "rule_delay", "1", 1.0, "Samples until a verdict takes effect: 1 printed, 0 at once", min=0.0, max=1.0
+        ),
     )
 
     def at_sample(self, before: tuple[Array, ...], told: Reading, p: Any) -> Judgement:
