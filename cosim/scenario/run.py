@@ -347,6 +347,8 @@ class _Setup:
 
     def _start_values(self, name: str, component: Component) -> dict[str, StartValue]:
         table = self.table.components[name]
+        if table.filter is not None:
+            return {}  # they are those of its FMU, which has taken them
         return start_values(component, protocol_parameters(table, component, f"components.{name}") | table.parameters)
 
     def _balise_roles(self) -> tuple[list[str], str]:
