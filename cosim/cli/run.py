@@ -14,6 +14,8 @@ from typing import Any
 from cosim import studies
 from cosim.cli.scenarios import add_scenario, load_scenario, positive, simulated_time_bar
 from cosim.errors import OutputError
+from cosim.evaluation.consistency import filter_consistency
+from cosim.evaluation.consistency_table import consistency_text
 from cosim.evaluation.cost import cost_text
 from cosim.evaluation.error_table import error_text
 from cosim.evaluation.fault_detection import fault_detection
@@ -196,6 +198,9 @@ def _tell(outcome: Outcome, study: Any, paths: dict[str, Path], options: argpars
         faults = fault_text(fault_detection(outcome.result, outcome.spec), outcome.spec)
         if faults:
             print("\n" + faults)
+        filters = consistency_text(filter_consistency(outcome.result, outcome.spec), outcome.spec)
+        if filters:
+            print("\n" + filters)
     print(cost_text(outcome.result), end="\n\n")
     if study is not None:
         print(study.text())

@@ -1,4 +1,6 @@
-"""What a run does not show: phases without rows, a train that stands, estimates worse than none. Imports NumPy only."""
+"""What a run does not show: phases without rows, a train that stands, estimates worse than none, covariances that do
+not fit. Imports NumPy only.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +8,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from cosim.evaluation.consistency import consistency_warnings
 from cosim.evaluation.facts import list_entry
 from cosim.evaluation.metrics import FEWEST_INSTANTS, instants, judged_size, within
 from cosim.evaluation.numbers import number
@@ -18,15 +21,21 @@ STANDSTILL = 0.01
 
 
 def result_warnings(result: Result, spec: ReportSpec) -> list[str]:
-    """Why the numbers of a run say little or nothing, in words; none where the true speed is not known.
+    """Why the numbers of a run say little or nothing, in words.
 
     Args:
         result: the run; one that failed tells of its end by itself. spec: roles, phases, start of the evaluation.
 
     Returns:
-        A text for each of: a train that never moves, phases that were not reached or hold too few rows, phases in which
-        the train stands to the end of the run, observers whose speed error is larger than the speed of the train.
+        A text for each of: filters whose covariance does not fit their errors; where the true speed is known, a train
+        that never moves, phases that were not reached or hold too few rows, phases in which the train stands to the end
+        of the run, observers whose speed error is larger than the speed of the train.
     """
+    filters = [] if result.failure is not None else list(consistency_warnings(result, spec))
+    return _of_the_journey(result, spec) + filters
+
+
+def _of_the_journey(result: Result, spec: ReportSpec) -> list[str]:
     speed = recorded(result, spec.true_speed)
     if speed is None or not len(result.time):
         return []

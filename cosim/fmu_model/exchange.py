@@ -78,6 +78,8 @@ class ExchangeModel(SealedModel):
 
     def _own_states(self, given: Sequence[str] | None) -> Sequence[str]:
         own = declared_states(self.instance)
+        if given is not None and not given:
+            return ()  # it starts where the FMU itself does
         if given is not None and set(given) != set(own):
             raise FmuModelError(
                 f"{self.path}: in model exchange all states are set at once: {', '.join(own)}; given are: "

@@ -25,6 +25,7 @@ from cosim.diagnostics.call_log import CallLog
 from cosim.diagnostics.messages import in_order
 from cosim.errors import CosimError
 from cosim.evaluation.balise_gaps import gap_errors
+from cosim.evaluation.consistency import filter_consistency
 from cosim.evaluation.fault_detection import fault_detection
 from cosim.evaluation.result_warnings import result_warnings
 from cosim.evaluation.spec import Phase, ReportSpec
@@ -273,6 +274,8 @@ class _Setup:
             summary["fault_detection"] = [found.to_data() for found in faults]
         if (gaps := gap_errors(Result(table, signals, events, failure=failure), spec)).errors:
             summary["balise_gaps"] = gaps.to_data()
+        if filters := filter_consistency(Result(table, signals, failure=failure), spec):
+            summary["consistency"] = [found.to_data() for found in filters]
         summary["report"] = asdict(spec)  # so that the folder tells which signal plays which role
         if interruption.came:
             failure = failure or INTERRUPTED
@@ -344,6 +347,8 @@ class _Setup:
 
     def _start_values(self, name: str, component: Component) -> dict[str, StartValue]:
         table = self.table.components[name]
+        if table.filter is not None:
+            return {}  # they are those of its FMU, which has taken them
         return start_values(component, protocol_parameters(table, component, f"components.{name}") | table.parameters)
 
     def _balise_roles(self) -> tuple[list[str], str]:

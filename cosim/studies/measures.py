@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from cosim.evaluation.balise_gaps import PLAIN_ODOMETER, gap_errors, largest
+from cosim.evaluation.consistency import filter_consistency
 from cosim.evaluation.fault_detection import fault_detection
 from cosim.evaluation.metrics import judged_size, within
 from cosim.evaluation.roles import Quantity, estimation_error
@@ -25,6 +26,7 @@ RATES: Mapping[str, tuple[str, str]] = {"false_alarms_per_hour": ("false_alarms"
 """Measures that are counts in an hour: name to those of the count and of the time [s]."""
 ERROR_UNITS: Mapping[Quantity, str] = {"speed": "m/s", "position": "m"}
 GAP_UNITS = {"gap_error_max": "m", "gap_error_time_max": "s"}
+CONSISTENCY = ("nis", "nees", "nis_inside", "nees_inside")
 DETECTION_UNITS = {
     "faults": "1",
     "missed_faults": "1",
@@ -71,7 +73,28 @@ def error_measures(outcome: Outcome) -> dict[str, float]:
             failed = outcome.failure is not None
             measures[f"{observer}.{quantity}_error_max"] = nan if failed else size.max_abs
             measures[f"{observer}.{quantity}_error_rms"] = nan if failed else size.rms
-    return measures | detection_measures(outcome) | _gap_measures(outcome)
+    return measures | detection_measures(outcome) | _gap_measures(outcome) | consistency_measures(outcome)
+
+
+def consistency_measures(outcome: Outcome) -> dict[str, float]:
+    """How well the covariances of filters fit their errors.
+
+    Args:
+        outcome: the run.
+
+    Returns:
+        ``observer.nis``, ``observer.nees`` and ``observer.position_nees`` likewise for other quantities: means of the
+        normalised squares over their degrees of freedom, 1 for a consistent filter, and with ``_inside`` the share of
+        samples inside the 95 % band; NaN for a run that failed.
+    """
+    measures: dict[str, float] = {}
+    for entry in filter_consistency(outcome.result, outcome.spec):
+        kind = f"{entry.quantity}_nees" if entry.kind == "error" else entry.kind.lower()
+        found = entry.found
+        numbers = {kind: found.mean / found.degrees, f"{kind}_inside": found.inside}
+        failed = outcome.failure is not None
+        measures |= {f"{entry.observer}.{name}": nan if failed else float(v) for name, v in numbers.items()}
+    return measures
 
 
 def detection_measures(outcome: Outcome) -> dict[str, float]:
@@ -173,4 +196,6 @@ def measure_unit(name: str) -> str | None:
     for quantity, unit in ERROR_UNITS.items():
         if name.endswith((f".{quantity}_error_max", f".{quantity}_error_rms")):
             return unit
+    if name.endswith(CONSISTENCY):
+        return "1"
     return (GAP_UNITS | DETECTION_UNITS).get(name.rpartition(".")[2])

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from math import nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from cosim.errors import OutputError
 from cosim.results.summary_file import jsonable, restored
@@ -42,15 +42,7 @@ class Journal:
         Raises:
             OutputError: the file cannot be read.
         """
-        try:
-            lines = self.path.read_text(encoding="utf-8").splitlines() if self.path.is_file() else []
-        except OSError as error:
-            raise OutputError(f"{self.path} cannot be read: {error.strerror or error}.") from error
-        entries: dict[str, dict[str, Any]] = {}
-        for line in lines:
-            with suppress(json.JSONDecodeError):
-                entry = restored(json.loads(line))
-                entries[entry["key"]] = entry
+        entries = {entry["key"]: entry for entry in read_lines(self.path)}
         known = {number: entries.get(self.key(number)) for number in range(len(self._sweep))} if entries else {}
         return {
             number: self._run(number, entry)
@@ -67,7 +59,7 @@ class Journal:
         Raises:
             OutputError: the file cannot be written.
         """
-        self._write("w", runs)
+        write_lines(self.path, "w", map(self._entry, runs))
 
     def add(self, run: SweepRun) -> None:
         """Add a run.
@@ -78,15 +70,7 @@ class Journal:
         Raises:
             OutputError: the file cannot be written.
         """
-        self._write("a", [run])
-
-    def _write(self, mode: str, runs: Iterable[SweepRun]) -> None:
-        try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            with self.path.open(mode, encoding="utf-8") as file:
-                file.writelines(json.dumps(jsonable(self._entry(run)), allow_nan=False) + "\n" for run in runs)
-        except OSError as error:
-            raise OutputError(f"{self.path} cannot be written: {error.strerror or error}.") from error
+        write_lines(self.path, "a", [self._entry(run)])
 
     def key(self, number: int) -> str:
         """What a run follows from: the text of its scenario, and size and age of the files it names.
@@ -94,11 +78,7 @@ class Journal:
         Args:
             number: of the variation.
         """
-        scenario = self._sweep.varied(number)
-        digest = hashlib.sha256(scenario_text(scenario.table(), scenario.folder).encode())
-        for place in _files(scenario):
-            digest.update(f"{place} {place.stat().st_size} {place.stat().st_mtime_ns}".encode())
-        return digest.hexdigest()
+        return scenario_key(self._sweep.varied(number))
 
     def _entry(self, run: SweepRun) -> dict[str, Any]:
         return {
@@ -115,6 +95,56 @@ class Journal:
         folder = None if entry["folder"] is None else Path(entry["folder"])
         settings = self._sweep.variations[number]
         return SweepRun(number, settings, None, None, measures, tuple(entry["faults"]), folder)
+
+
+def scenario_key(scenario: Scenario) -> str:
+    """What a run follows from: the text of its scenario, and size and age of the files it names, as a digest.
+
+    Args:
+        scenario: of the run.
+    """
+    digest = hashlib.sha256(scenario_text(scenario.table(), scenario.folder).encode())
+    for place in _files(scenario):
+        digest.update(f"{place} {place.stat().st_size} {place.stat().st_mtime_ns}".encode())
+    return digest.hexdigest()
+
+
+def read_lines(path: Path) -> list[dict[str, Any]]:
+    """The entries of a journal, in order; none where there is no file. A last line that was cut off is no entry.
+
+    Args:
+        path: of the file.
+
+    Raises:
+        OutputError: the file cannot be read.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
+    except OSError as error:
+        raise OutputError(f"{path} cannot be read: {error.strerror or error}.") from error
+    entries: list[dict[str, Any]] = []
+    for line in lines:
+        with suppress(json.JSONDecodeError):
+            entries.append(restored(json.loads(line)))
+    return entries
+
+
+def write_lines(path: Path, mode: Literal["a", "w"], entries: Iterable[dict[str, Any]]) -> None:
+    """Write entries of a journal, one a line.
+
+    Args:
+        path: of the file; its folder is created where it does not exist. mode: ``w`` anew, ``a`` behind what is there.
+        entries: plain data.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open(mode, encoding="utf-8") as file:
+            file.writelines(json.dumps(jsonable(entry), allow_nan=False) + "\n" for entry in entries)
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
 
 
 def _files(scenario: Scenario) -> list[Path]:

@@ -57,28 +57,65 @@ def in_processes(task: Callable[[Any], Any], arguments: Sequence[Any], workers: 
     Yields:
         Number of the argument and the answer, `Died` or `Raised`, as they come.
     """
-    waiting = list(enumerate(arguments))[::-1]
-    team = [_Worker(task) for _ in range(min(workers, len(waiting)))]
-    try:
-        for worker in team:
-            worker.give(*waiting.pop())
-        while team:
-            ready = wait([worker.pipe for worker in team])
-            for worker in [w for w in team if w.pipe in ready]:
-                number, answer = worker.number, worker.answer()
-                team.remove(worker)
-                if waiting:
+    with Team(task, workers) as team:
+        yield from team.each(arguments)
+
+
+class Team:
+    """Processes that stay for several rounds of tasks; each is started when it is first needed.
+
+    Args:
+        task: a function of a module; it and its arguments and answers are pickled. workers: processes at a time.
+    """
+
+    def __init__(self, task: Callable[[Any], Any], workers: int) -> None:
+        self.task, self.workers = task, workers
+        self._idle: list[_Worker] = []
+
+    def each(self, arguments: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+        """One round: the task for each argument.
+
+        Args:
+            arguments: one for each call.
+
+        Yields:
+            Number of the argument and the answer, `Died` or `Raised`, as they come.
+        """
+        waiting = list(enumerate(arguments))[::-1]
+        busy: list[_Worker] = []
+
+        def occupy() -> None:
+            while waiting and len(busy) < self.workers:
+                busy.append(self._idle.pop() if self._idle else _Worker(self.task))
+                busy[-1].give(*waiting.pop())
+
+        try:
+            occupy()
+            while busy:
+                ready = wait([worker.pipe for worker in busy])
+                for worker in [w for w in busy if w.pipe in ready]:
+                    number, answer = worker.number, worker.answer()
+                    busy.remove(worker)
                     if isinstance(answer, Died):
                         worker.stop()
-                        worker = _Worker(task)  # noqa: PLW2901 - in the place of the one that died
-                    worker.give(*waiting.pop())
-                    team.append(worker)
-                else:
-                    worker.stop()
-                yield number, answer
-    finally:
-        for worker in team:
-            worker.kill()
+                    else:
+                        self._idle.append(worker)
+                    occupy()  # before the answer is looked at, which may take long
+                    yield number, answer
+        finally:
+            for worker in busy:
+                worker.kill()
+
+    def close(self) -> None:
+        """Let all processes end."""
+        while self._idle:
+            self._idle.pop().stop()
+
+    def __enter__(self) -> Team:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
 
 class _Worker:

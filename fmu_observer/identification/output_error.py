@@ -14,6 +14,7 @@ import scipy
 from numpy.typing import NDArray
 
 from fmu_observer.identification.acceleration_run import PARAMETERS, integration_grid, speeds_and_sensitivities
+from fmu_observer.identification.least_squares import serial_correlation, serial_enlargement
 
 Array = NDArray[np.float64]
 COUNT = len(PARAMETERS)
@@ -109,10 +110,8 @@ def with_covariance(
     count = residuals.shape[1]
     freedom = count - len(estimates)
     squares = np.sum(residuals**2, axis=1)
-    safe = np.where(squares > 0.0, squares, 1.0)
-    correlation = np.sum(residuals[:, 1:] * residuals[:, :-1], axis=1) / safe
-    alike = np.where(correlation > 2.0 / np.sqrt(count), np.minimum(correlation, 0.999), 0.0)
-    covariance = inverse * (squares / freedom * (1.0 + alike) / (1.0 - alike))[:, None, None]
+    correlation = serial_correlation(residuals)
+    covariance = inverse * (squares / freedom * serial_enlargement(residuals))[:, None, None]
     return RunFits(
         estimates, covariance, residuals, np.sqrt(squares / freedom), correlation, condition, freedom, converged
     )

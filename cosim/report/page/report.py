@@ -120,6 +120,7 @@ def report_page(
         packets=run_tables.packets_table(result),
         indicators=run_tables.indicators_table(result, spec),
         faults=run_tables.faults_table(result, spec),
+        consistency=run_tables.consistency_table(result, spec),
         components=run_tables.components_table(result),
         compiled=was_compiled(result),
         calls=run_tables.calls_table(result),

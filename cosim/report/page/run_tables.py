@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
+from cosim.evaluation.consistency import ADVICE, filter_consistency
+from cosim.evaluation.consistency_table import HEADINGS as CONSISTENCY_HEADINGS
+from cosim.evaluation.consistency_table import cells as consistency_cells
 from cosim.evaluation.cost import KINDS, cost_rows
 from cosim.evaluation.event_counts import outcome_columns
 from cosim.evaluation.facts import list_entry, mapping_entry
@@ -147,6 +151,18 @@ def faults_table(result: Result, spec: ReportSpec) -> Table:
     """
     rows = [[label(spec, found.observer), *cells(found)] for found in fault_detection(result, spec)]
     return simple_table(["Observer", *HEADINGS], rows, range(1, len(HEADINGS) + 1))
+
+
+def consistency_table(result: Result, spec: ReportSpec) -> Table:
+    """Filters whose covariances can be judged, and whether they fit.
+
+    Args:
+        result: the run.
+        spec: roles and labels.
+    """
+    rows = [[label(spec, entry.observer), *consistency_cells(entry)] for entry in filter_consistency(result, spec)]
+    table = simple_table(["Observer", *CONSISTENCY_HEADINGS], rows, range(2, len(CONSISTENCY_HEADINGS)))
+    return replace(table, bad=set(ADVICE))
 
 
 def components_table(result: Result) -> Table:

@@ -59,7 +59,7 @@ class MotorEkf(MotorFilter):
                     f"Unknown {option} {value!r}; choose one of: {', '.join(self.option_choices[option])}."
                 )
         self.jacobian = printed_jacobian if jacobian == "as_published" else rotor_jacobian
-        super().__init__(frame, True, jacobian=jacobian)
+        super().__init__(frame, True, (1.0, 1.0, 1.0, 1.0), jacobian=jacobian)
         self.options["frame"] = frame
 
     def predict(self, estimate: Array, u: Any, p: Any) -> tuple[Array, Array]:

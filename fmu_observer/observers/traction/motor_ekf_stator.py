@@ -13,6 +13,8 @@ from plant_models.railway.traction.motor_equations import euler_step
 from plant_models.railway.traction.transforms import to_rotor, to_stator
 
 Load = Literal["known", "estimated"]
+NOISE = {"quiet": (1e-4, 1e-2), "very_quiet": (1e-5, 1e-3), "faint": (1e-7, 1e-4), "loud": (1e-3, 0.1)}
+"""Variances of currents and speed per sample, and of measured currents [A2], by preset; the angle has a hundredth."""
 
 
 class MotorEkfStator(MotorFilter):
@@ -28,9 +30,11 @@ class MotorEkfStator(MotorFilter):
     Raises:
         ValueError: `load` is unknown.
 
-    Presets: `quiet` (default): variances 1e-4 per sample and 1e-2; `very_quiet`: 1e-5 and 1e-3; `loud`: 1e-3 and 0.1,
-    at which the drive loses synchronism under load; `traction_200kw`. They are those of the motor's presets, but for
-    the angle and the load.
+    P(0) is that of a rotor whose angle is known to 0.1 rad, since it was aligned before the start.
+
+    Presets: `quiet` (default): variances 1e-4 per sample and 1e-2; `very_quiet`: 1e-5 and 1e-3; `faint`: 1e-7 and 1e-4,
+    with which the drive holds 100 rpm under load; `loud`: 1e-3 and 0.1, at which it loses synchronism under load;
+    `traction_200kw`. They are those of the motor's presets, but for the angle and the load.
 
     Source: ours, on the equations of Allaoui 2024, (4.31), (b.4).
     """
@@ -48,9 +52,10 @@ class MotorEkfStator(MotorFilter):
         heavy = () if load == "known" else (1.0,)
         self.presets: Mapping[str, Mapping[str, Any]] = {
             name: {"process_variance": (w, w, w, 1e-2 * w, *extra), "measurement_variance": (v, v)}
-            for name, w, v in (("quiet", 1e-4, 1e-2), ("very_quiet", 1e-5, 1e-3), ("loud", 1e-3, 0.1))
+            for name, (w, v) in NOISE.items()
         } | {"traction_200kw": traction_preset((0.01, 0.01, 1e-6, 1e-8, *heavy), 1.0)}
-        super().__init__("stator", load == "known", load=load)
+        start = (1.0, 1.0, 1.0, 0.01) if load == "known" else (1.0, 1.0, 1.0, 0.01, 1e-4)
+        super().__init__("stator", load == "known", start, load=load)
 
     def predict(self, estimate: Array, u: Any, p: Any) -> tuple[Array, Array]:
         """Euler step of the motor with its voltages turned by the estimated angle, and its Jacobian."""

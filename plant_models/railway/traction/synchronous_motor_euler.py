@@ -26,7 +26,8 @@ class SynchronousMotorEuler(SynchronousMotor):
     second, which no drive has.
 
     Signals and parameters are those of `synchronous_motor`. Presets: `as_published` (default): variances 1e-3 and 0.1;
-    `exact`: none; `quiet` and `very_quiet`: noise in which the sensorless drive of `motor_ekf_stator` holds.
+    `exact`: none; `quiet`, `very_quiet`, `faint`: noise in which the sensorless drive of `motor_ekf_stator` holds, the
+    last one at 100 rpm too.
 
     Args:
         frame: of voltages and measured currents: ``rotor`` (d, q) or ``stator`` (alpha, beta).
@@ -48,6 +49,7 @@ class SynchronousMotorEuler(SynchronousMotor):
         "exact": {},
         "quiet": {"process_variance": (1e-4, 1e-4, 1e-4, 0.0), "measurement_variance": 1e-2},
         "very_quiet": {"process_variance": (1e-5, 1e-5, 1e-5, 0.0), "measurement_variance": 1e-3},
+        "faint": {"process_variance": (1e-7, 1e-7, 1e-7, 0.0), "measurement_variance": 1e-4},
     }
     default_preset = "as_published"
 

@@ -1,0 +1,102 @@
+"""Which columns of a recording a calibration uses, as what. Knows tables and names only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.errors import CosimError, nearest
+from cosim.results.result import Result
+
+Array = NDArray[np.float64]
+
+
+class CalibrationError(CosimError, ValueError):
+    """A calibration that cannot be done; the message says why and what to do."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedSignals:
+    """A recording, sorted for a calibration.
+
+    Attributes:
+        time: instants [s], shape (n,), increasing.
+        measured: what is fitted, by the name of the model's signal, each of shape (n,).
+        inputs: what drives the model, by the name of its input, each of shape (n,).
+        units: of the measured signals, by name.
+    """
+
+    time: Array
+    measured: Mapping[str, Array]
+    inputs: Mapping[str, Array]
+    units: Mapping[str, str]
+
+
+def sort_columns(
+    recording: Result,
+    source: str,
+    outputs: Sequence[str],
+    inputs: Sequence[str],
+    signals: Sequence[str] | None,
+    begin: float = -np.inf,
+    end: float = np.inf,
+) -> RecordedSignals:
+    """Find what drives the model and what it is held against.
+
+    A column fits a signal of its own name, with or without the component before the point. A signal may be given as
+    ``name=column`` where the names differ.
+
+    Args:
+        recording: the table. source: its name, for messages.
+        outputs: signals that the model has. inputs: inputs that it takes.
+        signals: those to fit; None for all outputs that were recorded. begin, end: part of the recording to use [s].
+
+    Returns:
+        The columns.
+
+    Raises:
+        CalibrationError: a signal was not recorded, or nothing is in the part.
+    """
+    columns = [signal.name for signal in recording.signals]
+    units = {signal.name: signal.unit for signal in recording.signals}
+    chosen: dict[str, str] = {}
+    if signals is None:
+        chosen = {name: column for name in outputs if (column := _column(name, columns)) is not None}
+        if not chosen:
+            raise CalibrationError(
+                f"{source}: none of the model's outputs was recorded ({', '.join(outputs) or 'it has none'}). The "
+                f"recording holds: {', '.join(columns)}. Say which belong together: --signals NAME=COLUMN."
+            )
+    for given in signals or ():
+        name, sign, asked = given.partition("=")
+        if name not in outputs:
+            raise CalibrationError(f"The model has no output {name!r}; {nearest(name, outputs)}")
+        column = _column(asked if sign else name, columns)
+        if column is None:
+            raise CalibrationError(
+                f"{source}: signal {asked or name!r} was not recorded; {nearest(asked or name, columns)}"
+            )
+        chosen[name] = column
+    time, rows = np.unique(recording.time, return_index=True)  # an event has two rows
+    part = (time >= begin) & (time <= end)
+    if np.count_nonzero(part) < 2:
+        raise CalibrationError(f"{source}: fewer than two samples in the part to use; there are {len(time)} in all.")
+    rows = rows[part]
+    driving = {name: column for name in inputs if (column := _column(name, columns)) is not None}
+    return RecordedSignals(
+        time[part],
+        {name: np.asarray(recording[column], dtype=float)[rows] for name, column in chosen.items()},
+        {name: np.asarray(recording[column], dtype=float)[rows] for name, column in driving.items()},
+        {name: units[column] for name, column in chosen.items()},
+    )
+
+
+def _column(name: str, columns: Sequence[str]) -> str | None:
+    """The column of a name, whole or behind the component; None where there is none or more than one."""
+    if name in columns:
+        return name
+    fitting = [column for column in columns if column.partition(".")[2] == name or column == name.partition(".")[2]]
+    return fitting[0] if len(fitting) == 1 else None

@@ -1,0 +1,193 @@
+"""Runs of what is calibrated: a sealed FMU, one loaded instance for all runs, or a scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import ceil
+from pathlib import Path
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.calibration.recorded_signals import CalibrationError, RecordedSignals
+from cosim.errors import CosimError, nearest
+from cosim.fmu_model.opening import Interface, open_model
+from cosim.results.result import Result
+from cosim.simulation.scenario import Scenario
+
+Array = NDArray[np.float64]
+Held = Literal["hold", "linear"]
+
+
+class Runs(Protocol):
+    """What can be run with other parameters.
+
+    Attributes:
+        outputs: signals that it has. inputs: inputs that a recording may drive. start: first guesses by name.
+        bounds: lowest and highest value by name.
+    """
+
+    outputs: tuple[str, ...]
+    inputs: tuple[str, ...]
+    start: dict[str, float]
+    bounds: dict[str, tuple[float, float]]
+
+    def run(self, values: Mapping[str, float], recorded: RecordedSignals) -> Array:
+        """Simulate with parameters.
+
+        Args:
+            values: by name. recorded: instants, inputs and names of the signals.
+
+        Returns:
+            The signals at the instants, shape (q, n).
+        """
+
+    def close(self) -> None:
+        """Free what was opened."""
+
+
+class FmuRuns:
+    """Runs of an FMU of either interface type: reset, parameters set, driven by the recorded inputs.
+
+    Args:
+        path: the ``.fmu`` file. names: parameters to fit, or start values of states.
+        fixed: other start values by name. guesses: first guesses by name, where the FMU's own are not wanted.
+        interface: ``co-simulation`` or ``model-exchange``; None for co-simulation where the FMU has it.
+        step: longest communication step [s]; None for the sampling of the recording.
+        between: what inputs do between samples: ``hold``, or ``linear``, as their mean over each step.
+
+    Raises:
+        CalibrationError: a parameter does not exist or cannot be set. FmuLoadError: the FMU cannot be opened.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        names: Sequence[str],
+        *,
+        fixed: Mapping[str, float] | None = None,
+        guesses: Mapping[str, float] | None = None,
+        interface: Interface | None = None,
+        step: float | None = None,
+        between: Held = "hold",
+    ) -> None:
+        self.path, self._step, self._between, self._fixed = str(path), step, between, dict(fixed or {})
+        everything = dict.fromkeys(names, 0.0) | dict(guesses or {}) | self._fixed
+        self._model = open_model(path, interface, states=(), parameters=everything)
+        variables = self._model.instance.variables
+        self.outputs, self.inputs = self._model.outputs, self._model.inputs
+        self.start, self.bounds = {}, {}
+        for name in names:
+            variable = variables[name]
+            if (
+                variable.causality in ("output", "independent", "calculatedParameter")
+                or variable.variability == "constant"
+            ):
+                raise CalibrationError(
+                    f"{path}: {name!r} cannot be set (causality {variable.causality}, variability "
+                    f"{variable.variability}); expected a parameter or the start value of a state."
+                )
+            self.start[name] = float((guesses or {}).get(name, _number(variable.start, 0.0)))
+            self.bounds[name] = _number(variable.min, -np.inf), _number(variable.max, np.inf)
+
+    def unit(self, name: str) -> str:
+        """Unit of a variable as the FMU names it.
+
+        Args:
+            name: of the variable.
+        """
+        return self._model.unit(name)
+
+    def run(self, values: Mapping[str, float], recorded: RecordedSignals) -> Array:
+        """Simulate with parameters; arguments and result as for `Runs`."""
+        model, time = self._model, recorded.time
+        places = [model.outputs.index(name) for name in recorded.measured]
+        u = np.tile(model.start_inputs, (len(time), 1))
+        for name, series in recorded.inputs.items():
+            u[:, model.inputs.index(name)] = series
+        held = u if self._between == "hold" else np.vstack([0.5 * (u[1:] + u[:-1]), u[-1:]])
+        model.parameters.update(values)
+        found = np.empty((len(time), len(places)))
+        model.restart(float(time[0]), np.zeros(0), u[0])
+        found[0] = model.read()[1][places]
+        for k in range(len(time) - 1):
+            model.set_inputs(held[k])
+            begin, span = float(time[k]), float(time[k + 1] - time[k])
+            parts = 1 if self._step is None else max(1, ceil(span / self._step - 1e-9))
+            for i in range(parts):
+                model.advance(begin + span * i / parts, span / parts)
+            found[k + 1] = model.read()[1][places]
+        return found.T
+
+    def close(self) -> None:
+        """Free the instance."""
+        self._model.close()
+
+
+class ScenarioRuns:
+    """Runs of a scenario with other values of ``component.parameter``.
+
+    Args:
+        scenario: what is run. names: values to fit, as `Scenario.set` takes them.
+        guesses: first guesses by name; needed where the scenario does not set the value itself.
+
+    Raises:
+        CalibrationError: there is no first guess for a value.
+    """
+
+    inputs: tuple[str, ...] = ()
+
+    def __init__(self, scenario: Scenario, names: Sequence[str], guesses: Mapping[str, float] | None = None) -> None:
+        self.scenario = scenario
+        table = scenario.table()
+        self.start, self.bounds = {}, dict.fromkeys(names, (-np.inf, np.inf))
+        for name in names:
+            component, _, key = name.partition(".")
+            if component not in table.components:
+                raise CalibrationError(
+                    f"{scenario.where}: {name!r} names no component; write component.parameter, "
+                    f"{nearest(component, table.components)}"
+                )
+            value = (guesses or {}).get(name, table.components[component].parameters.get(key))
+            if not isinstance(value, int | float):
+                raise CalibrationError(
+                    f"{scenario.where}: no first guess of {name}: the scenario does not set it. Write {name}=VALUE."
+                )
+            self.start[name] = float(value)
+        outcome = self._outcome(self.start)
+        self.outputs = tuple(signal.name for signal in outcome.signals)
+
+    def run(self, values: Mapping[str, float], recorded: RecordedSignals) -> Array:
+        """Simulate with parameters; arguments and result as for `Runs`."""
+        result = self._outcome(values)
+        instants, rows = np.unique(result.time, return_index=True)
+        return np.array([np.interp(recorded.time, instants, result[name][rows]) for name in recorded.measured])
+
+    def _outcome(self, values: Mapping[str, float]) -> Result:
+        scenario = self.scenario.copy()
+        for name, value in values.items():
+            scenario.set(name, float(value))
+        outcome = scenario.run(warn=lambda _text: None)
+        if outcome.failure is not None:
+            raise CosimError(f"{self.scenario.where}: a run of the calibration failed: {outcome.failure}")
+        result: Result = outcome.result
+        return result
+
+    def unit(self, name: str) -> str:
+        """Nothing is said of the unit of a scenario's value.
+
+        Args:
+            name: of the value.
+        """
+        return ""
+
+    def close(self) -> None:
+        """Nothing to free."""
+
+
+def _number(text: object, otherwise: float) -> float:
+    try:
+        return float(str(text))
+    except ValueError:
+        return otherwise

@@ -1,0 +1,185 @@
+"""Whether the covariances that observers tell fit their errors: NIS and NEES of a run, with their bands. Imports NumPy;
+SciPy where a filter is judged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from cosim.evaluation.metrics import FEWEST_INSTANTS
+from cosim.evaluation.numbers import number
+from cosim.evaluation.roles import estimate, label, recorded
+from cosim.evaluation.spec import ReportSpec
+from cosim.results.result import Result
+from fmu_observer.filtering.consistency import Consistency, judge, normalised_squares
+
+Kind = Literal["NIS", "NEES", "error"]
+STD = "_std"
+NOT_MEASUREMENTS = ("_std", "_covariance", "_likelihood")
+
+ADVICE = {
+    "overconfident": "it trusts itself more than its errors allow. Increase the covariance of the process noise, or "
+    "that of the measurements where the sensor is worse than told; a wrong model or a bias looks alike",
+    "underconfident": "its errors are smaller than it tells. Decrease the covariances of process or measurements",
+}
+
+
+@dataclass(frozen=True)
+class FilterConsistency:
+    """Normalised squares of one observer over the evaluated part of a run.
+
+    Args:
+        observer: component name. kind: ``NIS`` of the innovation, ``NEES`` of all states with their covariance, or
+            ``error``, of one quantity with its standard deviation.
+        quantity: what an ``error`` is of; empty for the others.
+        time: of the samples [s], shape (samples,). squares: normalised squares, shape (samples,).
+        degrees: degrees of freedom of each sample, shape (samples,).
+        found: mean, bands and verdict.
+    """
+
+    observer: str
+    kind: Kind
+    quantity: str
+    time: np.ndarray
+    squares: np.ndarray
+    degrees: np.ndarray
+    found: Consistency
+
+    @property
+    def name(self) -> str:
+        """What is normalised, for people."""
+        return f"NEES of {self.quantity}" if self.kind == "error" else self.kind
+
+    def to_data(self) -> dict[str, Any]:
+        """Numbers for the summary of a run."""
+        found = self.found
+        return {
+            "observer": self.observer,
+            "quantity": self.name,
+            "degrees": found.degrees,
+            "mean": found.mean,
+            "low": found.band.low,
+            "high": found.band.high,
+            "inside": found.inside,
+            "samples": found.samples,
+            "independent_samples": found.independent,
+            "verdict": found.verdict,
+        }
+
+
+def filter_consistency(result: Result, spec: ReportSpec) -> list[FilterConsistency]:
+    """NIS and NEES of all observers that tell a covariance, from the start of the evaluation on.
+
+    An observer is judged by its outputs: ``nis`` (degrees: the outputs ``innovation...``, or ``nis_degrees`` at each
+    sample); ``<x>_std`` beside the true value of x; and all of them together where ``covariance`` was recorded, its
+    rows in the order of the ``<x>_std``. The true value of x is the signal with its role, or the output x of the
+    component that gives the true position or speed.
+
+    Args:
+        result: the run. spec: observers, roles and start of the evaluation.
+
+    Returns:
+        Observer by observer: NIS, NEES, then single quantities.
+    """
+    if not len(result.time):
+        return []
+    return [found for observer in spec.observers for found in _of_one(result, spec, observer)]
+
+
+def consistency_warnings(result: Result, spec: ReportSpec) -> Iterator[str]:
+    """Texts for filters whose covariance does not fit, one an observer: of NIS, or else of NEES.
+
+    Args:
+        result: the run. spec: observers, roles and labels.
+    """
+    told: set[str] = set()
+    for entry in filter_consistency(result, spec):
+        advice = ADVICE.get(entry.found.verdict)
+        if advice is None or entry.observer in told:
+            continue
+        told.add(entry.observer)
+        found = entry.found
+        yield (
+            f"{label(spec, entry.observer)} is {found.verdict}: its {entry.name} is {number(found.mean)} on average "
+            f"where {number(found.degrees)} is expected ({number(found.band.low)} to {number(found.band.high)} for 99 "
+            f"% of consistent filters): {advice}; see docs/consistency.md."
+        )
+
+
+def true_value(result: Result, spec: ReportSpec, quantity: str) -> np.ndarray | None:
+    """The true value of a quantity, shape (rows,), or None where none was recorded.
+
+    Args:
+        result: the run. spec: roles. quantity: as observers call it.
+    """
+    of_role = recorded(result, getattr(spec, f"true_{quantity}", None))
+    if of_role is not None:
+        return of_role
+    for place in (spec.true_position, spec.true_speed):
+        plant = "" if place is None else place.rpartition(".")[0]
+        found = recorded(result, f"{plant}.{quantity}") if plant else None
+        if found is not None:
+            return found
+    return None
+
+
+def _of_one(result: Result, spec: ReportSpec, observer: str) -> Iterator[FilterConsistency]:
+    fields = [f for f in result.table.dtype.names or () if f.startswith(f"{observer}.")]
+    names = [f.removeprefix(f"{observer}.") for f in fields]
+    nis = estimate(result, observer, "nis")
+    if nis is not None:
+        rows = np.flatnonzero(np.diff(nis) != 0.0) + 1  # between samples it is held
+        rows = rows[result.time[rows] >= spec.evaluate_after]
+        yield from _judged(observer, "NIS", "", result.time[rows], nis[rows], _degrees(result, observer, names)[rows])
+    rows = _instants(result, spec)
+    quantities = [name.removesuffix(STD) for name in names if name.endswith(STD)]
+    errors: dict[str, np.ndarray] = {}
+    for quantity in quantities:
+        true, believed = true_value(result, spec, quantity), estimate(result, observer, quantity)
+        if true is not None and believed is not None:
+            with np.errstate(invalid="ignore", over="ignore"):
+                errors[quantity] = (believed - true)[rows]
+    time, n = result.time[rows], len(quantities)
+    covariance = [f"{observer}.covariance[{i}]" for i in range(1, n * n + 1)]
+    if n > 1 and len(errors) == n and set(covariance) <= set(fields):
+        P = np.stack([result[name][rows] for name in covariance], axis=1).reshape(-1, n, n)
+        squares = normalised_squares(np.stack(list(errors.values()), axis=1), P)
+        yield from _judged(observer, "NEES", "", time, squares, np.full(len(time), float(n)))
+    for quantity, error in errors.items():
+        spread = result[f"{observer}.{quantity}{STD}"][rows]
+        squares = normalised_squares(error[:, None], spread[:, None] ** 2)
+        yield from _judged(observer, "error", quantity, time, squares, np.ones(len(time)))
+
+
+def _judged(
+    observer: str, kind: Kind, quantity: str, time: np.ndarray, squares: np.ndarray, degrees: np.ndarray
+) -> Iterator[FilterConsistency]:
+    known = ~np.isnan(squares)
+    if np.count_nonzero(known) < FEWEST_INSTANTS:
+        return
+    time, squares, degrees = time[known], squares[known], degrees[known]
+    found = judge(squares, degrees, white=kind == "NIS")
+    yield FilterConsistency(observer, kind, quantity, time, squares, degrees, found)
+
+
+def _degrees(result: Result, observer: str, names: list[str]) -> np.ndarray:
+    """Degrees of freedom of NIS in each row: told, or the number of innovations, or 1."""
+    told = estimate(result, observer, "nis_degrees")
+    if told is not None:
+        return told
+    innovations = [name for name in names if name.startswith("innovation") and not _ends(name)]
+    return np.full(len(result.time), float(max(len(innovations), 1)))
+
+
+def _ends(name: str) -> bool:
+    return name.partition("[")[0].endswith(NOT_MEASUREMENTS)
+
+
+def _instants(result: Result, spec: ReportSpec) -> np.ndarray:
+    """The last row of each instant that is judged."""
+    last = np.append(np.diff(result.time) > 0.0, True)
+    return np.flatnonzero(last & (result.time >= spec.evaluate_after))

@@ -1,0 +1,118 @@
+"""Figures of normalised squares, of innovations and of errors, beside their chi-square bands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from cosim.drawing.style import GAP, MARK, axes_or_new, observer_line, styled
+from cosim.evaluation.consistency import FilterConsistency, Kind, filter_consistency
+from cosim.evaluation.roles import label
+from cosim.evaluation.spec import ReportSpec
+from cosim.report.figures.drawing import curve, legend_above, mark_evaluation, time_axis
+from cosim.report.figures.panel import Panel
+from cosim.results.result import Result
+from fmu_observer.filtering.consistency import chi_square_band
+
+AVERAGED = 50  # samples in the drawn mean, at most a quarter of all
+SMALLEST, LARGEST = 1e-2, 1e3  # of a drawn share; beyond it is cut
+
+
+@styled
+def nis_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
+    """NIS over its degrees of freedom against time on a logarithmic axis, moving means, and the band of these means.
+
+    Args:
+        result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
+
+    Returns:
+        The axes.
+    """
+    return _figure(result, spec, axes_or_new(ax), ("NIS",))
+
+
+@styled
+def nees_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
+    """NEES over its degrees of freedom against time, of all states where the covariance was recorded, else of each
+    quantity with its standard deviation; moving means, and the band of a single sample.
+
+    Args:
+        result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
+
+    Returns:
+        The axes.
+    """
+    return _figure(result, spec, axes_or_new(ax), ("NEES", "error"))
+
+
+def _figure(result: Result, spec: ReportSpec, ax: Axes, kinds: Sequence[Kind]) -> Axes:
+    entries = _chosen(result, spec, kinds)
+    shortest = min((len(e.squares) for e in entries), default=0)
+    count = max(min(AVERAGED, shortest // 4), 1) if kinds == ("NIS",) else 1  # errors of samples that follow are alike
+    for degrees in sorted({float(e.degrees.mean()) for e in entries}):
+        band = chi_square_band(degrees, float(count))
+        text = f"95 % band, {degrees:g} degree{'s' if degrees != 1.0 else ''} of freedom"
+        ax.axhspan(band.low / degrees, band.high / degrees, color=GAP, alpha=0.3, linewidth=0, label=text)
+    ax.axhline(1.0, color=MARK, linewidth=0.8)
+    names = [f"{e.observer} {e.name}" for e in entries]
+    for name, entry in zip(names, entries, strict=True):
+        share = np.clip(entry.squares / entry.degrees, SMALLEST, LARGEST)
+        mean = np.convolve(share, np.full(count, 1.0 / count), mode="valid")
+        text = label(spec, entry.observer) + ("" if entry.kind != "error" else f", {entry.quantity}")
+        text = f"{text}: {100.0 * entry.found.inside:.3g} % inside"
+        curve(ax, entry.time[count - 1 :], mean, None, label=text, **observer_line(names, name))
+    ax.set_yscale("log")
+    ax.set_ylabel(f"{kinds[0]} / degrees of freedom [1]")
+    mark_evaluation(ax, result, spec)
+    time_axis(ax, result)
+    legend_above(ax)
+    return ax
+
+
+def _chosen(result: Result, spec: ReportSpec, kinds: Sequence[Kind]) -> list[FilterConsistency]:
+    """Of each observer the entries of the first of these kinds that it has."""
+    found = filter_consistency(result, spec)
+    chosen: list[FilterConsistency] = []
+    for observer in spec.observers:
+        of_it = [[e for e in found if e.observer == observer and e.kind == kind] for kind in kinds]
+        chosen += next((entries for entries in of_it if entries), [])
+    return chosen
+
+
+class NisPanel(Panel):
+    """Normalised innovations."""
+
+    name = "nis"
+    title = "Normalised innovations (NIS)"
+    caption = (
+        "Moving mean of the squares of the innovations over what the filter expects; a consistent filter stays in the "
+        "band for 95 % of the time. Above it the filter trusts itself too much, below it too little."
+    )
+    place = 3.7
+
+    @staticmethod
+    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
+        return nis_figure(result, spec, ax)
+
+    @staticmethod
+    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
+        return bool(_chosen(result, spec, ("NIS",)))
+
+
+class NeesPanel(Panel):
+    """Normalised errors."""
+
+    name = "nees"
+    title = "Normalised errors (NEES)"
+    caption = "Squares of the errors over what the filter's covariance lets expect, and the band of 95 % of them."
+    place = 3.8
+
+    @staticmethod
+    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
+        return nees_figure(result, spec, ax)
+
+    @staticmethod
+    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
+        return bool(_chosen(result, spec, ("NEES", "error")))

@@ -1,0 +1,235 @@
+"""Costs of candidates over seeds: run here or in worker processes, each written to a journal as soon as it is there,
+and taken from it where it stands there already.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from math import inf, isfinite, nan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim.errors import CosimError, RunError, ScenarioError
+from cosim.results.folder import write_results
+from cosim.scenario.outcome import INTERRUPTED, Outcome
+from cosim.simulation.scenario import Scenario
+from cosim.studies.sweep_journal import read_lines, scenario_key, write_lines
+from cosim.studies.workers import Died, Raised, Team, attempt
+from cosim.tuning.bench import Seeded
+from cosim.tuning.costs import Cost
+from cosim.tuning.parameters import Tunable
+
+JOURNAL = "evaluations.jsonl"
+ROWS = 500
+"""Of a run, for the directions that change nothing: so many tell enough."""
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """The cost of one candidate with one seed.
+
+    Args:
+        cost: infinite where the run failed. failure: why, or None. estimates: of the observer at some instants, in
+            units of their own sizes, where they were asked for.
+    """
+
+    cost: float
+    failure: str | None = None
+    estimates: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class _Job:
+    """One run: recorded to a folder, or judged."""
+
+    scenario: Scenario
+    settings: Mapping[str, Any]
+    cost: Cost | None = None
+    folder: Path | None = None
+    observed: str | None = None
+
+
+class Evaluator:
+    """Evaluates candidates.
+
+    Args:
+        benches: the scenario with each seed. tunable: what is tuned. cost: of a run. directory: of recordings and
+            journal. workers: processes at a time, 1 for this one. resume: whether the journal of an earlier search is
+            taken over.
+    """
+
+    def __init__(
+        self,
+        benches: Mapping[int, Seeded],
+        tunable: Tunable,
+        cost: Cost,
+        directory: Path,
+        *,
+        workers: int = 1,
+        resume: bool = False,
+    ) -> None:
+        self.benches, self.tunable, self.cost, self.directory = benches, tunable, cost, directory
+        self.runs = 0
+        self.failures: dict[str, int] = {}
+        self._team = Team(_do, workers) if workers > 1 else None
+        self._journal = directory / JOURNAL
+        self._known = {entry["key"]: entry for entry in read_lines(self._journal)} if resume else {}
+        if not resume:
+            write_lines(self._journal, "w", [])
+        self._keys: dict[int, str] = {}
+        self._bases: dict[int, Scenario] = {}
+
+    def prepare(self, seeds: Sequence[int], progress: Callable[[int, int], None] | None = None) -> None:
+        """Record the plant side with these seeds, as far as it has not been.
+
+        Args:
+            seeds: of the benches. progress: called with the number done and the number in all.
+
+        Raises:
+            RunError: a recording failed.
+        """
+        new = [seed for seed in seeds if seed not in self._bases]
+        folders = {seed: self.directory / "recordings" / f"seed_{seed}" for seed in new}
+        wanted = {seed: self.benches[seed].recording() for seed in new}
+        jobs = [(s, _Job(scenario, {}, folder=folders[s])) for s, scenario in wanted.items() if scenario is not None]
+        for done, (place, answer) in enumerate(self._answers([job for _, job in jobs]), start=1):
+            if answer.failure is not None:
+                raise RunError(f"The plant side with seed {jobs[place][0]} could not be recorded: {answer.failure}")
+            if progress is not None:
+                progress(done, len(jobs))
+        self._bases |= {seed: self.benches[seed].base(folders[seed], self.cost) for seed in new}
+
+    def costs(
+        self,
+        candidates: Sequence[Mapping[str, Any] | None],
+        seeds: Sequence[int],
+        label: Mapping[str, Any],
+        tell: Callable[[], None] = lambda: None,
+    ) -> np.ndarray:
+        """Costs of candidates with each seed, shape (m, seeds); infinite where a run failed.
+
+        Args:
+            candidates: values by name; None for the scenario as it is. seeds: of the benches.
+            label: what the journal says of them besides.
+            tell: called after each run.
+        """
+        found = np.full((len(candidates), len(seeds)), nan)
+        open_: list[tuple[int, int, str]] = []
+        for i, candidate in enumerate(candidates):
+            for j, seed in enumerate(seeds):
+                key = self._key(seed, candidate)
+                if key in self._known:
+                    found[i, j] = self._taken(self._known[key])
+                    tell()
+                else:
+                    open_.append((i, j, key))
+        if open_:
+            self.prepare(sorted({seeds[j] for _, j, _ in open_}))
+        jobs = [self._job(candidates[i], seeds[j]) for i, j, _ in open_]
+        for place, answer in self._answers(jobs):
+            i, j, key = open_[place]
+            found[i, j] = answer.cost
+            self._note(answer.failure)
+            entry = {**label, "candidate": i, "seed": seeds[j], "values": candidates[i], "cost": answer.cost}
+            self._known[key] = entry | {"failure": answer.failure, "key": key}
+            write_lines(self._journal, "a", [self._known[key]])
+            tell()
+        return found
+
+    def estimates(self, candidates: Sequence[Mapping[str, Any]], seed: int, observed: str) -> list[Evaluated]:
+        """What the observer estimates with each candidate.
+
+        Args:
+            candidates: values by name. seed: of a bench. observed: component whose outputs are compared.
+        """
+        self.prepare([seed])
+        jobs = [self._job(candidate, seed, observed) for candidate in candidates]
+        answers = dict(self._answers(jobs))
+        return [answers[place] for place in range(len(jobs))]
+
+    def close(self) -> None:
+        """Let the worker processes end."""
+        if self._team is not None:
+            self._team.close()
+
+    def _job(self, candidate: Mapping[str, Any] | None, seed: int, observed: str | None = None) -> _Job:
+        settings = {} if candidate is None else self.tunable.settings(candidate)
+        return _Job(self._bases[seed], settings, self.cost, observed=observed)
+
+    def _answers(self, jobs: Sequence[_Job]) -> Iterator[tuple[int, Evaluated]]:
+        answers = ((n, attempt(_do, job)) for n, job in enumerate(jobs))
+        for place, answer in answers if self._team is None else self._team.each(jobs):
+            self.runs += 1
+            if isinstance(answer, Died | Raised):
+                yield place, Evaluated(inf, answer.reason)
+                continue
+            if answer.failure == INTERRUPTED:  # who interrupts a run means the search
+                raise KeyboardInterrupt
+            yield place, answer
+
+    def _key(self, seed: int, candidate: Mapping[str, Any] | None) -> str:
+        if seed not in self._keys:
+            played = "recorded" if self.benches[seed].sides is not None else "whole"
+            self._keys[seed] = f"{scenario_key(self.benches[seed].whole)} {played} {self.cost.text} {self.cost.signals}"
+        said = None if candidate is None else self.tunable.settings(candidate)
+        return hashlib.sha256(f"{self._keys[seed]} {json.dumps(said, sort_keys=True)}".encode()).hexdigest()
+
+    def _taken(self, entry: Mapping[str, Any]) -> float:
+        self._note(entry["failure"])
+        return inf if entry["cost"] is None else float(entry["cost"])
+
+    def _note(self, failure: str | None) -> None:
+        if failure is not None:
+            self.failures[failure] = self.failures.get(failure, 0) + 1
+
+
+@contextmanager
+def closing(evaluator: Evaluator) -> Iterator[Evaluator]:
+    """The evaluator, closed at the end.
+
+    Args:
+        evaluator: whose workers end then.
+    """
+    try:
+        yield evaluator
+    finally:
+        evaluator.close()
+
+
+def _do(job: _Job) -> Evaluated:
+    """One run, here or in a worker."""
+    try:
+        outcome = job.scenario.run(overrides=job.settings, warn=_silent)
+    except CosimError as error:
+        return Evaluated(inf, str(error))
+    if outcome.failure is not None:
+        return Evaluated(inf, outcome.failure)
+    if job.folder is not None:
+        write_results(outcome.result, job.folder, ("npy",))
+        return Evaluated(nan)
+    assert job.cost is not None
+    estimates = None if job.observed is None else _estimates(outcome, job.observed)
+    try:
+        cost = job.cost.of(outcome)
+    except ScenarioError as error:
+        return Evaluated(inf, str(error), estimates)
+    return Evaluated(cost, None, estimates) if isfinite(cost) else Evaluated(inf, "the cost is not finite", estimates)
+
+
+def _estimates(outcome: Outcome, observed: str) -> np.ndarray:
+    """Outputs of a component at some rows, one after the other."""
+    table = outcome.result.table
+    rows = np.unique(np.linspace(0, len(table) - 1, ROWS).astype(int))
+    names = [name for name in table.dtype.names or () if name.startswith(f"{observed}.")]
+    with suppress(ValueError):
+        return np.concatenate([np.asarray(table[name][rows], float) for name in names])
+    return np.empty(0)
+
+
+def _silent(_text: str) -> None: ...

@@ -1,0 +1,196 @@
+"""A study: searches over training seeds, what they cannot see, and the judgement of the best with other seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from cosim.errors import ScenarioError
+from cosim.simulation.scenario import Scenario
+from cosim.studies.sweep_journal import write_lines
+from cosim.tuning.evaluation import Evaluator
+from cosim.tuning.identifiability import Directions, covariances, directions, neighbours
+from cosim.tuning.parameters import Tunable
+from cosim.tuning.progress import Bar, Progress
+from cosim.tuning.tuning_result import Searched, Tuning
+from fmu_observer.optimisers.optimiser import Optimiser
+from fmu_observer.optimisers.registry import find_optimiser
+from fmu_observer.optimisers.search_space import SearchSpace
+
+ITERATIONS = "iterations.jsonl"
+
+
+class Study:
+    """Searches of one scenario.
+
+    Args:
+        scenario: that is tuned. asked: what is tuned. evaluator: gives costs. training, judging: seeds.
+        observer: component that is tuned, or None. method: of the search. options: of the method.
+        iterations: populations after the first one. progress: see `tune`.
+
+    Raises:
+        ScenarioError: the method or an option of it is unknown.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        asked: Tunable,
+        evaluator: Evaluator,
+        training: Sequence[int],
+        judging: Sequence[int],
+        *,
+        observer: str | None,
+        method: str,
+        options: Mapping[str, Any],
+        iterations: int,
+        progress: Progress | None,
+    ) -> None:
+        self.scenario, self.asked, self.evaluator, self.observer = scenario, asked, evaluator, observer
+        self.training, self.judging = training, judging
+        self.method, self.options, self.iterations = method, options, iterations
+        self.done: list[Searched] = []
+        self._bar = Bar(progress)
+        make_optimiser(method, asked.space, 0, options)  # refused before anything is run
+
+    def run(self, searches: int, how: str) -> Tuning:
+        """Search, and judge the best of all searches.
+
+        Args:
+            searches: how many, with optimiser seeds 0, 1, ... how: in what candidates are run, in words.
+
+        Raises:
+            ScenarioError: nothing can be tuned, or no cost is finite. KeyboardInterrupt: interrupted before the first
+                population was done; later, what was found until then is returned.
+        """
+        self._bar.text = "before"
+        before = self.evaluator.costs([None], self.training, {"search": "before"}, self._bar.step)[0]
+        shown = self._directions(self._inside())
+        fixed, why = self._held(shown)
+        write_lines(self.evaluator.directory / ITERATIONS, "w", [])
+        interrupted = False
+        try:
+            for seed in range(searches):
+                self._search(seed, self.asked.space.without(fixed), fixed)
+        except KeyboardInterrupt:
+            if not self.done:
+                raise
+            interrupted = True
+        best = min(self.done, key=lambda search: search.costs[-1]).best
+        judging = () if interrupted else self.judging
+        self._bar.text = "judge"
+        after = self.evaluator.costs([best], self.training, {"search": "after"}, self._bar.step)[0]
+        judged = self.evaluator.costs([None, best], judging, {"search": "judge"}, self._bar.step)
+        tuned = self.scenario.copy()
+        for name, value in self.asked.settings(best).items():
+            tuned.set(name, value)
+        return Tuning(
+            scenario=tuned,
+            method=self.method,
+            cost=self.evaluator.cost.text,
+            searches=self.done,
+            start=self.asked.start,
+            best=best,
+            seeds=self.training,
+            judged=judging,
+            before=before.tolist(),
+            after=after.tolist(),
+            judged_before=judged[0].tolist(),
+            judged_after=judged[1].tolist(),
+            runs=self.evaluator.runs,
+            how=how,
+            warnings=self._warnings(shown, None if interrupted else self._directions(best)),
+            fixed=why,
+            interrupted=interrupted,
+        )
+
+    def _search(self, seed: int, space: SearchSpace, fixed: Mapping[str, float]) -> None:
+        """One search, from this seed of the optimiser; what is found is kept iteration by iteration."""
+        optimiser = make_optimiser(self.method, space, seed, self.options)
+        costs: list[float] = []
+        counts: list[int] = []
+        self._bar.text = f"search {seed}"
+        for iteration in range(self.iterations + 1):
+            candidates = optimiser.ask()
+            if not len(candidates):
+                break
+            named = [{**fixed, **space.named(candidate)} for candidate in candidates]
+            self._bar.expect(len(named) * len(self.training), self.iterations - iteration)
+            label = {"search": seed, "iteration": iteration}
+            found = self.evaluator.costs(named, self.training, label, self._bar.step)
+            optimiser.tell(candidates, found.mean(axis=1))
+            if optimiser.best is None:
+                raise ScenarioError(_never_finite(len(candidates), self.evaluator.failures))
+            costs.append(optimiser.best_cost)
+            counts.append(optimiser.evaluations)
+            best = {**fixed, **space.named(optimiser.best)}
+            entry = label | {"evaluations": optimiser.evaluations, "cost": optimiser.best_cost, "best": best}
+            write_lines(self.evaluator.directory / ITERATIONS, "a", [entry])
+            self.done = [*(s for s in self.done if s.seed != seed), Searched(seed, best, costs, counts)]
+
+    def _inside(self) -> dict[str, float]:
+        """The present values as far as they lie within the bounds, else the middle of them."""
+        space, start = self.asked.space, self.asked.start
+        middle = space.named(0.5 * (space.lower + space.upper))
+        return {p.name: start[p.name] if p.low <= start[p.name] <= p.high else middle[p.name] for p in space.parameters}
+
+    def _directions(self, values: Mapping[str, float]) -> Directions | None:
+        """What moves the estimates at a candidate; None where there is no observer, or a run fails."""
+        if self.observer is None:
+            return None
+        around = neighbours(self.asked.space, values)
+        found = self.evaluator.estimates(around, self.training[0], self.observer)
+        return directions(self.asked.space, [e.estimates for e in found])
+
+    def _held(self, shown: Directions | None) -> tuple[dict[str, float], dict[str, str]]:
+        """Parameters that are not searched, with the reasons: those that change nothing, and one covariance where only
+        ratios matter.
+
+        Raises:
+            ScenarioError: none of the parameters changes anything.
+        """
+        if shown is None:
+            return {}, {}
+        values = self._inside()
+        if set(shown.idle) == set(self.asked.space.names):
+            raise ScenarioError(
+                f"None of {', '.join(self.asked.space.names)} changes anything that the observer says in this run; "
+                "there is nothing to tune."
+            )
+        fixed = {name: values[name] for name in shown.idle}
+        why = {name: f"at {value:g}: it changes nothing" for name, value in fixed.items()}
+        if shown.scale_invariant:
+            last = [name for name in covariances(self.asked.space) if name not in fixed][-1]
+            fixed[last] = values[last]
+            why[last] = f"at {values[last]:g}: only ratios of the covariances matter"
+        return fixed, why
+
+    def _warnings(self, shown: Directions | None, at_best: Directions | None) -> list[str]:
+        told = [*self.asked.notes, *([] if shown is None else shown.warnings())]
+        later = [] if at_best is None else at_best.warnings()
+        told += [f"At the best candidate: {text}" for text in later if text not in told]
+        return told + [f"{count} runs failed: {reason}" for reason, count in self.evaluator.failures.items()]
+
+
+def make_optimiser(method: str, space: SearchSpace, seed: int, options: Mapping[str, Any]) -> Optimiser:
+    """An optimiser of a search space.
+
+    Args:
+        method: its name. space: names and bounds. seed: of its generator. options: keywords of its class.
+
+    Raises:
+        ScenarioError: there is none of this name, an option is unknown, or its package is not installed.
+    """
+    try:
+        made: Optimiser = find_optimiser(method)(space.lower, space.upper, seed=seed, **options)
+    except (ValueError, TypeError, ImportError) as error:
+        raise ScenarioError(f"method {method}: {error}") from error
+    return made
+
+
+def _never_finite(count: int, failures: Mapping[str, int]) -> str:
+    reasons = "; ".join(f"{reason} ({times} times)" for reason, times in list(failures.items())[:3])
+    return (
+        f"None of the {count} candidates of the first population has a finite cost: "
+        f"{reasons or 'the cost is never finite'}. Look at the bounds, and run the scenario with one of these values."
+    )

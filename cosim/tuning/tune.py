@@ -1,0 +1,153 @@
+"""`tune`: parameters of an observer, an FMU or a scenario, searched over training seeds and judged with others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from cosim.errors import ScenarioError
+from cosim.results.folder import check_writable
+from cosim.scenario.outcome import Outcome
+from cosim.scenario.structure import describe_component
+from cosim.simulation.scenario import Scenario
+from cosim.tuning.bench import seeded, why_whole, with_observer
+from cosim.tuning.costs import Cost, make_cost
+from cosim.tuning.evaluation import Evaluator, closing
+from cosim.tuning.parameters import Bounds, tunable
+from cosim.tuning.progress import Progress
+from cosim.tuning.seeds import seed_settings, with_seed
+from cosim.tuning.study import Study
+from cosim.tuning.tuning_files import write_tuning
+from cosim.tuning.tuning_result import Tuning
+
+
+def tune(
+    scenario: Scenario,
+    parameters: Mapping[str, Bounds],
+    *,
+    observer: str | None = None,
+    method: str = "bbo",
+    cost: str | Cost | Callable[[Outcome], float] = "state",
+    seeds: Sequence[int] = (0,),
+    judge: Sequence[int] = (),
+    seed_names: Sequence[str] | None = None,
+    iterations: int = 20,
+    searches: int = 1,
+    options: Mapping[str, Any] | None = None,
+    workers: int = 1,
+    directory: str | Path | None = None,
+    resume: bool = False,
+    whole_runs: bool = False,
+    progress: Progress | None = None,
+) -> Tuning:
+    """Search parameters of a scenario for the smallest mean cost over training seeds, and judge the best with others.
+
+    All candidates see the same seeds (common random numbers). Where one observer is tuned that only listens, the plant
+    side is recorded once for each seed and candidates run beside the recording.
+
+    Args:
+        scenario: to be tuned.
+        parameters: by name (low, high), or (low, high, True) for a search in the logarithm: ``component.parameter``,
+            or a parameter of `observer`; ``process_covariance[1,1]`` for an entry of a diagonal.
+        observer: component that is tuned, or a shipped observer that joins the scenario for it.
+        method: ``bbo``, ``pso``, ``ga``, ``cma``, ``gradient``, ``hand``, or a name in `OPTIMISERS`.
+        cost: see `cosim.tuning.costs.make_cost`.
+        seeds: for training; each moves every seed of the scenario by so much, 0 is the scenario as it is.
+        judge: other seeds, with which before and after are compared at the end.
+        seed_names: settings that the seeds move, such as ``wheel.seed``; None for all there are.
+        iterations: populations after the first one.
+        searches: how many times it is searched, with optimiser seeds 0, 1, ...; the best counts, all are told.
+        options: of the optimiser, such as ``{"population": 30}``.
+        workers: processes at a time; a script that uses more than 1 needs ``if __name__ == "__main__":``.
+        directory: where history and results are written as they come; None writes nothing.
+        resume: take over the evaluations of an earlier search in `directory`, as far as they are of this one.
+        whole_runs: run the whole scenario for each candidate, also where a recording would do.
+        progress: called with runs done, runs in all as far as known, and what is done.
+
+    Returns:
+        What was found; when interrupted, what was found until then.
+
+    Raises:
+        ScenarioError: something asked for cannot be: parameters, bounds, seeds, cost. RunError: the plant side fails.
+        KeyboardInterrupt: it was interrupted before anything was found.
+    """
+    if observer is not None:
+        scenario, observer = with_observer(scenario, observer)
+    asked = tunable(scenario, observer, parameters)
+    heads = sorted({name.partition(".")[0] for name in asked.space.names})
+    training, judging = _seeds(seeds, judge)
+    if resume and directory is None:
+        raise ScenarioError("A search is resumed from its folder: give directory=...")
+    judged_by = make_cost(cost, observer, _measurements(scenario, observer))
+    drawn = seed_settings(scenario, seed_names)
+    if len(training) + len(judging) > 1 and not drawn:
+        raise ScenarioError(
+            f"{scenario.where}: nothing in this scenario draws from a seed; give one training seed only."
+        )
+    benches = {
+        seed: seeded(with_seed(scenario, drawn, seed), seed, observer, heads, whole_runs)
+        for seed in (*training, *judging)
+    }
+    played = benches[training[0]].sides is not None
+    how = (
+        "each beside the recorded plant side of its seed"
+        if played
+        else f"of the whole scenario: {'as asked for' if whole_runs else why_whole(scenario, observer, heads)}"
+    )
+    with _folder(directory) as folder:
+        evaluator = Evaluator(benches, asked, judged_by, folder, workers=workers, resume=resume)
+        with closing(evaluator):
+            study = Study(
+                scenario,
+                asked,
+                evaluator,
+                training,
+                judging,
+                observer=observer,
+                method=method,
+                options=options or {},
+                iterations=iterations,
+                progress=progress,
+            )
+            found = study.run(searches, how)
+        if directory is not None:
+            write_tuning(found, asked.settings(found.best), folder)
+    return found
+
+
+def _seeds(seeds: Sequence[int], judge: Sequence[int]) -> tuple[list[int], list[int]]:
+    training, judging = list(dict.fromkeys(seeds)), list(dict.fromkeys(judge))
+    if not training:
+        raise ScenarioError("There are no training seeds; give at least one.")
+    if both := sorted(set(training) & set(judging)):
+        raise ScenarioError(
+            f"Seeds {', '.join(map(str, both))} stand among training and judging seeds; what was learnt by heart "
+            "cannot be judged by them. Give others."
+        )
+    if min(training + judging) < 0:
+        raise ScenarioError("Seeds are whole numbers from 0.")
+    return training, judging
+
+
+def _measurements(scenario: Scenario, observer: str | None) -> int:
+    """How many measurements the innovations of an observer have; 1 where it does not say."""
+    if observer is None:
+        return 1
+    table = scenario.table().components[observer]
+    described = describe_component(observer, table, scenario.folder, f"{scenario.where}: components.{observer}")
+    outputs = described.names("output")
+    found = [name for name in outputs if name == "innovation" or name.startswith("innovation[")]
+    return max(len(found), len([name for name in outputs if name.endswith("_innovation")]), 1)
+
+
+@contextmanager
+def _folder(directory: str | Path | None) -> Iterator[Path]:
+    """The folder of history and results; one that is thrown away where none is wanted."""
+    if directory is not None:
+        yield check_writable(Path(directory)).absolute()
+        return
+    with TemporaryDirectory(prefix="tuning-") as folder:
+        yield Path(folder)

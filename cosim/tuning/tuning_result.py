@@ -1,0 +1,131 @@
+"""What tuning leaves: the best candidate of each search, costs with training and judging seeds, warnings, as text and
+plain data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cosim.evaluation.numbers import number
+from cosim.studies.groups import Spread, mean_of
+from fmus.text_table import text_table
+
+if TYPE_CHECKING:
+    from cosim.simulation.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Searched:
+    """One search.
+
+    Args:
+        seed: of the optimiser. best: values by name. costs: best cost after each iteration, with the training seeds.
+        evaluations: candidates asked for up to each iteration.
+    """
+
+    seed: int
+    best: Mapping[str, float]
+    costs: Sequence[float]
+    evaluations: Sequence[int]
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """What came out.
+
+    Args:
+        scenario: with the best values. method: name of the optimiser. cost: in words.
+        searches: one for each seed of the optimiser. start: values before, by name. best: values after.
+        seeds, judged: training and judging seeds.
+        before, after: costs with the training seeds, one each; of the scenario as it was, and of the best candidate.
+        judged_before, judged_after: likewise with the judging seeds.
+        runs: made in all. how: in what the candidates were run, in words.
+        warnings: what the user should know. fixed: parameters that were held, and why.
+        interrupted: whether somebody stopped it.
+    """
+
+    scenario: Scenario
+    method: str
+    cost: str
+    searches: Sequence[Searched]
+    start: Mapping[str, float]
+    best: Mapping[str, float]
+    seeds: Sequence[int]
+    judged: Sequence[int]
+    before: Sequence[float]
+    after: Sequence[float]
+    judged_before: Sequence[float]
+    judged_after: Sequence[float]
+    runs: int
+    how: str
+    warnings: Sequence[str] = ()
+    fixed: Mapping[str, str] = ()  # type: ignore[assignment] # replaced by `tune`
+    interrupted: bool = False
+
+    @property
+    def gain(self) -> Spread:
+        """Cost before minus after with the judging seeds, pair by pair; of the training seeds where none judge."""
+        pairs = zip(self.judged_before, self.judged_after, strict=True) if self.judged else None
+        pairs = pairs or zip(self.before, self.after, strict=True)
+        return mean_of([float(b) - float(a) for b, a in pairs])
+
+    def rows(self) -> list[dict[str, Any]]:
+        """A row for each kind of seeds: costs before and after, with 95 % intervals."""
+        parts = [("training", self.seeds, self.before, self.after)]
+        if self.judged:
+            parts.append(("judging", self.judged, self.judged_before, self.judged_after))
+        return [
+            {"seeds": kind, "count": len(seeds), "before": mean_of(before), "after": mean_of(after)}
+            for kind, seeds, before, after in parts
+        ]
+
+    def text(self) -> str:
+        """For a terminal: costs before and after, spread over searches, values, warnings."""
+        table = [["seeds", "number", "before", "after"]]
+        table += [[r["seeds"], str(r["count"]), r["before"].text(), r["after"].text()] for r in self.rows()]
+        lines = [f"{self.method}: {self.cost}", *text_table(table, left=(0,), heading=True), ""]
+        if len(self.searches) > 1:
+            finals = np.array([search.costs[-1] for search in self.searches])
+            low, middle, high = np.percentile(finals, (25, 50, 75))
+            lines.append(
+                f"{len(finals)} searches end at {number(middle)} in the median, quartiles {number(low)} and "
+                f"{number(high)}, best {number(finals.min())}."
+            )
+        values = [["parameter", "before", "after"]]
+        values += [[name, number(self.start.get(name, np.nan)), number(v)] for name, v in self.best.items()]
+        lines += [*text_table(values, left=(0,), heading=True), ""]
+        if self.judged and not self.gain.low > 0.0:
+            lines.append(
+                "The judging seeds do not show that the scenario has become better: what was learnt may be luck."
+            )
+        lines += [f"held: {name}, {why}" for name, why in self.fixed.items()]
+        lines += [f"warning: {text}" for text in self.warnings]
+        return "\n".join([*lines, f"{self.runs} runs, {self.how}."])
+
+    def to_data(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "method": self.method,
+            "cost": self.cost,
+            "best": dict(self.best),
+            "start": dict(self.start),
+            "fixed": dict(self.fixed),
+            "seeds": list(self.seeds),
+            "before": list(self.before),
+            "after": list(self.after),
+            "judged": list(self.judged),
+            "judged_before": list(self.judged_before),
+            "judged_after": list(self.judged_after),
+            "searches": [
+                {"seed": s.seed, "best": dict(s.best), "costs": list(s.costs), "evaluations": list(s.evaluations)}
+                for s in self.searches
+            ],
+            "runs": self.runs,
+            "how": self.how,
+            "warnings": list(self.warnings),
+            "interrupted": self.interrupted,
+        }

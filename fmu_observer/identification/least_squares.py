@@ -1,0 +1,255 @@
+"""Least squares on any simulation: estimates, confidence regions and what cannot be told apart. Arrays in, a fit out;
+knows no FMU and no file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Simulation = Callable[[Array], Array]  # parameters of shape (p,) -> signals of shape (q, n)
+
+DIFFERENCE = 1e-4
+"""Step of central differences, as a share of a parameter's size: a solver in the simulation may round at 1e-9."""
+ALMOST_ONE = 0.999
+REPEATS = 3  # the noise is estimated anew after each fit
+
+
+def serial_enlargement(residuals: Array) -> Array:
+    """How much wider variances become where neighbouring residuals are alike: ``(1 + r) / (1 - r)``, as for noise of
+    first order.
+
+    Args:
+        residuals: shape (..., n).
+
+    Returns:
+        Factors of at least 1, shape (...): 1 where the correlation r is no larger than chance makes it.
+    """
+    correlation = serial_correlation(residuals)
+    alike = np.where(correlation > 2.0 / np.sqrt(residuals.shape[-1]), np.minimum(correlation, ALMOST_ONE), 0.0)
+    return np.asarray((1.0 + alike) / (1.0 - alike))
+
+
+def serial_correlation(residuals: Array) -> Array:
+    """Correlation of neighbouring residuals, shape (...).
+
+    Args:
+        residuals: shape (..., n).
+    """
+    squares = np.sum(residuals**2, axis=-1)
+    return np.asarray(np.sum(residuals[..., 1:] * residuals[..., :-1], axis=-1) / np.where(squares > 0.0, squares, 1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Parameters of a simulation that comes nearest to measured signals.
+
+    Attributes:
+        parameters: estimates, shape (p,). covariance: of them, shape (p, p).
+        sizes: sizes of the parameters by which directions are compared, shape (p,).
+        residuals: measured less simulated, shape (q, n). noise: their standard deviations, shape (q,).
+        correlation: of neighbouring residuals, shape (q,). jacobian: of the signals by the parameters, shape (q, n, p).
+        freedom: samples less parameters. runs: simulations that it took. converged: whether it came to rest.
+    """
+
+    parameters: Array
+    covariance: Array
+    sizes: Array
+    residuals: Array
+    noise: Array
+    correlation: Array
+    jacobian: Array
+    freedom: int
+    runs: int
+    converged: bool
+
+    def half_widths(self, level: float) -> Array:
+        """Half of the confidence intervals, one parameter at a time, shape (p,).
+
+        Args:
+            level: probability that an interval covers the true value, between 0 and 1.
+        """
+        quantile = float(scipy.stats.t.ppf(0.5 + 0.5 * level, self.freedom))
+        return np.asarray(quantile * np.sqrt(np.diagonal(self.covariance)))
+
+    def covers(self, truth: Array, level: float) -> bool:
+        """Whether the joint confidence region, an ellipsoid, holds a point.
+
+        Args:
+            truth: the point, shape (p,). level: probability of the region, between 0 and 1.
+        """
+        count = len(self.parameters)
+        away = (truth - self.parameters) / self.sizes
+        scaled = self.covariance / np.outer(self.sizes, self.sizes)
+        distance = float(away @ np.linalg.pinv(scaled, hermitian=True) @ away)
+        return distance <= count * float(scipy.stats.f.ppf(level, count, self.freedom))
+
+
+def fit(
+    simulate: Simulation,
+    start: Array,
+    measured: Array,
+    *,
+    noise: Array | None = None,
+    sizes: Array | None = None,
+    low: Array | None = None,
+    high: Array | None = None,
+) -> Fit:
+    """Fit a simulation to measured signals by least squares on residuals divided by the noise.
+
+    Derivatives are central differences. The covariance is that of the Jacobian with the noise that the residuals show,
+    enlarged where neighbouring residuals are alike.
+
+    Args:
+        simulate: the signals, shape (q, n), for parameters of shape (p,).
+        start: first guess, shape (p,). measured: shape (q, n), with NaN where nothing was measured.
+        noise: standard deviations of the measurements, shape (q,), which weigh the signals; None: estimated.
+        sizes: typical sizes of the parameters, shape (p,), all positive; None for those of the start, 1 where that is
+            0. low, high: bounds, shape (p,); None for none.
+
+    Returns:
+        The fit.
+
+    Raises:
+        ValueError: the simulation at the start gives no finite number.
+    """
+    sizes = np.where(start != 0.0, np.abs(start), 1.0) if sizes is None else sizes
+    known, runs = np.isfinite(measured), [0]
+    bounds = (
+        np.full(len(start), -np.inf) if low is None else low / sizes,
+        np.full(len(start), np.inf) if high is None else high / sizes,
+    )
+
+    def residuals(parameters: Array) -> Array:
+        runs[0] += 1
+        with np.errstate(all="ignore"):
+            return np.where(known, measured - simulate(parameters), 0.0)
+
+    def jacobian(parameters: Array) -> Array:
+        return _differences(residuals, parameters, sizes, low, high)
+
+    first = residuals(start)
+    if not np.isfinite(first).all():
+        raise ValueError("the simulation at the start of the fit gives values that are no finite numbers")
+    spreads = np.array([np.std(row[k]) if k.any() else 1.0 for row, k in zip(measured, known, strict=True)])
+    weights = 1.0 / (np.where(spreads > 0.0, spreads, 1.0) if noise is None else noise)
+    found, converged = start / sizes, False
+    for _ in range(1 if noise is not None or len(measured) == 1 else REPEATS):
+        result = scipy.optimize.least_squares(
+            lambda z, w=weights: np.nan_to_num((residuals(z * sizes) * w[:, None]).ravel(), nan=1e9),
+            np.clip(found, *bounds),
+            jac=lambda z, w=weights: (jacobian(z * sizes) * w[:, None, None] * sizes).reshape(-1, len(start)),
+            bounds=bounds,
+            x_scale="jac",
+            xtol=1e-10,
+        )
+        found, converged = result.x, bool(result.success)
+        left = residuals(found * sizes)
+        seen = _deviations(left, known, 0)
+        weights = weights if noise is not None else 1.0 / np.maximum(seen, 1e-12 * np.maximum(spreads, 1e-300))
+    parameters = found * sizes
+    left, slopes = residuals(parameters), -jacobian(parameters)
+    freedom = max(1, int(known.sum()) - len(start))
+    seen = _deviations(left, known, len(start) / max(1, int(known.sum())))
+    covariance = _covariance(slopes, weights, seen**2 * serial_enlargement(left), sizes)
+    return Fit(parameters, covariance, sizes, left, seen, serial_correlation(left), slopes, freedom, runs[0], converged)
+
+
+def _deviations(residuals: Array, known: NDArray[np.bool_], share: float) -> Array:
+    """Standard deviations of the residuals, shape (q,), where a share of the samples went into the parameters."""
+    counts = np.maximum(known.sum(axis=1) * (1.0 - share), 1.0)
+    return np.asarray(np.sqrt(np.sum(residuals**2, axis=1) / counts))
+
+
+def _differences(function: Simulation, at: Array, sizes: Array, low: Array | None, high: Array | None) -> Array:
+    """Derivatives of a function of shape (q, n) by central differences inside the bounds, shape (q, n, p)."""
+    columns = []
+    for i, size in enumerate(sizes):
+        above, below = at.copy(), at.copy()
+        step = DIFFERENCE * max(abs(at[i]), size)
+        above[i] = at[i] + step if high is None else min(at[i] + step, high[i])
+        below[i] = at[i] - step if low is None else max(at[i] - step, low[i])
+        columns.append((function(above) - function(below)) / (above[i] - below[i]))
+    return np.stack(columns, axis=-1)
+
+
+def _covariance(jacobian: Array, weights: Array, variances: Array, sizes: Array) -> Array:
+    """Covariance of weighted least squares under noise of given variances, shape (p, p); infinite directions are made
+    very wide, not lost.
+    """
+    rows = jacobian * sizes
+    normal = np.einsum("qni,qnj,q->ij", rows, rows, weights**2)
+    spread = np.einsum("qni,qnj,q->ij", rows, rows, weights**4 * variances)
+    values, vectors = np.linalg.eigh(normal)
+    floor = np.finfo(float).eps * max(float(values[-1]), np.finfo(float).tiny)
+    inverse = (vectors / np.maximum(values, floor)) @ vectors.T
+    return np.asarray(inverse @ spread @ inverse * np.outer(sizes, sizes) + _unseen(vectors, values, floor, sizes))
+
+
+def _unseen(vectors: Array, values: Array, floor: float, sizes: Array) -> Array:
+    """What is added for directions that no signal shows: a variance of very many sizes."""
+    hidden = vectors[:, values <= floor] * sizes[:, None]
+    return np.asarray(1e12 * hidden @ hidden.T)
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A common change of parameters that the signals show too little of.
+
+    Attributes:
+        shares: change of each parameter by name, relative to its size, the largest 1; small ones are left out.
+        uncertainty: standard deviation along it, relative to the sizes of the parameters.
+    """
+
+    shares: dict[str, float]
+    uncertainty: float
+
+    def explain(self) -> str:
+        """The direction in words."""
+        names = list(self.shares)
+        if len(names) == 1:
+            return (
+                f"{names[0]} cannot be told from these signals (uncertain by {100.0 * self.uncertainty:.3g} % of its "
+                "size)"
+            )
+        changes = ", ".join(f"{name} {100.0 * share:+.0f} %" for name, share in self.shares.items())
+        text = f"a common change of {changes} is hardly seen (uncertain by {100.0 * self.uncertainty:.3g} %)"
+        if len(names) == 2 and abs(abs(self.shares[names[1]] / self.shares[names[0]]) - 1.0) < RATIO:
+            one, other = names
+            same = self.shares[one] * self.shares[other] > 0.0
+            text += f": only the {'ratio' if same else 'product'} of {one} and {other} is identified"
+        return text
+
+
+RATIO = 0.1
+"""Two shares within this count as equal, so that a ratio or a product is told."""
+SMALL = 0.05
+"""Shares below this are left out of the words."""
+
+
+def unseen_directions(found: Fit, names: Sequence[str], limit: float) -> list[Direction]:
+    """Directions in which the parameters are not identified: the long axes of the confidence ellipsoid.
+
+    Args:
+        found: the fit. names: of the parameters. limit: standard deviation relative to the sizes of the parameters
+            beyond which a direction counts as not identified.
+
+    Returns:
+        The directions, the worst first.
+    """
+    size = np.where(found.parameters != 0.0, np.abs(found.parameters), found.sizes)
+    values, vectors = np.linalg.eigh(found.covariance / np.outer(size, size))
+    directions = []
+    for value, vector in zip(values[::-1], vectors.T[::-1], strict=True):
+        deviation = float(np.sqrt(max(value, 0.0)))
+        if not deviation > limit:
+            break
+        turned = vector / vector[np.argmax(np.abs(vector))]
+        shares = {name: float(s) for name, s in zip(names, turned, strict=True) if abs(s) >= SMALL}
+        directions.append(Direction(shares, deviation))
+    return directions
