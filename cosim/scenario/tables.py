@@ -251,6 +251,7 @@ class ReportTable(Table):
     odometer: str | None = None
     speed_reference: str | None = None
     observers: list[Name] | None = None
+    other_trains: list[Name] = []
     phases: list[PhaseTable] = []
     zones: list[tuple[float, float]] = []
     evaluate_after: float = 0.0
