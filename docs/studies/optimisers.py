@@ -3,8 +3,8 @@
 ``python docs/studies/optimisers.py`` prints the tables of docs/tuning.md and draws docs/images/optimisers.png; it takes
 about a quarter of an hour. ``--seeds N`` takes the first N seeds.
 
-The drive is run once for a noise record of 10 000 samples; candidates are members of a batch over what the filter heard,
-and all see the same record.
+The drive is run once for a noise record of 10 000 samples; candidates are members of a batch over what the filter
+heard, and all see the same record.
 """
 
 from __future__ import annotations
@@ -20,13 +20,10 @@ import numpy as np
 
 from cosim import Scenario
 from cosim.studies.replay import Replay
-from fmu_observer.filtering.kalman import correct, flattened, log_likelihood, predicted_covariance
-from fmu_observer.observers.traction.motor_ekf import MotorEkf
 from fmu_observer.optimisers.registry import find_optimiser
 from fmu_observer.optimisers.search import Search, minimise
 from fmu_observer.optimisers.search_space import Bounded, SearchSpace
 from fmu_observer.tuning.likelihood import AccumulatedOutput
-from plant_models.hybrid import memory, output_signal, vector
 
 NAMES = (*(f"process_variance[{i}]" for i in range(1, 5)), "measurement_variance[1]", "measurement_variance[2]")
 CURRENTS = ("current_d", "current_q")
@@ -64,33 +61,6 @@ class Drive:
     def floor(self) -> float:
         """Cost with the variances of the noise itself."""
         return float(self.cost(TRUE[np.newaxis])[0])
-
-
-class LikelihoodEkf(MotorEkf):
-    """The filter that also adds up the logarithm of the likelihood of its innovations."""
-
-    name = "motor_ekf_with_likelihood"
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.states = (*self.states[:-1], memory("log_likelihood", "1", 0.0, "Log-likelihood"), self.states[-1])
-        self.outputs = (*self.outputs, output_signal("innovation_likelihood", "1", "Log-likelihood"))
-
-    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
-        n = self.order
-        before, told, primed = x[: n + n * n], x[n + n * n], x[n + n * n + 1]
-        moved, F = self.predict(before[:n], u, p)
-        P = predicted_covariance(np.reshape(before[n:], (n, n)), F, np.diag(p.process_variance))
-        after = vector(*(moved[i] for i in range(n)), *flattened(P))
-        values = np.where(primed > 0.5, after, before)
-        innovation, H = self.measure(values[:n], u, p)
-        found = correct(values[:n], np.reshape(values[n:], (n, n)), innovation, H, np.diag(p.measurement_variance))
-        told = told + log_likelihood(innovation, found.innovation_covariance)
-        estimate = (found.estimate[i] for i in range(n))
-        return vector(*estimate, *flattened(found.covariance), told, 1.0 + 0.0 * primed)
-
-    def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return super().output(t, x, u, p) | {"innovation_likelihood": x[self.order * (self.order + 1)]}
 
 
 @dataclass(frozen=True)
@@ -141,9 +111,7 @@ def searches(drive: Drive, method: Method, seeds: Sequence[int]) -> list[Search]
 
 def likelihood(drive: Drive) -> AccumulatedOutput:
     """Log-likelihood of the innovations over the record, with its gradient by the six variances."""
-    system = LikelihoodEkf()
-    inputs = drive.replay.heard()
-    return AccumulatedOutput(system, inputs, NAMES)
+    return AccumulatedOutput(drive.replay.system, drive.replay.heard(), NAMES)
 
 
 def gradient_searches(drive: Drive, seeds: Sequence[int]) -> list[Search]:
@@ -194,8 +162,8 @@ def main() -> None:
     drive, seeds = Drive(options.noise), range(options.seeds)
     floor = drive.floor
     print(f"noise record {options.noise}, floor {floor:.5f} A2, {len(seeds)} seeds\n")
-    print("| method | " + " | ".join(f"it. {k}" for k in ITERATIONS) + " | 10 % to 90 % at 20 | evaluations to 1.05 floor: "
-          "quartile, median, quartile | reached |")  # fmt: skip
+    counted = "evaluations to 1.05 floor: quartile, median, quartile"
+    print("| method | " + " | ".join(f"it. {k}" for k in ITERATIONS) + f" | 10 % to 90 % at 20 | {counted} | reached |")
     print("|" + "---|" * (len(ITERATIONS) + 4))
     curves = {}
     for method in (*METHODS, GRADIENT):

@@ -45,7 +45,9 @@ class AccumulatedOutput:
     ) -> None:
         periodic = [event for event in system.events if isinstance(event, PeriodicEvent)]
         if system.continuous_count or len(periodic) != 1 or len(system.events) != 1:
-            raise ValueError(f"{system.name}: expected a filter that is sampled by one periodic event and flows nowhere.")
+            raise ValueError(
+                f"{system.name}: expected a filter that is sampled by one periodic event and flows nowhere."
+            )
         known, outputs = scalar_names(system.parameter_signals), scalar_names(system.outputs)
         for name in (*names, *(parameters or {})):
             if name not in known:
@@ -54,7 +56,9 @@ class AccumulatedOutput:
             raise ValueError(f"{system.name} has no output {output!r}; known: {', '.join(outputs)}.")
         rows = np.asarray(inputs, float)
         if rows.ndim != 2 or rows.shape[1] != len(system.start_inputs()):
-            raise ValueError(f"{system.name}: expected inputs of shape (k, {len(system.start_inputs())}), got {rows.shape}.")
+            raise ValueError(
+                f"{system.name}: expected inputs of shape (k, {len(system.start_inputs())}), got {rows.shape}."
+            )
         values = np.asarray(system.start_parameters(), float)
         for name, value in (parameters or {}).items():
             values[known.index(name)] = value
