@@ -91,7 +91,9 @@ METHODS = (
     Method("CMA-ES in logarithms", "cma", BUDGET // 9, log=True),
     Method("GA, population 100, start [0, 0.1]", "ga", 20, options={"start": (0.0, 0.1)}, seeds=12),
 )
-GRADIENT = Method("gradient of the likelihood, in logarithms", "gradient", 60, log=True, options={"gradients": True}, seeds=10)
+GRADIENT = Method(
+    "gradient of the likelihood, in logarithms", "gradient", 60, log=True, options={"gradients": True}, seeds=10
+)
 
 
 def space(log: bool) -> SearchSpace:
