@@ -8,7 +8,7 @@ import pytest
 from cosim import Outcome, Scenario
 
 pytestmark = pytest.mark.compiler
-NAMES = ("ending", "exponential", "held")
+NAMES = ("ending", "exponential", "held", "settling")
 
 
 @cache
@@ -30,6 +30,23 @@ def test_what_ends_is_twice_as_good_as_what_is_held() -> None:
     """Measured: 3.9, 4.3 and 9.5 m; 0.30, 0.31 and 0.56 m/s."""
     assert rms("ending", "position") < rms("exponential", "position") < 0.5 * rms("held", "position")
     assert rms("ending", "speed") < 0.6 * rms("held", "speed")
+
+
+def test_a_gain_that_starts_sharp_finds_a_wrong_speed_and_misreads_a_wrong_place() -> None:
+    """Measured from 10 s to 60 s: 18.5 m against 103 m, its limit the same; with the place wrong 462 m against 46 m."""
+    speed, place = ({"estimated_speed": 17.778}, {"estimated_speed": 17.778, "estimated_position": 3000.0})
+    found = []
+    for wrong in (speed, place):
+        scenario = Scenario.load("balise_holes")
+        scenario.stop = 60.0
+        for name in ("exponential", "settling"):
+            scenario.components[name].parameters.update(wrong)
+        outcome = scenario.run(warn=lambda _warning: None)
+        late = outcome["time"] > 10.0
+        off = [outcome[f"{n}.position"] - outcome["train.position"] for n in ("exponential", "settling")]
+        found.append([float(np.sqrt(np.mean(o[late] ** 2))) for o in off])
+    assert found[0][1] < 0.25 * found[0][0]
+    assert found[1][1] > 5.0 * found[1][0]
 
 
 def test_all_expectations_are_met() -> None:
