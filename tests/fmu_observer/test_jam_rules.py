@@ -29,7 +29,7 @@ from fmu_observer.observers.train.quasi_lpv_uio import speed_errors
 from plant_models.hybrid import Runtime
 
 SHARED = {"odometer_period": PERIOD, "threshold": 0.9, "residual_gain": 2.3, "arming_delay": 0.0}
-PRINTED = SimpleNamespace(**SHARED, rule_4=0.0)
+PRINTED = SimpleNamespace(**SHARED, rule_4=0.0, rule_delay=1.0)
 P = SimpleNamespace(**SHARED, **{s.name: s.start for s in RepairedRules.parameters})
 ARMED = RuleMemory(TRUSTED, 0.0, 0.0, 9.0, 0.0, 20.0, 9.0, 0.0, 99.0, -99.0)  # while braking
 THETA = 0.9 / 2.3
@@ -58,6 +58,12 @@ def test_the_printed_rules_take_effect_a_sample_late() -> None:
     assert printed([20.0, 19.0, 18.9, 19.9, 19.8, 19.7], 20.0) == [(0, 0), (0, 0), (1, 0), (1, 0), (1, 1), (0, 0)]
 
 
+def test_without_the_delay_they_take_effect_at_the_sample_that_shows_it() -> None:
+    at_once = SimpleNamespace(**SHARED, rule_4=0.0, rule_delay=0.0)
+    told = printed([20.0, 19.0, 18.9, 19.9, 19.8, 19.7], 20.0, at_once)
+    assert told == [(0, 0), (1, 0), (1, 0), (1, 1), (0, 0), (0, 0)]
+
+
 def test_the_printed_fault_stays_for_ever_where_the_reading_only_falls() -> None:
     """The latch-up: the wheel rolls, and nothing ends the fault."""
     falling = [20.0 - 0.18 * k for k in range(100)]
@@ -67,7 +73,7 @@ def test_the_printed_fault_stays_for_ever_where_the_reading_only_falls() -> None
 def test_rule_4_calls_a_rise_a_fault_and_rule_5_a_standing_wheel() -> None:
     rising = [20.0, 19.9, 19.95, 19.9, 19.85, 19.8]
     assert (1.0, 1.0) not in printed(rising, 19.9)
-    assert (1.0, 1.0) in printed(rising, 19.9, SimpleNamespace(**SHARED, rule_4=1.0))
+    assert (1.0, 1.0) in printed(rising, 19.9, SimpleNamespace(**SHARED, rule_4=1.0, rule_delay=1.0))
     memory = PrintedMemory(1.0, 1.0, 1.0, 1.0, 0.5, 9.0)  # rule 3 and rule 5 at once: the later one counts
     after = PrintedRules().at_sample(memory, Reading(0.0, 0.1, -0.2, -1.0), PRINTED).memory
     assert PrintedMemory(*after).next_fault == 1.0
