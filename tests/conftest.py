@@ -13,6 +13,10 @@ from zlib import crc32
 import pytest
 from hypothesis import settings
 
+# Matrices here have a few rows: a second thread of BLAS makes `expm` of five rows 14 times as dear, and takes the core
+# of the other worker. It is said before NumPy is loaded, and inherited by workers and commands.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import fmus.toolchain.compile as compiling
 
 settings.register_profile("here", deadline=None)

@@ -34,6 +34,7 @@ COMMANDS = (
     Command("bound", "cosim.cli.bound", "bounds of an observer's error between samples"),
     Command("limits", "cosim.cli.limits", "gaps and delays that an observer survives"),
     Command("report", "cosim.cli.report", "report of results, or of several laid over each other"),
+    Command("reference", "cosim.cli.reference", "trajectory behind a recording, smoothed"),
     Command("convert", "cosim.cli.convert", "write a result in another format"),
     Command("new", "cosim.cli.new", "write a starter scenario for an FMU"),
     Command("show", "cosim.cli.show", "show components, connections, order and loops"),

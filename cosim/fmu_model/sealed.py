@@ -70,17 +70,22 @@ class SealedModel(ABC):
         self._chosen(list(self.parameters), [], "parameter")
         self._demand_settable()
         self._told(instance.instantiate)
-        names = [*self.parameters, *(self.states if all(map(self._has_start, self.states)) else ())]
-        self._write_starts, self._starts = instance.writer(names)
-        self._write_inputs, self._inputs = instance.writer(list(self.inputs))
         self._states_read, self._outputs_read = np.zeros(len(self.states)), np.zeros(len(self.outputs))
         self._read_states = instance.reader(list(self.states), self._states_read)
         self._read_outputs = instance.reader(list(self.outputs), self._outputs_read)
-        self.start_inputs = self._told(lambda: instance.read(list(self.inputs)))
+        self._write_inputs, self._inputs = instance.writer(list(self.inputs))
+        self.start, self.start_inputs = self._told(self._begun)
+        self.parameters = {name: value for name, value in self.parameters.items() if name not in self.states}
+        names = [*self.parameters, *(self.states if all(map(self._has_start, self.states)) else ())]
+        self._write_starts, self._starts = instance.writer(names)
+
+    def _begun(self) -> tuple[Array, Array]:
+        """States and inputs where the FMU itself begins under its parameters."""
         for name, value in self.parameters.items():
-            self._told(lambda n=name, v=value: instance.set_start(n, float(v)))  # type: ignore[misc]
-        self.start = self._told(lambda: instance.read(list(self.states)))
-        self._fresh = True
+            self.instance.set_start(name, float(value))
+        begin = getattr(self.instance.description.defaultExperiment, "startTime", None)
+        self._enter(float(begin or 0.0))
+        return self.instance.read(list(self.states)), self.instance.read(list(self.inputs))
 
     # -- one point ----------------------------------------------------------------------------------------------------
 
@@ -97,13 +102,12 @@ class SealedModel(ABC):
 
     def _restart(self, t: float, x: Array, u: Array) -> None:
         instance = self.instance
-        if not self._fresh:
-            instance.reset()
-        self._fresh = False
+        instance.reset()
         count = len(self.parameters)
         self._starts[:count] = list(self.parameters.values())
         self._starts[count:] = x[: len(self._starts) - count]
-        self._write_starts()
+        if len(self._starts):
+            self._write_starts()
         if len(self.inputs):
             self._inputs[:] = u
             self._write_inputs()

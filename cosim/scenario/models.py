@@ -18,6 +18,7 @@ from cosim.components.python_model import PythonModel
 from cosim.components.recording import RecordingComponent, load_recording
 from cosim.components.recording_data import Recording
 from cosim.errors import ScenarioError, nearest
+from cosim.fmu_filter.component import FmuFilterModel
 from cosim.scenario.backends import FAULTS, Request, Tell, cannot_build, realise
 from cosim.scenario.model_name import ModelName
 from cosim.scenario.tables import Backend, ComponentTable
@@ -129,6 +130,8 @@ def component_factories(
             recording = open_recording(name, table, folder, places[name], span)
             factories[name] = partial(RecordingComponent, name, recording)
             made.notes += left_out_note(name, recording)
+        elif table.filter is not None:
+            factories[name] = partial(filter_component, name, table, folder, places[name])
         elif name not in systems and table.fmu is None:
             factories[name] = partial(python_component, name, table, places[name])
         elif name in made.files:
@@ -157,6 +160,22 @@ def python_component(name: str, table: ComponentTable, where: str) -> PythonComp
             f"{where}: 'preset' and 'as' belong to hybrid systems; plain Python takes 'parameters' and 'options'."
         )
     return PythonComponent(name, make_declared(table, where), str(table.model or table.observer))
+
+
+def filter_component(name: str, table: ComponentTable, folder: Path, where: str) -> PythonComponent:
+    """A component that is a filter over its FMU.
+
+    Args:
+        name: of the component. table: its table, with `filter`. folder: start of relative paths.
+        where: place for messages.
+
+    Raises:
+        FmuLoadError: the FMU cannot be opened. CosimError: it cannot serve this filter.
+    """
+    assert table.filter is not None
+    path = (folder / str(table.fmu)).resolve()
+    model = PythonModel(FmuFilterModel(path, table.filter, table.parameters), {}, where)
+    return PythonComponent(name, model, f"{table.filter.kind} over {table.fmu}")
 
 
 def open_recording(

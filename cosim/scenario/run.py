@@ -347,6 +347,8 @@ class _Setup:
 
     def _start_values(self, name: str, component: Component) -> dict[str, StartValue]:
         table = self.table.components[name]
+        if table.filter is not None:
+            return {}  # they are those of its FMU, which has taken them
         return start_values(component, protocol_parameters(table, component, f"components.{name}") | table.parameters)
 
     def _balise_roles(self) -> tuple[list[str], str]:
@@ -448,6 +450,7 @@ class _Setup:
             title=self.table.title,
             **{role: getattr(table, role) for role in ROLES},
             observers=observers,
+            other_trains=table.other_trains,
             labels={n: t.label for n, t in self.table.components.items() if t.label is not None},
             phases=[Phase(p.name, p.start, p.end) for p in table.phases],
             zones=table.zones,

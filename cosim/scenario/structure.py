@@ -20,7 +20,7 @@ from cosim.scenario.backends import intended
 from cosim.scenario.balise_service import find_receivers, watched_plant
 from cosim.scenario.connections import parse_connections
 from cosim.scenario.master import stepping_groups
-from cosim.scenario.models import make_system, open_recording, python_component
+from cosim.scenario.models import filter_component, make_system, open_recording, python_component
 from cosim.scenario.movement import movement_chains
 from cosim.scenario.network import Network, connect_over, make_network
 from cosim.scenario.schema import ScenarioTable
@@ -101,6 +101,8 @@ def describe_component(
     component: Component
     if table.recording is not None:
         component = RecordingComponent(name, open_recording(name, table, folder, where, span))
+    elif table.filter is not None:
+        component = filter_component(name, table, folder, where)
     elif system is None and table.fmu is None:
         component = python_component(name, table, where)
     elif system is None:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, PlainValidator, Tag, model_validator
 
 from cosim.errors import nearest
+from cosim.fmu_filter.settings import FilterTable
 from cosim.results.formats.catalogue import FORMATS
 from cosim.scenario.model_name import Model
 from cosim.table import Name, Table
@@ -62,6 +63,7 @@ class ComponentTable(Table):
     label: str | None = None
     every: Annotated[int, Field(ge=1)] = 1
     substeps: Annotated[int, Field(ge=1)] = 1
+    filter: FilterTable | None = None
 
     @model_validator(mode="after")
     def _one_origin(self) -> ComponentTable:
@@ -73,6 +75,8 @@ class ComponentTable(Table):
             )
         if given == ["fmu"] and (self.preset or self.options or self.backend):
             raise ValueError("'preset', 'options' and 'as' belong to shipped models; an FMU takes 'parameters' only")
+        if given != ["fmu"] and self.filter is not None:
+            raise ValueError("'filter' belongs to an 'fmu', which it takes as its model")
         if given != ["fmu"] and self.tolerance is not None:
             raise ValueError("'tolerance' belongs to an FMU; shipped models have the parameter 'internal_step' instead")
         if given != ["recording"] and {"component", "interpolation"} & self.model_fields_set:
@@ -247,6 +251,7 @@ class ReportTable(Table):
     odometer: str | None = None
     speed_reference: str | None = None
     observers: list[Name] | None = None
+    other_trains: list[Name] = []
     phases: list[PhaseTable] = []
     zones: list[tuple[float, float]] = []
     evaluate_after: float = 0.0

@@ -92,6 +92,19 @@ class Replay:
         batch.start(float(self.instants[0]))
         return batch.run(self.instants[1:], results, self._moved(late or {}), progress)
 
+    def heard(self) -> np.ndarray:
+        """Inputs as the observer had them at each communication point, in the order of its scalar inputs; those that
+        nothing is connected to have their start values.
+
+        Returns:
+            Shape (points, inputs).
+        """
+        rows = np.tile(self.system.start_inputs(), (len(self.instants), 1))
+        for column, name in enumerate(scalar_names(self.system.input_signals)):
+            if name in self._first:
+                rows[0, column], rows[1:, column] = self._first[name], self._inputs[name][:-1]
+        return rows
+
     # -- internals --------------------------------------------------------------------------------------------------
 
     def _moved(self, late: Mapping[str, int]) -> dict[str, np.ndarray]:

@@ -41,3 +41,17 @@ def exact_jacobian(
         return np.asarray(traced(at, known), dtype=float).reshape(shape)
 
     return jacobian
+
+
+def is_affine(function: Callable[[Array, Array], Array], states: int, inputs: int) -> bool:
+    """Whether a function is affine in x: no entry of its exact Jacobian depends on x, whatever u is.
+
+    Args:
+        function: as for `exact_jacobian`. states: number of states. inputs: number of inputs.
+    """
+    import casadi as ca  # noqa: PLC0415 - as above
+
+    symbolic = ca.ArrayInterface.SX
+    x, u = ca.SX.sym("x", states), ca.SX.sym("u", inputs)
+    value = ca.SX(function(symbolic(x, shape=(states,)), symbolic(u, shape=(inputs,))))
+    return not ca.depends_on(ca.simplify(ca.jacobian(value, x)), x)

@@ -1,0 +1,182 @@
+"""What a filter believes, and what moves it: prediction and correction with an FMU as the model. Formulas come from
+`fmu_observer.filtering`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.fmu_model.sealed import SealedModel
+from fmu_observer.filtering import kalman, unscented
+from fmu_observer.filtering.square_root import factor
+
+Array = NDArray[np.float64]
+SHARE = 1e-4
+"""Step of a difference, as a share of the standard deviation of the state: the slope is that near the estimate."""
+LEAST = 1e-7
+"""The same as a share of the state's value or nominal size: a shorter step drowns in rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Belief:
+    """Estimate and covariance.
+
+    Attributes:
+        x: estimate of the states, shape (n,). P: covariance, shape (n, n).
+        nis: normalised square of the last innovation, NaN before the first. degrees: how many values it had.
+        count: samples taken in, and steps made, so that random numbers do not repeat.
+        points: particles, shape (n, N). weights: of them, shape (N,). None where the filter has none.
+    """
+
+    x: Array
+    P: Array
+    nis: float = 0.0
+    degrees: int = 0
+    count: int = 0
+    points: Array | None = None
+    weights: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Noises:
+    """Noises of the model.
+
+    Attributes:
+        intensity: covariance that a second adds to the states, shape (n, n).
+        inputs: covariance of the inputs, held over a step, shape (m, m).
+    """
+
+    intensity: Array
+    inputs: Array
+
+
+class FmuFilter(ABC):
+    """One kind of filter over an FMU.
+
+    Args:
+        model: the FMU, whose states can be written. noises: of it.
+    """
+
+    def __init__(self, model: SealedModel, noises: Noises) -> None:
+        self.model, self.noises = model, noises
+        self._sizes = np.array([model.nominal(name) for name in model.states])
+        self._noisy = np.flatnonzero(np.diagonal(noises.inputs) > 0.0)
+
+    def begin(self, x: Array, P: Array) -> Belief:
+        """The belief at the start.
+
+        Args:
+            x: estimate, shape (n,). P: covariance, shape (n, n).
+        """
+        return Belief(x, P)
+
+    @abstractmethod
+    def predict(self, belief: Belief, t: float, h: float, u: Array) -> Belief:
+        """The belief a step later.
+
+        Args:
+            belief: at the begin of the step. t: begin [s]. h: length [s]. u: inputs, held, shape (m,).
+        """
+
+    @abstractmethod
+    def correct(self, belief: Belief, t: float, u: Array, seen: Sequence[int], y: Array, R: Array) -> Belief:
+        """The belief after a measurement.
+
+        Args:
+            belief: before it. t: instant [s]. u: inputs, shape (m,).
+            seen: which outputs of the model were measured. y: their values, shape (k,). R: covariance, shape (k, k).
+        """
+
+    def outputs(self, belief: Belief, t: float, u: Array) -> Array:
+        """Outputs of the model at the estimate, shape (q,).
+
+        Args:
+            belief: what is believed. t: instant [s]. u: inputs, shape (m,).
+        """
+        return self.model.values_at(t, belief.x, u)[1]
+
+    def _steps(self, belief: Belief) -> Array:
+        deviations = np.sqrt(np.maximum(np.diagonal(belief.P), 0.0))
+        return np.maximum(SHARE * deviations, LEAST * np.maximum(np.abs(belief.x), self._sizes))
+
+    def _corrected(self, belief: Belief, found: kalman.Corrected, innovation: Array) -> Belief:
+        nis = float(kalman.normalised_square(innovation, found.innovation_covariance))
+        counted = belief.count + 1
+        return replace(belief, x=found.estimate, P=found.covariance, nis=nis, degrees=len(innovation), count=counted)
+
+    def _from_inputs(self, t: float, h: float, x: Array, u: Array) -> Array:
+        """Covariance that the noises of the inputs add over a step, shape (n, n), by central differences."""
+        columns = []
+        for i in self._noisy:
+            size = np.zeros(len(u))
+            size[i] = 0.1 * np.sqrt(self.noises.inputs[i, i])
+            ends = [self.model.transition(t, h, x, u + sign * size)[0] for sign in (1.0, -1.0)]
+            columns.append((ends[0] - ends[1]) / (2.0 * size[i]))
+        W = np.array(columns).T.reshape(len(x), len(self._noisy))
+        return np.asarray(kalman.through(self.noises.inputs[np.ix_(self._noisy, self._noisy)], W))
+
+
+class ExtendedFilter(FmuFilter):
+    """Extended Kalman filter: slopes by central differences of whole steps, over a small share of what is not known."""
+
+    def predict(self, belief: Belief, t: float, h: float, u: Array) -> Belief:
+        """The belief a step later; arguments as for `FmuFilter`."""
+        x, steps = belief.x, self._steps(belief)
+        F = np.empty((len(x), len(x)))
+        for i, step in enumerate(steps):
+            away = np.zeros(len(x))
+            away[i] = step
+            above, below = x + away, x - away
+            ends = [self.model.transition(t, h, at, u)[0] for at in (above, below)]
+            F[:, i] = (ends[0] - ends[1]) / (above[i] - below[i])
+        P = kalman.predicted_covariance(belief.P, F, h * self.noises.intensity) + self._from_inputs(t, h, x, u)
+        return replace(belief, x=self.model.transition(t, h, x, u)[0], P=P, count=belief.count + 1)
+
+    def correct(self, belief: Belief, t: float, u: Array, seen: Sequence[int], y: Array, R: Array) -> Belief:
+        """The belief after a measurement; arguments as for `FmuFilter`."""
+        x, steps = belief.x, self._steps(belief)
+        chosen = list(seen)
+        H = np.empty((len(chosen), len(x)))
+        for i, step in enumerate(steps):
+            away = np.zeros(len(x))
+            away[i] = step
+            above, below = x + away, x - away
+            ends = [self.model.values_at(t, at, u)[1][chosen] for at in (above, below)]
+            H[:, i] = (ends[0] - ends[1]) / (above[i] - below[i])
+        innovation = y - self.model.values_at(t, x, u)[1][chosen]
+        return self._corrected(belief, kalman.correct(x, belief.P, innovation, H, R), innovation)
+
+
+class UnscentedFilter(FmuFilter):
+    """Unscented Kalman filter: sigma points through whole steps, drawn anew before each measurement.
+
+    Args:
+        model: the FMU. noises: of it. alpha: spread of the points [1].
+    """
+
+    def __init__(self, model: SealedModel, noises: Noises, alpha: float) -> None:
+        super().__init__(model, noises)
+        self._weights = unscented.weights(len(model.states), alpha)
+
+    def predict(self, belief: Belief, t: float, h: float, u: Array) -> Belief:
+        """The belief a step later; arguments as for `FmuFilter`."""
+        w = self._weights
+        points = unscented.sigma_points(belief.x, factor(belief.P), w.spread)
+        found = unscented.scattered(lambda at: self.model.transition(t, h, at, u)[0], points)
+        P = kalman.symmetric(unscented.covariance(found, found, w)) + h * self.noises.intensity
+        P = P + self._from_inputs(t, h, belief.x, u)
+        return replace(belief, x=np.asarray(unscented.mean(found, w)), P=P, count=belief.count + 1)
+
+    def correct(self, belief: Belief, t: float, u: Array, seen: Sequence[int], y: Array, R: Array) -> Belief:
+        """The belief after a measurement; arguments as for `FmuFilter`."""
+        w, chosen = self._weights, list(seen)
+        points = unscented.sigma_points(belief.x, factor(belief.P), w.spread)
+        states = unscented.scattered(lambda at: at, points)
+        looks = unscented.scattered(lambda at: self.model.values_at(t, at, u)[1][chosen], points)
+        found = unscented.correct(belief.x, belief.P, states, looks, y, R, w)
+        return self._corrected(belief, found, y - unscented.mean(looks, w))

@@ -1,0 +1,215 @@
+"""A filter over a sealed FMU as a component of a scenario: inputs, samples and telegrams in, an estimate out.
+
+It is plain Python to the master: what `cosim.components.python_model` demands of an object.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.errors import nearest
+from cosim.fmu_filter.belief import ExtendedFilter, FmuFilter, Noises, UnscentedFilter
+from cosim.fmu_filter.journal import SAME, Journal
+from cosim.fmu_filter.settings import FilterTable
+from cosim.fmu_model.opening import open_model
+from cosim.fmu_model.sealed import FmuModelError, SealedModel
+from plant_models.hybrid.signal import Signal, input_signal, output_signal
+from plant_models.hybrid.units import UnitError, parse_unit
+
+Array = NDArray[np.float64]
+MEASURED = "measured_"
+"""How the inputs begin that take measurements."""
+
+
+class FmuFilterModel:
+    """A filter over an FMU: ``step`` predicts and takes samples, ``balise`` takes telegrams, late ones too.
+
+    Inputs are those of the FMU, and ``measured_NAME`` for each output that is measured. Outputs are the estimated
+    states, the FMU's outputs at the estimate, ``NAME_std`` for each state, ``nis`` and ``nis_degrees``.
+
+    Args:
+        path: the ``.fmu`` file. table: which filter. parameters: start values of the FMU by name.
+
+    Raises:
+        FmuLoadError: the FMU cannot be opened.
+        FmuModelError: a name is unknown, or it cannot serve this filter.
+    """
+
+    def __init__(self, path: str | Path, table: FilterTable, parameters: Mapping[str, Any] | None = None) -> None:
+        self._made_of = path, table, dict(parameters or {})
+        self._model = open_model(
+            path, table.interface, states=table.states, outputs=table.outputs, parameters=_numbers(parameters or {})
+        )
+        model = self._model
+        self._start = model.start.copy()
+        self._seen = [_place(model, "output", model.outputs, name) for name in table.measurements]
+        self._R = np.diag([value**2 for value in table.measurements.values()])
+        self._balise = None if table.balise is None else _place(model, "output", model.outputs, table.balise)
+        intensity = np.diag(_by_name(model, "state", model.states, table.process_noise) ** 2)
+        noisy = np.diag(_by_name(model, "input", model.inputs, table.input_noise) ** 2)
+        self._engine = _engine(table, model, Noises(intensity, noisy))
+        self._P = np.diag(_by_name(model, "state", model.states, table.start_deviation) ** 2)
+        self.inputs = [_signal(model, name, "input", name) for name in model.inputs]
+        self.inputs += [_signal(model, name, "input", MEASURED + name) for name in table.measurements]
+        self.outputs = self._output_signals()
+        self._journal: Journal | None = None
+        self._next = 0
+        self._u = model.start_inputs.copy()
+        if table.balise is None:
+            self.balise = None  # type: ignore[method-assign,assignment]
+
+    # -- what the master calls ----------------------------------------------------------------------------------------
+
+    def step(self, t: float, inputs: Mapping[str, float], dt: float) -> dict[str, float]:
+        """Predict over a step, and take the samples at its end.
+
+        Args:
+            t: begin of the step [s]. inputs: by name. dt: length of the step [s].
+
+        Returns:
+            The outputs.
+        """
+        table, model = self._made_of[1], self._model
+        journal = self._begun(t)
+        self._u = np.array([inputs[name] for name in model.inputs], dtype=float)
+        journal.predict(dt, self._u)
+        now = t + dt
+        period = table.sample_period
+        if self._seen and (period is None or now >= self._origin + self._next * period - SAME):
+            y = np.array([inputs[MEASURED + name] for name in table.measurements], dtype=float)
+            known = np.flatnonzero(np.isfinite(y))  # NaN is a missing measurement
+            if len(known):
+                seen = [self._seen[i] for i in known]
+                journal.correct(now, self._u, seen, y[known], self._R[np.ix_(known, known)])
+            if period is not None:
+                self._next = int(np.floor((now - self._origin) / period + SAME / period)) + 1
+        return self._values(now)
+
+    def balise(self, stamp: float, position: float, location_accuracy: float = 0.0) -> bool | dict[str, float]:
+        """Take a telegram in at its stamp; what followed a late one is done again.
+
+        Args:
+            stamp: when the balise was passed [s]. position: told [m]. location_accuracy: told [m].
+
+        Returns:
+            The outputs; False for a telegram from before the horizon.
+        """
+        journal = self._begun(stamp)
+        assert self._balise is not None
+        deviation = location_accuracy if location_accuracy > 0.0 else self._made_of[1].balise_deviation
+        taken = journal.correct(stamp, self._u, [self._balise], np.array([position]), np.array([[deviation**2]]))
+        return self._values(journal.t) if taken else False
+
+    def get_state(self) -> Any:
+        """What to keep in order to return here."""
+        journal = None if self._journal is None else self._journal.state()
+        return journal, self._next, self._u.copy(), getattr(self, "_origin", 0.0)
+
+    def set_state(self, state: Any) -> None:
+        """Return.
+
+        Args:
+            state: from `get_state`.
+        """
+        journal, self._next, self._u, self._origin = state
+        if journal is None:
+            self._journal = None
+        else:
+            self._begun(journal[1]).restore(journal)
+
+    def __deepcopy__(self, memo: Any) -> FmuFilterModel:
+        return FmuFilterModel(*self._made_of)
+
+    # -- internals ----------------------------------------------------------------------------------------------------
+
+    def _begun(self, t: float) -> Journal:
+        if self._journal is None:
+            self._origin = t
+            belief = self._engine.begin(self._start, self._P)
+            self._journal = Journal(self._engine, belief, t, self._made_of[1].horizon)
+            self._next = 1
+        return self._journal
+
+    def _values(self, t: float) -> dict[str, float]:
+        assert self._journal is not None
+        belief, model = self._journal.belief, self._model
+        found = dict(zip(model.outputs, self._engine.outputs(belief, t, self._u).tolist(), strict=True))
+        found |= dict(zip(model.states, belief.x.tolist(), strict=True))
+        deviations = np.sqrt(np.maximum(np.diagonal(belief.P), 0.0))
+        found |= {f"{name}_std": float(value) for name, value in zip(model.states, deviations, strict=True)}
+        return found | {"nis": belief.nis, "nis_degrees": float(belief.degrees)}
+
+    def _output_signals(self) -> list[Signal]:
+        model = self._model
+        names = list(dict.fromkeys([*model.states, *model.outputs]))
+        found = [_signal(model, name, "output", name) for name in names]
+        found += [_signal(model, name, "output", f"{name}_std") for name in model.states]
+        return [
+            *found,
+            output_signal("nis", "1", "NIS of the last sample"),
+            output_signal("nis_degrees", "1", "Values in it"),
+        ]
+
+    def __getattr__(self, name: str) -> float:
+        """First outputs, before the first step: the start."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        first = dict(zip(self._model.states, self._start.tolist(), strict=True))
+        deviations = np.sqrt(np.diagonal(self._P)).tolist()
+        first |= {f"{state}_std": value for state, value in zip(self._model.states, deviations, strict=True)}
+        if name in first:
+            return first[name]
+        if name in self._model.outputs:
+            _, y = self._model.values_at(0.0, self._start, self._model.start_inputs)
+            return float(y[self._model.outputs.index(name)])
+        if name in ("nis", "nis_degrees"):
+            return 0.0
+        raise AttributeError(name)
+
+
+def _engine(table: FilterTable, model: SealedModel, noises: Noises) -> FmuFilter:
+    if table.kind == "ukf":
+        return UnscentedFilter(model, noises, table.alpha)
+    if table.kind == "ekf":
+        return ExtendedFilter(model, noises)
+    raise FmuModelError(f"{model.path}: kind {table.kind!r} is not there yet; use 'ekf' or 'ukf'.")
+
+
+def _place(model: SealedModel, what: str, names: tuple[str, ...], name: str) -> int:
+    if name not in names:
+        raise FmuModelError(f"{model.path}: no {what} {name!r}; {nearest(name, names)}")
+    return names.index(name)
+
+
+def _by_name(model: SealedModel, what: str, names: tuple[str, ...], given: Mapping[str, float]) -> Array:
+    found = np.zeros(len(names))
+    for name, value in given.items():
+        found[_place(model, what, names, name)] = value
+    return found
+
+
+def _numbers(parameters: Mapping[str, Any]) -> dict[str, float]:
+    for name, value in parameters.items():
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise FmuModelError(f"parameter {name} = {value!r}: an FMU in a filter takes numbers.")
+    return {name: float(value) for name, value in parameters.items()}
+
+
+def _signal(model: SealedModel, source: str, causality: str, name: str) -> Signal:
+    """A signal like a variable of the FMU, with its unit where that is one we know."""
+    unit = model.unit(source)
+    try:
+        parse_unit(unit)
+    except UnitError:
+        unit = "1"
+    variable = model.instance.variables[source]
+    text = variable.description or source
+    if causality == "input":
+        start = model.start_inputs[model.inputs.index(source)] if name == source else 0.0
+        return input_signal(name, unit, float(start), text)
+    return output_signal(name, unit, text)

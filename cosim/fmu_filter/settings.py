@@ -1,0 +1,56 @@
+"""The keys of ``[components.NAME.filter]``: which filter, its states, measurements and noises."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from cosim.table import Table
+
+Kind = Literal["ekf", "ukf", "particle"]
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+
+
+class FilterTable(Table):
+    """A filter over the FMU of its component.
+
+    Each key of a mapping is a name of the FMU; standard deviations are in the unit of that variable.
+    """
+
+    kind: Kind = Field(description="`ekf`, `ukf` or `particle`")
+    interface: Literal["co-simulation", "model-exchange"] | None = Field(
+        default=None, description="of an FMU that has both; co-simulation by default"
+    )
+    states: list[str] | None = Field(default=None, description="states; those that the FMU declares by default")
+    outputs: list[str] | None = Field(default=None, description="outputs that are estimated; all by default")
+    measurements: dict[str, Positive] = Field(
+        default={}, description="outputs of the FMU that are measured, with standard deviations"
+    )
+    sample_period: Positive | None = Field(
+        default=None, description="time between samples of the measurements [s]; every communication step by default"
+    )
+    process_noise: dict[str, NotNegative] = Field(
+        default={}, description="by state: standard deviation that a second adds, in the unit of the state by sqrt(s)"
+    )
+    input_noise: dict[str, NotNegative] = Field(
+        default={}, description="by input: standard deviation, held over a step; enters the model where the input does"
+    )
+    start_deviation: dict[str, NotNegative] = Field(
+        default={}, description="by state: standard deviation of the start value"
+    )
+    balise: str | None = Field(default=None, description="output that a telegram measures, a position [m]")
+    balise_deviation: Positive = Field(
+        default=1.0, description="standard deviation of it [m], where a telegram tells no location accuracy"
+    )
+    horizon: NotNegative = Field(default=10.0, description="how far back a late telegram is still taken in [s]")
+    alpha: Positive = Field(default=1.0, description="spread of the sigma points of a `ukf`")
+    particles: Annotated[int, Field(ge=2)] = Field(default=200, description="of a `particle` filter")
+    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="of its numbers")
+
+    @model_validator(mode="after")
+    def _sees_something(self) -> FilterTable:
+        if not self.measurements and self.balise is None:
+            raise ValueError("a filter needs 'measurements' (outputs with standard deviations) or 'balise' (an output)")
+        return self

@@ -1,0 +1,279 @@
+"""Any hybrid system as the model of a filter: its own flow over a period, or its own periodic jump. It knows no filter.
+
+What does not flow and does not jump at one period only has no transition that a filter could differentiate; it is
+refused in words.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from fmu_observer.models.filter_model import FilterModel, Known, Measured, Transition, filter_model
+from fmu_observer.models.model import ObserverModel
+from fmu_observer.models.registry import MODELS, find_model
+from plant_models import PLANTS
+from plant_models.hybrid import HybridSystem, Signal, TracedSystem, input_signal, scalar_names, state, vector
+from plant_models.hybrid.integration import step
+from plant_models.hybrid.option import require_whole
+from plant_models.hybrid.system import Array
+from plant_models.interop.continuous_part import known as known_name
+from plant_models.user_file import Expected, load_class, names_code
+
+SUBSTEPS = 4
+"""Steps of the system's own integrator in one period; by default each is an internal step of the system."""
+
+USERS = Expected("subclass of HybridSystem", lambda found: isinstance(found, type) and issubclass(found, HybridSystem))
+
+Source = str | ObserverModel | FilterModel | HybridSystem | type[HybridSystem]
+
+
+def system_model(
+    system: HybridSystem,
+    outputs: Sequence[str],
+    inputs: Sequence[str] | None = None,
+    *,
+    process_noises: Sequence[str] = (),
+    measurement_noises: Sequence[str] = (),
+    substeps: int = SUBSTEPS,
+    preset: str | None = None,
+) -> FilterModel:
+    """A hybrid system as the model of a filter.
+
+    1. Continuous states are estimated. They move by the system's own method (dry friction and switches included) in
+       `substeps` equal steps a period; memory stays at its start, triggered events do not occur.
+    2. A system without continuous states that jumps at one periodic event moves by this jump; all its memory is
+       estimated, and the period of the event is that of the filter.
+    3. Its parameters become parameters of the filter. Vectors are taken apart, ``x[1]`` as ``x_1``.
+
+    Args:
+        system: traceable. outputs: scalar names of what is measured. inputs: names of the inputs that the filter knows,
+            all by default; the others stay at their starts.
+        process_noises: names of inputs, or of noises of the periodic event, through which the process noise enters,
+            held over a period; none for additive noise on every state.
+        measurement_noises: names of inputs through which noise enters the outputs; none for additive noise.
+        substeps: integration steps in a period. preset: of the start values; None for the default one.
+
+    Raises:
+        ValueError: a name is unknown, nothing is measured, or the system does not move so; the message says which.
+    """
+    if isinstance(outputs, str) or not outputs:
+        raise ValueError(
+            f"{system.name}: outputs = {outputs!r}; expected a list of what is measured, some of: "
+            f"{', '.join(scalar_names(system.outputs))}."
+        )
+    require_whole(f"Filter model of {system.name}", substeps=substeps)
+    moving = _Moving(system, substeps, preset)
+    noisy = (*process_noises, *measurement_noises)
+    signals = {name: s for s in system.input_signals for name in s.scalar_names}
+    names = [n for n in scalar_names(system.inputs) if n not in noisy] if inputs is None else list(inputs)
+    for name in (*names, *noisy):
+        known_name(name, signals, f"{system.name}: input")
+    every = {name: s for s in system.outputs for name in s.scalar_names}
+    measured = [every[known_name(name, every, f"{system.name}: output")] for name in outputs]
+    rows = [list(every).index(name) for name in outputs]
+    return FilterModel(
+        name=system.name,
+        description=system.description,
+        source=system.source,
+        states=moving.states,
+        inputs=tuple(_input(name, signals[name]) for name in names),
+        measurements=tuple(_input(name, s) for name, s in zip(outputs, measured, strict=True)),
+        parameters=moving.parameters,
+        process_noises=tuple(_input(name, signals[name]) for name in process_noises),
+        measurement_noises=tuple(_input(name, signals[name]) for name in measurement_noises),
+        moved=moving.transition(names, process_noises),
+        measured=moving.measured(names, measurement_noises, rows),
+        sample_period=moving.sample_period,
+        any_period=moving.event is None,
+    )
+
+
+def find_filter_model(
+    model: Source,
+    outputs: Sequence[str] = (),
+    inputs: Sequence[str] | None = None,
+    process_noises: Sequence[str] = (),
+    measurement_noises: Sequence[str] = (),
+    substeps: int = SUBSTEPS,
+) -> FilterModel:
+    """The model of a filter, of whatever names or is one.
+
+    Args:
+        model: name of an observer model, or of a plant, or ``file.py:Class``; or a model or hybrid system itself. A
+            name that both bear is the observer model's, unless `outputs` are given.
+        outputs, inputs, process_noises, measurement_noises, substeps: of a hybrid system, see `system_model`.
+
+    Raises:
+        ValueError: the name is unknown, or something is asked for that the model has not.
+    """
+    options = {"inputs": inputs, "process_noises": process_noises, "measurement_noises": measurement_noises}
+    if isinstance(model, FilterModel | ObserverModel) or (model in MODELS and not outputs):
+        given = [name for name, value in ({"outputs": outputs} | options).items() if value]
+        if given:
+            raise ValueError(
+                f"{', '.join(given)}: what an observer model measures and knows stands in the model; leave it out, or "
+                "name a plant."
+            )
+        return model if isinstance(model, FilterModel) else filter_model(find_model(model))
+    return system_model(
+        _found(model),
+        outputs,
+        inputs,
+        process_noises=process_noises,
+        measurement_noises=measurement_noises,
+        substeps=substeps,
+    )
+
+
+def _found(model: object) -> HybridSystem:
+    if isinstance(model, HybridSystem):
+        return model
+    if isinstance(model, type) and issubclass(model, HybridSystem):
+        return model()
+    if isinstance(model, str) and names_code(model):
+        found: HybridSystem = load_class(model, USERS)()
+        return found
+    if not isinstance(model, str) or model not in PLANTS:
+        raise ValueError(
+            f"Unknown model {model!r} of a filter; known are the observer models {', '.join(MODELS)}, and with "
+            f"`outputs` the plants {', '.join(PLANTS)}."
+        )
+    return PLANTS[model]()
+
+
+@dataclass(frozen=True)
+class _Moving:
+    """How a hybrid system moves, with all that a filter does not know at its start values."""
+
+    system: HybridSystem
+    substeps: int
+    preset: str | None
+
+    def __post_init__(self) -> None:
+        system = self.system
+        if not system.traceable:
+            raise ValueError(f"{system.name}: it cannot be traced, so it has no Jacobian and is no model of a filter.")
+        own = [f"periodic {e.name!r}" for e in system.periodic_events]
+        own += [f"communication {e.name!r}" for e in system.communication_events]
+        if not system.state_count or (own and (system.continuous_count or len(own) > 1 or system.communication_events)):
+            reason = f"jumps at its own events ({', '.join(own)})" if own else "has no states"
+            raise ValueError(
+                f"{system.name}: it {reason}, expected a system that flows between events from outside, or that has "
+                "no continuous states and one periodic event; it is no model of a filter."
+            )
+
+    @property
+    def event(self) -> str | None:
+        """The periodic event by which the system moves; None where it flows."""
+        events = self.system.periodic_events
+        return events[0].name if events else None
+
+    @property
+    def states(self) -> tuple[Signal, ...]:
+        kept = "continuous" if self.event is None else "discrete"
+        starts = dict(zip(scalar_names(self.system.states), self.system.start_state(self.preset), strict=True))
+        return tuple(
+            state(_identifier(name), s.unit, float(starts[name]), s.description)
+            for s in self.system.states
+            if s.variability == kept
+            for name in s.scalar_names
+        )
+
+    @property
+    def parameters(self) -> tuple[Signal, ...]:
+        """Those of the system, at the values of the preset; the period of its event is the filter's own."""
+        values = dict(
+            zip(scalar_names(self.system.parameters), self.system.start_parameters(self.preset), strict=False)
+        )
+        own = [e.period for e in self.system.periodic_events]
+        return tuple(
+            replace(s, start=tuple(float(values[n]) for n in s.scalar_names) if s.size else float(values[s.name]))
+            for s in self.system.parameters
+            if s.name not in own
+        )
+
+    @property
+    def sample_period(self) -> float:
+        if self.event is None:
+            return float(self.substeps * self.system.internal_step)
+        names = scalar_names(self.system.parameter_signals)
+        return float(self.system.start_parameters(self.preset)[names.index(self.system.periodic_events[0].period)])
+
+    def transition(self, names: Sequence[str], noises: Sequence[str]) -> Transition:
+        """The state a period later."""
+        return lambda x, w, known, period: self._moved(
+            x, self._inputs((*names, *noises), np.hstack([known.u, w])), known, period
+        )
+
+    def measured(self, names: Sequence[str], noises: Sequence[str], rows: Sequence[int]) -> Measured:
+        """Some outputs."""
+
+        def outputs(x: Array, v: Array, known: Known) -> Array:
+            u = self._inputs((*names, *noises), np.hstack([known.u, v]))
+            y = self.system.output_vector(known.t, self._whole(x), u, self._parameters(known.p, self.sample_period))
+            return vector(*(y[i] for i in rows))
+
+        return outputs
+
+    def _moved(self, x: Array, u: Array, known: Known, period: Array) -> Array:
+        p = self._parameters(known.p, period)
+        if self.event is not None:
+            return self.system.jump_vector(self.event, known.t + period, x, u, p)
+        n, h, whole = self.system.continuous_count, period / self.substeps, self._whole(x)
+        for i in range(self.substeps):
+            whole = step(self.system, known.t + i * h, h, whole, u, p, self._jacobian(whole, u, p))
+        return whole[:n]
+
+    def _jacobian(self, x: Array, u: Array, p: Array) -> Callable[[Array, Array], tuple[Array, Array]] | None:
+        if self.system.method != "rosenbrock":
+            return None
+        import casadi as ca  # noqa: PLC0415 - numbers or symbols, as in exact_jacobian
+
+        def derivatives(t: Array, _continuous: Array) -> tuple[Array, Array]:
+            by_x, by_t = self._traced.effective_jacobian(*(ca.SX(value) for value in (t, x, u, p)))
+            symbolic = ca.ArrayInterface.SX
+            count = self.system.continuous_count
+            if isinstance(x, ca.ArrayInterface):
+                return symbolic(by_x, shape=(count, count)), symbolic(by_t, shape=(count,))
+            return np.asarray(ca.DM(by_x)), np.asarray(ca.DM(by_t)).ravel()
+
+        return derivatives
+
+    @cached_property
+    def _traced(self) -> TracedSystem:
+        return TracedSystem(self.system)
+
+    def _whole(self, x: Array) -> Array:
+        held = self.system.start_state(self.preset)[self.system.continuous_count :]
+        return x if self.event is not None or not len(held) else np.hstack([x, held])
+
+    def _inputs(self, names: Sequence[str], values: Array) -> Array:
+        starts = self.system.start_inputs()
+        places = scalar_names(self.system.input_signals)
+        given = {name: values[i] for i, name in enumerate(names)}
+        return vector(*(given.get(n, s) for n, s in zip(places, map(float, starts), strict=True))) if places else starts
+
+    def _parameters(self, p: Array, period: Array) -> Array:
+        """All parameters of the system: those of the filter, its period, and those of the runtime."""
+        own, i, parts = [e.period for e in self.system.periodic_events], 0, []
+        for s in self.system.parameters:
+            if s.name in own:
+                parts.append(period)
+                continue
+            parts.extend(p[i + j] for j in range(s.width))
+            i += s.width
+        runtime = self.system.start_parameters(self.preset)[len(parts) :]
+        return vector(*parts, *map(float, runtime))
+
+
+def _identifier(name: str) -> str:
+    return name.replace("[", "_").replace("]", "")
+
+
+def _input(name: str, signal: Signal) -> Signal:
+    start = signal.start_values[signal.scalar_names.index(name)]
+    return input_signal(_identifier(name), signal.unit, float(start), signal.description)

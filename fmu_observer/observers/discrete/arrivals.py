@@ -1,0 +1,95 @@
+"""How the measurements of a filter arrive: at its own period, or by events from outside. A value."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from fmu_observer.models.filter_model import FilterModel
+from fmu_observer.models.model import stacked
+from plant_models.hybrid import Event, PeriodicEvent, Signal, TriggeredEvent, input_signal
+from plant_models.hybrid.system import Array
+
+PERIODIC = "periodic"
+SAMPLING = "sampling"
+
+
+class Arrivals:
+    """Which measurement arrives at which event.
+
+    Args:
+        who: name of the filter, for messages. model: whose measurements they are.
+        arrival: ``periodic``, or the name of an event, for all measurements or for each in a list.
+
+    Attributes:
+        names: of the events, one a measurement. timed: whether one arrives by an event from outside.
+        apart: whether they arrive at more than one event.
+
+    Raises:
+        ValueError: a list has another length, a name is no identifier, or the model moves at its own period only.
+    """
+
+    def __init__(self, who: str, model: FilterModel, arrival: str | Sequence[str]) -> None:
+        measured = [s.name for s in model.measurements]
+        names = [arrival] * len(measured) if isinstance(arrival, str) else list(arrival)
+        if len(names) != len(measured):
+            raise ValueError(
+                f"{who}: arrival = {list(arrival)!r}; expected one name for each of {', '.join(measured)}, or one for "
+                "all."
+            )
+        wrong = [n for n in names if not isinstance(n, str) or not n.isidentifier() or n == SAMPLING]
+        if wrong:
+            raise ValueError(
+                f"{who}: arrival {wrong[0]!r} is no legal name of an event; use {PERIODIC!r}, or letters, digits and "
+                f"'_', but not {SAMPLING!r}."
+            )
+        self.names = tuple(names)
+        self.signals = model.measurements
+        self.apart = len(set(names)) > 1
+        self.timed = any(name != PERIODIC for name in names)
+        if self.timed and not model.any_period:
+            raise ValueError(
+                f"{who}: {model.name!r} moves at its own period, so its measurements arrive at that period: leave out "
+                "`arrival`, or use a system that flows."
+            )
+
+    @property
+    def inputs(self) -> tuple[Signal, ...]:
+        """Inputs that are read at the filter's own period."""
+        return tuple(
+            input_signal(f"measured_{s.name}", s.unit, s.start, s.description)
+            for s, name in zip(self.signals, self.names, strict=True)
+            if name == PERIODIC
+        )
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """The periodic event, then those from outside with their payloads."""
+        text = "The measurements are read" if not self.timed else "The estimate is predicted"
+        found: list[Event] = [PeriodicEvent(SAMPLING, "sample_period", description=text)]
+        for name in dict.fromkeys(self.names):
+            if name != PERIODIC:
+                payload = tuple(
+                    input_signal(f"{name}_{s.name}", s.unit, s.start, s.description, variability="discrete")
+                    for s in (self.signals[i] for i in self.rows(name))
+                )
+                found.append(TriggeredEvent(name, payload, "A measurement arrives, at its own time stamp"))
+        return tuple(found)
+
+    def rows(self, event: str) -> tuple[int, ...]:
+        """Which measurements arrive at an event.
+
+        Args:
+            event: its name.
+        """
+        name = PERIODIC if event == SAMPLING else event
+        return tuple(i for i, given in enumerate(self.names) if given == name)
+
+    def measured(self, event: str, u: Any) -> Array:
+        """The measurements that arrive at an event, shape (len(rows),).
+
+        Args:
+            event: its name. u: inputs of the filter, payload included.
+        """
+        prefix = "measured" if event == SAMPLING else event
+        return stacked(tuple(getattr(u, f"{prefix}_{self.signals[i].name}") for i in self.rows(event)))

@@ -1,0 +1,383 @@
+"""Base of the filters that carry an estimate and its covariance: signals, arrival of measurements, innovations.
+
+It knows models of filters and hybrid systems; how a filter predicts and corrects is written by its subclass.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Literal, NamedTuple
+
+import numpy as np
+
+from fmu_observer.condition import Condition
+from fmu_observer.filtering.kalman import Corrected, flattened, log_likelihood, normalised_square
+from fmu_observer.models.filter_model import Known
+from fmu_observer.models.model import stacked
+from fmu_observer.models.process_noise import noise_over
+from fmu_observer.models.system_model import SUBSTEPS, Source, find_filter_model
+from fmu_observer.observers.discrete.arrivals import PERIODIC, Arrivals
+from fmu_observer.observers.discrete.covariance_requirements import positive
+from fmu_observer.observers.discrete.filter_condition import steady_condition
+from fmu_observer.observers.discrete.filter_signals import SignalsOf
+from fmu_observer.observers.discrete.sampling import PRIMED
+from fmu_observer.observers.gated_observer import GATED_EVENT, GatedObserver
+from fmu_observer.observers.model_observer import as_matrix
+from fmu_observer.observers.parameter_values import Value, parameter_values
+from plant_models.hybrid import Signal, parameter, vector, width
+from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid.system import Array
+
+Form = Literal["joseph", "short", "square_root"]
+
+DENSITY = 1e-2  # of the default process noise in every state or noise input [x2/s] [ours]
+VARIANCE = 1e-4  # of the default measurement noise [y2] [ours]
+SIGMAS = 3.0  # standard deviations of the position that the gate of balise telegrams grants [ours]
+
+
+class Belief(NamedTuple):
+    """What a filter believes.
+
+    Attributes:
+        estimate: shape (n,). spread: its covariance, or the lower factor of it, shape (n, n). drawn: what a prediction
+            hands on to the correction after it, or None.
+    """
+
+    estimate: Array
+    spread: Array
+    drawn: Any = None
+
+
+class GaussianFilter(GatedObserver):
+    """Base of the Kalman filters of any `FilterModel`.
+
+    The contract:
+
+    1. A subclass writes `predicted` and `corrected`, pure functions of a `Belief`, and `forms`, the forms it has; in
+       the form ``square_root`` the spread is a lower factor, otherwise the covariance.
+    2. With `arrival` ``periodic`` all measurements are inputs ``measured_<y>``, read at the periodic event `sampling`.
+       Any other name is a triggered event that brings the measurement as its payload ``<event>_<y>``; a list gives a
+       name for each measurement, equal names arrive together. A measurement that is missing is an event that does not
+       occur; one that is late is replayed at its stamp by the late policy.
+    3. At an event the belief is first predicted over the time since the last one, with the inputs of now, then
+       corrected by what has arrived. If all is periodic the first sample corrects the start; noise is given as
+       `process_covariance` of one period. With events it is given as `process_density`, `sampling` predicts too,
+       and its first instant begins the time.
+    4. The state is the estimates, the spread row by row, the last innovation and what is known of it. A measurement
+       ``position`` that arrives at the event ``balise`` passes the gate of balise telegrams, see `GatedObserver`.
+
+    Args:
+        model: name of an observer model or of a plant, ``file.py:Class``, or a model or system itself.
+        outputs, inputs, process_noises, measurement_noises, substeps: of a plant, see `models.system_model`.
+        arrival: see above. form: of the covariance equations, one of `forms`.
+        covariances: whether the whole covariance of the estimate is an output, `covariance`, row by row.
+        options: of the subclass.
+
+    Raises:
+        ValueError: an option is not legal, or the model does not suit; the message says which.
+    """
+
+    forms: ClassVar[tuple[Form, ...]] = ("joseph", "short", "square_root")
+    internal_step = 0.1  # nothing flows between samples
+    own_parameters: tuple[Signal, ...] = ()
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "model": (),
+        "outputs": (),
+        "inputs": (),
+        "process_noises": (),
+        "measurement_noises": (),
+        "substeps": (),
+        "arrival": (),
+        "form": ("joseph", "short", "square_root"),
+        "covariances": (False, True),
+    }
+
+    def __init__(
+        self,
+        model: Source,
+        *,
+        outputs: Sequence[str] = (),
+        inputs: Sequence[str] | None = None,
+        process_noises: Sequence[str] = (),
+        measurement_noises: Sequence[str] = (),
+        substeps: int = SUBSTEPS,
+        arrival: str | Sequence[str] = PERIODIC,
+        form: Form | None = None,
+        covariances: bool = False,
+        **options: Any,
+    ) -> None:
+        self.model = find_filter_model(model, outputs, inputs, process_noises, measurement_noises, substeps)
+        self.form: Form = self.forms[0] if form is None else form
+        if self.form not in self.forms:
+            raise ValueError(f"{self.name}: unknown form {form!r}; choose one of: {', '.join(self.forms)}.")
+        self.arrivals = Arrivals(self.name, self.model, arrival)
+        self.covariances = covariances
+        self._declare()
+        super().__init__(model=self.model.name, arrival=arrival, form=self.form, covariances=covariances, **options)
+
+    # -- what a subclass writes -------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def predicted(self, belief: Belief, known: Known, period: Array, noise: Array, p: Any) -> Belief:
+        """The belief a period later.
+
+        Args:
+            belief: before. known: time, inputs and parameters of the model. period: [s].
+            noise: covariance of the process noise in that period, shape (r, r). p: all parameters.
+        """
+
+    @abstractmethod
+    def corrected(
+        self, belief: Belief, known: Known, y: Array, rows: Sequence[int], noise: Array, p: Any
+    ) -> tuple[Corrected, Array]:
+        """The belief after some measurements, and their innovation.
+
+        Args:
+            belief: before. known: time, inputs and parameters of the model. y: the measurements, shape (len(rows),).
+            rows: which they are. noise: covariance of all measurement noise, shape (s, s). p: all parameters.
+        """
+
+    def unmoved(self, belief: Belief, p: Any) -> Belief:
+        """The belief as a prediction hands it on, where there is nothing to predict yet.
+
+        Args:
+            belief: at the start. p: all parameters.
+        """
+        return belief
+
+    # -- what it may use --------------------------------------------------------------------------------------------
+
+    @property
+    def rooted(self) -> bool:
+        """Whether the spread is a factor of the covariance."""
+        return self.form == "square_root"
+
+    def known(self, t: Array, u: Any, p: Any) -> Known:
+        """Time, inputs and parameters of the model.
+
+        Args:
+            t: [s]. u: inputs of the filter. p: its parameters.
+        """
+        inputs = stacked(tuple(getattr(u, s.name) for s in self.model.inputs))
+        values: list[Array] = []
+        for s in self.model.parameters:
+            value = getattr(p, s.name)
+            values.extend([value] if s.size is None else [value[i] for i in range(s.size)])
+        return Known(t, inputs, stacked(tuple(values)))
+
+    def belief(self, x: Array) -> Belief:
+        """What the filter believes.
+
+        Args:
+            x: state, shape (k,).
+        """
+        n = self.model.order
+        return Belief(x[:n], as_matrix(x[n : n + n * n], n, n))
+
+    def covariance_of(self, spread: Array) -> Array:
+        """The covariance that a spread stands for, shape (n, n).
+
+        Args:
+            spread: shape (n, n).
+        """
+        return spread @ spread.T if self.rooted else spread
+
+    # -- what follows -----------------------------------------------------------------------------------------------
+
+    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Prediction over the time since the last event, then correction by what has arrived, shape (own_count,)."""
+        places = self._places
+        before, rows = self.belief(x), self.arrivals.rows(event)
+        primed = x[places["primed"]] > 0.5
+        if self.arrivals.timed:
+            period = np.where(primed, t - x[places["last_time"]], 0.0)
+            known = self.known(t - period, u, p)
+            noise = self._noise_of_density(before.estimate, known, period, p)
+            belief = self.predicted(before, known, period, noise, p)
+        else:
+            known, r = self.known(t - p.sample_period, u, p), self.model.noise_count
+            noise = as_matrix(p.process_covariance, r, r)
+            ahead = self.predicted(before, known, p.sample_period, noise, p)
+            belief = _chosen(primed, ahead, self.unmoved(before, p))
+        kept = {name: x[first] for name, first in places.items()}
+        q = len(self.model.measurements)
+        first, second = places["last_innovation"], places["last_innovation_covariance"]
+        e, S = x[first : first + q], as_matrix(x[second : second + q * q], q, q)
+        if rows:
+            y = self.arrivals.measured(event, u)
+            s = self.model.reading_noise_count
+            after, error = self.corrected(
+                belief, self.known(t, u, p), y, rows, as_matrix(p.measurement_covariance, s, s), p
+            )
+            belief = Belief(after.estimate, after.covariance)
+            kept["last_nis"] = normalised_square(error, after.innovation_covariance)
+            kept["log_likelihood"] = kept["log_likelihood"] + log_likelihood(error, after.innovation_covariance)
+            e, S = _replaced(e, S, rows, error, after.innovation_covariance)
+        timed = (t + 0.0 * kept["primed"],) if self.arrivals.timed else ()
+        counted = ((float(len(rows)) if rows else kept["last_count"]),) if self.arrivals.apart else ()
+        return vector(
+            *(belief.estimate[i] for i in range(self.model.order)),
+            *flattened(belief.spread),
+            *(e[i] for i in range(q)),
+            *flattened(S),
+            kept["last_nis"],
+            kept["log_likelihood"],
+            *counted,
+            *timed,
+            1.0 + 0.0 * kept["primed"],
+        )
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """Estimates, their standard deviations, and what is known of the last innovation."""
+        n, q, places = self.model.order, len(self.model.measurements), self._places
+        P = self.covariance_of(self.belief(x).spread)
+        first, second = places["last_innovation"], places["last_innovation_covariance"]
+        values = {s.name: x[i] for i, s in enumerate(self.model.states)}
+        values |= {f"{s.name}_std": np.sqrt(np.maximum(P[i, i], 0.0)) for i, s in enumerate(self.model.states)}
+        for i, s in enumerate(self.model.measurements):
+            values[f"innovation_{s.name}"] = x[first + i]
+        values["innovation_covariance"] = x[second : second + q * q]
+        values |= {"nis": x[places["last_nis"]], "innovation_likelihood": x[places["log_likelihood"]]}
+        if self.arrivals.apart:
+            values["nis_degrees"] = x[places["last_count"]]
+        if self.covariances:
+            values["covariance"] = np.reshape(P, (n * n,))
+        return values
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """Covariances are symmetric and positive; other parameters within their bounds."""
+        s = self.model.reading_noise_count
+        r = self.model.noise_count
+        needed = super().requirements(p) | within_bounds(self.own_parameters, p)
+        needed |= positive(self._process_name, getattr(p, self._process_name), r, definite=False)
+        return needed | positive("measurement_covariance", p.measurement_covariance, s, definite=True)
+
+    def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
+        """Whether the filter has a stable steady state with the gains of a preset, some replaced.
+
+        Args:
+            parameters: values by name. preset: to start from; None for the default one.
+
+        Raises:
+            ValueError: a parameter is unknown, not finite or of another size, or the preset is unknown.
+        """
+        return self.condition_of(self.unpack_parameters(parameter_values(self, parameters, preset, "to judge")))
+
+    def condition_of(self, p: Any) -> Condition:
+        """Whether the filter linearised at the start of the estimates has a stable steady state.
+
+        Args:
+            p: all parameters.
+        """
+        start, period = self.model.start, float(p.sample_period)
+        inputs = np.array([float(s.start_values[0]) for s in self.model.inputs])
+        known = Known(0.0, inputs, np.asarray(self.known(0.0, _Starts(self.model.inputs), p).p, dtype=float))
+        r, s = self.model.noise_count, self.model.reading_noise_count
+        if self.arrivals.timed:
+            noise = np.asarray(self._noise_of_density(start, known, period, p))
+        else:
+            noise = as_matrix(np.asarray(p.process_covariance), r, r)
+        readings = as_matrix(np.asarray(p.measurement_covariance), s, s)
+        return steady_condition(self.model, start, known, period, noise, readings, self.source)
+
+    def own_bound(self, x: Array, p: Any) -> Array:
+        """Three standard deviations of the position [m], for the gate of balise telegrams."""
+        i = self.position_state
+        return SIGMAS * np.sqrt(np.maximum(self.covariance_of(self.belief(x).spread)[i, i], 0.0))
+
+    # -- internals --------------------------------------------------------------------------------------------------
+
+    @property
+    def _process_name(self) -> str:
+        return "process_density" if self.arrivals.timed else "process_covariance"
+
+    def _noise_of_density(self, x: Array, known: Known, period: Array, p: Any) -> Array:
+        r = self.model.noise_count
+        density = as_matrix(p.process_density, r, r)
+        if self.model.process_noises:  # held over the period
+            return density / np.where(period > 0.0, period, 1.0)
+        return noise_over(self.model, x, known, period, density)
+
+    def _declare(self) -> None:
+        """Signals and events, from the model and the way its measurements arrive."""
+        model = self.model
+        told = SignalsOf(model, self.arrivals, rooted=self.rooted, covariances=self.covariances)
+        self.states = (*told.memory(), PRIMED)
+        self._places = {s.name: width(self.states[:i]) for i, s in enumerate(self.states)}
+        self.inputs = (*model.inputs, *self.arrivals.inputs)
+        self.events = self.arrivals.events
+        self.outputs = told.outputs()
+        self.parameters = (*self._declared_noise(), *self.own_parameters, *model.parameters)
+        period = "Period of the prediction" if self.arrivals.timed else "Sampling period of the measurements"
+        self.parameters += (parameter("sample_period", "s", model.sample_period, period, min=1e-6),)
+        if GATED_EVENT in self.arrivals.names:
+            self.position_state = self._position_state()
+
+    def _declared_noise(self) -> tuple[Signal, ...]:
+        r, s = self.model.noise_count, self.model.reading_noise_count
+        readings = VARIANCE * np.eye(s)
+        return (
+            _matrix(self._process_name, *self._default_noise(r)),
+            _matrix("measurement_covariance", readings, "Covariance RN of the measurements, row by row"),
+        )
+
+    def _default_noise(self, r: int) -> tuple[np.ndarray, str]:
+        model, density = self.model, DENSITY * np.eye(r)
+        if self.arrivals.timed:
+            return density, "Spectral density of the process noise, row by row"
+        text = "Covariance QN of the process noise of one period, row by row"
+        if model.process_noises:
+            return (density / model.sample_period if model.any_period else np.eye(r)), text
+        if not model.any_period:
+            return density * model.sample_period, text
+        inputs = np.array([float(s.start_values[0]) for s in model.inputs])
+        parameters = np.array([value for s in model.parameters for value in s.start_values])
+        known = Known(0.0, inputs, parameters)
+        return np.asarray(noise_over(model, model.start, known, model.sample_period, density)), text
+
+    def _position_state(self) -> int:
+        """The state that the told position is: the one whose column in its row of the Jacobian is largest."""
+        names = [s.name for s in self.model.measurements]
+        parameters = np.array([value for s in self.model.parameters for value in s.start_values])
+        inputs = np.array([float(s.start_values[0]) for s in self.model.inputs])
+        H, _ = self.model.measurement_jacobians(self.model.start, Known(0.0, inputs, parameters))
+        return int(np.argmax(np.abs(np.asarray(H)[names.index("position")])))
+
+
+def _matrix(name: str, values: np.ndarray, text: str) -> Signal:
+    return parameter(name, "1", tuple(map(float, values.ravel())), text, size=values.size)
+
+
+def _chosen(primed: Array, one: Belief, other: Belief) -> Belief:
+    """The one belief where a filter has begun, else the other."""
+
+    def fields(a: Any, b: Any) -> Any:
+        if a is None:
+            return None
+        return (
+            type(a)(*(fields(*pair) for pair in zip(a, b, strict=True)))
+            if isinstance(a, tuple)
+            else np.where(primed, a, b)
+        )
+
+    return Belief(*(fields(*pair) for pair in zip(one, other, strict=True)))
+
+
+def _replaced(e: Array, S: Array, rows: Sequence[int], error: Array, found: Array) -> tuple[Array, Array]:
+    """The last innovations and their covariance, with those of `rows` replaced."""
+    q = e.shape[0]
+    if list(rows) == list(range(q)):
+        return error, found
+    place = {row: i for i, row in enumerate(rows)}
+    innovations = vector(*(error[place[i]] if i in place else e[i] for i in range(q)))
+    entries = [found[place[i], place[j]] if i in place and j in place else S[i, j] for i in range(q) for j in range(q)]
+    return innovations, as_matrix(vector(*entries), q, q)
+
+
+class _Starts:
+    """Start values of signals as attributes, in place of the inputs of a run."""
+
+    def __init__(self, signals: Sequence[Signal]) -> None:
+        for s in signals:
+            setattr(self, s.name, float(s.start_values[0]))
