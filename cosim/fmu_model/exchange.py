@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import ceil
 
+import numpy as np
+
 from cosim.fmu_model.sealed import Array, FmuModelError, SealedModel, declared_states
 
 
@@ -53,6 +55,27 @@ class ExchangeModel(SealedModel):
                 self._write_inputs()
 
         self._told(move)
+
+    def demand_moved(self, x: Array) -> None:
+        """Refuse an FMU that does not take its states.
+
+        Args:
+            x: states where it stands, shape (n,).
+
+        Raises:
+            FmuModelError: states that were set are not there.
+        """
+        moved = x + 1e-3 * np.maximum(np.abs(x), 1.0)
+        self._told(lambda: self.instance.set_states(moved))
+        found = self._told(self.instance.states)
+        self._told(lambda: self.instance.set_states(x))
+        wrong = np.flatnonzero(np.abs(found - moved) > 1e-9 * np.maximum(np.abs(moved), 1.0))
+        if len(wrong):
+            i = int(wrong[0])
+            raise FmuModelError(
+                f"{self.path}: setContinuousStates does not move {self.states[i]}: set to {float(moved[i])!r}, it "
+                f"reads {float(found[i])!r}. Use its co-simulation where it has one."
+            )
 
     def advance(self, t: float, h: float) -> None:
         """Integrate from where the instance stands by Runge-Kutta steps of fourth order, inputs held.

@@ -91,6 +91,10 @@ def linearise(model: SealedModel, t: float, x: Array, u: Array, step: float) -> 
     else:
         function, length = _sampled(model, t, step), step
     rates, y = function(x, u)
+    if not (np.isfinite(rates).all() and np.isfinite(y).all()):
+        raise FmuModelError(f"{model.path}: at this point it gives values that are no finite numbers. Choose another.")
+    if isinstance(model, ExchangeModel):
+        model.demand_moved(x)
     whole = None
     if isinstance(model, ExchangeModel) and model.directional:
         whole, doubt = _directional(model, function, x, u)
