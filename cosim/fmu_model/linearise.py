@@ -125,6 +125,19 @@ def linearise(model: SealedModel, t: float, x: Array, u: Array, step: float) -> 
     )
 
 
+def right_slopes(model: ExchangeModel) -> bool:
+    """Whether an FMU has directional derivatives that agree with differences at its start.
+
+    Args:
+        model: the FMU.
+    """
+    if not model.directional:
+        return False
+    model.restart(0.0, model.start, model.start_inputs)
+    found, _ = _directional(model, _continuous(model, 0.0), model.start, model.start_inputs)
+    return found is not None
+
+
 def linearise_system(
     system: HybridSystem,
     *,

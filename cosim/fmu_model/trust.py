@@ -90,8 +90,8 @@ def _demand_read_back(model: SealedModel, t: float, x: Array, u: Array) -> None:
         if abs(found[i] - moved[i]) > ROUNDING * max(abs(moved[i]), 1.0):
             raise FmuModelError(
                 f"{model.path}: the state {name} was set to {float(moved[i])!r} and reads {float(found[i])!r} after "
-                "initialisation: the FMU does not take it. Name another variable that holds this state, or use a particle filter over "
-                "saved states."
+                "initialisation: the FMU does not take it. Name another variable that holds this state, or use a "
+                "particle filter over saved states."
             )
 
 
