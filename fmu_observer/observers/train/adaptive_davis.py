@@ -7,41 +7,51 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampled_error
+from fmu_observer.observers.adaptation_at_samples import (
+    AtSample,
+    Constants,
+    Since,
+    constants_now,
+    covariance_at_first,
+    covariance_at_sample,
+    covariance_now,
+    excitation_now,
+    gain_now,
+    since_flow,
+    state_covariance,
+)
 from fmu_observer.observers.adaptive_law import (
-    Adaptation,
-    Gains,
-    Plant,
-    Sizes,
-    adaptation_flow,
-    adaptation_of,
-    adaptation_states,
-    covariance_after,
-    error_drift,
-    gains_of,
     gentle_gain,
     learnt_constants,
     packed,
     smallest_eigenvalue,
-    start_covariance,
+    unpacked,
 )
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
-from fmu_observer.observers.train.train_observer import BALISE, POSITION, SPEED
-from plant_models.hybrid import PeriodicEvent, Signal, input_signal, memory, output_signal, parameter, state, vector
+from fmu_observer.observers.train.adaptive_davis_states import (
+    FIRST_GAIN,
+    SCALE,
+    SIZES,
+    STATES,
+    entries,
+    just_sampled,
+    moving_values,
+    of_state,
+    parts_of,
+    sensitivity_of,
+)
+from fmu_observer.observers.train.train_observer import BALISE
+from plant_models.hybrid import PeriodicEvent, Signal, input_signal, output_signal, parameter, vector
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
-SIZES = Sizes(2, 3, 2, sampled=True)
 BALISE_WEIGHT = 0.1  # [1/m] [ours]: a metre of a balise counts as 0.1 m/s of the odometer
 C = np.array([[BALISE_WEIGHT, 0.0], [0.0, 1.0]])
 A = np.array([[0.0, 1.0], [0.0, 0.0]])
-SCALE = 30.0  # [m/s]: constants are what each term of the resistance is at this speed [m/s2]
 MU, FORGETTING = 0.2, 0.0  # [1/s] [ours]
-FIRST_GAIN = 1.0  # [ours], of R
-PRIOR = (100.0, 5.0, 0.02, 0.02, 0.02)  # standard deviations at the start [m], [m/s], [m/s2] three times [ours]
-QUICKEST = 50.0  # [1/s]: no sample moves constants faster, which keeps explicit integration stable
-COUNT = SIZES.error * (SIZES.error + 1) // 2
-P, V, DELTA, ADAPTATION = 0, 1, 2, 5
+QUICKEST = 50.0  # [1/s]: no sample moves constants faster [ours]
+P, V = 0, 1
 NAMES = ("davis_a_per_mass", "davis_b_per_mass", "davis_c_per_mass")
 UNITS = ("m/s2", "1/s", "1/m")
 POWERS = np.array([1.0, SCALE, SCALE**2])
@@ -51,7 +61,7 @@ ADAPTIVE = (
     parameter("gain_floor", "1", 0.0, "One over the largest adaptation gain; 0 for no limit", min=0.0),
     parameter("least_excitation", "1", 1e-4, "Mean excitation below which a coefficient is held", min=0.0),
     parameter("excitation_time", "s", 120.0, "Window of that mean", min=1e-9),
-    parameter("first_gain", "1", FIRST_GAIN, "Adaptation gain R at the first balise", min=0.0),
+    parameter("first_gain", "1", FIRST_GAIN, "Adaptation gain R at the first reading", min=0.0),
     parameter("balise_deviation", "m", 0.5, "Standard deviation of the place of a balise as read", min=0.0),
     parameter("odometer_deviation", "m/s", 0.05, "Standard deviation of the noise of a reading", min=0.0),
     parameter("odometer_period", "s", 0.2, "Time between two readings", min=1e-4),
@@ -66,14 +76,15 @@ class AdaptiveDavis(GatedObserver, GapCertified):
     ``dp = v``, ``dv = effort / mass - (a + b v + c v^2)``, with a, b, c unknown, believed first to be the parameters
     `davis_a`, `davis_b`, `davis_c` over `mass`. Measured are the position at balises and the speed at samples of the
     odometer, each with an output of its own that is predicted between its samples; sensitivities are sampled like the
-    outputs, see `adaptive_law`. The regressors ``1, v, v^2`` are those of the estimated speed. The first balise sets
-    the position, the first reading the speed.
+    outputs, and the coefficients move in closed form, see `adaptation_at_samples`. The regressors ``1, v, v^2`` are
+    those of the estimated speed. The first balise sets the position, the first reading the speed.
 
     Only effort over mass is known, so a mass or an effort that is wrong by a share is told as resistance, and so are
     gradients: use it where the line is level or its gradient is part of the effort, with the effort that acts. One
     speed tells the resistance at that speed and no more: b and c are learnt where the speed varies.
     `resistance_per_mass_deviation` is the standard deviation of the resistance at the speed now, always much surer
-    than its parts. Below `minimum_speed`, and where `least_excitation` is not reached, coefficients are held.
+    than its parts. Below `minimum_speed`, and where `least_excitation` is not reached, coefficients are held: from one
+    sample to the next.
 
     Gains [ours]: mu 0.2 1/s; coefficients do not forget.
     """
@@ -82,6 +93,7 @@ class AdaptiveDavis(GatedObserver, GapCertified):
     description = "Train observer that learns the Davis coefficients per unit mass"
     source = "Hann 2014, (4.7); the train case, covariance and holding are ours"
     internal_step = 1e-2
+    states = STATES
     inputs: tuple[Signal, ...] = (
         input_signal("effort", "N", 0.0, "Effort that acts at the wheel rim: traction positive, brake negative"),
         input_signal("odometer", "m/s", 0.0, "Odometer speed"),
@@ -114,98 +126,98 @@ class AdaptiveDavis(GatedObserver, GapCertified):
     )
     events = (BALISE, PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read"))
 
-    def __init__(self) -> None:
-        first = start_covariance(C, PRIOR, SIZES, True)
-        self.states = (
-            POSITION,
-            SPEED,
-            *(state(f"correction_{n[6]}", "m/s2", 0.0, f"Correction of {n[6]}, at {SCALE:g} m/s") for n in NAMES),
-            *adaptation_states(SIZES, first, gain=FIRST_GAIN),
-            state("predicted_balise", "1", 0.0, f"Predicted position times {BALISE_WEIGHT:g}"),
-            state("predicted_odometer", "m/s", 1.0, "Predicted odometer"),
-            memory("balises_used", "1", 0.0, "Balises used so far"),
-            memory("readings_used", "1", 0.0, "Readings used so far"),
-            memory("last_innovation", "m", 0.0, "Position error seen at the last balise"),
-        )
-        super().__init__()
-
     def requirements(self, p: Any) -> dict[str, Array]:
         """The parameters lie within their bounds."""
         return super().requirements(p) | within_bounds(ADAPTIVE, p)
 
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Position, speed, corrections, adaptation and predicted outputs."""
-        adaptation = self._adaptation(x)
-        regressor = _regressor(x[V])
-        acceleration = self._acceleration(x, u, p)
+        """Position, speed, their sensitivities and gain, and what happens since the last sample."""
+        known, since = parts_of(x)
+        now = constants_now(known, since)
+        sensitivity, inverse_s = sensitivity_of(x), unpacked(of_state(x, "inverse_s"), 2)
         slope = (p.davis_b + 2.0 * p.davis_c * x[V]) / p.mass
         drift = A - np.vstack([np.zeros((1, 2)), np.hstack([0.0, slope])])
-        Phi = -np.vstack([np.zeros((1, 3)), regressor])
-        noise = p.unknown_acceleration * np.outer(DISTURBED, DISTURBED)
-        plant = Plant(drift, x[:2], Phi, C, noise)
-        gains = self._gains(adaptation, x, p)
-        c = C @ x[:2] - x[self.own_count - 5 : self.own_count - 3]
-        predicted = vector(x[V], acceleration)
-        return np.hstack(
-            [
-                predicted - gains.total @ c,
-                -(gains.constants @ c),
-                *adaptation_flow(adaptation, plant, gains, error_drift(plant, gains, SIZES, True), p.mu, p, SIZES),
-                C @ predicted - gains.output @ c,
-            ]
+        gain = inverse_s @ C.T
+        predicted = vector(x[V], self._acceleration(x, now, u, p))
+        moving = since_flow(since, gain, drift, C, p.unknown_acceleration * DISTURBED)
+        d_sensitivity = drift @ sensitivity - gain @ (since.decay @ known.seen)
+        d_speed = [d_sensitivity[1, j] - r for j, r in enumerate(_regressor(x[V]))]
+        d_inverse = p.mu * inverse_s + drift @ inverse_s + inverse_s @ drift.T - gain @ gain.T
+        return vector(
+            *entries(predicted - gain @ now.innovation + sensitivity @ now.rates),
+            *(d_sensitivity[0, j] for j in range(3)),
+            *d_speed,
+            *entries(packed(d_inverse, 2)),
+            *moving_values(moving),
         )
 
     def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """The predicted output of what is measured is set to it; the first measurement sets the estimate too."""
+        """One component of the innovation is set to what is measured; the first measurement sets the estimate too."""
         row = 0 if event == BALISE.name else 1
+        known, since = parts_of(x)
+        now = constants_now(known, since)
         if row == 0:
             measured, deviation = u.balise_position, p.balise_deviation
         else:
-            measured, deviation = u.odometer + p.reading_age * self._acceleration(x, u, p), p.odometer_deviation
-        weight = float(C[row, row])
-        first = np.where(x[self.own_count - 3 + row] > 0.0, 0.0, 1.0)
-        adaptation = self._adaptation(x)
-        moved = covariance_after(adaptation.covariance, C, row, (weight * deviation) ** 2, SIZES, True)
-        begun = _begun(adaptation.covariance, row, weight, deviation**2)
-        V_after = np.where(first > 0.0, packed(begun, SIZES.error), packed(moved, SIZES.error))
-        # what has just been measured does not depend on the coefficients
-        L = [np.where(first > 0.0, 0.0, adaptation.sensitivity[row, j]) for j in range(3)]
-        R = packed(gentle_gain(adaptation.R, weight * vector(*L), QUICKEST), 3)
-        before = self.own_count - 5 - COUNT
-        estimate = np.where(first > 0.0, measured, x[row])
-        own = [x[i] for i in range(before)]
-        own[row] = estimate
-        own[ADAPTATION : ADAPTATION + 6] = [R[i] for i in range(6)]
-        own[ADAPTATION + 6 + 3 * row : ADAPTATION + 9 + 3 * row] = L
-        own[ADAPTATION + 12 + 3 * row : ADAPTATION + 15 + 3 * row] = [weight * value for value in L]
-        kept = [x[i] for i in range(self.own_count - 5, self.own_count)]
-        kept[row] = weight * measured
-        kept[2 + row] = kept[2 + row] + 1.0
-        if row == 0:
-            kept[4] = x[P] - measured
-        return vector(*own, *(V_after[i] for i in range(COUNT)), *kept)
+            measured = u.odometer + p.reading_age * self._acceleration(x, now, u, p)
+            deviation = p.odometer_deviation
+        weight, used = float(C[row, row]), list(entries(of_state(x, "samples_used")))
+        first = np.where(used[row] > 0.0, 0.0, 1.0)
+        used[row] = used[row] + 1.0
+        estimate, sensitivity = [x[P], x[V]], list(entries(of_state(x, "sensitivity")))
+        # what has just been measured for the first time does not depend on the coefficients
+        L = [np.where(first > 0.0, 0.0, sensitivity[3 * row + j]) for j in range(3)]
+        sensitivity[3 * row : 3 * row + 3] = L
+        reads = weight * vector(*L)
+        seen, c = [r for line in (since.decay @ known.seen) for r in entries(line)], list(entries(now.innovation))
+        seen[3 * row : 3 * row + 3] = entries(reads)
+        c[row] = np.where(first > 0.0, 0.0, weight * (x[row] - measured))
+        estimate[row] = np.where(first > 0.0, measured, x[row])
+        R = gain_now(known, since, p.forgetting, p.gain_floor)
+        if row == 1:
+            R = np.where(first > 0.0, p.first_gain * np.eye(3), R)
+        before = covariance_now(known, since, now.by_innovation, SIZES)
+        moved = covariance_at_sample(before, C, row, reads, (weight * deviation) ** 2, SIZES)
+        begun = covariance_at_first(before, row, row, deviation**2, SIZES)
+        excitation = excitation_now(known, since, p.excitation_time)
+        innovation = x[P] - measured if row == 0 else of_state(x, "last_innovation")[0]
+        return vector(
+            *estimate,
+            *sensitivity,
+            *entries(of_state(x, "inverse_s")),
+            *just_sampled(),
+            *entries(now.values),
+            *c,
+            *entries(packed(gentle_gain(R, reads, QUICKEST), 3)),
+            *seen,
+            *entries(packed(excitation, 3)),
+            *entries(packed(np.where(first > 0.0, begun, moved), SIZES.error)),
+            *self._learnt(excitation, estimate[V], p),
+            *used,
+            innovation,
+        )
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """Position, speed and coefficients with their uncertainty."""
-        adaptation = self._adaptation(x)
-        covariance = adaptation.covariance
-        learnt = self._learnt(adaptation, x, p)
+        known, since = parts_of(x)
+        now = constants_now(known, since)
+        covariance = self._covariance(x, known, since, now)
         regressor = _regressor(x[V])
         of_resistance = sum(
-            (regressor[0, i] * regressor[0, j] * covariance[2 + i, 2 + j] for i in range(3) for j in range(3)), 0.0
+            (regressor[i] * regressor[j] * covariance[2 + i, 2 + j] for i in range(3) for j in range(3)), 0.0
         )
-        believed = self._coefficients(x, p)
+        believed = self._coefficients(now, p)
         return {
             "position": x[P],
             "speed": x[V],
-            "innovation": x[self.own_count - 1],
+            "innovation": of_state(x, "last_innovation")[0],
             "position_deviation": _root(covariance[0, 0]),
             **{n: believed[i] for i, n in enumerate(NAMES)},
             **{f"{n}_deviation": _root(covariance[2 + i, 2 + i]) / POWERS[i] for i, n in enumerate(NAMES)},
-            **{f"{n}_learnt": learnt[i] for i, n in enumerate(NAMES)},
-            "resistance_per_mass": self._resistance(x, p),
+            **{f"{n}_learnt": known.learnt[i] for i, n in enumerate(NAMES)},
+            "resistance_per_mass": self._resistance(x, now, p),
             "resistance_per_mass_deviation": _root(of_resistance),
-            "smallest_excitation": smallest_eigenvalue(adaptation.excitation, 3),
+            "smallest_excitation": smallest_eigenvalue(excitation_now(known, since, p.excitation_time), 3),
         }
 
     def odometer_of(self, u: Any) -> Array:
@@ -214,7 +226,8 @@ class AdaptiveDavis(GatedObserver, GapCertified):
 
     def own_bound(self, x: Array, p: Any) -> Array:
         """One standard deviation of the position [m]; the gate adds three times the recent innovation."""
-        return _root(self._adaptation(x).covariance[0, 0])
+        known, since = parts_of(x)
+        return _root(self._covariance(x, known, since, constants_now(known, since))[0, 0])
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate of position and speed with the coefficients known and the odometer read all the time."""
@@ -230,45 +243,34 @@ class AdaptiveDavis(GatedObserver, GapCertified):
 
     # -- internals --------------------------------------------------------------------------------------------------
 
-    def _adaptation(self, x: Array) -> Adaptation:
-        return adaptation_of(x[ADAPTATION:], C, SIZES)[0]
+    def _covariance(self, x: Array, known: AtSample, since: Since, now: Constants) -> Array:
+        """Of position, speed and corrections, shape (5, 5)."""
+        V_now = covariance_now(known, since, now.by_innovation, SIZES)
+        return state_covariance(V_now, sensitivity_of(x), SIZES)
 
-    def _learnt(self, adaptation: Adaptation, x: Array, p: Any) -> Array:
-        moves = np.where(x[V] > p.minimum_speed, 1.0, 0.0)
-        return moves * learnt_constants(adaptation.excitation, p.least_excitation, 3)
+    def _learnt(self, excitation: Array, speed: Array, p: Any) -> list[Array]:
+        moves = np.where(speed > p.minimum_speed, 1.0, 0.0)
+        return [moves * one for one in entries(learnt_constants(excitation, p.least_excitation, 3))]
 
-    def _gains(self, adaptation: Adaptation, x: Array, p: Any) -> Gains:
-        return gains_of(adaptation, C, self._learnt(adaptation, x, p))
-
-    def _coefficients(self, x: Array, p: Any) -> tuple[Array, ...]:
+    def _coefficients(self, now: Constants, p: Any) -> tuple[Array, ...]:
         first = (p.davis_a, p.davis_b, p.davis_c)
-        return tuple(first[i] / p.mass + x[DELTA + i] / POWERS[i] for i in range(3))
+        return tuple(first[i] / p.mass + now.values[i] / POWERS[i] for i in range(3))
 
-    def _resistance(self, x: Array, p: Any) -> Array:
-        a, b, c = self._coefficients(x, p)
+    def _resistance(self, x: Array, now: Constants, p: Any) -> Array:
+        a, b, c = self._coefficients(now, p)
         return a + b * x[V] + c * x[V] ** 2
 
-    def _acceleration(self, x: Array, u: Any, p: Any) -> Array:
+    def _acceleration(self, x: Array, now: Constants, u: Any, p: Any) -> Array:
         moves = np.where(x[V] > 0.0, 1.0, 0.0)
-        return u.effort / p.mass - moves * self._resistance(x, p)
+        return u.effort / p.mass - moves * self._resistance(x, now, p)
 
 
-DISTURBED = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+DISTURBED = np.array([[0.0, 0.0], [0.0, 1.0]])
 
 
-def _regressor(speed: Array) -> Array:
+def _regressor(speed: Array) -> tuple[Array, Array, Array]:
     share = speed / SCALE
-    return np.reshape(vector(1.0 + 0.0 * share, share, share * share), (1, 3))
-
-
-def _begun(covariance: Array, row: int, weight: float, variance: Array) -> Array:
-    """Covariance where an estimate has just been set to its first measurement."""
-    place = SIZES.n + SIZES.m + row
-    kept = np.eye(SIZES.error)
-    kept[row, row] = kept[place, place] = 0.0
-    noise = np.zeros(SIZES.error)
-    noise[row], noise[place] = 1.0, weight
-    return kept @ covariance @ kept + variance * np.outer(noise, noise)
+    return 1.0, share, share * share
 
 
 def _settled(mu: float) -> np.ndarray:

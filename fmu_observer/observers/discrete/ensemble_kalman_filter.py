@@ -1,0 +1,42 @@
+"""The ensemble Kalman filter as a system."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from fmu_observer.filtering.ensemble import correct_members, inflated, mean_of, variances_of
+from fmu_observer.models.filter_model import Known
+from fmu_observer.observers.discrete.member_filter import MemberFilter
+from fmu_observer.observers.model_observer import as_matrix
+from plant_models.hybrid import parameter
+from plant_models.hybrid.system import Array
+
+
+class EnsembleKalmanFilter(MemberFilter):
+    """Ensemble Kalman filter with perturbed measurements; needs no Jacobian.
+
+    Its estimate is the mean of the members, its covariance theirs, so both carry a sampling error of
+    ``1 / sqrt(2 members)`` of their size; `inflation` moves members apart before each correction, against the spread
+    that small ensembles lose.
+
+    Options and signals are those of `MemberFilter`. Defaults [ours]: QN of white noise of density 0.01 in every state,
+    RN = 1e-4, members drawn with the covariance I.
+    """
+
+    name = "ensemble_kalman_filter"
+    description = "Ensemble Kalman filter, periodic measurements"
+    source = "Burgers, van Leeuwen, Evensen, Monthly Weather Review 126 (1998) 1719"
+    perturbs = True
+    own_parameters = (parameter("inflation", "1", 1.0, "Factor of the members' distances from their mean", min=1.0),)
+
+    def corrected(self, members: Array, more: Array, y: Array, known: Known, u: Any, p: Any) -> Sequence[Array]:
+        """Estimate, NIS, variances and members after the gain of the ensemble, see `MemberFilter.corrected`."""
+        q = len(self.model.measurements)
+        spread = inflated(members, p.inflation)
+        RN = as_matrix(p.measurement_covariance, q, q)
+        draws = np.reshape(u.measurement_normal, (q, self.members))
+        after = correct_members(spread, self.seen(spread, known), y, RN, draws)
+        return mean_of(after.members), after.nis, variances_of(after.members), after.members

@@ -1,0 +1,78 @@
+"""The particle filter as a system."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from fmu_observer.filtering.particles import effective_size, innovation_square, moments, resampled, reweighted
+from fmu_observer.models.filter_model import Known
+from fmu_observer.models.system_model import Source
+from fmu_observer.observers.discrete.member_filter import DEFAULT, MemberFilter
+from fmu_observer.observers.model_observer import as_matrix
+from plant_models.hybrid import memory, output_signal, parameter
+from plant_models.hybrid.system import Array
+
+
+class ParticleFilter(MemberFilter):
+    """Bootstrap particle filter: members with weights, so that beliefs may have several peaks.
+
+    Each particle's weight is multiplied by the likelihood of the measurement. Where the effective sample size falls
+    below `resampling_threshold` times the members, they are resampled systematically, without drawing. Estimate and
+    deviation are the mean and the spread of the weighted particles. With few members and small measurement noise all
+    weight falls on one particle: `effective_members` tells.
+
+    Options and signals are those of `MemberFilter`. Defaults [ours]: QN of white noise of density 0.01 in every state,
+    RN = 1e-4, particles drawn with the covariance I.
+
+    Args:
+        model: see `MemberFilter`. members: how many particles, 2 to 50. options: those of `MemberFilter`.
+    """
+
+    name = "particle_filter"
+    description = "Particle filter, periodic measurements"
+    source = "Gordon, Salmond, Smith, IEE Proceedings F 140 (1993) 107"
+    own_parameters = (
+        parameter(
+            "resampling_threshold",
+            "1",
+            0.5,
+            "Effective share of members below which they are resampled",
+            min=0.0,
+            max=1.0,
+        ),
+    )
+    own_outputs = (
+        output_signal("effective_members", "1", "Effective sample size before resampling", variability="discrete"),
+    )
+
+    def __init__(self, model: Source = "pendulum", members: int = DEFAULT, **options: Any) -> None:
+        self.own_memory = (
+            memory("weights", "1", 1.0 / max(members, 1), "Weights of the members", size=max(members, 1)),
+            memory("effective", "1", float(members), "Effective sample size at the last sample"),
+        )
+        super().__init__(model, members, **options)
+
+    def corrected(self, members: Array, more: Array, y: Array, known: Known, u: Any, p: Any) -> Sequence[Array]:
+        """Estimate, NIS, variances, particles, weights and effective size, see `MemberFilter.corrected`."""
+        q, n, count = len(self.model.measurements), self.model.order, self.members
+        RN, seen = as_matrix(p.measurement_covariance, q, q), self.seen(members, known)
+        before = more[:count]
+        weights = reweighted(before, seen, y, RN)
+        found, size = moments(members, weights), effective_size(weights)
+        poor = size < p.resampling_threshold * count
+        variances = np.stack([found.covariance[i, i] for i in range(n)])
+        return (
+            found.mean,
+            innovation_square(seen, before, y, RN),
+            variances,
+            np.where(poor, resampled(members, weights), members),
+            np.where(poor, np.full(count, 1.0 / count), weights),
+            np.reshape(size, (1,)),
+        )
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """Estimates, their standard deviations, NIS and the effective sample size."""
+        return super().output(t, x, u, p) | {"effective_members": x[x.shape[0] - 2]}
