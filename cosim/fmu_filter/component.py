@@ -18,6 +18,7 @@ from cosim.fmu_filter.journal import SAME, Journal
 from cosim.fmu_filter.settings import FilterTable
 from cosim.fmu_model.opening import open_model
 from cosim.fmu_model.sealed import FmuModelError, SealedModel
+from cosim.fmu_model.trust import check_states, usual_step
 from plant_models.hybrid.signal import Signal, input_signal, output_signal
 from plant_models.hybrid.units import UnitError, parse_unit
 
@@ -34,18 +35,28 @@ class FmuFilterModel:
 
     Args:
         path: the ``.fmu`` file. table: which filter. parameters: start values of the FMU by name.
+        checked: whether its states have been looked at already.
 
     Raises:
         FmuLoadError: the FMU cannot be opened.
         FmuModelError: a name is unknown, or it cannot serve this filter.
     """
 
-    def __init__(self, path: str | Path, table: FilterTable, parameters: Mapping[str, Any] | None = None) -> None:
+    def __init__(
+        self,
+        path: str | Path,
+        table: FilterTable,
+        parameters: Mapping[str, Any] | None = None,
+        *,
+        checked: bool = False,
+    ) -> None:
         self._made_of = path, table, dict(parameters or {})
         self._model = open_model(
             path, table.interface, states=table.states, outputs=table.outputs, parameters=_numbers(parameters or {})
         )
         model = self._model
+        if not checked:
+            check_states(model, usual_step(model))
         self._start = model.start.copy()
         self._seen = [_place(model, "output", model.outputs, name) for name in table.measurements]
         self._R = np.diag([value**2 for value in table.measurements.values()])
@@ -123,7 +134,7 @@ class FmuFilterModel:
             self._begun(journal[1]).restore(journal)
 
     def __deepcopy__(self, memo: Any) -> FmuFilterModel:
-        return FmuFilterModel(*self._made_of)
+        return FmuFilterModel(*self._made_of, checked=True)
 
     # -- internals ----------------------------------------------------------------------------------------------------
 

@@ -91,6 +91,10 @@ def linearise(model: SealedModel, t: float, x: Array, u: Array, step: float) -> 
     else:
         function, length = _sampled(model, t, step), step
     rates, y = function(x, u)
+    if not (np.isfinite(rates).all() and np.isfinite(y).all()):
+        raise FmuModelError(f"{model.path}: at this point it gives values that are no finite numbers. Choose another.")
+    if isinstance(model, ExchangeModel):
+        model.demand_moved(x)
     whole = None
     if isinstance(model, ExchangeModel) and model.directional:
         whole, doubt = _directional(model, function, x, u)
@@ -119,6 +123,19 @@ def linearise(model: SealedModel, t: float, x: Array, u: Array, step: float) -> 
         method=method,
         remarks=tuple(remarks),
     )
+
+
+def right_slopes(model: ExchangeModel) -> bool:
+    """Whether an FMU has directional derivatives that agree with differences at its start.
+
+    Args:
+        model: the FMU.
+    """
+    if not model.directional:
+        return False
+    model.restart(0.0, model.start, model.start_inputs)
+    found, _ = _directional(model, _continuous(model, 0.0), model.start, model.start_inputs)
+    return found is not None
 
 
 def linearise_system(

@@ -255,11 +255,13 @@ def declared_states(instance: Instance) -> list[str]:
     Args:
         instance: of the FMU.
     """
+    description = instance.description
+    rates = [unknown.variable for unknown in description.derivatives]  # in the order of the state vector
+    rates += [variable for variable in description.modelVariables if variable.derivative is not None]
     names: list[str] = []
-    for variable in instance.description.modelVariables:
-        state = variable.derivative
-        if state is not None:
-            found = [element.name for element in instance.variables.expanded(state.name)]
+    for rate in rates:
+        if rate.derivative is not None:
+            found = [element.name for element in instance.variables.expanded(rate.derivative.name)]
             names += [name for name in found if name not in names]
     return names
 
