@@ -44,6 +44,7 @@ class Trial:
         settings: parameters and starts by name, those of the preset included.
         delay_parameter: parameter that tells the observer the delay; empty where it has none.
         event: by which packets are told. nodes: that send in turn; 0 for all measurements at once.
+        node_events: event of each node, where each has its own; `event` is not used then.
         payload: of packets by name, by the instants of their measurement, shape (k,).
         inputs: of the observer by name, by instants, shape (k,). truth: outputs by name, by instants, shape (k,).
         delayed_truth: whether the outputs are compared with the truth a delay ago.
@@ -63,6 +64,7 @@ class Trial:
     settings: Mapping[str, float] = field(default_factory=dict)
     delay_parameter: str = ""
     nodes: int = 0
+    node_events: tuple[str, ...] = ()
     delayed_truth: bool = False
     stop: float = 60.0
     left: float = 0.02

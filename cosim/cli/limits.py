@@ -16,6 +16,7 @@ from cosim.results.summary_file import jsonable
 from cosim.scenario.models import make_declared
 from cosim.scenario.tables import ComponentTable
 from fmu_observer import OBSERVERS
+from plant_models.hybrid import HybridSystem
 from plant_models.user_file import names_code
 
 FEWEST = 4
@@ -64,9 +65,7 @@ def execute(options: argparse.Namespace) -> int:
     table = {"observer": name, "options": dict(map(parse_setting, options.option))}
     made = make_declared(ComponentTable.model_validate(table), "limits")
     if not hasattr(made, "limits"):
-        raise CosimError(
-            f"Observer {name!r} tells no limits; observers of sampled measurements do, such as delayed_state_observer."
-        )
+        raise CosimError(f"Observer {name!r} tells no limits: {_why_none(made)}")
     try:
         rows = limit_rows(
             made.limits(dict(map(parse_setting, options.set)), options.preset), not options.no_runs, options.members
@@ -78,3 +77,12 @@ def execute(options: argparse.Namespace) -> int:
     else:
         print(limit_text(made.name, rows))
     return 0
+
+
+def _why_none(system: HybridSystem) -> str:
+    if not system.triggered_events:
+        return "no measurement comes to it as an event, so there are no gaps; try delayed_state_observer."
+    return (
+        "it declares no error equations (a method limits, or certify). Where it follows the odometer between its "
+        f"events {', '.join(e.name for e in system.triggered_events)}, run it in a scenario with longer gaps."
+    )

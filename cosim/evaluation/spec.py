@@ -25,7 +25,9 @@ class ReportSpec:
             recorded signals; `true_fault` is not zero while the odometer lies.
         observers: component names of the observers; signals are ``<name>.position``, ``.speed``, ``.slip``,
             ``.adhesion_force``, ``.slip_indicator``, ``.odometer_fault``, each used where it was recorded.
-        labels: text to show for an observer.
+        other_trains: components with a ``position`` and a ``speed`` that are drawn beside the true ones: the same train
+            under another controller, say.
+        labels: text to show for an observer or another train.
         phases: parts of the run for the table.
         zones: low-adhesion zones in time [s].
         evaluate_after: start of the evaluation, after the start-up transient [s].
@@ -43,6 +45,7 @@ class ReportSpec:
     odometer: str | None = None
     speed_reference: str | None = None
     observers: Sequence[str] = ()
+    other_trains: Sequence[str] = ()
     labels: Mapping[str, str] = field(default_factory=dict)
     phases: Sequence[Phase] = ()
     zones: Sequence[tuple[float, float]] = ()

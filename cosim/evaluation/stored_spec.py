@@ -56,6 +56,7 @@ def _stored(data: Mapping[str, Any], title: str) -> ReportSpec:
         title=data["title"] if isinstance(data.get("title"), str) else title,
         **roles,
         observers=[str(name) for name in _list(data.get("observers"))],
+        other_trains=[str(name) for name in _list(data.get("other_trains"))],
         labels={name: str(text) for name, text in _mapping(data.get("labels")).items()},
         phases=[
             Phase(str(p["name"]), float(p["start"]), float(p["end"])) for p in _list(data.get("phases")) if _is_phase(p)

@@ -73,9 +73,17 @@ def _tell(batch: Batch, trial: Trial, periods: np.ndarray, delays: np.ndarray) -
     turn = np.concatenate(numbers)
     stamps = turn * periods[members]
     payload = dict(trial.payload(stamps))
-    if trial.nodes:
-        payload["node"] = turn % trial.nodes + 1.0
-    batch.notify(trial.event, members, stamps + delays[members], **payload)
+    arrivals = stamps + delays[members]
+    if not trial.node_events:
+        told = payload | ({"node": turn % trial.nodes + 1.0} if trial.nodes else {})
+        batch.notify(trial.event, members, arrivals, **told)
+        return
+    events = {event.name: event for event in trial.system.triggered_events}
+    for node, name in enumerate(trial.node_events):
+        own = turn % len(trial.node_events) == node
+        fields = {s.name.removeprefix(f"{name}_") for s in events[name].payload}
+        told = {field: values[own] for field, values in payload.items() if field in fields}
+        batch.notify(name, members[own], arrivals[own], **told)
 
 
 def _error(trial: Trial, names: list[str], instants: np.ndarray, found: np.ndarray, delay: float) -> np.ndarray:

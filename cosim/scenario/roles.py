@@ -116,6 +116,9 @@ def check_roles(table: ScenarioTable, components: Mapping[str, Component], where
     for name in report.observers or []:
         if name not in components:
             raise ScenarioError(f"{where}: report.observers: no component {name!r}; {nearest(name, components)}")
+    for name in report.other_trains:
+        for signal, role in (("position", "true_position"), ("speed", "true_speed")):
+            _check_signal(f"{name}.{signal}", ROLES[role], components, f"{where}: report.other_trains")
     intervals = [(f"report.phases, {p.name!r}", p.start, p.end) for p in report.phases]
     intervals += [(f"report.zones, number {i}", *zone) for i, zone in enumerate(report.zones, start=1)]
     for what, start, end in intervals:

@@ -450,6 +450,7 @@ class _Setup:
             title=self.table.title,
             **{role: getattr(table, role) for role in ROLES},
             observers=observers,
+            other_trains=table.other_trains,
             labels={n: t.label for n, t in self.table.components.items() if t.label is not None},
             phases=[Phase(p.name, p.start, p.end) for p in table.phases],
             zones=table.zones,

@@ -37,7 +37,8 @@ class PrintedRules:
     4. N = 1 and ``v_{k-1} < v_k``: R = F = 1, N = 0 (parameter `rule_4`)
     5. N = 0 and ``v_k = 0``: F = 1, N = 0
 
-    New values take effect at the next sample. Rule 4 calls a noisy reading a fault: with a deceleration of 0.9 m/s2
+    New values take effect at the next sample (parameter `rule_delay`): the first reading of a jam is then used as any
+    other. Rule 4 calls a noisy reading a fault: with a deceleration of 0.9 m/s2
     samples 0.2 s apart fall by 0.18 m/s, and noise of 0.05 m/s makes some of them rise. No rule is applied before
     `arming_delay` [ours; the print has none].
     """
@@ -50,10 +51,15 @@ class PrintedRules:
         memory("last_odometer", "m/s", 0.0, "Reading before"),
         memory("samples", "1", 0.0, "Readings since the start"),
     )
-    parameters: tuple[Signal, ...] = (parameter("rule_4", "1", 1.0, "1 where rule 4 is applied", min=0.0, max=1.0),)
+    parameters: tuple[Signal, ...] = (
+        parameter("rule_4", "1", 1.0, "1 where rule 4 is applied", min=0.0, max=1.0),
+        parameter(
+            "rule_delay", "1", 1.0, "Samples until a verdict takes effect: 1 printed, 0 at once", min=0.0, max=1.0
+        ),
+    )
 
     def at_sample(self, before: tuple[Array, ...], told: Reading, p: Any) -> Judgement:
-        """Judge an odometer sample; it takes effect at the next one.
+        """Judge an odometer sample; it takes effect at the next one, or at once.
 
         Args:
             before: memory, in the order of `memory`. told: the sample. p: parameters, as in `HybridSystem.flow`.
@@ -72,7 +78,9 @@ class PrintedRules:
         new_recovering = np.where(fourth > 0.0, 1.0, new_recovering)
         new_fault = np.where(fault * _is(y == 0.0) > 0.0, 1.0, new_fault)
         armed = _is((m.samples + ROUNDING) * p.odometer_period >= p.arming_delay)
-        after = PrintedMemory(fault, recovering, armed * new_fault, armed * new_recovering, y, m.samples + 1.0)
+        new_fault, new_recovering, late = armed * new_fault, armed * new_recovering, p.rule_delay > 0.5
+        in_force = np.where(late, fault, new_fault), np.where(late, recovering, new_recovering)
+        after = PrintedMemory(*in_force, new_fault, new_recovering, y, m.samples + 1.0)
         return Judgement(tuple(after), 0.0 * y, 0.0 * y, 0.0 * y)
 
     def at_balise(self, before: tuple[Array, ...], told: Passing, p: Any) -> Judgement:

@@ -92,8 +92,8 @@ def _interval(observer: DelayedStateObserver, p: Any) -> float:
 def _trial(
     observer: DelayedStateObserver, what: Varied, high: float, named: Mapping[str, Any], **settings: Any
 ) -> Trial:
-    nodes = _nodes(observer)
-    return model_trial(observer, what, high / 50.0, high, named, delay_parameter="delay", nodes=nodes, **settings)
+    settings |= {"nodes": _nodes(observer), "node_events": observer.node_events}
+    return model_trial(observer, what, high / 50.0, high, named, delay_parameter="delay", **settings)
 
 
 def _nodes(observer: DelayedStateObserver) -> int:

@@ -14,9 +14,12 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.certificates import Certificate
+from fmu_observer.limits import Limit
 from fmu_observer.observers.gated_observer import is_gate_parameter
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import HybridSystem, Signal
+
+ASKED_GAP = 1.0  # [s] of the certificate behind `limits`, which looks much further than that
 
 
 class GapCertified(HybridSystem):
@@ -54,6 +57,17 @@ class GapCertified(HybridSystem):
         deciding = self._deciding_values(values)
         return replace(certificate, observer=self.name, preset=chosen, parameters=deciding, event=event)
 
+    def limits(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> tuple[Limit, ...]:
+        """Gaps by the certificate: first constant one that is unstable, and up to which every mixture is covered.
+
+        Args:
+            parameters: values by name that replace those of the preset. preset: to start from; None for the default.
+
+        Raises:
+            ValueError: as `certify`.
+        """
+        return limits_of(self.certify(ASKED_GAP, parameters, preset))
+
     def deciding_parameters(self) -> tuple[Signal, ...]:
         """What the certificate names as the values it judged: all parameters but the timing, unless a subclass knows
         better.
@@ -66,3 +80,24 @@ class GapCertified(HybridSystem):
             for signal in self.deciding_parameters()
             for name, value in zip(signal.scalar_names, np.atleast_1d(getattr(values, signal.name)), strict=True)
         )
+
+
+def limits_of(certificate: Certificate) -> tuple[Limit, ...]:
+    """The limits that a certificate found on its way.
+
+    Args:
+        certificate: of an observer.
+    """
+    about = f"gaps up to {certificate.horizon:.4g} s; {certificate.error_model}"
+    return (
+        Limit(
+            f"constant gap between {certificate.event}s",
+            exact=certificate.constant_limit,
+            exact_test=f"certificate, first gap at which the error grows, {about}",
+        ),
+        Limit(
+            f"mixed gaps between {certificate.event}s",
+            exact=certificate.aperiodic_limit,
+            exact_test="certificate, longest gap up to which one Lyapunov function covers every mixture",
+        ),
+    )

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import chain
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
 from cosim.drawing.style import (
+    BLACK,
     NOISY_LINE,
     ODOMETER_LINE,
     PALE,
@@ -29,6 +32,8 @@ from cosim.report.figures.scales import bounded, slip_in_percent, value_limits
 from cosim.results.result import Result
 
 KMH = 3.6  # km/h in a m/s
+OTHER_LINE: dict[str, Any] = {"color": BLACK, "linewidth": 1.2}
+DASHES: tuple[Any, ...] = ("--", "-.", (0, (6, 2)), (0, (3, 1, 1, 1, 1, 1)))  # of other trains
 STRIP = 0.055  # height of an indicator's strip as a share of the axes
 
 
@@ -57,7 +62,7 @@ def _draw_estimates(
 
 @styled
 def speed_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
-    """True speed, odometer, reference and estimates in km/h, against time.
+    """True speed, odometer, reference, other trains and estimates in km/h, against time.
 
     Args:
         result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
@@ -68,7 +73,8 @@ def speed_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Ax
     ax = axes_or_new(ax)
     true, odometer = _scaled(result, spec.true_speed, KMH), _scaled(result, spec.odometer, KMH)
     reference, estimates = _scaled(result, spec.speed_reference, KMH), _estimates(result, spec, "speed", KMH)
-    limits = value_limits(true + reference, odometer + list(estimates.values()))
+    others = {train: _scaled(result, f"{train}.speed", KMH) for train in spec.other_trains}
+    limits = value_limits([*true, *reference, *chain(*others.values())], odometer + list(estimates.values()))
     shade_zones(ax, spec)
     for values in true:
         curve(ax, result.time, values, limits, label="true", **TRUE_LINE)
@@ -76,6 +82,10 @@ def speed_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Ax
         curve(ax, result.time, values, limits, label="odometer", **ODOMETER_LINE)
     for values in reference:
         curve(ax, result.time, values, limits, label="reference", **REFERENCE_LINE)
+    for i, (train, found) in enumerate(others.items()):
+        line = OTHER_LINE | {"linestyle": DASHES[i % len(DASHES)], "label": label(spec, train)}
+        for values in found:
+            curve(ax, result.time, values, limits, **line)
     _draw_estimates(ax, result, spec, estimates, limits)
     if limits is not None:
         ax.set_ylim(*limits)
@@ -162,7 +172,7 @@ class SpeedPanel(Panel):
 
     name = "speed"
     title = "Speed"
-    caption = "True speed, odometer, reference and estimates."
+    caption = "True speed, odometer, reference, other trains of the run and estimates."
     place = 1
 
     @staticmethod

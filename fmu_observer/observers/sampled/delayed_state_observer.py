@@ -426,6 +426,11 @@ class DelayedStateObserver(HighGainSampled):
         """Measurements of each node, from 0: the turns of a round."""
         return tuple(tuple(i for i, of in enumerate(self.node_of) if of == node) for node in sorted(set(self.node_of)))
 
+    @property
+    def node_events(self) -> tuple[str, ...]:
+        """Event of each node in the order of `turns`, where each has its own; none here: a packet names its node."""
+        return ()
+
     # -- internals --------------------------------------------------------------------------------------------------
 
     def _events(self) -> tuple[Any, ...]:

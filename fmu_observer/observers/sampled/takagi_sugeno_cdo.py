@@ -12,9 +12,11 @@ import numpy as np
 
 from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampled_error, with_switching_noted
 from fmu_observer.condition import Condition
+from fmu_observer.limits import Limit
 from fmu_observer.models import TAKAGI_SUGENO_MODELS, TakagiSugenoModel, find_takagi_sugeno_model
 from fmu_observer.models.model import stacked
 from fmu_observer.observability import require_detectable_vertices
+from fmu_observer.observers.gap_certified import ASKED_GAP, limits_of
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from fmu_observer.observers.sampled.takagi_sugeno_gains import GAINS, TakagiSugenoGains
@@ -203,6 +205,17 @@ class GeneralTakagiSugenoCdo(GatedObserver):
         values = tuple((name, float(v)) for s in self.parameters for name, v in self._named(s, p))
         chosen = preset or self.default_preset or ""
         return replace(found, observer=self.name, preset=chosen, parameters=values, lyapunov_matrix=P)
+
+    def limits(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> tuple[Limit, ...]:
+        """Gaps by the certificate, see `limits_of`.
+
+        Args:
+            parameters: values by name that replace those of the preset. preset: to start from.
+
+        Raises:
+            ValueError: as `certify`.
+        """
+        return limits_of(self.certify(ASKED_GAP, parameters, preset))
 
     def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
         """Whether every vertex error decays for infinitely frequent samples: ``A_i - K_i1 C1 - K_i2 C2`` is Hurwitz.

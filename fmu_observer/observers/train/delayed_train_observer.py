@@ -54,6 +54,11 @@ class DelayedTrainObserver(DelayedStateObserver):
         after = [u.balise_position, outputs[1]] if event == "balise" else [outputs[0], u.packet_speed]
         return self.with_outputs(x, after)
 
+    @property
+    def node_events(self) -> tuple[str, ...]:
+        """Balises tell the position, packets the speed."""
+        return ("balise", "packet")
+
     def remembering(self, memory_places: int) -> DelayedTrainObserver:
         """The same observer with another memory.
 

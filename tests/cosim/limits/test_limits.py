@@ -9,8 +9,10 @@ import pytest
 
 from cosim.cli import main
 from cosim.limits import limit_rows, limit_text, practical_limit, survives
+from fmu_observer import OBSERVERS
 from fmu_observer.limits import Trial
 from fmu_observer.observers.sampled import OutputPredictor
+from fmu_observer.observers.train import DelayedTrainObserver, MultirateCdo
 from plant_models.hybrid import HybridSystem, TriggeredEvent, input_signal, output_signal, parameter, state, vector
 
 
@@ -70,6 +72,62 @@ def test_every_sampled_observer_has_limits() -> None:
     assert "period of the samples" in limit_text("output_predictor", rows)
 
 
+class Told(Relaxation):
+    """`x` and `y` from two nodes, each with an event of its own: what came last, and how often."""
+
+    name = "told"
+    states = (state("x", "1", 9.0, "First"), state("y", "1", 9.0, "Second"))
+    outputs = (output_signal("first", "1", "First"), output_signal("second", "1", "Second"))
+    parameters = (parameter("period", "s", 0.1, "Period"),)
+    events = tuple(
+        TriggeredEvent(name, (input_signal(f"{name}_{field}", "1", 0.0, "Measured", variability="discrete"),))
+        for name, field in (("one", "x"), ("other", "y"))
+    )
+
+    def jump(self, event, t, x, u, p):  # type: ignore[no-untyped-def]
+        return vector(u.one_x, x[1]) if event == "one" else vector(x[0], u.other_y)
+
+    def output(self, t, x, u, p):  # type: ignore[no-untyped-def]
+        return {"first": x[0], "second": x[1]}
+
+
+def test_nodes_may_have_events_of_their_own() -> None:
+    told = trial(
+        system=Told(),
+        node_events=("one", "other"),
+        payload=lambda t: {"x": 1.0 + 0.0 * t, "y": 2.0 + 0.0 * t},
+        truth=lambda t: {"first": 1.0 + 0.0 * np.asarray(t), "second": 2.0 + 0.0 * np.asarray(t)},
+    )
+    assert survives(told, [0.1, 0.2]).tolist() == [True, True]
+
+
+def test_the_train_behind_a_network_keeps_its_plant_far_beyond_the_printed_bounds() -> None:
+    packets, delay = limit_rows(DelayedTrainObserver(memory_places=5).limits(), members=4)
+    assert [packets.exact, packets.practical, delay.exact, delay.practical] == [np.inf] * 4
+    assert (packets.printed[0][0], delay.printed[0][0]) == pytest.approx((0.39, 0.549), rel=0.01)
+
+
+@pytest.mark.parametrize("name", [n for n in OBSERVERS if n != "odometer_reset"])
+def test_every_observer_has_limits_or_says_why_not(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    observer = OBSERVERS[name]()
+    if not observer.triggered_events:
+        assert main(["limits", name, "--no-runs"]) == 2
+        assert "no measurement comes to it as an event" in capsys.readouterr().err
+        return
+    limits = observer.limits()
+    assert limits
+    for limit in limits:
+        assert limit.exact is not None
+        assert limit.exact > 0.0
+        assert limit.exact_test
+
+
+def test_limits_of_a_certificate_are_its_own() -> None:
+    constant, mixed = MultirateCdo().limits()
+    found = MultirateCdo().certify(0.3)
+    assert (constant.exact, mixed.exact) == pytest.approx((found.constant_limit, found.aperiodic_limit), rel=1e-2)
+
+
 def test_the_command(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["limits", "delayed_state_observer", "--option", "model=flexible_joint_arm", "--option", "predictors=3"]
     assert main([*words, "--no-runs"]) == 0
@@ -84,7 +142,8 @@ def test_the_command(capsys: pytest.CaptureFixture[str]) -> None:
     ("words", "said"),
     [
         (["nobody"], "There is no observer 'nobody'"),
-        (["jam_detector"], "tells no limits"),
+        (["jam_detector"], "tells no limits: no measurement comes to it as an event"),
+        (["odometer_reset"], "tells no limits: it declares no error equations"),
         (["output_predictor", "--set", "speed=3"], "unknown parameter 'speed'"),
         (["output_predictor", "--members", "1"], "expected 4 values or more"),
         (["delayed_state_observer", "--option", "predictors=12"], "choose from 1, 0, 2, 3"),

@@ -22,12 +22,14 @@ from cosim.errors import OutputError
 from cosim.evaluation.error_table import error_text
 from cosim.evaluation.metrics import phase_metrics
 from cosim.evaluation.spec import ReportSpec
+from cosim.evaluation.stored_spec import spec_of
 from cosim.report.figures.drawing import thin
 from cosim.report.figures.gap_figure import GapErrorsPanel, GapsPanel, certified_gaps, sampling_gaps
 from cosim.report.figures.main_picture import main_picture
+from cosim.report.figures.other_trains_figure import OtherTrainsPanel
 from cosim.report.figures.panel import Panel
 from cosim.report.figures.panels import draw_all, panels
-from cosim.report.figures.run_figures import adhesion_figure, slip_figure
+from cosim.report.figures.run_figures import SpeedPanel, adhesion_figure, slip_figure
 from cosim.report.figures.zooms import ZOOM_KEYS
 from cosim.report.page.render import first_sentence
 from cosim.report.page.report import report_page, write_report
@@ -107,6 +109,28 @@ def test_legends_lie_above_the_curves_and_inside_the_picture(result: Result) -> 
         assert legend.y0 >= box.y1
         assert legend.x1 <= ax.figure.bbox.x1, panel.name
         assert box.width > 0.8 * ax.figure.bbox.width, panel.name  # nothing squashes the axes
+
+
+def test_what_is_granted_is_a_line_across_the_figure_however_alike_the_gaps(result: Result) -> None:
+    ax = GapErrorsPanel.draw(result, synthetic_spec(), None)
+    granted = next(line for line in ax.get_lines() if str(line.get_label()).startswith("SUBSET-041"))
+    way, error = (np.asarray(values, float) for values in granted.get_data())
+    assert tuple(way[[0, -1]]) == pytest.approx(ax.get_xlim())
+    assert error[-1] == pytest.approx(5.0 + 0.05 * way[-1])
+
+
+def test_other_trains_of_a_run_are_drawn_beside_the_true_one(result: Result) -> None:
+    spec = replace(
+        synthetic_spec(), observers=[], other_trains=["discrete_uio"], labels={"discrete_uio": "a second train"}
+    )
+    assert not OtherTrainsPanel.available(result, synthetic_spec())
+    assert OtherTrainsPanel.available(result, spec)
+    ax = OtherTrainsPanel.draw(result, spec, None)
+    apart = np.asarray(ax.get_lines()[-1].get_ydata(), float)
+    assert apart[-1] == pytest.approx((result["discrete_uio.position"] - result["locomotive.position"])[-1])
+    for figure in (ax, SpeedPanel.draw(result, spec, None)):
+        assert "a second train" in figure.get_legend_handles_labels()[1]
+    assert spec_of(replace(result, summary={"report": {**vars(spec), "phases": []}})).other_trains == ["discrete_uio"]
 
 
 def limits(ax: Axes) -> tuple[float, float]:

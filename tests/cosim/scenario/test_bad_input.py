@@ -259,6 +259,7 @@ def test_a_setting_without_effect_is_told(key: str, value: float, needed: str) -
         ("report.true_speed", "locomotive.sped", r"no variable 'sped'.*'speed'"),
         ("report.true_speed", "locomotive.position", r"report.true_speed: locomotive.position is not in m/s"),
         ("report.observers", ["nobody"], r"report.observers: no component 'nobody'"),
+        ("report.other_trains", ["driver"], r"driver: no variable 'position'"),
         ("report.zones", [[5.0, 2.0]], r"report.zones, number 1: ends at 2 s"),
         ("report.phases", [{"name": "p", "start": 1.0, "end": 1.0}], r"report.phases, 'p'"),
         ("balises.false_telegrams", [{"time": 500.0, "offset": 1.0}], r"false_telegrams: 500 s lies outside the run"),
