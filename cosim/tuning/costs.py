@@ -33,6 +33,11 @@ class Cost(ABC):
         """Signals ``component.signal`` that must be recorded for it."""
         return ()
 
+    @property
+    def seen(self) -> tuple[str, ...]:
+        """Outputs of the observer on which it depends; none where that is not known."""
+        return ()
+
     @abstractmethod
     def of(self, outcome: Outcome) -> float:
         """The cost.
@@ -66,6 +71,11 @@ class StateCost(Cost):
     def signals(self) -> tuple[str, ...]:
         """Both of each pair."""
         return tuple(name for pair in self.pairs for name in pair)
+
+    @property
+    def seen(self) -> tuple[str, ...]:
+        """The estimates."""
+        return tuple(estimate for estimate, _ in self.pairs) or (f"{self.observer}.speed",)
 
     def of(self, outcome: Outcome) -> float:
         """The cost, see `Cost.of`."""
@@ -103,6 +113,11 @@ class LikelihoodCost(Cost):
         """The accumulated log-likelihood."""
         return (f"{self.observer}.innovation_likelihood",)
 
+    @property
+    def seen(self) -> tuple[str, ...]:
+        """The accumulated log-likelihood."""
+        return self.signals
+
     def of(self, outcome: Outcome) -> float:
         """The cost, see `Cost.of`."""
         return -float(_of(outcome.result, self.signals[0])[-1])
@@ -130,6 +145,11 @@ class NisCost(Cost):
     def signals(self) -> tuple[str, ...]:
         """The normalised innovation squared."""
         return (f"{self.observer}.nis",)
+
+    @property
+    def seen(self) -> tuple[str, ...]:
+        """The normalised innovation squared."""
+        return self.signals
 
     def of(self, outcome: Outcome) -> float:
         """The cost, see `Cost.of`."""

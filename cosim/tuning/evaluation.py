@@ -7,7 +7,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from math import inf, isfinite, nan
 from pathlib import Path
@@ -24,6 +24,7 @@ from cosim.studies.workers import Died, Raised, Team, attempt
 from cosim.tuning.bench import Seeded
 from cosim.tuning.costs import Cost
 from cosim.tuning.parameters import Tunable
+from cosim.tuning.replays import Replays, make_replays
 
 JOURNAL = "evaluations.jsonl"
 ROWS = 500
@@ -53,6 +54,7 @@ class _Job:
     cost: Cost | None = None
     folder: Path | None = None
     observed: str | None = None
+    seed: int | None = None
 
 
 class Evaluator:
@@ -84,6 +86,8 @@ class Evaluator:
             write_lines(self._journal, "w", [])
         self._keys: dict[int, str] = {}
         self._bases: dict[int, Scenario] = {}
+        self._replays: dict[int, Replays] = {}
+        self.replayed = False
 
     def prepare(self, seeds: Sequence[int], progress: Callable[[int, int], None] | None = None) -> None:
         """Record the plant side with these seeds, as far as it has not been.
@@ -104,6 +108,12 @@ class Evaluator:
             if progress is not None:
                 progress(done, len(jobs))
         self._bases |= {seed: self.benches[seed].base(folders[seed], self.cost) for seed in new}
+        for seed in new:
+            if self.benches[seed].candidate is not None and (self.replayed or not self._replays):
+                found = self._make_replays(seed)
+                self.replayed = found is not None
+                if found is not None:
+                    self._replays[seed] = found
 
     def costs(
         self,
@@ -160,9 +170,26 @@ class Evaluator:
 
     def _job(self, candidate: Mapping[str, Any] | None, seed: int, observed: str | None = None) -> _Job:
         settings = {} if candidate is None else self.tunable.settings(candidate)
-        return _Job(self._bases[seed], settings, self.cost, observed=observed)
+        return _Job(self._bases[seed], settings, self.cost, observed=observed, seed=seed)
+
+    def _make_replays(self, seed: int) -> Replays | None:
+        candidate = self.benches[seed].candidate
+        names = list(self.tunable.settings(self.tunable.start))
+        return None if candidate is None else make_replays(self._bases[seed], candidate.name, self.cost, names)
 
     def _answers(self, jobs: Sequence[_Job]) -> Iterator[tuple[int, Evaluated]]:
+        """Answers as they come: of replays first, all candidates of a seed together."""
+        others = list(range(len(jobs)))
+        for seed, replays in self._replays.items():
+            mine = [n for n in others if jobs[n].seed == seed]
+            others = [n for n in others if n not in set(mine)]
+            for place, outcome in zip(mine, replays.outcomes([jobs[n].settings for n in mine]), strict=True):
+                self.runs += 1
+                yield place, Evaluated(inf, outcome) if isinstance(outcome, str) else _judged(outcome, jobs[place])
+        for place, answer in self._in_runs([jobs[n] for n in others]):
+            yield others[place], answer
+
+    def _in_runs(self, jobs: Sequence[_Job]) -> Iterator[tuple[int, Evaluated]]:
         answers = ((n, attempt(_do, job)) for n, job in enumerate(jobs))
         for place, answer in answers if self._team is None else self._team.each(jobs):
             self.runs += 1
@@ -213,8 +240,12 @@ def _do(job: _Job) -> Evaluated:
     if job.folder is not None:
         write_results(outcome.result, job.folder, ("npy",))
         return Evaluated(nan)
+    return _judged(outcome, job)
+
+
+def _judged(outcome: Outcome, job: _Job) -> Evaluated:
     assert job.cost is not None
-    estimates = None if job.observed is None else _estimates(outcome, job.observed)
+    estimates = None if job.observed is None else _estimates(outcome, job.observed, job.cost)
     try:
         cost = job.cost.of(outcome)
     except ScenarioError as error:
@@ -222,14 +253,14 @@ def _do(job: _Job) -> Evaluated:
     return Evaluated(cost, None, estimates) if isfinite(cost) else Evaluated(inf, "the cost is not finite", estimates)
 
 
-def _estimates(outcome: Outcome, observed: str) -> np.ndarray:
-    """Outputs of a component at some rows, one after the other."""
+def _estimates(outcome: Outcome, observed: str, cost: Cost) -> np.ndarray:
+    """What the cost sees of an observer at some rows, one signal after the other, each in units of its own spread."""
     table = outcome.result.table
     rows = np.unique(np.linspace(0, len(table) - 1, ROWS).astype(int))
-    names = [name for name in table.dtype.names or () if name.startswith(f"{observed}.")]
-    with suppress(ValueError):
-        return np.concatenate([np.asarray(table[name][rows], float) for name in names])
-    return np.empty(0)
+    mine = [name for name in table.dtype.names or () if name.startswith(f"{observed}.")]
+    names = [name for name in mine if name in cost.seen] or [name for name in mine if not name.endswith("_std")]
+    columns = [np.asarray(table[name][rows], float) for name in names]
+    return np.concatenate([column / (np.std(column) or 1.0) for column in columns]) if columns else np.empty(0)
 
 
 def _silent(_text: str) -> None: ...

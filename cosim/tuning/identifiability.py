@@ -12,7 +12,7 @@ from fmu_observer.optimisers.search_space import SearchSpace
 STEP = 0.1  # relative, of a parameter that is not zero; of its range, of one that may be
 NOTHING = 1e-6  # of the largest change: such a parameter changes nothing
 WEAK = 0.02  # of the largest singular value: such a direction hardly shows; a start P(0) that fades leaves up to 1 %
-COVARIANCE = "covariance"
+COVARIANCE = "variance"  # `process_covariance`, `measurement_variance`
 
 
 @dataclass(frozen=True)
@@ -94,6 +94,8 @@ def directions(space: SearchSpace, estimates: Sequence[np.ndarray | None]) -> Di
     """
     first = estimates[0]
     if first is None or any(e is None or e.shape != first.shape or not np.isfinite(e).all() for e in estimates):
+        return None
+    if not first.size:
         return None
     moves = np.stack([e - first for e in estimates[1:] if e is not None])
     count = len(space.parameters)

@@ -98,7 +98,7 @@ class Study:
             judged_before=judged[0].tolist(),
             judged_after=judged[1].tolist(),
             runs=self.evaluator.runs,
-            how=how,
+            how="as members of a batch over what the observer heard" if self.evaluator.replayed else how,
             warnings=self._warnings(shown, None if interrupted else self._directions(best)),
             fixed=why,
             interrupted=interrupted,
@@ -114,7 +114,7 @@ class Study:
             candidates = optimiser.ask()
             if not len(candidates):
                 break
-            named = [{**fixed, **space.named(candidate)} for candidate in candidates]
+            named = [self._whole(fixed, space.named(candidate)) for candidate in candidates]
             self._bar.expect(len(named) * len(self.training), self.iterations - iteration)
             label = {"search": seed, "iteration": iteration}
             found = self.evaluator.costs(named, self.training, label, self._bar.step)
@@ -123,10 +123,14 @@ class Study:
                 raise ScenarioError(_never_finite(len(candidates), self.evaluator.failures))
             costs.append(optimiser.best_cost)
             counts.append(optimiser.evaluations)
-            best = {**fixed, **space.named(optimiser.best)}
+            best = self._whole(fixed, space.named(optimiser.best))
             entry = label | {"evaluations": optimiser.evaluations, "cost": optimiser.best_cost, "best": best}
             write_lines(self.evaluator.directory / ITERATIONS, "a", [entry])
             self.done = [*(s for s in self.done if s.seed != seed), Searched(seed, best, costs, counts)]
+
+    def _whole(self, fixed: Mapping[str, float], found: Mapping[str, float]) -> dict[str, float]:
+        """All parameters in the order asked for."""
+        return {name: fixed[name] if name in fixed else found[name] for name in self.asked.space.names}
 
     def _inside(self) -> dict[str, float]:
         """The present values as far as they lie within the bounds, else the middle of them."""

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.condition import Condition
-from fmu_observer.filtering.kalman import correct, flattened, normalised_square, predicted_covariance
+from fmu_observer.filtering.kalman import correct, flattened, log_likelihood, normalised_square, predicted_covariance
 from fmu_observer.observers.discrete.sampling import at_sample, primed_memory
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import (
@@ -76,6 +76,7 @@ class MotorFilter(HybridSystem):
             ),
             *(memory(f"held_innovation_{a}", "A", 0.0, f"Innovation of the current along {a}") for a in axes),
             memory("held_nis", "1", 0.0, "Normalised square of the innovation"),
+            memory("log_likelihood", "1", 0.0, "Logarithm of the likelihood of all innovations so far"),
         )
         self.inputs = (
             *(input_signal(f"voltage_{axis}", "V", 0.0, f"Voltage along {axis}, of the past period") for axis in axes),
@@ -98,6 +99,12 @@ class MotorFilter(HybridSystem):
                 for a in axes
             ),
             output_signal("nis", "1", "Normalised square of the innovation, two degrees", variability="discrete"),
+            output_signal(
+                "innovation_likelihood",
+                "1",
+                "Logarithm of the likelihood of all innovations so far",
+                variability="discrete",
+            ),
         )
         self.parameters = (*_variances(estimated), *MOTOR_PARAMETERS)
         super().__init__(**options)
@@ -123,22 +130,22 @@ class MotorFilter(HybridSystem):
     # -- what follows -----------------------------------------------------------------------------------------------
 
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
-        """Prediction over the period since the last sample, then correction, shape (n + n^2 + 4,)."""
+        """Prediction over the period since the last sample, then correction, shape (n + n^2 + 5,)."""
         n, RN = self.order, np.diag(p.measurement_variance)
         last = n + n * n
 
         def advance(values: Array) -> Array:
             moved, F = self.predict(values[:n], u, p)
             P = predicted_covariance(np.reshape(values[n:last], (n, n)), F, np.diag(p.process_variance))
-            return vector(*(moved[i] for i in range(n)), *flattened(P), *(values[last + i] for i in range(3)))
+            return vector(*(moved[i] for i in range(n)), *flattened(P), *(values[last + i] for i in range(4)))
 
         def by_measurement(values: Array) -> Array:
             innovation, H = self.measure(values[:n], u, p)
             after = correct(values[:n], np.reshape(values[n:last], (n, n)), innovation, H, RN)
             nis = normalised_square(innovation, after.innovation_covariance)
-            return vector(
-                *(after.estimate[i] for i in range(n)), *flattened(after.covariance), innovation[0], innovation[1], nis
-            )
+            told = values[last + 3] + log_likelihood(innovation, after.innovation_covariance)
+            estimate = (after.estimate[i] for i in range(n))
+            return vector(*estimate, *flattened(after.covariance), innovation[0], innovation[1], nis, told)
 
         return at_sample(x, advance, by_measurement)
 
@@ -151,6 +158,7 @@ class MotorFilter(HybridSystem):
             **{f"{name}_std": np.sqrt(np.maximum(x[n + i * (n + 1)], 0.0)) for i, name in enumerate(names)},
             **{f"innovation_{axis}": x[last + i] for i, axis in enumerate(AXES[self.frame])},
             "nis": x[last + 2],
+            "innovation_likelihood": x[last + 3],
         }
 
     def requirements(self, p: Any) -> dict[str, Array]:

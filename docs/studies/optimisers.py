@@ -1,0 +1,204 @@
+"""Optimisers on the published tuning problem: the six variances of the motor's Kalman filter, 30 seeds of every method.
+
+``python docs/studies/optimisers.py`` prints the tables of docs/tuning.md and draws docs/images/optimisers.png; it takes
+about a quarter of an hour. ``--seeds N`` takes the first N seeds.
+
+The drive is run once for a noise record of 10 000 samples; candidates are members of a batch over what the filter
+heard, and all see the same record.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim import Scenario
+from cosim.studies.replay import Replay
+from fmu_observer.optimisers.registry import find_optimiser
+from fmu_observer.optimisers.search import Search, minimise
+from fmu_observer.optimisers.search_space import Bounded, SearchSpace
+from fmu_observer.tuning.likelihood import AccumulatedOutput
+
+NAMES = (*(f"process_variance[{i}]" for i in range(1, 5)), "measurement_variance[1]", "measurement_variance[2]")
+CURRENTS = ("current_d", "current_q")
+LOW, HIGH = 1e-6, 20.0
+TRUE = np.array([1e-3] * 4 + [0.1] * 2)
+BUDGET = 1200  # evaluations of those that go on until the floor
+ITERATIONS = (0, 5, 10, 15, 20)
+WITHIN = 1.05  # of the floor
+SEEDS = 30
+PICTURE = Path(__file__).parents[1] / "images" / "optimisers.png"
+
+
+class Drive:
+    """A noise record of the shipped drive, and the cost of candidates over it: sum of the mean square errors of both
+    currents [A2].
+
+    Args:
+        seed: of the noise. stop: length of the record [s].
+    """
+
+    def __init__(self, seed: int, stop: float = 1.0) -> None:
+        scenario = Scenario.load("traction_drive").set("motor.seed", seed).set("stop", stop).set("expect", [])
+        self.run = scenario.run(warn=lambda _text: None)
+        self.replay = Replay(self.run, "filter")
+        self.true = np.stack([self.run[f"motor.{name}"] for name in CURRENTS], axis=1)
+
+    def cost(self, variances: np.ndarray) -> np.ndarray:
+        """Costs, shape (m,), of variances, shape (m, 6)."""
+        given = {"process_variance": variances[:, :4], "measurement_variance": variances[:, 4:]}
+        found = self.replay.run(CURRENTS, given, members=len(variances))
+        errors = (found - self.true)[:, 1:]
+        return np.asarray((errors**2).mean(axis=1).sum(axis=1))
+
+    @property
+    def floor(self) -> float:
+        """Cost with the variances of the noise itself."""
+        return float(self.cost(TRUE[np.newaxis])[0])
+
+
+@dataclass(frozen=True)
+class Method:
+    """How one line of the tables searches.
+
+    Args:
+        label: for people. name: of the optimiser. iterations: after the first population. log: whether in logarithms.
+        options: of the optimiser.
+    """
+
+    label: str
+    name: str
+    iterations: int
+    log: bool = False
+    options: Mapping[str, Any] | None = None
+
+
+POPULATION = 20
+LONG = BUDGET // POPULATION - 1
+METHODS = (
+    Method("PSO", "pso", LONG),
+    Method("BBO, blended", "bbo", LONG),
+    Method("BBO, Algorithms 3.1, 3.2", "biogeography_printed", LONG),
+    Method("GA, population 100, start [0, 0.1]", "ga", 20, options={"start": (0.0, 0.1)}),
+    Method("PSO in logarithms", "pso", LONG, log=True),
+    Method("BBO in logarithms", "bbo", LONG, log=True),
+    Method("CMA-ES in logarithms", "cma", BUDGET // 9, log=True),
+)
+GRADIENT = Method("gradient of the likelihood, in logarithms", "gradient", 60, log=True, options={"gradients": True})
+
+
+def space(log: bool) -> SearchSpace:
+    """The six variances with the bounds of the reference."""
+    return SearchSpace([Bounded(name, LOW, HIGH, log) for name in NAMES])
+
+
+def searches(drive: Drive, method: Method, seeds: Sequence[int]) -> list[Search]:
+    """A method with several seeds on one record."""
+    box = space(method.log)
+    cost: Callable[[np.ndarray], np.ndarray] = lambda candidates: drive.cost(box.values(candidates))  # noqa: E731
+    kind = find_optimiser(method.name)
+    return [
+        minimise(kind(box.lower, box.upper, seed=seed, **(method.options or {})), cost, method.iterations)
+        for seed in seeds
+    ]
+
+
+def likelihood(drive: Drive) -> AccumulatedOutput:
+    """Log-likelihood of the innovations over the record, with its gradient by the six variances."""
+    return AccumulatedOutput(drive.replay.system, drive.replay.heard(), NAMES)
+
+
+def gradient_searches(drive: Drive, seeds: Sequence[int]) -> list[Search]:
+    """Descents along the likelihood; the cost in the tables is that of the currents at the same candidates."""
+    box, told, found = space(True), likelihood(drive), []
+    for seed in seeds:
+        optimiser = find_optimiser(GRADIENT.name)(box.lower, box.upper, seed=seed, gradients=True)  # type: ignore[call-arg]
+        points: list[np.ndarray] = []
+        for _ in range(GRADIENT.iterations):
+            candidates = optimiser.ask()
+            if not len(candidates):
+                break
+            values = box.values(candidates)[0]
+            height, slope = told(values)
+            optimiser.tell(candidates, [-height], [-slope * values])  # by the logarithm
+            points.append(values)
+        costs = np.minimum.accumulate(drive.cost(np.array(points)))
+        found.append(Search(points[-1], float(costs[-1]), costs, np.arange(1.0, len(costs) + 1)))
+    return found
+
+
+def convergence(found: Sequence[Search]) -> list[float]:
+    """Median best cost at the iterations of the tables."""
+    return [float(np.median([s.costs[min(k, len(s.costs) - 1)] for s in found])) for k in ITERATIONS]
+
+
+def finals(found: Sequence[Search], iteration: int = 20) -> tuple[float, float, float]:
+    """10 %, 50 % and 90 % of the cost at an iteration."""
+    low, middle, high = np.percentile([s.costs[min(iteration, len(s.costs) - 1)] for s in found], (10, 50, 90))
+    return float(low), float(middle), float(high)
+
+
+def to_floor(found: Sequence[Search], floor: float) -> tuple[float, float, float, int]:
+    """Quartiles of the evaluations to within 5 % of the floor (infinite where it was never reached), and how many
+    reached it.
+    """
+    counts = np.array([s.evaluations_to(WITHIN * floor) for s in found])
+    low, middle, high = (float(np.percentile(counts, q, method="inverted_cdf")) for q in (25, 50, 75))
+    return low, middle, high, int(np.isfinite(counts).sum())
+
+
+def main() -> None:
+    """Both tables and the picture."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])  # type: ignore[union-attr]
+    parser.add_argument("--seeds", type=int, default=SEEDS)
+    parser.add_argument("--noise", type=int, default=3)
+    options = parser.parse_args()
+    drive, seeds = Drive(options.noise), range(options.seeds)
+    floor = drive.floor
+    print(f"noise record {options.noise}, floor {floor:.5f} A2, {len(seeds)} seeds\n")
+    counted = "evaluations to 1.05 floor: quartile, median, quartile"
+    print("| method | " + " | ".join(f"it. {k}" for k in ITERATIONS) + f" | 10 % to 90 % at 20 | {counted} | reached |")
+    print("|" + "---|" * (len(ITERATIONS) + 4))
+    curves = {}
+    for method in (*METHODS, GRADIENT):
+        found = gradient_searches(drive, seeds) if method is GRADIENT else searches(drive, method, seeds)
+        curves[method.label] = found
+        low, _, high = finals(found)
+        first, middle, last, reached = to_floor(found, floor)
+        cells = [f"{c:.4f}" for c in convergence(found)] + [f"{low:.4f} to {high:.4f}"]
+        counts = ", ".join("never" if np.isinf(c) else f"{c:.0f}" for c in (first, middle, last))
+        print(f"| {method.label} | {' | '.join(cells)} | {counts} | {reached} of {len(found)} |", flush=True)
+    if options.seeds == SEEDS:
+        draw(curves, floor)
+
+
+def draw(curves: Mapping[str, Sequence[Search]], floor: float) -> None:
+    """Median cost over evaluations."""
+    import matplotlib as mpl  # noqa: PLC0415 - only to draw
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt  # noqa: PLC0415
+
+    from cosim.drawing.style import OBSERVER_LINES, RC  # noqa: PLC0415
+
+    mpl.rcParams.update(RC)
+    figure, axes = plt.subplots(figsize=(8.2, 4.2), layout="constrained")
+    for place, (label, found) in enumerate(curves.items()):
+        grid = np.unique(np.geomspace(1, BUDGET, 120).round())
+        rows = [[s.costs[max(np.searchsorted(s.evaluations, n, "right") - 1, 0)] for n in grid] for s in found]
+        style = OBSERVER_LINES[place % len(OBSERVER_LINES)] | ({"linewidth": 0.8} if place >= 6 else {})
+        axes.plot(grid, np.median(rows, axis=0), label=label, **style)
+    axes.axhline(floor, color="black", linewidth=0.8)
+    axes.set(xscale="log", yscale="log", xlabel="Evaluations", ylabel="Median best cost [A2]")
+    axes.legend(fontsize=8)
+    figure.savefig(PICTURE, dpi=90)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
