@@ -2,168 +2,257 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 
 from fmu_observer.condition import Condition
-from fmu_observer.design.discretisation import process_covariance
-from fmu_observer.design.riccati import steady_filter
 from fmu_observer.filtering.ensemble import drawn
-from fmu_observer.models import ObserverModel, find_model
-from fmu_observer.models.discretisation import transition, transition_jacobian
-from fmu_observer.models.linearisation import linear_part, start_of
-from fmu_observer.observability import require_detectable_model
-from fmu_observer.observers.model_observer import ModelObserver, as_matrix
-from plant_models.hybrid import PeriodicEvent, Signal, input_signal, memory, output_signal, vector
+from fmu_observer.models.filter_model import Known
+from fmu_observer.models.model import stacked
+from fmu_observer.models.process_noise import noise_over
+from fmu_observer.models.system_model import SUBSTEPS, Source, find_filter_model
+from fmu_observer.observers.discrete.covariance_requirements import positive
+from fmu_observer.observers.discrete.filter_condition import steady_condition
+from fmu_observer.observers.discrete.sampling import PRIMED
+from fmu_observer.observers.model_observer import as_matrix
+from fmu_observer.observers.parameter_values import Value, parameter_values
+from plant_models.hybrid import (
+    HybridSystem,
+    PeriodicEvent,
+    Signal,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+    vector,
+)
+from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
-DENSITY = 1e-2  # of the default process noise in every state [x2/s] [ours]
+DENSITY = 1e-2  # of the default process noise in every state or noise input [x2/s] [ours]
 VARIANCE = 1e-4  # of the default measurement noise [y2] [ours]
-MOST = 50  # members: each stands in the generated C once
-DEFAULT = 20
+MOST, DEFAULT = 50, 20  # members: each stands in the generated C once
 
 
-class MemberFilter(ModelObserver):
-    """Base of filters whose belief is a number of members.
+class MemberFilter(HybridSystem):
+    """Base of filters of any `FilterModel` whose belief is a number of members.
 
-    The contract: a subclass sets `more_memory` and `more_outputs` before ``super().__init__`` and writes `corrected`
-    and `told`. At the first sample members are drawn around the start of the estimates; at later ones each runs through
-    the model over the period and feels process noise of its own. Noises are of (seed, signal, index), so that block,
-    FMU and a run that is done again draw the same.
+    The contract:
 
-    Memory: estimates, NIS, their variances, the members column by column, what the subclass adds, and whether a sample
-    has come.
+    1. A subclass sets `own_parameters`, `own_memory` and `own_outputs` before ``super().__init__``, and writes
+       `corrected`.
+    2. At the first sample members are drawn around the start of the estimates with `start_covariance`; at later ones
+       each runs through the model over the period and feels process noise of its own. Noises are of (seed, signal,
+       index), so that block, FMU and a run that is done again draw the same.
+    3. The state is the estimates, NIS, standard deviations, the members one after the other, what the subclass adds,
+       and whether a sample has come.
 
     Args:
-        model: a model or the name of one in `MODELS`.
+        model: name of an observer model or of a plant, ``file.py:Class``, or a model or system itself.
         members: how many, 2 to 50.
+        outputs, inputs, process_noises, substeps: of a plant, see `models.system_model`.
 
     Raises:
-        ValueError: the model is unknown, a mode of it does not decay and is not measured, or so many members are not
-            possible.
+        ValueError: an option is not legal, or the model does not suit; the message says which.
     """
 
-    timing = "periodic"
-    discrete = True
     internal_step = 0.1  # nothing flows between samples
-    more_memory: tuple[Signal, ...] = ()
-    more_outputs: tuple[Signal, ...] = ()
-    perturbs = False
+    perturbs: ClassVar[bool] = False
+    own_parameters: tuple[Signal, ...] = ()
+    own_memory: tuple[Signal, ...] = ()
+    own_outputs: tuple[Signal, ...] = ()
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "model": (),
+        "members": range(2, MOST + 1),
+        "outputs": (),
+        "inputs": (),
+        "process_noises": (),
+        "substeps": (),
+    }
 
-    def __init__(self, model: str | ObserverModel = "pendulum", members: int = DEFAULT) -> None:
-        chosen = find_model(model)
-        require_detectable_model(chosen, self.name)
+    def __init__(
+        self,
+        model: Source = "pendulum",
+        members: int = DEFAULT,
+        *,
+        outputs: Sequence[str] = (),
+        inputs: Sequence[str] | None = None,
+        process_noises: Sequence[str] = (),
+        substeps: int = SUBSTEPS,
+    ) -> None:
+        self.model = find_filter_model(model, outputs, inputs, process_noises, (), substeps)
+        if self.model.measurement_noises:
+            raise ValueError(
+                f"{self.name}: measurement noise of {self.model.name!r} enters by inputs; expected additive noise. Use "
+                "'unscented_kalman_filter'."
+            )
         if not 2 <= members <= MOST:
             raise ValueError(
                 f"{self.name}: members = {members!r}; expected 2 to {MOST}, since each stands in the generated C. "
                 "Use the functions of fmu_observer.filtering for more."
             )
         self.members = members
-        n, q = chosen.order, len(chosen.measurements)
-        QN = process_covariance(linear_part(chosen), DENSITY * np.eye(n), chosen.sample_period)
-        self.gain_parameters = (
-            self.gain_parameter(
-                "process_covariance", QN, "Covariance QN of the process noise of one period, row by row"
-            ),
-            self.gain_parameter(
-                "measurement_covariance", VARIANCE * np.eye(q), "Covariance RN of the measurements, row by row"
-            ),
-            self.gain_parameter("start_covariance", np.eye(n), "Covariance of the first estimate, row by row"),
-            *self.gain_parameters,
-        )
-        self.extra_memory = (
-            memory("squared_innovation", "1", 0.0, "Normalised innovation squared of the last sample"),
-            memory("variances", "1", (1.0,) * n, "Variances of the estimates, SI units", size=n),
-            memory("members", "1", 0.0, "Members, one after the other, SI units", size=n * members),
-            *self.more_memory,
-            memory("primed", "1", 0.0, "1 after the first sample"),
-        )
-        self.extra_outputs = (
-            *(
-                output_signal(
-                    f"{s.name}_std",
-                    s.unit,
-                    f"Standard deviation of the estimate: {s.description}",
-                    variability="discrete",
-                )
-                for s in chosen.states
-            ),
-            output_signal("nis", "1", "Normalised innovation squared of the last sample", variability="discrete"),
-            output_signal("nis_degrees", "1", "Degrees of freedom of nis", variability="discrete"),
-            *self.more_outputs,
-        )
-        super().__init__(chosen, members=members)
+        self._declare()
+        super().__init__(model=self.model.name, members=members)
 
     # -- what a subclass writes -------------------------------------------------------------------------------------
 
-    def corrected(self, members: Array, more: Sequence[Array], u: Any, p: Any) -> Sequence[Array]:
+    @abstractmethod
+    def corrected(self, members: Array, more: Array, y: Array, known: Known, u: Any, p: Any) -> Sequence[Array]:
         """What a sample makes of the members.
 
         Args:
-            members: predictions, shape (n, M). more: values of `more_memory`. u: inputs. p: parameters.
+            members: predictions, shape (n, M). more: values of `own_memory`, flat. y: measurements, shape (q,).
+            known: time, inputs and parameters of the model. u: inputs. p: parameters.
 
         Returns:
-            Estimate of shape (n,), NIS, variances of shape (n,), members of shape (n, M), and values of `more_memory`,
-            one array each.
+            Estimate of shape (n,), NIS, variances of shape (n,), members of shape (n, M), and the values of
+            `own_memory`, one array each.
         """
-        raise NotImplementedError
 
     # -- what follows -----------------------------------------------------------------------------------------------
 
+    def known(self, t: Array, u: Any, p: Any) -> Known:
+        """Time, inputs and parameters of the model.
+
+        Args:
+            t: [s]. u: inputs of the filter. p: its parameters.
+        """
+        values: list[Array] = []
+        for s in self.model.parameters:
+            value = getattr(p, s.name)
+            values.extend([value] if s.size is None else [value[i] for i in range(s.size)])
+        return Known(t, stacked(tuple(getattr(u, s.name) for s in self.model.inputs)), stacked(tuple(values)))
+
+    def seen(self, members: Array, known: Known) -> Array:
+        """What each member measures, shape (q, M).
+
+        Args:
+            members: shape (n, M). known: time, inputs and parameters of the model.
+        """
+        none = self.model.no_reading_noise()
+        return np.stack([self.model.measured(members[:, i], none, known) for i in range(self.members)], axis=1)
+
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Members drawn at the first sample, or moved over the period, then corrected; shape of the state."""
-        n, count, known = self.model.order, self.members, self.known(u)
+        n, count = self.model.order, self.members
         first = 2 * n + 1
-        before = [x[first + i * n : first + (i + 1) * n] for i in range(count)]
-        noise = np.reshape(u.process_normal, (n, count))
-        start = x[:n].reshape(n, 1) + drawn(as_matrix(p.start_covariance, n, n), noise)
-        moved = np.stack([transition(self.model, member, known, p.sample_period) for member in before], axis=1)
-        moved = moved + drawn(as_matrix(p.process_covariance, n, n), noise)
-        members = np.where(x[x.shape[0] - 1] > 0.5, moved, start)
+        before = np.reshape(x[first : first + n * count], (count, n))
+        start = x[:n].reshape(n, 1) + drawn(
+            as_matrix(p.start_covariance, n, n), np.reshape(u.process_normal, (-1, count))[:n]
+        )
+        members = np.where(x[x.shape[0] - 1] > 0.5, self._moved(before, t, u, p), start)
+        y = stacked(tuple(getattr(u, f"measured_{s.name}") for s in self.model.measurements))
         more = x[first + n * count : x.shape[0] - 1]
-        estimate, nis, variances, after, *others = self.corrected(members, more, u, p)
+        estimate, nis, variances, after, *others = self.corrected(members, more, y, self.known(t, u, p), u, p)
+        deviations = np.sqrt(np.maximum(variances, 0.0))
         columns = [after[i, j] for j in range(count) for i in range(n)]
-        told = [*(estimate[i] for i in range(n)), nis, *(variances[i] for i in range(n))]
+        told = [*(estimate[i] for i in range(n)), nis, *(deviations[i] for i in range(n))]
         added = [other[i] for other in others for i in range(other.shape[0])]
         return vector(*told, *columns, *added, 1.0 + 0.0 * nis)
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """Estimates, their standard deviations and NIS."""
-        n = self.model.order
-        spreads = {f"{s.name}_std": np.sqrt(np.maximum(x[n + 1 + i], 0.0)) for i, s in enumerate(self.model.states)}
-        degrees = float(len(self.model.measurements)) + 0.0 * x[n]
-        return super().output(t, x, u, p) | spreads | {"nis": x[n], "nis_degrees": degrees}
+        n, names = self.model.order, [s.name for s in self.model.states]
+        values = {name: x[i] for i, name in enumerate(names)}
+        values |= {f"{name}_std": x[n + 1 + i] for i, name in enumerate(names)}
+        return values | {"nis": x[n], "nis_degrees": float(len(self.model.measurements)) + 0.0 * x[n]}
 
-    def condition_of(self, p: Any) -> Condition:
-        """Whether the Kalman filter of the model linearised at the start has a steady state; members add sampling
-        errors of ``1 / sqrt(members)``.
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """Covariances are symmetric and positive; other parameters within their bounds."""
+        n, r, q = self.model.order, self.model.noise_count, len(self.model.measurements)
+        needed = super().requirements(p) | within_bounds(self.own_parameters, p)
+        needed |= positive("process_covariance", p.process_covariance, r, definite=False)
+        needed |= positive("start_covariance", p.start_covariance, n, definite=False)
+        return needed | positive("measurement_covariance", p.measurement_covariance, q, definite=True)
+
+    def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
+        """Whether the Kalman filter of the model, linearised at the start, has a stable steady state; members add
+        sampling errors of ``1 / sqrt(members)``.
+
+        Args:
+            parameters: values by name. preset: to start from; None for the default one.
+
+        Raises:
+            ValueError: a parameter is unknown, not finite or of another size, or the preset is unknown.
         """
-        n, q, T = self.model.order, len(self.model.measurements), float(p.sample_period)
-        QN, RN = (as_matrix(np.asarray(v), k, k) for v, k in ((p.process_covariance, n), (p.measurement_covariance, q)))
-        jacobian = transition_jacobian(self.model)
-        F = np.asarray(jacobian(start_of(self.model), np.zeros(len(self.model.inputs)), T))
-        steady = steady_filter(F, self.model.C, QN, RN)
-        return Condition(
-            holds=steady is not None,
-            values={
-                "members": self.members,
-                "spectral_radius": np.inf if steady is None else steady.spectral_radius,
-            },
-            statement="the Riccati equation of the model, linearised at the start, has a stabilising solution",
-            source=self.source,
+        p = self.unpack_parameters(parameter_values(self, parameters, preset, "to judge"))
+        r, q = self.model.noise_count, len(self.model.measurements)
+        noise, readings = (
+            as_matrix(np.asarray(v), k, k) for v, k in ((p.process_covariance, r), (p.measurement_covariance, q))
+        )
+        start, known = self.model.start, self._at_start()
+        return steady_condition(self.model, start, known, float(p.sample_period), noise, readings, self.source)
+
+    # -- internals --------------------------------------------------------------------------------------------------
+
+    def _moved(self, before: Array, t: Array, u: Any, p: Any) -> Array:
+        """All members a period later, with noise, shape (n, M)."""
+        known, count, r = self.known(t - p.sample_period, u, p), self.members, self.model.noise_count
+        draws = np.reshape(u.process_normal, (-1, count))[:r]
+        noise, none = drawn(as_matrix(p.process_covariance, r, r), draws), self.model.no_noise()
+        if self.model.process_noises:
+            columns = [self.model.moved(before[i], noise[:, i], known, p.sample_period) for i in range(count)]
+            return np.stack(columns, axis=1)
+        return np.stack([self.model.moved(before[i], none, known, p.sample_period) for i in range(count)], 1) + noise
+
+    def _at_start(self) -> Known:
+        inputs = np.array([float(s.start_values[0]) for s in self.model.inputs])
+        parameters = np.array([value for s in self.model.parameters for value in s.start_values])
+        return Known(0.0, inputs, parameters)
+
+    def _declare(self) -> None:
+        model, count, normal = self.model, self.members, "Standard normal numbers of this sample"
+        n, q, r = model.order, len(model.measurements), model.noise_count
+        self.states = (
+            *(memory(f"estimated_{s.name}", s.unit, s.start, f"Estimate: {s.description}") for s in model.states),
+            memory("last_nis", "1", 0.0, "Last normalised innovation squared"),
+            memory("deviations", "1", (1.0,) * n, "Standard deviations of the estimates, SI units", size=n),
+            memory("drawn_members", "1", 0.0, "Members, one after the other, SI units", size=n * count),
+            *self.own_memory,
+            PRIMED,
+        )
+        self.inputs = (
+            *model.inputs,
+            *(input_signal(f"measured_{s.name}", s.unit, s.start, s.description) for s in model.measurements),
+        )
+        sizes = {"process_normal": max(n, r)} | ({"measurement_normal": q} if self.perturbs else {})
+        noises = (
+            input_signal(name, "1", 0.0, normal, variability="discrete", size=k * count) for name, k in sizes.items()
+        )
+        self.events = (
+            PeriodicEvent("sampling", "sample_period", noises=tuple(noises), description="The measurements are read"),
+        )
+        told = [(s.name, s.unit, f"Estimate: {s.description}") for s in model.states]
+        told += [
+            (f"{s.name}_std", s.unit, f"Standard deviation of the estimate: {s.description}") for s in model.states
+        ]
+        told += [("nis", "1", "Normalised innovation squared of the last sample")]
+        told += [("nis_degrees", "1", "Degrees of freedom of the normalised innovation squared")]
+        self.outputs = (*(output_signal(*words, variability="discrete") for words in told), *self.own_outputs)
+        self.parameters = (
+            *self._noises(),
+            *self.own_parameters,
+            *model.parameters,
+            parameter("sample_period", "s", model.sample_period, "Sampling period of the measurements", min=1e-6),
         )
 
-    def _events(self) -> tuple[Any, ...]:
-        n, q = self.model.order, len(self.model.measurements)
-        sizes = {"process_normal": n} | ({"measurement_normal": q} if self.perturbs else {})
-        noises = tuple(
-            input_signal(name, "1", 0.0, "Standard normal numbers", variability="discrete", size=size * self.members)
-            for name, size in sizes.items()
+    def _noises(self) -> tuple[Signal, ...]:
+        model, n, r, q = self.model, self.model.order, self.model.noise_count, len(self.model.measurements)
+        density, period = DENSITY * np.eye(r), self.model.sample_period
+        if model.process_noises or not model.any_period:
+            QN = density / period if model.process_noises else density * period
+        else:
+            QN = np.asarray(noise_over(model, model.start, self._at_start(), period, density))
+        return (
+            _matrix("process_covariance", QN, "Covariance QN of the process noise of one period, row by row"),
+            _matrix("measurement_covariance", VARIANCE * np.eye(q), "Covariance RN of the measurements, row by row"),
+            _matrix("start_covariance", np.eye(n), "Covariance of the first estimate, row by row"),
         )
-        return (PeriodicEvent("sampling", "sample_period", noises=noises, description="The measurements are read"),)
 
-    def _seen(self, members: Array) -> Array:
-        """What each member measures, shape (q, M)."""
-        return np.stack([self.model.measured(members[:, i]) for i in range(self.members)], axis=1)
+
+def _matrix(name: str, values: np.ndarray, text: str) -> Signal:
+    return parameter(name, "1", tuple(map(float, values.ravel())), text, size=values.size)

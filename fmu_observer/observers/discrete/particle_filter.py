@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from fmu_observer.filtering.particles import effective_size, innovation_square, moments, resampled, reweighted
-from fmu_observer.models import ObserverModel
-from fmu_observer.observers.discrete.member_filter import DEFAULT, MOST, MemberFilter
+from fmu_observer.models.filter_model import Known
+from fmu_observer.models.system_model import Source
+from fmu_observer.observers.discrete.member_filter import DEFAULT, MemberFilter
 from fmu_observer.observers.model_observer import as_matrix
 from plant_models.hybrid import memory, output_signal, parameter
 from plant_models.hybrid.system import Array
@@ -23,42 +24,41 @@ class ParticleFilter(MemberFilter):
     deviation are the mean and the spread of the weighted particles. With few members and small measurement noise all
     weight falls on one particle: `effective_members` tells.
 
-    Args:
-        model: a model or the name of one in `MODELS`.
-        members: how many particles, 2 to 50.
+    Options and signals are those of `MemberFilter`. Defaults [ours]: QN of white noise of density 0.01 in every state,
+    RN = 1e-4, particles drawn with the covariance I.
 
-    Raises:
-        ValueError: the model is unknown, a mode of it does not decay and is not measured, or so many members are not
-            possible.
+    Args:
+        model: see `MemberFilter`. members: how many particles, 2 to 50. options: those of `MemberFilter`.
     """
 
     name = "particle_filter"
     description = "Particle filter, periodic measurements"
     source = "Gordon, Salmond, Smith, IEE Proceedings F 140 (1993) 107"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
-        "model": ("pendulum", "linear_pendulum", "freight_train", "cart_pendulum"),
-        "members": range(2, MOST + 1),
-    }
+    own_parameters = (
+        parameter(
+            "resampling_threshold",
+            "1",
+            0.5,
+            "Effective share of members below which they are resampled",
+            min=0.0,
+            max=1.0,
+        ),
+    )
+    own_outputs = (
+        output_signal("effective_members", "1", "Effective sample size before resampling", variability="discrete"),
+    )
 
-    def __init__(self, model: str | ObserverModel = "pendulum", members: int = DEFAULT) -> None:
-        self.gain_parameters = (
-            parameter(
-                "resampling_threshold", "1", 0.5, "Effective share of members below which they are resampled", max=1.0
-            ),
-        )
-        self.more_memory = (
-            memory("weights", "1", 1.0 / members, "Weights of the members", size=members),
+    def __init__(self, model: Source = "pendulum", members: int = DEFAULT, **options: Any) -> None:
+        self.own_memory = (
+            memory("weights", "1", 1.0 / max(members, 1), "Weights of the members", size=max(members, 1)),
             memory("effective", "1", float(members), "Effective sample size at the last sample"),
         )
-        self.more_outputs = (
-            output_signal("effective_members", "1", "Effective sample size before resampling", variability="discrete"),
-        )
-        super().__init__(model, members)
+        super().__init__(model, members, **options)
 
-    def corrected(self, members: Array, more: Sequence[Array], u: Any, p: Any) -> Sequence[Array]:
-        """Estimate, NIS, variances, particles, weights and effective sample size after the measurement."""
+    def corrected(self, members: Array, more: Array, y: Array, known: Known, u: Any, p: Any) -> Sequence[Array]:
+        """Estimate, NIS, variances, particles, weights and effective size, see `MemberFilter.corrected`."""
         q, n, count = len(self.model.measurements), self.model.order, self.members
-        RN, y, seen = as_matrix(p.measurement_covariance, q, q), self.measured(u), self._seen(members)
+        RN, seen = as_matrix(p.measurement_covariance, q, q), self.seen(members, known)
         before = more[:count]
         weights = reweighted(before, seen, y, RN)
         found, size = moments(members, weights), effective_size(weights)
