@@ -12,12 +12,15 @@ from cosim.cli import main
 from cosim.cli.tune import _seeds
 
 
+RUNNING = {"train_speed": 10.0, "wheel_rate": 10.0 / 0.575, "effort": 5e4}
+
+
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     """A locomotive that is asked to be fast."""
     scenario = Scenario(stop=0.1, step=0.01)
-    scenario.add("train", model="locomotive", **{"as": "block3"}, parameters={"train_speed": 10.0, "effort": 5e4})
-    scenario.expect("signal", name="it is fast", signal="train.speed", start=0.1, min=10.1)
+    scenario.add("train", model="locomotive", **{"as": "block3"}, parameters=RUNNING)
+    scenario.expect("signal", name="it is fast", signal="train.speed", start=0.05, min=10.1)
     return scenario.save(tmp_path / "fast.toml")
 
 
