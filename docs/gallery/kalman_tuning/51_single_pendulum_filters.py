@@ -12,7 +12,6 @@ CELLS = {
     "1 ms, free fall": (Cell(NAME, 1e-3, 1e-6, 1e-2, 2), 1.001),
     "50 ms, free fall, q 1e-4, r 0.1": (Cell(NAME, 0.05, 1e-4, 0.1, 40), 0.924),
     "50 ms, free fall, q 1e-3, r 0.1": (Cell(NAME, 0.05, 1e-3, 0.1, 40), 0.966),
-    "10 ms, free fall, angle all but unmeasured": (Cell(NAME, 0.01, 1e-6, (1e-2, 10.0), 30), 0.757),
 }
 
 

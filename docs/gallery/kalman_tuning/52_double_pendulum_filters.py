@@ -8,9 +8,9 @@ from shared.sheet import Sheet
 
 NAME, FALLING = "cart_double_pendulum", (0.3, -0.2)
 CELLS = {
-    "1 ms, held upright": (Cell(NAME, 1e-3, 1e-6, 1e-2, 2, held=True, start=(0.05, -0.03), length=1.5), 1.001),
-    "1 ms, free fall": (Cell(NAME, 1e-3, 1e-6, 1e-2, 2, start=FALLING, length=2.5), 1.003),
-    "10 ms, free fall, q 1e-3, r 0.1": (Cell(NAME, 0.01, 1e-3, 0.1, 12, start=FALLING, length=3.0), 0.961),
+    "1 ms, held upright": (Cell(NAME, 1e-3, 1e-6, 1e-2, 2, held=True, start=(0.05, -0.03), length=1.0), 1.001),
+    "1 ms, free fall": (Cell(NAME, 1e-3, 1e-6, 1e-2, 2, start=FALLING, length=2.0), 1.003),
+    "10 ms, free fall, q 1e-3, r 0.1": (Cell(NAME, 0.01, 1e-3, 0.1, 10, start=FALLING, length=3.0), 0.961),
 }
 
 
