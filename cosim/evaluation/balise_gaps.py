@@ -8,13 +8,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, nan
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from cosim.evaluation.roles import estimation_error, label, recorded
 from cosim.evaluation.spec import ReportSpec
 from cosim.results.result import BaliseRecord, Result
+
+Length = TypeVar("Length", float, np.ndarray)
 
 LONGEST = 10
 """How many gaps a table shows, the longest first."""
@@ -53,7 +55,16 @@ class Gap:
     @property
     def envelope(self) -> float:
         """What SUBSET-041 grants an odometer at the end of this gap [m]."""
-        return FIXED_SHARE + SHARE_OF_DISTANCE * self.length
+        return envelope(self.length)
+
+
+def envelope(length: Length) -> Length:
+    """What SUBSET-041 grants an odometer [m].
+
+    Args:
+        length: way since the last balise [m], a number or an array.
+    """
+    return FIXED_SHARE + SHARE_OF_DISTANCE * length
 
 
 @dataclass(frozen=True)

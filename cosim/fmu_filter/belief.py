@@ -7,10 +7,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cosim.fmu_model.exchange import ExchangeModel
+from cosim.fmu_model.linearise import right_slopes
 from cosim.fmu_model.sealed import SealedModel
 from fmu_observer.filtering import kalman, unscented
 from fmu_observer.filtering.square_root import factor
@@ -30,7 +33,8 @@ class Belief:
         x: estimate of the states, shape (n,). P: covariance, shape (n, n).
         nis: normalised square of the last innovation, NaN before the first. degrees: how many values it had.
         count: samples taken in, and steps made, so that random numbers do not repeat.
-        points: particles, shape (n, N). weights: of them, shape (N,). None where the filter has none.
+        points: members, shape (n, N). weights: of them, shape (N,). None where the filter has none.
+        states: saved states of the FMU, one a member.
     """
 
     x: Array
@@ -40,6 +44,7 @@ class Belief:
     count: int = 0
     points: Array | None = None
     weights: Array | None = None
+    states: tuple[Any, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,11 +127,26 @@ class FmuFilter(ABC):
 
 
 class ExtendedFilter(FmuFilter):
-    """Extended Kalman filter: slopes by central differences of whole steps, over a small share of what is not known."""
+    """Extended Kalman filter.
+
+    Slopes come from the directional derivatives of a model exchange FMU where they are right, which is seen by
+    differences at the start; else from central differences of whole steps, over a small share of what is not known.
+
+    Args:
+        model: the FMU. noises: of it.
+    """
+
+    def __init__(self, model: SealedModel, noises: Noises) -> None:
+        super().__init__(model, noises)
+        self._directional = model if isinstance(model, ExchangeModel) and right_slopes(model) else None
 
     def predict(self, belief: Belief, t: float, h: float, u: Array) -> Belief:
         """The belief a step later; arguments as for `FmuFilter`."""
         x, steps = belief.x, self._steps(belief)
+        if self._directional is not None:
+            moved, F = self._directional.transition_with_slope(t, h, x, u)
+            P = kalman.predicted_covariance(belief.P, F, h * self.noises.intensity) + self._from_inputs(t, h, x, u)
+            return replace(belief, x=moved, P=P, count=belief.count + 1)
         F = np.empty((len(x), len(x)))
         for i, step in enumerate(steps):
             away = np.zeros(len(x))
@@ -141,6 +161,10 @@ class ExtendedFilter(FmuFilter):
         """The belief after a measurement; arguments as for `FmuFilter`."""
         x, steps = belief.x, self._steps(belief)
         chosen = list(seen)
+        if self._directional is not None:
+            expected = self.model.values_at(t, x, u)[1][chosen]
+            slopes = self._directional.slopes([self.model.outputs[i] for i in chosen])
+            return self._corrected(belief, kalman.correct(x, belief.P, y - expected, slopes, R), y - expected)
         H = np.empty((len(chosen), len(x)))
         for i, step in enumerate(steps):
             away = np.zeros(len(x))

@@ -53,7 +53,7 @@ class ComponentTable(Table):
     interpolation: Literal["linear", "hold"] = "linear"
     backend: Backend | None = Field(default=None, alias="as")
     preset: str | None = None
-    options: dict[str, str | int | float | bool] = {}
+    options: dict[str, str | int | float | bool | list[str]] = {}
     parameters: dict[str, Start] = {}
     tolerance: Tolerance | None = None
     late_policy: LatePolicy = "replay"

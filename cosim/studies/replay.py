@@ -62,6 +62,7 @@ class Replay:
         parameters: Mapping[str, ArrayLike] | None = None,
         members: int | None = None,
         progress: Callable[[int, int], None] | None = None,
+        late: Mapping[str, int] | None = None,
     ) -> np.ndarray:
         """Run members over the recording.
 
@@ -71,12 +72,15 @@ class Replay:
                 of a vector with n elements shape (n,) or (members, n). Start values of states too.
             members: how many; None: as many as the longest of the parameters has rows.
             progress: called with the number of members done and of all.
+            late: by name of a connected input the number of points that its values come later than in the run, or
+                sooner where negative: what a wrong order of exchange would cost.
 
         Returns:
             Shape (members, points, len(results)); NaN from where a member failed.
 
         Raises:
             BatchError: a name is unknown or a shape does not fit.
+            ReplayError: an input that is to be late is not connected.
         """
         given = {name: np.asarray(values, dtype=float) for name, values in (parameters or {}).items()}
         count = members if members is not None else self._members(given)
@@ -86,7 +90,7 @@ class Replay:
         for name, value in self._first.items():
             batch.set(name, value)
         batch.start(float(self.instants[0]))
-        return batch.run(self.instants[1:], results, self._inputs, progress)
+        return batch.run(self.instants[1:], results, self._moved(late or {}), progress)
 
     def heard(self) -> np.ndarray:
         """Inputs as the observer had them at each communication point, in the order of its scalar inputs; those that
@@ -102,6 +106,15 @@ class Replay:
         return rows
 
     # -- internals --------------------------------------------------------------------------------------------------
+
+    def _moved(self, late: Mapping[str, int]) -> dict[str, np.ndarray]:
+        """The inputs with some of them later; at an end the value there stays."""
+        for name in late:
+            if name not in self._inputs:
+                raise ReplayError(f"{self.name!r} has no connected input {name!r}; {nearest(name, self._inputs)}")
+        places = np.arange(len(self.instants))
+        moved = {name: np.clip(places - points, 0, len(places) - 1) for name, points in late.items()}
+        return {name: values[moved[name]] if name in moved else values for name, values in self._inputs.items()}
 
     def _members(self, given: Mapping[str, np.ndarray]) -> int:
         """How many members the parameters are given for; 1 where each has one value for all."""

@@ -4,6 +4,7 @@ docs/jam_detection.md. NumPy only; knows the rules' parameters and the error equ
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, inf, log
 from typing import Any
@@ -11,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.certificates.exponential import small_exponential
+from fmu_observer.certificates.gap_error import matrix_powers
 
-SPEEDS = 9  # of the scheduling, at which the transition over a period is taken
 NEGLIGIBLE, LONGEST = 1e-9, 5000  # of what is left of an error; periods until then at most
 
 
@@ -28,7 +29,7 @@ class RecoveryBounds:
         settle_time: from a restart to a residual below eps / 2 for ever [s]; infinite where it does not settle.
         any_state: from the instant at which the wheel rolls to trust for good, from whatever state and memory [s].
         steady_residual: bound of the residual of a settled estimate [m/s].
-        contraction: largest factor by which the error falls in a period, after long [1].
+        contraction: factor by which the error falls in a period at the middle of the vertices, after long [1].
     """
 
     agrees: bool
@@ -72,8 +73,9 @@ def recovery_bounds(
 ) -> RecoveryBounds:
     """The bounds for the gains and parameters in use, the innovation held between samples.
 
-    Noise, curvature and start are taken at their worst (sums of absolute values), the speed of the scheduling as fixed
-    at the worst of nine between the vertices: the printed gains differ by 1 % from vertex to vertex.
+    Noise, curvature and start are taken at their worst (sums of absolute values), and so is the speed of the
+    scheduling, which may be another one in each period: the error over a period is that at the middle of the vertices
+    and at most a `spread` beside it, element by element, and what the spread does is summed up too.
 
     Args:
         drifts: ``A_1``, ``A_2`` of speed, disturbance and its rate, shape (2, 3, 3). gains: ``K_1``, ``K_2``, shape (2,
@@ -90,20 +92,25 @@ def recovery_bounds(
     """
     period, noise, theta = float(p.odometer_period), float(p.odometer_noise), float(p.threshold / p.residual_gain)
     samples, late = float(p.recover_samples), period if aggregated else 0.0
-    F, G, H = _period(drifts, gains, period)
-    radius = max(float(np.abs(np.linalg.eigvals(one)).max()) for one in F)
+    error = _over_a_period(drifts, gains, period)
+    radius = float(np.abs(np.linalg.eigvals(error.middle)).max())
     steady, settle = inf, inf
-    if radius < 1.0:
-        seen = _seen(F, radius)
-        on_noise, on_curvature = (
-            max(float(np.abs(rows @ column).sum()) for rows, column in zip(seen, columns, strict=True))
-            for columns in (G, H)
-        )
-        steady = noise * (1.0 + on_noise) + curvature * on_curvature
+    powers = _powers(error.middle, radius) if radius < 1.0 else np.zeros((1, 3, 3))
+    sums = np.abs(powers).sum(axis=0)
+    loop = sums @ error.spread
+    if radius < 1.0 and float(np.abs(np.linalg.eigvals(loop)).max()) < 1.0:
+        share = float(p.schedule_max) / (float(p.schedule_max) - float(p.schedule_min))
+        # The drag is that of the reading, the train's that of its speed: they part during a period.
+        unlike = abs(drifts[1] - drifts[0])[0, 0] * share * (float(p.acceleration_limit) * period + noise)
+        inputs = np.abs(powers @ error.noise).sum(axis=0) + sums @ error.noise_spread
+        driven = noise * inputs + sums @ (curvature * error.curvature + unlike * error.drag)
+        closed = np.linalg.inv(np.eye(3) - loop)
+        steady = noise + float((closed @ driven)[0])
         corners = np.array([noise, disturbance_error, rate_error])
-        left = np.max([np.abs(rows) @ corners for rows in seen], axis=0)  # of every start within the corners
-        above = np.flatnonzero(left > 0.5 * theta - steady)
-        if steady < 0.5 * theta:
+        left = _decay(powers, error.spread, corners)
+        tail = float((closed @ np.abs(powers).max(axis=0) @ left[-1])[0])  # of all that comes after the last period
+        above = np.flatnonzero(left[:, 0] > 0.5 * theta - steady)
+        if steady + tail < 0.5 * theta:
             settle = period * (int(above[-1]) + 1 if above.size else 0)
     quiet = settle + float(p.settle_samples) * period
     hold = period * ceil(float(p.hold_limit) / period - 1e-9) + period
@@ -119,33 +126,66 @@ def recovery_bounds(
     )
 
 
-def _period(
-    drifts: np.ndarray, gains: np.ndarray, period: float
-) -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
-    """Error over a period at speeds between the vertices: transition, and effects of noise and of curvature."""
-    transitions, noises, curvatures = [], [], []
-    for share in np.linspace(0.0, 1.0, SPEEDS):
-        A, K = ((1.0 - share) * pair[0] + share * pair[1] for pair in (drifts, gains))
-        generator = np.zeros((5, 5))
-        generator[:3, :3], generator[:3, 3], generator[2, 4] = A, K[:, 0], 1.0
+@dataclass(frozen=True)
+class _PeriodError:
+    """The error over a period, for any speed between the vertices.
+
+    Attributes:
+        middle: transition at the middle, shape (3, 3). spread: by how much it may differ, shape (3, 3).
+        noise: effect of the reading's noise at the middle, shape (3,). noise_spread: by how much it may differ.
+        curvature, drag: largest effects of the disturbance's second derivative and of an acceleration, shape (3,).
+    """
+
+    middle: np.ndarray
+    spread: np.ndarray
+    noise: np.ndarray
+    noise_spread: np.ndarray
+    curvature: np.ndarray
+    drag: np.ndarray
+
+
+def _over_a_period(drifts: np.ndarray, gains: np.ndarray, period: float) -> _PeriodError:
+    """``e(+) = (Phi - Gamma K c) e``, with the speed held over the period and anything between the vertices.
+
+    ``A(z)`` differs in its first element only, and all elements of ``Phi = e^{A h}`` and of its integral ``Gamma`` are
+    monotone in that: their values at the vertices enclose them. K lies between those of the vertices.
+    """
+    flows, integrals = [], []
+    for A in drifts:
+        generator = np.zeros((6, 6))
+        generator[:3, :3], generator[:3, 3:] = A, np.eye(3)
         flown = small_exponential(generator * period)
-        # The estimate gets the held innovation: e(+) = Phi e - Gamma K e_1, and the noise of the reading with it.
-        transition = flown[:3, :3].copy()
-        transition[:, 0] -= flown[:3, 3]
-        transitions.append(transition)
-        noises.append(flown[:3, 3])
-        curvatures.append(flown[:3, 4])
-    return transitions, noises, curvatures
+        flows.append(flown[:3, :3])
+        integrals.append(flown[:3, 3:])
+    flow, flow_spread = _enclosed(flows)
+    integral, integral_spread = _enclosed(integrals)
+    gain, gain_spread = _enclosed([K[:, 0] for K in gains])
+    noise = integral @ gain
+    noise_spread = integral_spread @ (np.abs(gain) + gain_spread) + np.abs(integral) @ gain_spread
+    middle, spread = flow.copy(), flow_spread.copy()
+    middle[:, 0] -= noise
+    spread[:, 0] += noise_spread
+    largest = np.abs(integral) + integral_spread
+    return _PeriodError(middle, spread, noise, noise_spread, largest[:, 2], largest[:, 0])
 
 
-def _seen(transitions: list[np.ndarray], radius: float) -> list[np.ndarray]:
-    """``c F^k``, c the speed, for k = 0 .. until it has vanished, shape (count, 3) for each transition."""
+def _enclosed(pair: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Middle of two, and half of their distance."""
+    return 0.5 * (pair[0] + pair[1]), 0.5 * np.abs(pair[1] - pair[0])
+
+
+def _powers(transition: np.ndarray, radius: float) -> np.ndarray:
+    """``F^k`` for k = 0 .. until it has vanished, shape (count, 3, 3)."""
     count = min(int(log(NEGLIGIBLE) / log(max(radius, 1e-3))) + 1, LONGEST)
-    found = []
-    for F in transitions:
-        rows = np.zeros((count, 3))
-        rows[0, 0] = 1.0
-        for k in range(1, count):
-            rows[k] = rows[k - 1] @ F
-        found.append(rows)
-    return found
+    return np.concatenate([np.eye(3)[None], matrix_powers(transition, count)])
+
+
+def _decay(powers: np.ndarray, spread: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Bound of what is left of every start within the corners, shape (count, 3):
+    ``b_k = |F^k| b_0 + sum_j |F^(k-1-j)| spread b_j``.
+    """
+    sizes = np.abs(powers)
+    left = sizes @ corners
+    for k in range(1, len(left)):
+        left[k] += np.einsum("jab,jb->a", sizes[k - 1 :: -1], left[:k] @ spread.T)
+    return left

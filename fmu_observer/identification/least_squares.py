@@ -17,6 +17,8 @@ Simulation = Callable[[Array], Array]  # parameters of shape (p,) -> signals of 
 DIFFERENCE = 1e-4
 """Step of central differences, as a share of a parameter's size: a solver in the simulation may round at 1e-9."""
 ALMOST_ONE = 0.999
+UNSEEN = 1e12
+"""Variance, in squared sizes of the parameters, of a direction that no signal shows."""
 REPEATS = 3  # the noise is estimated anew after each fit
 
 
@@ -186,15 +188,10 @@ def _covariance(jacobian: Array, weights: Array, variances: Array, sizes: Array)
     normal = np.einsum("qni,qnj,q->ij", rows, rows, weights**2)
     spread = np.einsum("qni,qnj,q->ij", rows, rows, weights**4 * variances)
     values, vectors = np.linalg.eigh(normal)
-    floor = np.finfo(float).eps * max(float(values[-1]), np.finfo(float).tiny)
-    inverse = (vectors / np.maximum(values, floor)) @ vectors.T
-    return np.asarray(inverse @ spread @ inverse * np.outer(sizes, sizes) + _unseen(vectors, values, floor, sizes))
-
-
-def _unseen(vectors: Array, values: Array, floor: float, sizes: Array) -> Array:
-    """What is added for directions that no signal shows: a variance of very many sizes."""
-    hidden = vectors[:, values <= floor] * sizes[:, None]
-    return np.asarray(1e12 * hidden @ hidden.T)
+    seen = values > np.finfo(float).eps * max(float(values[-1]), np.finfo(float).tiny)
+    inverse = (vectors[:, seen] / values[seen]) @ vectors[:, seen].T
+    hidden = vectors[:, ~seen]
+    return np.asarray((inverse @ spread @ inverse + UNSEEN * hidden @ hidden.T) * np.outer(sizes, sizes))
 
 
 @dataclass(frozen=True)

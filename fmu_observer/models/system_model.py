@@ -10,13 +10,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import casadi as ca
 import numpy as np
 
 from fmu_observer.models.filter_model import FilterModel, Known, Measured, Transition, filter_model
 from fmu_observer.models.model import ObserverModel
 from fmu_observer.models.registry import MODELS, find_model
 from plant_models import PLANTS
-from plant_models.hybrid import HybridSystem, Signal, TracedSystem, input_signal, scalar_names, state, vector
+from plant_models.hybrid import HybridSystem, Signal, TracedSystem, input_signal, scalar_names, state, vector, width
 from plant_models.hybrid.integration import step
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.system import Array
@@ -44,7 +45,8 @@ def system_model(
     """A hybrid system as the model of a filter.
 
     1. Continuous states are estimated. They move by the system's own method (dry friction and switches included) in
-       `substeps` equal steps a period; memory stays at its start, triggered events do not occur.
+       `substeps` equal steps a period; memory stays at its start, triggered events do not occur, and periodic ones
+       must leave the continuous states alone.
     2. A system without continuous states that jumps at one periodic event moves by this jump; all its memory is
        estimated, and the period of the event is that of the filter.
     3. Its parameters become parameters of the filter. Vectors are taken apart, ``x[1]`` as ``x_1``.
@@ -75,6 +77,7 @@ def system_model(
     every = {name: s for s in system.outputs for name in s.scalar_names}
     measured = [every[known_name(name, every, f"{system.name}: output")] for name in outputs]
     rows = [list(every).index(name) for name in outputs]
+    moving.check_outputs(rows)
     return FilterModel(
         name=system.name,
         description=system.description,
@@ -157,20 +160,53 @@ class _Moving:
         system = self.system
         if not system.traceable:
             raise ValueError(f"{system.name}: it cannot be traced, so it has no Jacobian and is no model of a filter.")
+        if not system.state_count:
+            raise ValueError(f"{system.name}: it has no states, so there is nothing to estimate.")
         own = [f"periodic {e.name!r}" for e in system.periodic_events]
         own += [f"communication {e.name!r}" for e in system.communication_events]
-        if not system.state_count or (own and (system.continuous_count or len(own) > 1 or system.communication_events)):
-            reason = f"jumps at its own events ({', '.join(own)})" if own else "has no states"
+        if system.communication_events or (len(own) > 1 and not system.continuous_count) or self._meddling():
             raise ValueError(
-                f"{system.name}: it {reason}, expected a system that flows between events from outside, or that has "
-                "no continuous states and one periodic event; it is no model of a filter."
+                f"{system.name}: it moves by its own events ({', '.join(own)}), expected a system whose continuous "
+                "states flow on whatever they do, or that has no continuous states and one periodic event; it is no "
+                "model of a filter."
+            )
+
+    def _meddling(self) -> bool:
+        """Whether periodic events, but for their noise, change what flows, at once or by way of memory."""
+        system, n = self.system, self.system.continuous_count
+        if not n or not system.periodic_events:
+            return False
+        if self._traced.dependencies("derivative", "x")[:, n:].any():
+            return True
+        x = ca.SX.sym("x", system.state_count)
+        quiet = width(system.noises)  # which stand last
+        u = ca.vertcat(ca.SX.sym("u", len(system.start_inputs()) - quiet), ca.SX(quiet, 1))
+        p = ca.SX.sym("p", len(system.start_parameters()))
+        jumped = [self._traced.jump(e.name)(ca.SX.sym("t"), x, u, p) for e in system.periodic_events]
+        return not all(ca.is_equal(ca.simplify(after[i]), x[i]) for after in jumped for i in range(n))
+
+    def check_outputs(self, rows: Sequence[int]) -> None:
+        """No output is what periodic events made of a flowing state.
+
+        Raises:
+            ValueError: one is; the message names it.
+        """
+        system, n = self.system, self.system.continuous_count
+        if not n or not system.periodic_events:
+            return
+        read = np.asarray(self._traced.dependencies("output", "x")[:, n:].any(axis=1))
+        wrong = [scalar_names(system.outputs)[i] for i in rows if read[i]]
+        if wrong:
+            raise ValueError(
+                f"{system.name}: output {wrong[0]!r} follows its own sampling, not the state now; measure an output "
+                "that follows the state."
             )
 
     @property
     def event(self) -> str | None:
         """The periodic event by which the system moves; None where it flows."""
         events = self.system.periodic_events
-        return events[0].name if events else None
+        return events[0].name if events and not self.system.continuous_count else None
 
     @property
     def states(self) -> tuple[Signal, ...]:
@@ -185,16 +221,21 @@ class _Moving:
 
     @property
     def parameters(self) -> tuple[Signal, ...]:
-        """Those of the system, at the values of the preset; the period of its event is the filter's own."""
+        """Those of the system, at the values of the preset, without periods of its events."""
         values = dict(
             zip(scalar_names(self.system.parameters), self.system.start_parameters(self.preset), strict=False)
         )
-        own = [e.period for e in self.system.periodic_events]
+        own = self._own_periods
         return tuple(
             replace(s, start=tuple(float(values[n]) for n in s.scalar_names) if s.size else float(values[s.name]))
             for s in self.system.parameters
             if s.name not in own
         )
+
+    @property
+    def _own_periods(self) -> list[str]:
+        """Parameters that the period of the filter takes the place of."""
+        return [e.period for e in self.system.periodic_events]
 
     @property
     def sample_period(self) -> float:
@@ -231,7 +272,6 @@ class _Moving:
     def _jacobian(self, x: Array, u: Array, p: Array) -> Callable[[Array, Array], tuple[Array, Array]] | None:
         if self.system.method != "rosenbrock":
             return None
-        import casadi as ca  # noqa: PLC0415 - numbers or symbols, as in exact_jacobian
 
         def derivatives(t: Array, _continuous: Array) -> tuple[Array, Array]:
             by_x, by_t = self._traced.effective_jacobian(*(ca.SX(value) for value in (t, x, u, p)))
@@ -259,7 +299,7 @@ class _Moving:
 
     def _parameters(self, p: Array, period: Array) -> Array:
         """All parameters of the system: those of the filter, its period, and those of the runtime."""
-        own, i, parts = [e.period for e in self.system.periodic_events], 0, []
+        own, i, parts = self._own_periods, 0, []
         for s in self.system.parameters:
             if s.name in own:
                 parts.append(period)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from jam_members import PERIOD, Members
+from scipy.linalg import expm
 
 from fmu_observer.design.jam_recovery import held_position_error, held_speed_error, recovery_bounds
 from fmu_observer.design.quasi_lpv_published import SECTION_3_3_4, SECTION_5_3_1
@@ -25,6 +26,7 @@ from fmu_observer.detection.jam_rules import (
     agreement_limit,
 )
 from fmu_observer.detection.printed_jam_rules import PrintedMemory, PrintedRules
+from fmu_observer.observers.train import QuasiLpvUio
 from fmu_observer.observers.train.quasi_lpv_uio import speed_errors
 from plant_models.hybrid import Runtime
 
@@ -304,6 +306,36 @@ def test_b_from_every_state_it_is_believed_for_good_within_the_bound(members: in
     assert last.max() > run.p.trust_time  # some went all the way
     assert np.percentile(last, 99.0) < 60.0  # the bound, 107 s, is of the worst that could follow the worst
     assert (np.abs(run.x[1] - v[-1])).max() < 0.3
+
+
+@pytest.mark.parametrize("preset", ["as_published", "as_published_5_3_1"])
+def test_b_holds_for_a_speed_that_changes_from_period_to_period(preset: str) -> None:
+    """Errors of followed odometers, with noise at its worst and scheduling at any speeds, by SciPy's exponentials."""
+    observer, noise, members, count = QuasiLpvUio(), 0.02, 200, 200
+    p = observer.unpack_parameters(observer.start_parameters(preset))._replace(odometer_noise=noise)
+    drifts, gains = speed_errors(p)
+    bounds = recovery_bounds(drifts, gains, p, onset_error=0.2, curvature=0.0)
+    shares = np.linspace(0.0, 1.0, 6)
+    F, G = [], []
+    for s in shares:
+        A, K = ((1.0 - s) * pair[0] + s * pair[1] for pair in (drifts, gains))
+        flown = expm(np.block([[A, K], [np.zeros((1, 4))]]) * PERIOD)
+        F.append(flown[:3, :3] - np.outer(flown[:3, 3], [1.0, 0.0, 0.0]))
+        G.append(flown[:3, 3])
+    rng = np.random.default_rng(3)
+    chosen = rng.integers(0, len(shares), (members, count))
+    F, G = np.array(F), np.array(G)
+    response = np.array([(np.linalg.matrix_power(F[3], count - 1 - k) @ G[3])[0] for k in range(count)])
+    error = rng.choice([-1.0, 1.0], (members, 3)) * [noise, 1.0, 0.2]
+    largest = np.zeros(count)
+    for k in range(count):
+        now = chosen[:, k]
+        error = np.einsum("mab,mb->ma", F[now], error) + noise * np.sign(response[k]) * G[now]
+        largest[k] = p.residual_gain * (np.abs(error[:, 0]).max() + noise)
+    after = np.arange(1, count + 1) * PERIOD > bounds.settle_time
+    assert bounds.settles
+    assert largest[after].max() < 0.5 * p.threshold
+    assert 0.75 * bounds.steady_residual < largest[-1] <= bounds.steady_residual + 1e-5  # what is left of the start
 
 
 def test_the_position_strays_by_no_more_than_its_bound_while_the_model_runs_alone() -> None:

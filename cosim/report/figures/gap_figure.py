@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from cosim.drawing.style import BLACK, GAP, MARK, axes_or_new, observer_line, styled
-from cosim.evaluation.balise_gaps import PLAIN_ODOMETER, gap_errors
+from cosim.evaluation.balise_gaps import PLAIN_ODOMETER, envelope, gap_errors
 from cosim.evaluation.event_counts import accepted_stamps
 from cosim.evaluation.facts import mapping_entry, number_entry
 from cosim.evaluation.numbers import number
@@ -123,9 +123,9 @@ def gap_error_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -
             alpha=0.75,
             label=found.labels[name],
         )
-    order = np.argsort(lengths)
-    granted = np.clip([gap.envelope for gap in found.gaps], SMALLEST, LARGEST)
-    ax.plot(lengths[order], granted[order], color=MARK, linewidth=1.2, label=GRANTED)
+    way = np.linspace(*ax.get_xlim(), 50)  # balises at one distance are one column of marks, and the line is seen still
+    ax.plot(way, np.clip(envelope(np.maximum(way, 0.0)), SMALLEST, LARGEST), color=MARK, linewidth=1.2, label=GRANTED)
+    ax.set_xlim(way[0], way[-1])
     ax.set_yscale("log")
     ax.set_xlabel("Way since the last balise [m]")
     ax.set_ylabel("|Position error| at the end [m]")

@@ -107,14 +107,29 @@ class GaussianFilter(GatedObserver):
         covariances: bool = False,
         **options: Any,
     ) -> None:
-        self.model = find_filter_model(model, outputs, inputs, process_noises, measurement_noises, substeps)
+        named: dict[str, Any] = {
+            "outputs": outputs,
+            "inputs": inputs,
+            "process_noises": process_noises,
+            "measurement_noises": measurement_noises,
+        }
+        self.model = find_filter_model(model, **named, substeps=substeps)
         self.form: Form = self.forms[0] if form is None else form
         if self.form not in self.forms:
             raise ValueError(f"{self.name}: unknown form {form!r}; choose one of: {', '.join(self.forms)}.")
         self.arrivals = Arrivals(self.name, self.model, arrival)
         self.covariances = covariances
         self._declare()
-        super().__init__(model=self.model.name, arrival=arrival, form=self.form, covariances=covariances, **options)
+        given = {name: list(value) for name, value in named.items() if value}
+        super().__init__(
+            model=model if isinstance(model, str) else self.model.name,
+            **given,
+            **({} if substeps == SUBSTEPS else {"substeps": substeps}),
+            arrival=arrival if isinstance(arrival, str) else list(arrival),
+            form=self.form,
+            covariances=covariances,
+            **options,
+        )
 
     # -- what a subclass writes -------------------------------------------------------------------------------------
 

@@ -59,7 +59,8 @@ def motor_outputs(frame: str) -> tuple[Signal, ...]:
     """Outputs of a motor: state, torque and measured currents.
 
     Args:
-        frame: of the measured currents, ``rotor`` or ``stator``.
+        frame: of the measured currents, ``rotor`` or ``stator``. They are continuous signals also where they
+            are sampled, so that a master hands them on within the step of the sample.
 
     Returns:
         The declared signals.
@@ -70,10 +71,7 @@ def motor_outputs(frame: str) -> tuple[Signal, ...]:
         output_signal("speed", "rad/s", "Speed of the shaft", display_unit="rpm"),
         output_signal("angle", "rad", "Electrical angle of the rotor, not wrapped"),
         output_signal("torque", "N.m", "Electromagnetic torque C_em"),
-        *(
-            output_signal(f"measured_current_{axis}", "A", f"Sampled current along {axis}", variability="discrete")
-            for axis in AXES[frame]
-        ),
+        *(output_signal(f"measured_current_{axis}", "A", f"Measured current along {axis}") for axis in AXES[frame]),
     )
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 from plant_models.hybrid import HybridSystem, Signal, memory, vector
 from plant_models.hybrid.system import Array
-from plant_models.railway.traction.motor_equations import euler_step, rotor_voltages
+from plant_models.railway.traction.motor_equations import FRAMES, Frame, euler_step, rotor_voltages
 from plant_models.railway.traction.sampled_currents import (
     PUBLISHED_NOISE,
     measured_currents,
@@ -52,6 +52,10 @@ class SynchronousMotorEuler(SynchronousMotor):
         "faint": {"process_variance": (1e-7, 1e-7, 1e-7, 0.0), "measurement_variance": 1e-4},
     }
     default_preset = "as_published"
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"frame": FRAMES}
+
+    def __init__(self, *, frame: Frame = "rotor") -> None:
+        super().__init__(frame=frame, noise="sampled")
 
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Nothing flows, shape (0,)."""

@@ -111,8 +111,18 @@ def test_legends_lie_above_the_curves_and_inside_the_picture(result: Result) -> 
         assert box.width > 0.8 * ax.figure.bbox.width, panel.name  # nothing squashes the axes
 
 
+def test_what_is_granted_is_a_line_across_the_figure_however_alike_the_gaps(result: Result) -> None:
+    ax = GapErrorsPanel.draw(result, synthetic_spec(), None)
+    granted = next(line for line in ax.get_lines() if str(line.get_label()).startswith("SUBSET-041"))
+    way, error = (np.asarray(values, float) for values in granted.get_data())
+    assert tuple(way[[0, -1]]) == pytest.approx(ax.get_xlim())
+    assert error[-1] == pytest.approx(5.0 + 0.05 * way[-1])
+
+
 def test_other_trains_of_a_run_are_drawn_beside_the_true_one(result: Result) -> None:
-    spec = replace(synthetic_spec(), other_trains=["discrete_uio"], labels={"discrete_uio": "a second train"})
+    spec = replace(
+        synthetic_spec(), observers=[], other_trains=["discrete_uio"], labels={"discrete_uio": "a second train"}
+    )
     assert not OtherTrainsPanel.available(result, synthetic_spec())
     assert OtherTrainsPanel.available(result, spec)
     ax = OtherTrainsPanel.draw(result, spec, None)

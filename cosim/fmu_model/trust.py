@@ -1,0 +1,134 @@
+"""Whether the states of an FMU are all of its state, by measurement: written, read back, stepped, compared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosim.fmu_model.sealed import Array, FmuModelError, SealedModel
+
+STEPS = 3
+SOLVER = 1e-3
+"""What a restarted solver may make of a step, as a share of the change over it; a part of the state that was forgotten
+makes more of it.
+"""
+ROUNDING = 1e-9
+"""The same as a share of the values."""
+
+
+@dataclass(frozen=True)
+class StateTrust:
+    """What was seen of the states of an FMU.
+
+    Attributes:
+        way: how they are written. exact: whether a restart continued the run bit for bit.
+        deviation: largest difference after a restart, as a share of the change over a step.
+        idle: states whose value changes nothing in a step.
+    """
+
+    way: str
+    exact: bool
+    deviation: float
+    idle: tuple[str, ...]
+
+
+def usual_step(model: SealedModel) -> float:
+    """The step of the FMU's default experiment [s], 10 ms where it has none.
+
+    Args:
+        model: the FMU.
+    """
+    declared = getattr(model.instance.description.defaultExperiment, "stepSize", None)
+    return float(declared) if declared else 0.01
+
+
+def check_states(model: SealedModel, h: float, t: float = 0.0) -> StateTrust:
+    """Measure whether the states determine what follows.
+
+    A run of some steps is left at one of them, started again from the states read there, and compared with the run that
+    went on. Then each state is moved, read back, and must change the step that follows.
+
+    Args:
+        model: the FMU. h: length of the steps [s]. t: start of the run [s].
+
+    Returns:
+        What was seen.
+
+    Raises:
+        FmuModelError: the states are not taken, do not determine what follows, or change nothing. The message says
+            which finding it was and what to do.
+    """
+    u = model.start_inputs + 1.0
+    model.restart(t, model.start, u)
+    rows = [model.read()]
+    for k in range(2 * STEPS):
+        model.advance(t + k * h, h)
+        rows.append(model.read())
+    at, (x, _) = t + STEPS * h, rows[STEPS]
+    _demand_read_back(model, at, x, u)
+    model.restart(at, x, u)
+    worst, exact = 0.0, True
+    for k in range(STEPS, 2 * STEPS):
+        model.advance(t + k * h, h)
+        deviation, same = _deviation(model, rows, k + 1, model.read(), t + (k + 1) * h)
+        worst, exact = max(worst, deviation), exact and same
+    idle = _idle(model, at, x, u, h)
+    if len(idle) == len(model.states):
+        raise FmuModelError(
+            f"{model.path}: no state changes what follows ({', '.join(idle)}): the FMU does not start from the values "
+            "given. No filter can move it; a particle filter over saved states only selects."
+        )
+    return StateTrust(model.way, exact, worst, idle)
+
+
+def _demand_read_back(model: SealedModel, t: float, x: Array, u: Array) -> None:
+    for i, name in enumerate(model.states):
+        moved = x.copy()
+        moved[i] += 1e-3 * max(abs(x[i]), model.nominal(name))
+        found, _ = model.values_at(t, moved, u)
+        if abs(found[i] - moved[i]) > ROUNDING * max(abs(moved[i]), 1.0):
+            raise FmuModelError(
+                f"{model.path}: the state {name} was set to {float(moved[i])!r} and reads {float(found[i])!r} after "
+                "initialisation: the FMU does not take it. Name another variable that holds this state, or use a "
+                "particle filter over saved states."
+            )
+
+
+def _deviation(
+    model: SealedModel, rows: list[tuple[Array, Array]], k: int, again: tuple[Array, Array], t: float
+) -> tuple[float, bool]:
+    """Largest deviation from row k of the run as a share of its change, and whether there is none at all."""
+    names = (*model.states, *model.outputs)
+    run, redone = np.concatenate(rows[k]), np.concatenate(again)
+    change = np.max(
+        [np.abs(np.concatenate(rows[i]) - np.concatenate(rows[i - 1])) for i in range(1, len(rows))], axis=0
+    )
+    broken = np.flatnonzero(~(np.isfinite(run) & np.isfinite(redone)))
+    if len(broken):
+        raise FmuModelError(f"{model.path}: {names[broken[0]]} is no finite number at t = {t:g} s.")
+    apart = np.where(run == redone, 0.0, np.abs(run - redone))
+    wrong = ~(apart <= SOLVER * change + ROUNDING * np.maximum(np.abs(run), 1.0))
+    if wrong.any():
+        i = int(np.argmax(np.where(wrong, apart / np.maximum(change, np.finfo(float).tiny), 0.0)))
+        raise FmuModelError(
+            f"{model.path}: started again from its states ({', '.join(model.states)}), {names[i]} is "
+            f"{float(redone[i])!r} at t = {t:g} s, and {float(run[i])!r} in the run: the FMU holds more than these "
+            "states (samples, delays, modes). Name the missing states, or use a particle filter over saved states."
+        )
+    shares = apart / np.maximum(change, np.finfo(float).tiny)
+    return float(np.max(np.where(apart <= ROUNDING * np.maximum(np.abs(run), 1.0), 0.0, shares))), bool(
+        (run == redone).all()
+    )
+
+
+def _idle(model: SealedModel, t: float, x: Array, u: Array, h: float) -> tuple[str, ...]:
+    """States that change nothing over a step, themselves included."""
+    still = np.concatenate(model.transition(t, h, x, u))
+    idle = []
+    for i, name in enumerate(model.states):
+        moved = x.copy()
+        moved[i] += 1e-3 * max(abs(x[i]), model.nominal(name))
+        if np.array_equal(np.concatenate(model.transition(t, h, moved, u)), still):
+            idle.append(name)
+    return tuple(idle)

@@ -1,0 +1,147 @@
+"""Linearised FMUs against the exact Jacobians of the same equations, and what is said of FMUs that lie."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import lying_fmus
+import numpy as np
+import pytest
+import scipy
+
+import fmus
+from cosim import fmu_model
+from cosim.cli import main
+from cosim.fmu_model.exact import linearise_system
+from cosim.fmu_model.linearisation import Linearisation
+from cosim.fmu_model.linearise import linearise_fmu
+from cosim.fmu_model.sealed import FmuModelError
+from plant_models import PLANTS
+
+STATES = {"train_speed": 12.0, "wheel_rate": 21.0}
+INPUTS = {"effort": 5e4}
+
+
+@pytest.fixture(scope="module")
+def locomotive() -> Path:
+    return fmus.cached_fmu(PLANTS["locomotive"](), fmi_version=3)
+
+
+@pytest.fixture(scope="module")
+def exact() -> Linearisation:
+    return linearise_system(PLANTS["locomotive"](), states=STATES, inputs=INPUTS, t=5.0)
+
+
+@pytest.fixture
+def liar(tmp_path: Path) -> Iterator[Path]:
+    return lying_fmus.build(tmp_path, xml=lying_fmus.description(model=lying_fmus.STATES))
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_matrices_are_the_exact_ones(version: int, exact: Linearisation) -> None:
+    path = fmus.cached_fmu(PLANTS["locomotive"](), fmi_version=version)
+    found = linearise_fmu(path, states=STATES, inputs=INPUTS, t=5.0)
+    assert found.method == "directional derivatives"
+    assert found.units["train_speed"] == "m/s"
+    for key in "ABCD":  # both come from the same traced derivatives
+        np.testing.assert_allclose(getattr(found, key), getattr(exact, key), rtol=1e-12, atol=1e-12)
+
+
+def test_co_simulation_gives_the_step(locomotive: Path, exact: Linearisation) -> None:
+    found = linearise_fmu(
+        locomotive, states=STATES, inputs=INPUTS, t=5.0, interface="co-simulation", step=1e-3, outputs=["speed", "slip"]
+    )
+    assert found.step == 1e-3
+    # the slow part of the step: the exponential of A, within the second order of the Rosenbrock step of 5e-4 s
+    slow = np.sort(np.log(np.abs(np.linalg.eigvals(found.A))))[::-1] / 1e-3
+    expected = np.sort(np.linalg.eigvals(exact.A).real)[::-1]
+    np.testing.assert_allclose(slow[:2], expected[:2], atol=0.03)  # of 1400 1/s
+
+
+def test_the_operating_point_is_where_a_run_arrives(locomotive: Path) -> None:
+    found = linearise_fmu(locomotive, inputs=INPUTS, parameters={"mass": 50e3}, t=2.0, outputs=["speed"])
+    run = linearise_fmu(
+        locomotive, inputs=INPUTS, parameters={"mass": 50e3}, t=2.0, outputs=["speed"], interface="co-simulation"
+    )
+    np.testing.assert_allclose(found.x, run.x, rtol=1e-3)  # two solvers; the tolerance of the one is 1e-4
+    assert found.x[1] > 0.5
+
+
+def test_hidden_modes_are_told(exact: Linearisation) -> None:
+    part = exact.part(None, ["speed"])
+    assert [round(mode.eigenvalue.real, 6) for mode in part.unobservable()] == [0.0]
+    assert part.unobservable()[0].taking_part.keys() == {"train_position"}
+    assert not exact.unobservable()
+    assert not part.uncontrollable()
+    assert "1 of 3 modes no output shows" in part.text()
+
+
+@pytest.mark.parametrize("ending", ["json", "npz", "mat"])
+def test_files_hold_the_matrices(exact: Linearisation, tmp_path: Path, ending: str) -> None:
+    path = exact.save(tmp_path / f"point.{ending}")
+    if ending == "json":
+        data = json.loads(path.read_text())
+    else:
+        data = np.load(path) if ending == "npz" else scipy.io.loadmat(path)
+    for key in "ABCD":
+        np.testing.assert_array_equal(np.asarray(data[key]), getattr(exact, key))
+
+
+def test_python_control_gets_names(exact: Linearisation) -> None:
+    sys = fmu_model.to_state_space(exact)
+    assert sys.state_labels == list(exact.states)
+    np.testing.assert_array_equal(sys.A, exact.A)
+
+
+def test_honest_foreign_fmu_in_the_order_of_its_own_state_vector(liar: Path) -> None:
+    found = linearise_fmu(liar)  # its derivatives are declared in another order than its variables
+    assert found.states == ("position", "speed")
+    assert found.method == "directional derivatives"
+    np.testing.assert_allclose(found.A, [[0.0, 1.0], [0.0, -0.5]], atol=1e-12)
+
+
+def test_wrong_directional_derivatives_are_not_used(tmp_path: Path) -> None:
+    path = lying_fmus.build(tmp_path, "DERIVATIVE", xml=lying_fmus.description(model=lying_fmus.STATES))
+    found = linearise_fmu(path)
+    assert found.method == "central differences"
+    assert "is said to be -0.505" in found.remarks[0]
+    np.testing.assert_allclose(found.A, [[0.0, 1.0], [0.0, -0.5]], atol=1e-9)  # linear: rounding of differences only
+
+
+@pytest.mark.parametrize(
+    ("lie", "words"), [("STATES_NOT_SET", "does not move position"), ("NAN_DERIVATIVE", "no finite numbers")]
+)
+def test_lies_are_refused(tmp_path: Path, lie: str, words: str) -> None:
+    path = lying_fmus.build(tmp_path, lie, xml=lying_fmus.description(model=lying_fmus.STATES))
+    with pytest.raises(FmuModelError, match=words):
+        linearise_fmu(path)
+
+
+def test_command(locomotive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    at = ["--set", "train_speed=12", "--set", "wheel_rate=21", "--set", "effort=5e4", "--outputs", "speed"]
+    assert main(["linearise", str(locomotive), *at, "-o", str(tmp_path / "a.npz")]) == 0
+    text = capsys.readouterr().out
+    assert "-1422.2" in text
+    assert main(["linearise", "locomotive", *at]) == 0
+    assert "exact Jacobians" in capsys.readouterr().out
+    assert np.load(tmp_path / "a.npz")["C"].shape == (1, 3)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--set", "trainspeed=1"], "did you mean 'train_speed'"),
+        (["--outputs", "sped"], "did you mean 'speed'"),
+        (["--inputs", "efort"], "did you mean 'effort'"),
+        (["-o", "a.txt"], "expected one of: .json, .npz, .mat"),
+        (["--set", "mass=heavy"], "expected a number"),
+    ],
+)
+def test_mistakes_are_told(
+    locomotive: Path, words: list[str], told: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    words = [str(tmp_path / word) if word == "a.txt" else word for word in words]
+    assert main(["linearise", str(locomotive), *words]) == 2
+    assert told in capsys.readouterr().err
