@@ -8,7 +8,8 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from cosim.calibration.calibrate import Calibration, calibrate
+from cosim import calibration
+from cosim.calibration.fitting import Calibration, calibrate
 from cosim.calibration.recorded_signals import CalibrationError, sort_columns
 from cosim.calibration.runs import FmuRuns, Runs, ScenarioRuns
 from cosim.cli.scenarios import parse_setting
@@ -135,10 +136,10 @@ def _number(option: str, name: str, value: Any) -> float:
 
 
 def _draw(path: Path, found: Calibration) -> None:
-    from cosim.drawing.calibration import calibration_figure  # noqa: PLC0415 - matplotlib only for those who draw
-
     recorded = found.recorded
-    figure = calibration_figure(recorded.time, recorded.measured, found.fit.residuals, recorded.units, found.fit.noise)
+    figure = calibration.calibration_figure(
+        recorded.time, recorded.measured, found.fit.residuals, recorded.units, found.fit.noise
+    )
     try:
         figure.savefig(path)
     except (OSError, ValueError) as error:  # matplotlib refuses endings that it does not know by a ValueError

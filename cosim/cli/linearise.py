@@ -12,8 +12,9 @@ import plant_models
 from cosim.cli.scenarios import parse_setting
 from cosim.components.loading import describe_fmu
 from cosim.errors import ScenarioError, nearest
+from cosim.fmu_model.exact import linearise_system
 from cosim.fmu_model.linearisation import Linearisation
-from cosim.fmu_model.linearise import linearise_fmu, linearise_system
+from cosim.fmu_model.linearise import linearise_fmu
 from cosim.fmu_model.sealed import declared_states
 from cosim.results.summary_file import jsonable
 from cosim.scenario.models import make_declared

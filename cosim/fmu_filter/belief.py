@@ -7,6 +7,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,8 @@ class Belief:
         x: estimate of the states, shape (n,). P: covariance, shape (n, n).
         nis: normalised square of the last innovation, NaN before the first. degrees: how many values it had.
         count: samples taken in, and steps made, so that random numbers do not repeat.
-        points: particles, shape (n, N). weights: of them, shape (N,). None where the filter has none.
+        points: members, shape (n, N). weights: of them, shape (N,). None where the filter has none.
+        states: saved states of the FMU, one a member.
     """
 
     x: Array
@@ -42,6 +44,7 @@ class Belief:
     count: int = 0
     points: Array | None = None
     weights: Array | None = None
+    states: tuple[Any, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

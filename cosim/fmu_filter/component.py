@@ -12,13 +12,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cosim.components.loading import load_fmu
 from cosim.errors import nearest
 from cosim.fmu_filter.belief import ExtendedFilter, FmuFilter, Noises, UnscentedFilter
 from cosim.fmu_filter.journal import SAME, Journal
+from cosim.fmu_filter.many import EnsembleFilter, ParticleFilter
 from cosim.fmu_filter.settings import FilterTable
-from cosim.fmu_model.opening import open_model
+from cosim.fmu_model.opening import open_model, start_value
 from cosim.fmu_model.sealed import FmuModelError, SealedModel
 from cosim.fmu_model.trust import check_states, usual_step
+from fmus.check.probe import probe
 from plant_models.hybrid.signal import Signal, input_signal, output_signal
 from plant_models.hybrid.units import UnitError, parse_unit
 
@@ -51,12 +54,11 @@ class FmuFilterModel:
         checked: bool = False,
     ) -> None:
         self._made_of = path, table, dict(parameters or {})
-        self._model = open_model(
-            path, table.interface, states=table.states, outputs=table.outputs, parameters=_numbers(parameters or {})
-        )
+        numbers = _numbers(parameters or {})
+        self._model = _opened(path, table, numbers)
         model = self._model
         if not checked:
-            check_states(model, usual_step(model))
+            _demand(table, model, numbers)
         self._start = model.start.copy()
         self._seen = [_place(model, "output", model.outputs, name) for name in table.measurements]
         self._R = np.diag([value**2 for value in table.measurements.values()])
@@ -64,7 +66,10 @@ class FmuFilterModel:
         intensity = np.diag(_by_name(model, "state", model.states, table.process_noise) ** 2)
         noisy = np.diag(_by_name(model, "input", model.inputs, table.input_noise) ** 2)
         self._engine = _engine(table, model, Noises(intensity, noisy))
-        self._P = np.diag(_by_name(model, "state", model.states, table.start_deviation) ** 2)
+        self._estimated = model.outputs if table.kind == "particle" else model.states
+        self._P = np.zeros((len(self._estimated), len(self._estimated)))
+        if table.kind != "particle":
+            self._P = np.diag(_by_name(model, "state", model.states, table.start_deviation) ** 2)
         self.inputs = [_signal(model, name, "input", name) for name in model.inputs]
         self.inputs += [_signal(model, name, "input", MEASURED + name) for name in table.measurements]
         self.outputs = self._output_signals()
@@ -150,16 +155,16 @@ class FmuFilterModel:
         assert self._journal is not None
         belief, model = self._journal.belief, self._model
         found = dict(zip(model.outputs, self._engine.outputs(belief, t, self._u).tolist(), strict=True))
-        found |= dict(zip(model.states, belief.x.tolist(), strict=True))
+        found |= dict(zip(self._estimated, belief.x.tolist(), strict=True))
         deviations = np.sqrt(np.maximum(np.diagonal(belief.P), 0.0))
-        found |= {f"{name}_std": float(value) for name, value in zip(model.states, deviations, strict=True)}
+        found |= {f"{name}_std": float(value) for name, value in zip(self._estimated, deviations, strict=True)}
         return found | {"nis": belief.nis, "nis_degrees": float(belief.degrees)}
 
     def _output_signals(self) -> list[Signal]:
         model = self._model
         names = list(dict.fromkeys([*model.states, *model.outputs]))
         found = [_signal(model, name, "output", name) for name in names]
-        found += [_signal(model, name, "output", f"{name}_std") for name in model.states]
+        found += [_signal(model, name, "output", f"{name}_std") for name in self._estimated]
         return [
             *found,
             output_signal("nis", "1", "NIS of the last sample"),
@@ -172,7 +177,7 @@ class FmuFilterModel:
             raise AttributeError(name)
         first = dict(zip(self._model.states, self._start.tolist(), strict=True))
         deviations = np.sqrt(np.diagonal(self._P)).tolist()
-        first |= {f"{state}_std": value for state, value in zip(self._model.states, deviations, strict=True)}
+        first |= {f"{state}_std": value for state, value in zip(self._estimated, deviations, strict=True)}
         if name in first:
             return first[name]
         if name in self._model.outputs:
@@ -186,9 +191,37 @@ class FmuFilterModel:
 def _engine(table: FilterTable, model: SealedModel, noises: Noises) -> FmuFilter:
     if table.kind == "ukf":
         return UnscentedFilter(model, noises, table.alpha)
-    if table.kind == "ekf":
-        return ExtendedFilter(model, noises)
-    raise FmuModelError(f"{model.path}: kind {table.kind!r} is not there yet; use 'ekf' or 'ukf'.")
+    if table.kind == "ensemble":
+        return EnsembleFilter(model, noises, table.members, table.seed)
+    if table.kind == "particle":
+        starts = {name: model.parameters[name] for name in table.start_deviation}
+        return ParticleFilter(model, noises, table.start_deviation, starts, table.members, table.seed)
+    return ExtendedFilter(model, noises)
+
+
+def _opened(path: str | Path, table: FilterTable, parameters: Mapping[str, float]) -> SealedModel:
+    """The FMU with its states, or without where they are only saved."""
+    if table.kind != "particle":
+        return open_model(path, table.interface, states=table.states, outputs=table.outputs, parameters=parameters)
+    if table.interface == "model-exchange":
+        raise FmuModelError(f"{path}: a particle filter saves states between steps, which is co-simulation's.")
+    starts = {name: start_value(path, name) for name in table.start_deviation if name not in parameters}
+    return open_model(path, "co-simulation", states=(), outputs=table.outputs, parameters={**parameters, **starts})
+
+
+def _demand(table: FilterTable, model: SealedModel, parameters: Mapping[str, float]) -> None:
+    """Refuse an FMU of which a measurement says that it cannot serve this filter."""
+    h = usual_step(model)
+    if table.kind != "particle":
+        check_states(model, h)
+        return
+    seen = probe(lambda: load_fmu(model.path, "probed"), parameters, 0.0, h)
+    if seen.restores == "no":
+        found = "; ".join(seen.remarks) or "it does not declare canGetAndSetFMUState"
+        raise FmuModelError(
+            f"{model.path}: its states cannot be saved and restored honestly ({found}), so no particle filter can "
+            "select among them. Use 'ekf', 'ukf' or 'ensemble' where its states have start values."
+        )
 
 
 def _place(model: SealedModel, what: str, names: tuple[str, ...], name: str) -> int:

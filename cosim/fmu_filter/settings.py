@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from cosim.table import Table
 
-Kind = Literal["ekf", "ukf", "particle"]
+Kind = Literal["ekf", "ukf", "ensemble", "particle"]
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 
@@ -19,7 +19,7 @@ class FilterTable(Table):
     Each key of a mapping is a name of the FMU; standard deviations are in the unit of that variable.
     """
 
-    kind: Kind = Field(description="`ekf`, `ukf` or `particle`")
+    kind: Kind = Field(description="`ekf`, `ukf`, `ensemble` or `particle`")
     interface: Literal["co-simulation", "model-exchange"] | None = Field(
         default=None, description="of an FMU that has both; co-simulation by default"
     )
@@ -38,19 +38,24 @@ class FilterTable(Table):
         default={}, description="by input: standard deviation, held over a step; enters the model where the input does"
     )
     start_deviation: dict[str, NotNegative] = Field(
-        default={}, description="by state: standard deviation of the start value"
+        default={}, description="by state, or start value of a `particle` filter: standard deviation at the start"
     )
     balise: str | None = Field(default=None, description="output that a telegram measures, a position [m]")
     balise_deviation: Positive = Field(
         default=1.0, description="standard deviation of it [m], where a telegram tells no location accuracy"
     )
     horizon: NotNegative = Field(default=10.0, description="how far back a late telegram is still taken in [s]")
-    alpha: Positive = Field(default=1.0, description="spread of the sigma points of a `ukf`")
-    particles: Annotated[int, Field(ge=2)] = Field(default=200, description="of a `particle` filter")
-    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="of its numbers")
+    alpha: Positive = Field(default=1.0, description="spread of the sigma points of a `ukf` [1]")
+    members: Annotated[int, Field(ge=2)] = Field(default=100, description="of an `ensemble`, or particles")
+    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="of the numbers that they draw")
 
     @model_validator(mode="after")
     def _sees_something(self) -> FilterTable:
         if not self.measurements and self.balise is None:
             raise ValueError("a filter needs 'measurements' (outputs with standard deviations) or 'balise' (an output)")
+        if self.kind == "particle" and (self.states or self.process_noise):
+            raise ValueError(
+                "a particle filter selects saved states and moves none: leave out 'states' and 'process_noise', and "
+                "give 'input_noise' and 'start_deviation'"
+            )
         return self

@@ -19,7 +19,7 @@ class CoSimulationModel(SealedModel):
         Raises:
             FmuModelError: the FMU refuses the step.
         """
-        self._told(lambda: self.instance.advance(t, t + h))
+        self.told(lambda: self.instance.advance(t, t + h))
 
     def _enter(self, t: float) -> None:
         self.instance.enter_initialization(t, t + FAR)

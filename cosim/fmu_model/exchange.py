@@ -35,7 +35,7 @@ class ExchangeModel(SealedModel):
 
     def derivatives(self) -> Array:
         """Derivatives of the states where the instance stands, shape (n,)."""
-        found: Array = self._told(self.instance.derivatives)
+        found: Array = self.told(self.instance.derivatives)
         return found
 
     def move(self, t: float, x: Array, u: Array) -> None:
@@ -52,7 +52,7 @@ class ExchangeModel(SealedModel):
                 self._inputs[:] = u
                 self._write_inputs()
 
-        self._told(move)
+        self.told(move)
 
     def demand_moved(self, x: Array) -> None:
         """Refuse an FMU that does not take its states.
@@ -64,9 +64,9 @@ class ExchangeModel(SealedModel):
             FmuModelError: states that were set are not there.
         """
         moved = x + 1e-3 * np.maximum(np.abs(x), 1.0)
-        self._told(lambda: self.instance.set_states(moved))
-        found = self._told(self.instance.states)
-        self._told(lambda: self.instance.set_states(x))
+        self.told(lambda: self.instance.set_states(moved))
+        found = self.told(self.instance.states)
+        self.told(lambda: self.instance.set_states(x))
         wrong = np.flatnonzero(np.abs(found - moved) > 1e-9 * np.maximum(np.abs(moved), 1.0))
         if len(wrong):
             i = int(wrong[0])
@@ -84,7 +84,7 @@ class ExchangeModel(SealedModel):
         Raises:
             FmuModelError: the FMU refuses.
         """
-        x, u = self._told(self.instance.states), self._inputs.copy()
+        x, u = self.told(self.instance.states), self._inputs.copy()
 
         def rates(instant: float, at: Array) -> Array:
             self.move(instant, at, u)
@@ -121,7 +121,7 @@ class ExchangeModel(SealedModel):
             unknowns: derivatives of states, or outputs.
         """
         ask = self.instance.directional_derivative
-        columns = self._told(lambda: [ask(unknowns, [name], [1.0]) for name in self.states])
+        columns = self.told(lambda: [ask(unknowns, [name], [1.0]) for name in self.states])
         return np.array(columns).T.reshape(len(unknowns), len(self.states))
 
     def _integrated(self, rates: Callable[[float, Array], Array], t: float, h: float, start: Array) -> Array:

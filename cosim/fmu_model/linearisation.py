@@ -8,7 +8,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 import scipy
@@ -20,9 +20,6 @@ from cosim.fmu_model.sealed import FmuModelError
 from fmu_observer.observability.measured_system import MeasuredSystem
 from fmu_observer.observability.modes import Mode, unobservable_modes
 from fmus.text_table import text_table
-
-if TYPE_CHECKING:
-    import control
 
 Array = NDArray[np.float64]
 Method = Literal["exact Jacobians", "directional derivatives", "central differences"]
@@ -66,21 +63,6 @@ class Linearisation:
         """Eigenvalues of A, the slowest first: [1/s], or factors by step."""
         found = np.linalg.eigvals(self.A).astype(complex)
         return found[np.argsort(-(np.abs(found) if self.step else found.real))]
-
-    def state_space(self) -> control.StateSpace:
-        """The matrices as an object of python-control, names kept.
-
-        Raises:
-            ValueError: there are no states, inputs or outputs, which a ``StateSpace`` needs.
-        """
-        import control  # noqa: PLC0415 - a second to import; only for those who convert
-
-        names: dict[str, Any] = {"states": self.states, "inputs": self.inputs, "outputs": self.outputs}
-        for what, found in names.items():
-            if not found:
-                raise ValueError(f"{self.name}: it has no {what}, and a StateSpace needs some; use A, B, C and D.")
-        lists = {key: list(found) for key, found in names.items()}
-        return control.StateSpace(self.A, self.B, self.C, self.D, self.step, name=self.name, **lists)
 
     def part(self, inputs: Sequence[str] | None, outputs: Sequence[str] | None) -> Linearisation:
         """The same for some inputs and outputs.

@@ -16,9 +16,6 @@ from cosim.fmu_model.opening import Interface, open_model
 from cosim.fmu_model.sealed import FmuModelError, SealedModel
 from fmus.check.derivatives import RELATIVE_STEP, compare
 from fmus.check.findings import Verdict
-from plant_models.hybrid import HybridSystem
-from plant_models.interop.continuous_part import ContinuousPart, filled, left_out
-from plant_models.interop.to_control import jacobians
 
 Array = NDArray[np.float64]
 Function = Callable[[Array, Array], tuple[Array, Array]]  # (states, inputs) -> (rates or next states, outputs)
@@ -65,12 +62,12 @@ def linearise_fmu(
         if simulate and t > 0.0 and set(states or {}) != set(model.states):
             x = _simulated(model, t, u, step)
         x = _filled(model, "state", model.states, x, states or {})
-        return linearise(model, t, x, u, step).part(by_inputs, None)
+        return linearise_model(model, t, x, u, step).part(by_inputs, None)
     finally:
         model.close()
 
 
-def linearise(model: SealedModel, t: float, x: Array, u: Array, step: float) -> Linearisation:
+def linearise_model(model: SealedModel, t: float, x: Array, u: Array, step: float) -> Linearisation:
     """Matrices of an open model at a point.
 
     Args:
@@ -136,52 +133,6 @@ def right_slopes(model: ExchangeModel) -> bool:
     model.restart(0.0, model.start, model.start_inputs)
     found, _ = _directional(model, _continuous(model, 0.0), model.start, model.start_inputs)
     return found is not None
-
-
-def linearise_system(
-    system: HybridSystem,
-    *,
-    t: float = 0.0,
-    states: Mapping[str, float] | None = None,
-    inputs: Mapping[str, float] | None = None,
-    parameters: Mapping[str, float] | None = None,
-    preset: str | None = None,
-) -> Linearisation:
-    """Matrices of a system of ours by its exact traced Jacobians.
-
-    Args:
-        system: a traceable hybrid system. t: instant [s]. states, inputs, parameters: values by name; those left out
-            at their starts. preset: of the parameters; None for the default one.
-
-    Returns:
-        The linearisation.
-
-    Raises:
-        FmuModelError: a name is unknown, or nothing in it is continuous.
-    """
-    try:
-        part = ContinuousPart(system, preset, parameters)
-        x = filled(dict(zip(part.states, part.start_state, strict=True)), states, f"{system.name}: state")
-        u = filled(dict(zip(part.inputs, part.start_inputs, strict=True)), inputs, f"{system.name}: input")
-    except ValueError as error:
-        raise FmuModelError(str(error)) from error
-    signals = (*system.states, *system.inputs, *system.outputs)
-    return Linearisation(
-        system.name,
-        *jacobians(part, x, u, t),
-        states=tuple(part.states),
-        inputs=tuple(part.inputs),
-        outputs=tuple(part.outputs),
-        units={name: signal.unit for signal in signals for name in signal.scalar_names},
-        t=t,
-        x=x,
-        u=u,
-        y=np.asarray(part.output(t, x, u, part.parameters), dtype=float),
-        rates=np.asarray(part.derivative(t, x, u, part.parameters), dtype=float),
-        step=0.0,
-        method="exact Jacobians",
-        remarks=() if not system.events else (left_out(system),),
-    )
 
 
 def _opened(

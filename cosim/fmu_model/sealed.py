@@ -69,12 +69,12 @@ class SealedModel(ABC):
         self.parameters = dict(parameters or {})
         self._chosen(list(self.parameters), [], "parameter")
         self._demand_settable()
-        self._told(instance.instantiate)
+        self.told(instance.instantiate)
         self._states_read, self._outputs_read = np.zeros(len(self.states)), np.zeros(len(self.outputs))
         self._read_states = instance.reader(list(self.states), self._states_read)
         self._read_outputs = instance.reader(list(self.outputs), self._outputs_read)
         self._write_inputs, self._inputs = instance.writer(list(self.inputs))
-        self.start, self.start_inputs = self._told(self._begun)
+        self.start, self.start_inputs = self.told(self._begun)
         self.parameters = {name: value for name, value in self.parameters.items() if name not in self.states}
         names = [*self.parameters, *(self.states if all(map(self._has_start, self.states)) else ())]
         self._write_starts, self._starts = instance.writer(names)
@@ -98,7 +98,7 @@ class SealedModel(ABC):
         Raises:
             FmuModelError: the FMU refuses.
         """
-        self._told(lambda: self._restart(t, x, u))
+        self.told(lambda: self._restart(t, x, u))
 
     def _restart(self, t: float, x: Array, u: Array) -> None:
         instance = self.instance
@@ -121,7 +121,7 @@ class SealedModel(ABC):
         """
         if len(self.inputs):
             self._inputs[:] = u
-            self._told(self._write_inputs)
+            self.told(self._write_inputs)
 
     def values_at(self, t: float, x: Array, u: Array) -> tuple[Array, Array]:
         """States and outputs just after a restart.
@@ -143,7 +143,7 @@ class SealedModel(ABC):
             if len(self.outputs):
                 self._read_outputs()
 
-        self._told(read)
+        self.told(read)
         return self._states_read.copy(), self._outputs_read.copy()
 
     @abstractmethod
@@ -232,8 +232,15 @@ class SealedModel(ABC):
                     "particle filter over saved states, which selects and moves nothing."
                 )
 
-    def _told(self, call: Callable[[], Any]) -> Any:
-        """What a call of the FMU gives; its failure in words with the file."""
+    def told(self, call: Callable[[], Any]) -> Any:
+        """What a call of the FMU gives; its failure in words with the file.
+
+        Args:
+            call: takes no arguments.
+
+        Raises:
+            FmuModelError: the call failed.
+        """
         try:
             return call()
         except SlaveError as error:

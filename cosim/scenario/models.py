@@ -10,6 +10,7 @@ from typing import Any, Literal
 import fmu_observer
 import fmus
 import plant_models
+from cosim import fmu_filter
 from cosim.components.component import Component
 from cosim.components.kept_libraries import load_shipped
 from cosim.components.loading import load_block, load_fmu
@@ -18,7 +19,6 @@ from cosim.components.python_model import PythonModel
 from cosim.components.recording import RecordingComponent, load_recording
 from cosim.components.recording_data import Recording
 from cosim.errors import ScenarioError, nearest
-from cosim.fmu_filter.component import FmuFilterModel
 from cosim.scenario.backends import FAULTS, Request, Tell, cannot_build, realise
 from cosim.scenario.model_name import ModelName
 from cosim.scenario.tables import Backend, ComponentTable
@@ -174,7 +174,7 @@ def filter_component(name: str, table: ComponentTable, folder: Path, where: str)
     """
     assert table.filter is not None
     path = (folder / str(table.fmu)).resolve()
-    model = PythonModel(FmuFilterModel(path, table.filter, table.parameters), {}, where)
+    model = PythonModel(fmu_filter.FmuFilterModel(path, table.filter, table.parameters), {}, where)
     return PythonComponent(name, model, f"{table.filter.kind} over {table.fmu}")
 
 

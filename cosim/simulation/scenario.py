@@ -63,6 +63,19 @@ class Scenario:
         self._name: str | None = None  # where it is not that of the file
         self._files: object = None  # what keeps unpacked files alive
 
+    def __setattr__(self, name: str, value: object) -> None:
+        """Refuse what would have no effect, such as ``scenario.step = 0.1``.
+
+        Args:
+            name: of the attribute. value: what it becomes.
+
+        Raises:
+            AttributeError: the scenario has no such attribute.
+        """
+        if not (name.startswith("_") or name in ("folder", "where")):
+            raise AttributeError(f"A scenario has no attribute {name!r} to be set; use scenario.set({name!r}, ...).")
+        super().__setattr__(name, value)
+
     @classmethod
     def load(cls, name_or_path: str | Path, *, strict: bool = False) -> Scenario:
         """A shipped scenario by name, or one from a TOML file (paths in it are relative to the file) or from an SSP.

@@ -62,7 +62,7 @@ def _traced_facts(system: HybridSystem) -> dict[str, Any]:
     return {
         "output": _traced_dependencies(system, "output", width(system.outputs)),
         "derivative": _traced_dependencies(system, "derivative", system.continuous_count),
-        "equations": hybrid.TracedSystem(system).digest() if system.traceable else type(system).__qualname__,
+        "equations": hybrid.traced_once(system).digest() if system.traceable else type(system).__qualname__,
     }
 
 
@@ -76,7 +76,7 @@ def _traced_dependencies(system: HybridSystem, function: str, count: int) -> lis
         ("p", table.parameters, parameters),
     )
     rows: list[list[int]] = [[] for _ in range(count)]
-    traced = hybrid.TracedSystem(system) if system.traceable and count else None
+    traced = hybrid.traced_once(system) if system.traceable and count else None
     for group, first, width_ in groups:
         pattern = np.ones((count, width_), dtype=bool)
         if traced is not None and width_:

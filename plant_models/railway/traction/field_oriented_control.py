@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 from plant_models.railway.traction.motor_equations import AXES, FRAMES, MOTOR_PARAMETERS, TRACTION_200_KW, Frame
 from plant_models.railway.traction.transforms import to_rotor, to_stator
+
+Reference = Literal["speed", "torque"]
 
 
 class FieldOrientedControl(HybridSystem):
@@ -27,9 +29,10 @@ class FieldOrientedControl(HybridSystem):
 
     Args:
         frame: of the measured currents: ``rotor`` (d, q), or ``stator`` (alpha, beta), turned by the angle.
+        reference: what is asked for: the ``speed``; or the ``torque``, where somebody else controls the speed.
 
     Raises:
-        ValueError: the frame is unknown.
+        ValueError: an option is unknown.
 
     Source: Allaoui 2024, section IV.2.3.8 and Fig. 4.15; no gains, limits and references are printed, all are ours.
     """
@@ -73,30 +76,41 @@ class FieldOrientedControl(HybridSystem):
         },
     }
     default_preset = "drive_100w"
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"frame": FRAMES}
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "frame": FRAMES,
+        "reference": ("speed", "torque"),
+    }
 
-    def __init__(self, *, frame: Frame = "rotor") -> None:
-        if frame not in FRAMES:
-            raise ValueError(f"Unknown frame {frame!r}; choose one of: {', '.join(FRAMES)}.")
-        self.frame = frame
+    def __init__(self, *, frame: Frame = "rotor", reference: Reference = "speed") -> None:
+        for option, value in (("frame", frame), ("reference", reference)):
+            if value not in self.option_choices[option]:
+                known = ", ".join(self.option_choices[option])
+                raise ValueError(f"Unknown {option} {value!r}; choose one of: {known}.")
+        self.frame, self.reference = frame, reference
+        speed = input_signal("speed_reference", "rad/s", 0.0, "Speed asked for", display_unit="rpm")
+        torque = input_signal("torque_reference", "N.m", 0.0, "Torque asked for")
         self.inputs = (
-            input_signal("speed_reference", "rad/s", 0.0, "Speed asked for", display_unit="rpm"),
+            speed if reference == "speed" else torque,
             input_signal("speed", "rad/s", 0.0, "Speed of the shaft, measured or estimated", display_unit="rpm"),
             input_signal("angle", "rad", 0.0, "Electrical angle, measured or estimated"),
             *(input_signal(f"current_{axis}", "A", 0.0, f"Current along {axis}") for axis in AXES[frame]),
         )
-        super().__init__(frame=frame)
+        super().__init__(frame=frame, reference=reference)
 
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Voltages of the coming period from the signals of this instant, shape (7,) or (7, members)."""
         first, second = (getattr(u, f"current_{axis}") for axis in AXES[self.frame])
         current_d, current_q = (first, second) if self.frame == "rotor" else to_rotor(first, second, u.angle)
-        error = u.speed_reference - u.speed
-        gain = p.speed_bandwidth * p.inertia / (1.5 * p.pole_pairs * p.rotor_flux)
-        asked = gain * error + x[0]
-        reference = np.minimum(np.maximum(asked, -p.current_limit), p.current_limit)
-        # Both integrals go back by what the limit cuts off, with the time constant of their own PI.
-        speed_integral = x[0] + p.control_period * p.speed_bandwidth / 5.0 * (gain * error + reference - asked)
+        torque_constant = 1.5 * p.pole_pairs * p.rotor_flux
+        if self.reference == "torque":
+            reference = _limited(u.torque_reference / torque_constant, p.current_limit)
+            speed_integral = 0.0 * x[0]
+        else:
+            push = p.speed_bandwidth * p.inertia / torque_constant * (u.speed_reference - u.speed)
+            reference = _limited(push + x[0], p.current_limit)
+            # Integrals go back by what a limit cuts off, with the time constant of their own PI.
+            cut = reference - push - x[0]
+            speed_integral = x[0] + p.control_period * p.speed_bandwidth / 5.0 * (push + cut)
 
         electrical, rate = p.pole_pairs * u.speed, p.current_bandwidth
         errors = (-current_d, reference - current_q)
@@ -128,3 +142,8 @@ class FieldOrientedControl(HybridSystem):
     def requirements(self, p: Any) -> dict[str, Array]:
         """Parameters keep their bounds."""
         return within_bounds(self.parameters, p)
+
+
+def _limited(asked: Array, limit: Array) -> Array:
+    """Within plus and minus the limit."""
+    return np.minimum(np.maximum(asked, -limit), limit)

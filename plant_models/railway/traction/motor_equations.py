@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 from plant_models.hybrid import Signal, input_signal, output_signal, parameter
-from plant_models.hybrid.signal import Variability
 from plant_models.hybrid.system import Array
 from plant_models.railway.traction.transforms import to_rotor
 
@@ -56,26 +55,23 @@ def motor_inputs(frame: str) -> tuple[Signal, ...]:
     )
 
 
-def motor_outputs(frame: str, *, sampled: bool) -> tuple[Signal, ...]:
+def motor_outputs(frame: str) -> tuple[Signal, ...]:
     """Outputs of a motor: state, torque and measured currents.
 
     Args:
-        frame: of the measured currents, ``rotor`` or ``stator``. sampled: whether these are held between samples.
+        frame: of the measured currents, ``rotor`` or ``stator``. They are continuous signals also where they
+            are sampled, so that a master hands them on within the step of the sample.
 
     Returns:
         The declared signals.
     """
-    moves: Variability = "discrete" if sampled else "continuous"
     return (
         output_signal("current_d", "A", "Current along d"),
         output_signal("current_q", "A", "Current along q"),
         output_signal("speed", "rad/s", "Speed of the shaft", display_unit="rpm"),
         output_signal("angle", "rad", "Electrical angle of the rotor, not wrapped"),
         output_signal("torque", "N.m", "Electromagnetic torque C_em"),
-        *(
-            output_signal(f"measured_current_{axis}", "A", f"Measured current along {axis}", variability=moves)
-            for axis in AXES[frame]
-        ),
+        *(output_signal(f"measured_current_{axis}", "A", f"Measured current along {axis}") for axis in AXES[frame]),
     )
 
 

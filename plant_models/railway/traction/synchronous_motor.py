@@ -78,7 +78,7 @@ class SynchronousMotor(HybridSystem):
             self.state_signal("electrical_angle", "rad", 0.0, "Electrical angle of the rotor"),
             *(measured_memory(frame) if self.sampled else ()),
         )
-        self.inputs, self.outputs = motor_inputs(frame), motor_outputs(frame, sampled=self.sampled)
+        self.inputs, self.outputs = motor_inputs(frame), motor_outputs(frame)
         super().__init__(**{option: value for option, value in chosen.items() if option in self.option_choices})
 
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:

@@ -11,7 +11,7 @@ import pytest
 
 import cosim
 import fmus
-from cosim.calibration.calibrate import calibrate
+from cosim.calibration.fitting import calibrate
 from cosim.calibration.recorded_signals import RecordedSignals
 from cosim.calibration.runs import FmuRuns, ScenarioRuns
 from cosim.cli import main

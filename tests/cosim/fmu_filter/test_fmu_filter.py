@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from test_fmus.build import linear_fmu
 
 import cosim
 import fmus
@@ -207,9 +208,53 @@ def test_mistakes_are_told(path: Path, more: dict[str, Any], told: str) -> None:
     [
         ({"kind": "ukf"}, "needs 'measurements'"),
         ({"kind": "ukf", "measurements": {"speed": 0.0}}, "greater than 0"),
-        ({"kind": "kf", "measurements": {"speed": 1.0}}, "'ekf', 'ukf' or"),
+        ({"kind": "kf", "measurements": {"speed": 1.0}}, "'ekf', 'ukf', 'ensemble' or"),
     ],
 )
 def test_tables_that_cannot_be(table: dict[str, Any], told: str) -> None:
     with pytest.raises(ValueError, match=told):
         FilterTable.model_validate(table)
+
+
+def test_ensemble_comes_near_the_unscented_filter(path: Path, readings: np.ndarray) -> None:
+    found = driven(made(path, "ensemble", members=60), readings[:8])
+    near = driven(made(path, "ukf"), readings[:8])
+    # what 60 members leave to chance: the mean to sigma / sqrt(60), here with five of it to spare
+    assert abs(found[-1, 1] - near[-1, 1]) < 5.0 * near[-1, 4] / np.sqrt(60)
+
+
+def test_particles_of_saved_states_find_start_and_input(path: Path) -> None:
+    table = {
+        "kind": "particle",
+        "measurements": {"wheel_speed": 0.1},
+        "input_noise": {"effort": 2e3},
+        "start_deviation": {"train_speed": 1.0},
+        "outputs": ["speed", "wheel_speed"],
+        "members": 60,
+    }
+    filter_ = FmuFilterModel(path, FilterTable.model_validate(table), START)
+    for k in range(6):
+        out = filter_.step(k * 0.1, {"effort": START["effort"], "measured_wheel_speed": 12.0 + 0.055 * (k + 1)}, 0.1)
+    assert out["speed"] == pytest.approx(12.3, abs=0.15)  # started at 11 +- 1; noise of 0.1 over six readings
+    assert 0.0 < out["speed_std"] < 0.15
+    state = filter_.get_state()
+    inputs = {"effort": START["effort"], "measured_wheel_speed": 12.4}
+    first = filter_.step(0.6, inputs, 0.1)
+    filter_.set_state(state)
+    assert filter_.step(0.6, inputs, 0.1) == first
+
+
+def test_particles_need_honest_states(tmp_path: Path) -> None:
+    path = linear_fmu(tmp_path, "mass", [[0, 1], [0, 0]], [[0], [1]], [[1, 0]], [[0]], inputs=["force"], state=False)
+    table = FilterTable.model_validate({"kind": "particle", "measurements": {"y1": 0.1}})
+    with pytest.raises(FmuModelError, match=r"cannot be saved and restored honestly \(it does not declare"):
+        FmuFilterModel(path, table)
+
+
+def test_particles_over_an_fmu_without_states_to_write(tmp_path: Path) -> None:
+    path = linear_fmu(tmp_path, "mass", [[0, 1], [0, 0]], [[0], [1]], [[1, 0]], [[0]], inputs=["force"])
+    table = {"kind": "particle", "measurements": {"y1": 0.1}, "input_noise": {"force": 1.0}, "members": 40}
+    filter_ = FmuFilterModel(path, FilterTable.model_validate(table))
+    for k in range(10):
+        out = filter_.step(0.1 * k, {"force": 1.0, "measured_y1": 0.5 * (0.1 * (k + 1)) ** 2}, 0.1)
+    assert out["y1"] == pytest.approx(0.5, abs=0.1)

@@ -12,9 +12,11 @@ import pytest
 import scipy
 
 import fmus
+from cosim import fmu_model
 from cosim.cli import main
+from cosim.fmu_model.exact import linearise_system
 from cosim.fmu_model.linearisation import Linearisation
-from cosim.fmu_model.linearise import linearise_fmu, linearise_system
+from cosim.fmu_model.linearise import linearise_fmu
 from cosim.fmu_model.sealed import FmuModelError
 from plant_models import PLANTS
 
@@ -88,7 +90,7 @@ def test_files_hold_the_matrices(exact: Linearisation, tmp_path: Path, ending: s
 
 
 def test_python_control_gets_names(exact: Linearisation) -> None:
-    sys = exact.state_space()
+    sys = fmu_model.to_state_space(exact)
     assert sys.state_labels == list(exact.states)
     np.testing.assert_array_equal(sys.A, exact.A)
 
