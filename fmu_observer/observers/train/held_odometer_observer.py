@@ -279,9 +279,9 @@ class HeldOdometerObserver(TrainObserver):
     def requirements(self, p: Any) -> dict[str, Array]:
         """Bounds of the numbers that the bounds rest on, and the proof of the decay at both ends of the drag slopes."""
         slowest, fastest = error_slopes(p)
-        proven = [proven(a11, p) for a11 in (slowest, fastest)]
+        shown = [proven(a11, p) for a11 in (slowest, fastest)]
         limited = tuple(s for s in self.estimator_parameters if s.min is not None)
-        return super().requirements(p) | within_bounds(limited, p) | {PROOF: proven[0] * proven[1]}
+        return super().requirements(p) | within_bounds(limited, p) | {PROOF: shown[0] * shown[1]}
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate of ``de = (A - K C) e`` with the position behind it, for all drag slopes up to `speed_max`."""
