@@ -195,7 +195,17 @@ class CompiledStepper:
                 self._answered_move(step.move, t, until)
             else:
                 step.step(t, until)
-        return NO_ROWS if balises is None else balises.rows()
+        rows = NO_ROWS if balises is None else balises.rows()
+        return [*rows, *self._packets_at_end(until)]
+
+    def _packets_at_end(self, t: float) -> Sequence[Row]:
+        """What is sent or arrives at the end of a step that the stepper has left, and the row before it."""
+        network, values = self.system.network, self.plan.values
+        if network is None or not network.is_due(t):
+            return NO_ROWS
+        before = values.copy()
+        network.handle(t)
+        return [(t, before)] if before.tobytes() != values.tobytes() else NO_ROWS
 
     def _quicken(self, place: int, step: PlannedComponent) -> None:
         """In the steps that are Python's a component still moves by one call into the stepper."""

@@ -91,13 +91,18 @@ def filter_consistency(result: Result, spec: ReportSpec) -> list[FilterConsisten
 
 
 def consistency_warnings(result: Result, spec: ReportSpec) -> Iterator[str]:
-    """Texts for filters whose covariance does not fit, one an observer: of NIS, or else of NEES.
+    """Texts for filters whose covariance does not fit, one an observer: of NIS or of NEES; of single quantities only
+    where it tells neither, since each further test raises false alarms.
 
     Args:
         result: the run. spec: observers, roles and labels.
     """
     told: set[str] = set()
-    for entry in filter_consistency(result, spec):
+    entries = filter_consistency(result, spec)
+    whole = {e.observer for e in entries if e.kind != "error"}
+    for entry in entries:
+        if entry.kind == "error" and entry.observer in whole:
+            continue
         advice = ADVICE.get(entry.found.verdict)
         if advice is None or entry.observer in told:
             continue

@@ -15,7 +15,7 @@ from fmpy.model_description import ModelVariable
 
 from fmu_observer.block.variables import BlockError
 from fmu_observer.description import VariableTable, exposed_inputs, referenced
-from plant_models.hybrid import HybridSystem, Runtime, TracedSystem, width
+from plant_models.hybrid import HybridSystem, Runtime, TracedSystem, traced_once, width
 
 
 class Sensitivity:
@@ -71,7 +71,7 @@ class Sensitivity:
 
     @cached_property
     def _traced(self) -> TracedSystem:
-        return TracedSystem(self.system)
+        return traced_once(self.system)
 
     def _tangent(self, runtime: Runtime, seeds: Sequence[np.ndarray]) -> np.ndarray:
         now = (runtime.t, runtime.x, runtime.u, runtime.p)

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import casadi as ca
 import numpy as np
 
 from fmu_observer.models.filter_model import FilterModel, Known, Measured, Transition, filter_model
@@ -175,16 +176,14 @@ class _Moving:
         system, n = self.system, self.system.continuous_count
         if not n or not system.periodic_events:
             return False
-        from casadi import SX, is_equal, simplify, vertcat  # noqa: PLC0415 - for systems with events of their own
-
         if self._traced.dependencies("derivative", "x")[:, n:].any():
             return True
-        x = SX.sym("x", system.state_count)
+        x = ca.SX.sym("x", system.state_count)
         quiet = width(system.noises)  # which stand last
-        u = vertcat(SX.sym("u", len(system.start_inputs()) - quiet), SX(quiet, 1))
-        p = SX.sym("p", len(system.start_parameters()))
-        jumped = [self._traced.jump(e.name)(SX.sym("t"), x, u, p) for e in system.periodic_events]
-        return not all(is_equal(simplify(after[i]), x[i]) for after in jumped for i in range(n))
+        u = ca.vertcat(ca.SX.sym("u", len(system.start_inputs()) - quiet), ca.SX(quiet, 1))
+        p = ca.SX.sym("p", len(system.start_parameters()))
+        jumped = [self._traced.jump(e.name)(ca.SX.sym("t"), x, u, p) for e in system.periodic_events]
+        return not all(ca.is_equal(ca.simplify(after[i]), x[i]) for after in jumped for i in range(n))
 
     def check_outputs(self, rows: Sequence[int]) -> None:
         """No output is what periodic events made of a flowing state.
@@ -195,7 +194,7 @@ class _Moving:
         system, n = self.system, self.system.continuous_count
         if not n or not system.periodic_events:
             return
-        read = self._traced.dependencies("output", "x")[:, n:].any(axis=1)
+        read = np.asarray(self._traced.dependencies("output", "x")[:, n:].any(axis=1))
         wrong = [scalar_names(system.outputs)[i] for i in rows if read[i]]
         if wrong:
             raise ValueError(
@@ -273,7 +272,6 @@ class _Moving:
     def _jacobian(self, x: Array, u: Array, p: Array) -> Callable[[Array, Array], tuple[Array, Array]] | None:
         if self.system.method != "rosenbrock":
             return None
-        import casadi as ca  # noqa: PLC0415 - numbers or symbols, as in exact_jacobian
 
         def derivatives(t: Array, _continuous: Array) -> tuple[Array, Array]:
             by_x, by_t = self._traced.effective_jacobian(*(ca.SX(value) for value in (t, x, u, p)))

@@ -17,7 +17,7 @@ from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmu_observer.description import FIRST_REFERENCE, VariableTable, exposed_inputs, referenced
 from fmus.content.casadi_source import private_source
-from plant_models.hybrid import HybridSystem, TracedSystem, scalar_names, width
+from plant_models.hybrid import HybridSystem, TracedSystem, scalar_names, traced_once, width
 from plant_models.hybrid.kernel import check_payloads
 from plant_models.hybrid.requirements import named_parameters
 
@@ -78,7 +78,7 @@ def trace_equations(system: HybridSystem) -> Equations:
             f"it. "
             "Step it as a block in Python, or export it with Python inside: fmus build ... --hosted."
         )
-    traced = TracedSystem(system)
+    traced = traced_once(system)
     if traced.digest() != TracedSystem(system).digest():
         raise GenerationError(
             f"{system.name}: its functions give other equations each time they are traced. They must depend on t, x, u "

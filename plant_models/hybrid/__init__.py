@@ -26,7 +26,7 @@ from plant_models.hybrid.system import HybridSystem, vector
 if TYPE_CHECKING:
     from plant_models.hybrid.kernel import NumpyKernel, TracedKernel, make_kernel
     from plant_models.hybrid.runtime import Runtime, Snapshot
-    from plant_models.hybrid.tracing import TracedSystem, TracingError
+    from plant_models.hybrid.tracing import TracedSystem, TracingError, traced_once
 
 __all__ = [
     "CommunicationEvent",
@@ -50,6 +50,7 @@ __all__ = [
     "parameter",
     "scalar_names",
     "state",
+    "traced_once",
     "vector",
     "width",
 ]
@@ -62,6 +63,7 @@ _HOMES = {
     "TracedSystem": "tracing",
     "TracingError": "tracing",
     "make_kernel": "kernel",
+    "traced_once": "tracing",
 }
 
 

@@ -7,6 +7,7 @@ symbols. It knows nothing of systems.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -26,12 +27,8 @@ def exact_jacobian(
     Returns:
         A function of x and u that returns shape (rows, states), for numbers and for traced symbols.
     """
-    import casadi as ca  # noqa: PLC0415 - for those who differentiate; every observer model imports this file
-
+    ca, x, u, columns = _traced(function, states, inputs)
     symbolic = ca.ArrayInterface.SX
-    x, u = ca.SX.sym("x", states), ca.SX.sym("u", inputs)
-    value = function(symbolic(x, shape=(states,)), symbolic(u, shape=(inputs,)))
-    columns = ca.SX(value) if getattr(value, "size", 1) else ca.SX(0, 1)
     traced = ca.Function("jacobian", [x, u], [ca.densify(ca.jacobian(columns, x))])
     shape = (columns.numel(), states)
 
@@ -49,9 +46,15 @@ def is_affine(function: Callable[[Array, Array], Array], states: int, inputs: in
     Args:
         function: as for `exact_jacobian`. states: number of states. inputs: number of inputs.
     """
-    import casadi as ca  # noqa: PLC0415 - as above
+    ca, x, _, columns = _traced(function, states, inputs)
+    return not ca.depends_on(ca.simplify(ca.jacobian(columns, x)), x)
+
+
+def _traced(function: Callable[[Array, Array], Array], states: int, inputs: int) -> tuple[Any, Any, Any, Any]:
+    """CasADi itself, symbols of x and u, and the function of them."""
+    import casadi as ca  # noqa: PLC0415 - for those who differentiate; every observer model imports this file
 
     symbolic = ca.ArrayInterface.SX
     x, u = ca.SX.sym("x", states), ca.SX.sym("u", inputs)
-    value = ca.SX(function(symbolic(x, shape=(states,)), symbolic(u, shape=(inputs,))))
-    return not ca.depends_on(ca.simplify(ca.jacobian(value, x)), x)
+    value = function(symbolic(x, shape=(states,)), symbolic(u, shape=(inputs,)))
+    return ca, x, u, ca.SX(value) if getattr(value, "size", 1) else ca.SX(0, 1)

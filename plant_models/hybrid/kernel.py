@@ -20,7 +20,7 @@ from plant_models.hybrid import integration
 from plant_models.hybrid.signal import scalar_names
 from plant_models.hybrid.switching import divided_step
 from plant_models.hybrid.system import HybridSystem
-from plant_models.hybrid.tracing import TracedSystem
+from plant_models.hybrid.tracing import traced_once
 
 BATCH_OF_STEPS = 10
 
@@ -75,7 +75,7 @@ class NumpyKernel(_Arrays):
     def __init__(self, system: HybridSystem) -> None:
         super().__init__(system)
         self.system = system
-        self._traced = TracedSystem(system) if system.method == "rosenbrock" else None
+        self._traced = traced_once(system) if system.method == "rosenbrock" else None
         self._x_next = self.x
 
     def attempt(self, t: float, h: float) -> bool:
@@ -198,7 +198,7 @@ def _traced_functions(system: HybridSystem) -> dict[str, ca.Function]:
 
 
 def _trace(system: HybridSystem) -> dict[str, str]:
-    traced = TracedSystem(system)
+    traced = traced_once(system)
     functions = {"step": traced.step, "steps": traced.steps(BATCH_OF_STEPS), "output": traced.output}
     functions |= {f"jump_{event.name}": traced.jump(event.name) for event in system.events}
     check_payloads(system, functions)

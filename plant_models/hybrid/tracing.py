@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import hashlib
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -74,6 +74,7 @@ class TracedSystem:
             ca.SX.sym("p", len(system.start_parameters())),
             ca.SX.sym("s", len(system.frictions) + len(system.switchings)),
         )
+        self._expressions: dict[tuple[str, ...], Any] = {}
 
     @cached_property
     def step(self) -> ca.Function:
@@ -218,8 +219,14 @@ class TracedSystem:
 
     def _trace(self, function: str, *arguments: str) -> ca.SX:
         t, _, x, u, p = self._arrays()
-        method = getattr(self.system, function)
-        return self._guarded(function, lambda: method(*arguments, t, x, u, p))
+        method = partial(getattr(self.system, function), *arguments, t, x, u, p)
+        return self._once((function, *arguments), lambda: self._guarded(function, method))
+
+    def _once(self, key: tuple[str, ...], compute: Callable[[], Any]) -> Any:
+        """An expression of the symbols, of which several functions are made: computed once."""
+        if key not in self._expressions:
+            self._expressions[key] = compute()
+        return self._expressions[key]
 
     def _step_expression(self) -> ca.SX:
         t, h, x, u, p = self._arrays()
@@ -249,6 +256,9 @@ class TracedSystem:
         return signs, switches
 
     def _derivative_expression(self) -> ca.SX:
+        return self._once(("derivative",), self._trace_derivative)
+
+    def _trace_derivative(self) -> ca.SX:
         t, _, x, u, p = self._arrays()
         signs, switches = self._held()
         if not self.system.continuous_count:
@@ -256,6 +266,9 @@ class TracedSystem:
         return self._guarded("flow", lambda: integration.effective_flow(self.system, t, x, u, p, signs, switches))
 
     def _effective_jacobian_expression(self) -> tuple[ca.SX, ca.SX]:
+        return self._once(("effective jacobian",), self._trace_effective_jacobian)
+
+    def _trace_effective_jacobian(self) -> tuple[ca.SX, ca.SX]:
         t, _, x, u, p = self._arrays()
         indices = self.system.friction_indices()
         sign = np.stack([np.sign(x[i]) for i in indices]) if indices else None
@@ -287,6 +300,22 @@ class TracedSystem:
         advice = "" if of_kind else f" {ADVICE}"
         reason = str(error).removeprefix(f"{self.system.name}: ").removesuffix(".")
         return f"{self.system.name}: cannot trace {WRITTEN_AS.get(function, function)}: {reason} (at {place}).{advice}"
+
+
+@lru_cache(maxsize=8)
+def traced_once(system: HybridSystem) -> TracedSystem:
+    """The traced functions of a system, shared by all who ask for them one after the other.
+
+    Args:
+        system: a traceable hybrid system, as it will stay.
+
+    Returns:
+        The same object as long as the system is one of the last 8.
+
+    Raises:
+        TracingError: the system declares that it cannot be traced.
+    """
+    return TracedSystem(system)
 
 
 @contextmanager

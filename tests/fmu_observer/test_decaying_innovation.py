@@ -24,7 +24,7 @@ from fmu_observer.models import find_model, tanh_system
 from fmu_observer.models.model import shift_matrix
 from fmu_observer.observers.innovation_decay import innovation_left
 from fmu_observer.observers.sampled import DecayingInnovation, DynamicHighGain, ExponentialGain, HeldInnovation
-from fmu_observer.observers.train import AdaptiveGainCdo, DecayingInnovationCdo
+from fmu_observer.observers.train import AdaptiveGainCdo, DecayingInnovationCdo, DynamicGainCdo
 from plant_models.benchmarks import TanhSystem
 from plant_models.hybrid import Runtime, scalar_names
 
@@ -428,12 +428,49 @@ def test_with_the_decay_of_the_gain_it_is_the_high_gain_train_observer() -> None
     np.testing.assert_allclose(found[0], found[1], atol=1e-8)
 
 
+def test_a_gain_that_settles_follows_its_law_and_is_the_adapting_one_once_settled() -> None:
+    """The law is logistic; RK4 at 0.01 s leaves 1e-6 of it."""
+    motion, limit = SteadyMotion(speed=12.0, acceleration=0.05), 2.0
+    found = []
+    for system, parameters, first in (
+        (AdaptiveGainCdo(), {"theta_min": limit, "theta_max": limit}, {}),
+        (DynamicGainCdo(), {"theta_limit": limit}, {"theta": limit}),
+        (DynamicGainCdo(), {"theta_limit": limit, "theta_rate": 0.25}, {"theta": 6.0}),
+    ):
+        runtime = Runtime(system)
+        names, inputs = scalar_names(system.parameter_signals), scalar_names(system.input_signals)
+        for name, value in parameters.items():
+            runtime.p[names.index(name)] = value
+        for name, value in first.items():
+            runtime.x[scalar_names(system.states).index(name)] = value
+        at = {name: inputs.index(name) for name in ("effort", "odometer", "balise_position")}
+        runtime.u[at["effort"]], runtime.u[at["odometer"]] = 2e4, 12.0
+        runtime.start(0.0)
+        for t in (0.4, 1.1, 1.4, 2.2, 3.0):
+            runtime.advance(t)
+            runtime.u[at["balise_position"]] = motion.position(t)
+            runtime.trigger("balise")
+        runtime.advance(3.7)
+        found.append(dict(zip(scalar_names(system.outputs), runtime.update_outputs(), strict=True)))
+    for name in ("position", "speed", "innovation"):
+        assert found[0][name] == pytest.approx(found[1][name], abs=1e-8)
+        assert found[0][name] != pytest.approx(found[2][name], abs=1e-6)
+    assert found[1]["gain"] == limit
+    logistic = limit / (1.0 + (limit / 6.0 - 1.0) * np.exp(-0.25 * limit * 3.7))
+    assert found[2]["gain"] == pytest.approx(logistic, rel=1e-6)
+
+
 def test_holes_are_certified_by_what_acts_in_them() -> None:
     observer = DecayingInnovationCdo()
     assert observer.certify(32.0, preset="balise_holes").holds
     held = observer.certify(32.0, {"decay_rate": 0.0}, preset="balise_holes")
     assert not held.holds
     assert held.constant_limit == pytest.approx(1.0 / 0.12, rel=0.01)  # the drag adds a little
+
+
+def test_the_gain_that_settles_is_certified_at_its_limit() -> None:
+    assert DynamicGainCdo().certify(32.0, preset="balise_holes").holds
+    assert not DynamicGainCdo().certify(32.0, {"theta_limit": 0.2}, preset="balise_holes").holds
 
 
 def test_gains_that_it_advises_are_certified() -> None:

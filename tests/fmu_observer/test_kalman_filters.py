@@ -17,7 +17,18 @@ from fmu_observer.observers.discrete.gaussian_filter import GaussianFilter
 from fmu_observer.observers.discrete.kalman_filter import KalmanFilter
 from fmu_observer.observers.discrete.unscented_kalman_filter import UnscentedKalmanFilter
 from plant_models import PLANTS
-from plant_models.hybrid import HybridSystem, Runtime, input_signal, output_signal, scalar_names, state, vector
+from plant_models.hybrid import (
+    HybridSystem,
+    PeriodicEvent,
+    Runtime,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+    scalar_names,
+    state,
+    vector,
+)
 from plant_models.hybrid.runtime import Runtime as Moving
 
 COUNT, T = 40, 0.1
@@ -256,6 +267,37 @@ def test_measurement_noise_through_an_input_by_hand(kind: type[GaussianFilter]) 
     assert runtime.x[0] == pytest.approx(0.1, abs=1e-5)
 
 
+class Read(HybridSystem):
+    """A decay that a periodic event reads with noise; with `resets` the event sets it back too."""
+
+    name = "read"
+    states = (state("level", "1", 1.0), memory("reading", "1"))
+    outputs = (output_signal("now", "1"), output_signal("read", "1"))
+    parameters = (parameter("period", "s", 0.1), parameter("noise", "1", 0.1))
+    events = (PeriodicEvent("look", "period", noises=(input_signal("jitter", "1", variability="discrete"),)),)
+
+    def __init__(self, resets: bool = False) -> None:
+        self.resets = resets
+        super().__init__(resets=resets)
+
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
+        return vector(-x[0])
+
+    def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        return {"now": x[0], "read": x[1]}
+
+    def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> Any:
+        return vector(1.0 if self.resets else x[0] + p.noise * u.jitter, x[0])
+
+
+def test_events_of_a_plant_that_only_read_or_disturb_do_no_harm() -> None:
+    assert [s.name for s in system_model(Read(), ["now"]).parameters] == ["noise"]
+    with pytest.raises(ValueError, match=r"read: output 'read' follows its own sampling"):
+        system_model(Read(), ["read"])
+    with pytest.raises(ValueError, match=r"moves by its own events \(periodic 'look'\)"):
+        system_model(Read(resets=True), ["now"])
+
+
 def test_what_is_no_model_of_a_filter_is_refused() -> None:
     for name, words in {
         "train": "moves by its own events \\(periodic 'brake_reading'\\)",
@@ -270,8 +312,6 @@ def test_what_is_no_model_of_a_filter_is_refused() -> None:
         find_filter_model("pendulum", ["angel"])
     with pytest.raises(ValueError, match="inputs: what an observer model"):
         find_filter_model("pendulum", inputs=["torque"])
-    with pytest.raises(ValueError, match="follows its own sampling"):
-        find_filter_model("synchronous_motor", ["measured_current_d"])
 
 
 # -- events

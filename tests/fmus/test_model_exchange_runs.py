@@ -54,6 +54,7 @@ elsewhere. More than half tells an order from the one below."""
 
 INPUTS = {"effort": 2.0e4, "force": 4.0, "load_torque": 0.02}
 STARTS: Mapping[str, Mapping[str, float]] = {
+    "dynamic_gain_cdo": {"odometer": 40.0},  # beyond the speed that a balise teaches: the slip bends where they meet
     "locomotive": {"train_speed": 10.0, "wheel_rate": 20.2},
     "train": {"brake_demand": 0.4, "elongation[1]": 0.002, **Train().rolling(10.0)},
 }

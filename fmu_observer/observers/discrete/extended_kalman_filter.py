@@ -41,7 +41,7 @@ class ExtendedKalmanFilter(GaussianFilter):
 
     def __init__(self, model: Source = "pendulum", **options: Any) -> None:
         if isinstance(model, ObserverModel) or (model in MODELS and not options.get("outputs")):
-            model = find_model(model)  # type: ignore[arg-type] # it is a name or a model
+            model = find_model(model)
             require_detectable_model(model, self.name)
         super().__init__(model, **options)
 

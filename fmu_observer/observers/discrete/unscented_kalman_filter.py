@@ -53,7 +53,8 @@ class UnscentedKalmanFilter(GaussianFilter):
         parameter("beta", "1", BETA, "What is known of the distribution, 2 for a Gaussian one"),
         parameter("kappa", "1", KAPPA, "Second spread of the sigma points, 0 or 3 - n"),
     )
-    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = GaussianFilter.option_choices | {
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+        **GaussianFilter.option_choices,
         "form": ("short", "square_root"),
         "redraw": (True, False),
     }
