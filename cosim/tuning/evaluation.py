@@ -130,7 +130,7 @@ class Evaluator:
             tell: called after each run.
         """
         found = np.full((len(candidates), len(seeds)), nan)
-        open_: list[tuple[int, int, str]] = []
+        open_: dict[str, list[tuple[int, int]]] = {}  # equal candidates are run once
         for i, candidate in enumerate(candidates):
             for j, seed in enumerate(seeds):
                 key = self._key(seed, candidate)
@@ -138,18 +138,21 @@ class Evaluator:
                     found[i, j] = self._taken(self._known[key])
                     tell()
                 else:
-                    open_.append((i, j, key))
+                    open_.setdefault(key, []).append((i, j))
         if open_:
-            self.prepare(sorted({seeds[j] for _, j, _ in open_}))
-        jobs = [self._job(candidates[i], seeds[j]) for i, j, _ in open_]
-        for place, answer in self._answers(jobs):
-            i, j, key = open_[place]
-            found[i, j] = answer.cost
+            self.prepare(sorted({seeds[places[0][1]] for places in open_.values()}))
+        keys = list(open_)
+        jobs = [self._job(candidates[i], seeds[j]) for (i, j), *_ in open_.values()]
+        for number, answer in self._answers(jobs):
+            key = keys[number]
+            i, j = open_[key][0]
+            for place in open_[key]:
+                found[place] = answer.cost
+                tell()
             self._note(answer.failure)
             entry = {**label, "candidate": i, "seed": seeds[j], "values": candidates[i], "cost": answer.cost}
             self._known[key] = entry | {"failure": answer.failure, "key": key}
             write_lines(self._journal, "a", [self._known[key]])
-            tell()
         return found
 
     def estimates(self, candidates: Sequence[Mapping[str, Any]], seed: int, observed: str) -> list[Evaluated]:

@@ -18,6 +18,7 @@ from fmu_observer.optimisers.registry import find_optimiser
 from fmu_observer.optimisers.search_space import SearchSpace
 
 ITERATIONS = "iterations.jsonl"
+NOTHING_BETTER = "No candidate is better with the training seeds than the scenario as it is; its values are kept."
 
 
 class Study:
@@ -76,13 +77,16 @@ class Study:
             if not self.done:
                 raise
             interrupted = True
-        best = min(self.done, key=lambda search: search.costs[-1]).best
+        winner = min(self.done, key=lambda search: search.costs[-1])
+        kept = not winner.costs[-1] < before.mean()
+        best = self.asked.start if kept else winner.best
         judging = () if interrupted else self.judging
         self._bar.text = "judge"
-        after = self.evaluator.costs([best], self.training, {"search": "after"}, self._bar.step)[0]
-        judged = self.evaluator.costs([None, best], judging, {"search": "judge"}, self._bar.step)
+        candidate = None if kept else best
+        after = self.evaluator.costs([candidate], self.training, {"search": "after"}, self._bar.step)[0]
+        judged = self.evaluator.costs([None, candidate], judging, {"search": "judge"}, self._bar.step)
         tuned = self.scenario.copy()
-        for name, value in self.asked.settings(best).items():
+        for name, value in () if kept else self.asked.settings(best).items():
             tuned.set(name, value)
         return Tuning(
             scenario=tuned,
@@ -99,7 +103,10 @@ class Study:
             judged_after=judged[1].tolist(),
             runs=self.evaluator.runs,
             how="as members of a batch over what the observer heard" if self.evaluator.replayed else how,
-            warnings=self._warnings(shown, None if interrupted else self._directions(best)),
+            warnings=[
+                *([NOTHING_BETTER] if kept else []),
+                *self._warnings(shown, None if interrupted or kept else self._directions(best)),
+            ],
             fixed=why,
             interrupted=interrupted,
         )

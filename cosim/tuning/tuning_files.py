@@ -6,13 +6,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
 from cosim.drawing.style import OBSERVER_LINES, axes_or_new, png, styled
 from cosim.errors import OutputError
 from cosim.results.summary_file import jsonable
+from cosim.scenario.override import override
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,13 +44,22 @@ def write_tuning(tuning: Tuning, settings: dict[str, object], directory: Path) -
     try:
         tuning.scenario.save(paths["scenario"])
         head = f"# {tuning.method}: {tuning.cost}; include this file behind the scenario\n"
-        paths["overlay"].write_text(head + tomli_w.dumps({"overrides": settings}), encoding="utf-8")
+        paths["overlay"].write_text(head + tomli_w.dumps(_tables(tuning, settings)), encoding="utf-8")
         data = json.dumps(jsonable(tuning.to_data()), indent=2, allow_nan=False) + "\n"
         paths["data"].write_text(data, encoding="utf-8")
         paths["picture"].write_bytes(png(convergence_figure(tuning).figure))
     except OSError as error:
         raise OutputError(f"{directory} cannot be written: {error.strerror or error}.") from error
     return paths
+
+
+def _tables(tuning: Tuning, settings: dict[str, object]) -> dict[str, Any]:
+    """The settings as the tables of a scenario file."""
+    tables: dict[str, Any] = {"components": {name: {} for name in tuning.scenario.table().components}}
+    for name, value in settings.items():
+        override(tables, name, value)
+    tables["components"] = {name: entries for name, entries in tables["components"].items() if entries}
+    return tables
 
 
 @styled

@@ -74,8 +74,8 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
     of the readings, carried exactly between them; `position_deviation` likewise. What is no noise is not in it: the
     mean creep of a pulling or braking wheel counts as wheel radius unless `creep_per_effort` tells how much of it an
     effort makes [ours: ``odometer / (1 + creep_per_effort effort)`` stands for the reading], and a wheel that locks or
-    spins spoils the estimate (give an axle that does neither). At standstill nothing is learnt: below `least_excitation` the constant
-    is held and `wheel_radius_learnt` is 0. Without balises the standard deviations grow.
+    spins spoils the estimate (give an axle that does neither). At standstill nothing is learnt: below
+    `least_excitation` the constant is held and `wheel_radius_learnt` is 0. Without balises the standard deviations grow.
 
     Gains [ours]: mu 0.03 1/s, forgetting 0.003 1/s. Errors of position and constant die out at any gaps.
     """

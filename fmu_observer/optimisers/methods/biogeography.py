@@ -21,6 +21,9 @@ class Biogeography(Optimiser):
         lower, upper: bounds, shape (d,). seed: of the generator.
         population: number of habitats. absorption: alpha. mutation: probability that a parameter mutates.
         mutation_size: standard deviation of a mutation, as a share of the range. kept: share of the habitats kept.
+
+    Raises:
+        ValueError: there are fewer than 3 habitats.
     """
 
     name = "biogeography"
@@ -40,6 +43,8 @@ class Biogeography(Optimiser):
         kept: float = 0.2,
     ) -> None:
         super().__init__(lower, upper, seed=seed)
+        if population < 3:
+            raise ValueError(f"{self.name}: a habitat takes from others, so there are at least 3 (got {population}).")
         self.population, self.absorption, self.mutation = population, absorption, mutation
         self._spread = mutation_size * (self.upper - self.lower)
         self._kept = round(kept * population)

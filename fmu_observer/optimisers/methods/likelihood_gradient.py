@@ -72,19 +72,16 @@ class LikelihoodGradient(Optimiser):
 
     def learn(self, candidates: Array, costs: Array, gradients: Array | None) -> None:
         """Take the costs in, see `Optimiser.learn`."""
-        d, width = self.dimension, self.upper - self.lower
+        count, width = 2 * self.dimension + 1, self.upper - self.lower
         for place, point in enumerate(self._wanted):
             if self._gradients:
                 if gradients is None:
                     raise ValueError(f"{self.name}: made with gradients=True, told none.")
                 self._known[point.tobytes()] = float(costs[place]), gradients[place] * width
                 continue
-            rows = slice(place * (2 * d + 1), (place + 1) * (2 * d + 1))
+            rows = slice(place * count, (place + 1) * count)
             units, values = (candidates[rows] - self.lower) / width, costs[rows]
-            distances = np.diag(units[1 : d + 1] - units[d + 1 :])
-            with np.errstate(invalid="ignore"):
-                slopes = (values[1 : d + 1] - values[d + 1 :]) / distances
-            self._known[point.tobytes()] = float(values[0]), slopes
+            self._known[point.tobytes()] = float(values[0]), _slopes(units, values)
 
     def _next(self, start: Array) -> Array | None:
         """Where the descent from this start wants the cost next; None where it has ended."""
@@ -103,3 +100,17 @@ class LikelihoodGradient(Optimiser):
         except _WantedError as wanted:
             return wanted.point
         return None
+
+
+def _slopes(units: Array, costs: Array) -> Array:
+    """Differences around a point, shape (d,): central, or to the one neighbour that has a cost.
+
+    Args:
+        units: the point, its d upper and its d lower neighbours, shape (2 d + 1, d). costs: of them.
+    """
+    d = units.shape[1]
+    ends = np.where(np.isfinite(costs), np.arange(2 * d + 1), 0)  # the point itself in place of one without a cost
+    upper, lower, axes = ends[1 : d + 1], ends[d + 1 :], np.arange(d)
+    distances = units[upper, axes] - units[lower, axes]
+    moved = distances != 0.0
+    return np.where(moved, (costs[upper] - costs[lower]) / np.where(moved, distances, 1.0), 0.0)

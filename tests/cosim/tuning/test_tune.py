@@ -1,0 +1,179 @@
+"""Tuning: the same costs in every way of running candidates, nothing lost, what cannot be seen is said."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from small_scenarios import small
+
+from cosim import Scenario
+from cosim.errors import ScenarioError
+from cosim.scenario.outcome import Outcome
+from cosim.tuning.tune import tune
+from cosim.tuning.tuning_result import Tuning
+
+CURRENTS = "state:current_d=motor.current_d,current_q=motor.current_q"
+VARIANCES = {
+    **{f"process_variance[{i}]": (1e-6, 20.0, True) for i in range(1, 5)},
+    **{f"measurement_variance[{i}]": (1e-6, 20.0, True) for i in (1, 2)},
+}
+
+
+def drive(stop: float = 0.01) -> Scenario:
+    """The shipped drive as blocks, 100 samples."""
+    scenario = Scenario.load("traction_drive").set("stop", stop).set("expect", [])
+    for name in ("cycle", "motor", "control", "filter"):
+        scenario.set(f"{name}.as", "block3")
+    return scenario
+
+
+def drive_with_poor_guess() -> Scenario:
+    """With covariances that trust the measurements too much."""
+    return drive().set("filter.process_variance", [1.0, 1.0, 1.0, 0.5]).set("filter.measurement_variance", [1.0, 1.0])
+
+
+def tuned(scenario: Scenario | None = None, **changes: Any) -> Tuning:
+    given: dict[str, Any] = {
+        "observer": "filter",
+        "cost": CURRENTS,
+        "iterations": 2,
+        "options": {"population": 5},
+    }
+    return tune(scenario or drive(), changes.pop("parameters", VARIANCES), **{**given, **changes})
+
+
+@pytest.fixture(scope="module")
+def found() -> Tuning:
+    return tuned(drive_with_poor_guess(), seeds=[0, 1], judge=[5])
+
+
+def mean_square(outcome: Outcome) -> float:
+    """The published cost, by hand, with the trapezoidal rule of the errors."""
+    errors = [outcome[f"filter.{name}"] - outcome[f"motor.{name}"] for name in ("current_d", "current_q")]
+    return float(sum(np.trapezoid(e**2, outcome.result.time) for e in errors) / outcome.result.time[-1])
+
+
+def test_costs_are_those_of_runs_of_the_scenario(found: Tuning) -> None:
+    """Members of a batch against whole runs: the same bits, and a cost written by hand to rounding."""
+    assert found.how == "as members of a batch over what the observer heard"
+    whole = tuned(drive_with_poor_guess(), seeds=[0, 1], judge=[5], whole_runs=True)
+    assert whole.how.startswith("of the whole scenario")
+    assert (found.before, found.after, found.judged_after) == (whole.before, whole.after, whole.judged_after)
+    assert found.searches == whole.searches
+    assert found.before[1] == pytest.approx(mean_square(drive_with_poor_guess().set("motor.seed", 1).run()), rel=1e-12)
+    again = found.scenario.copy().set("motor.seed", 5).run()
+    assert found.judged_after[0] == pytest.approx(mean_square(again), rel=1e-12)
+    assert sum(found.after) < sum(found.before)
+
+
+def test_what_changes_nothing_is_held_and_said() -> None:
+    """The angle's noise moves no current: rank 3 of 4."""
+    found = tuned(drive_with_poor_guess(), iterations=0, options={"population": 3})
+    assert list(found.fixed) == ["filter.process_variance[4]"]  # in 100 samples the start P(0) has not faded
+    assert found.best["filter.process_variance[4]"] == found.start["filter.process_variance[4]"]
+    assert any("process_variance[4] changes nothing" in text for text in found.warnings)
+    assert "held: filter.process_variance[4], at 0.5: it changes nothing" in found.text()
+    with pytest.raises(ScenarioError, match="nothing to tune"):
+        tuned(parameters={"process_variance[4]": (1e-6, 1.0)})
+
+
+def test_the_likelihood_needs_no_true_values_and_sees_the_scale() -> None:
+    """It tells how large the noise is, not only ratios: the common factor stays."""
+    some = {name: bounds for name, bounds in VARIANCES.items() if name != "process_variance[4]"}
+    found = tuned(parameters=some, cost="likelihood", seeds=[0], options={"population": 4})
+    assert not found.fixed
+    assert "only their ratios" not in " ".join(found.warnings)
+    nis = tuned(parameters=some, cost="nis", seeds=[0], iterations=1, options={"population": 4})
+    assert 0.0 <= nis.after[0] < 10.0
+
+
+def test_an_interrupted_search_keeps_what_it_found_and_goes_on(tmp_path: Path, found: Tuning) -> None:
+    def stop(done: int, _total: int, what: str) -> None:
+        if what.startswith("search") and done > 15:
+            raise KeyboardInterrupt
+
+    part = tuned(drive_with_poor_guess(), seeds=[0, 1], judge=[5], directory=tmp_path, progress=stop)
+    assert part.interrupted
+    assert part.judged == ()
+    lines = [json.loads(line) for line in (tmp_path / "iterations.jsonl").read_text().splitlines()]
+    assert [line["iteration"] for line in lines] == [0]
+    whole = tuned(drive_with_poor_guess(), seeds=[0, 1], judge=[5], directory=tmp_path, resume=True)
+    assert whole.searches == found.searches
+    assert whole.judged_after == found.judged_after
+    assert whole.runs < found.runs
+    evaluations = [json.loads(line) for line in (tmp_path / "evaluations.jsonl").read_text().splitlines()]
+    assert len({entry["key"] for entry in evaluations}) == len(evaluations)  # none was done twice
+    again = Scenario.load(tmp_path / "tuned.toml")
+    assert again.run(overrides={"motor.seed": 5}).failure is None
+    overlay = tmp_path / "both.toml"
+    drive_with_poor_guess().save(tmp_path / "drive.toml")
+    overlay.write_text('include = ["drive.toml", "overlay.toml"]\n')
+    assert mean_square(Scenario.load(overlay).run()) == pytest.approx(whole.after[0], rel=1e-12)
+    assert (tmp_path / "convergence.png").stat().st_size > 1000
+
+
+def test_an_observer_with_balises_runs_beside_recordings() -> None:
+    """A train observer: one recording a seed; its error is that of the whole run to the interpolation of nothing."""
+    asked: dict[str, Any] = {
+        "parameters": {"balise_gain_position[1]": (0.1, 1.0), "locomotive_mass": (1.0, 2.0)},
+        "observer": "observer",
+        "cost": "position_error_rms",
+        "method": "hand",
+        "options": {},
+    }
+    with pytest.raises(ScenarioError, match="has no 'locomotive_mass'"):
+        tuned(small(), **asked)
+    del asked["parameters"]["locomotive_mass"]
+    beside = tuned(small(), **asked, seeds=[0, 3], judge=[7])
+    assert "recorded" in beside.how
+    whole = tuned(small(), **asked, seeds=[0, 3], judge=[7], whole_runs=True)
+    np.testing.assert_allclose(beside.before, whole.before, rtol=1e-9)
+    np.testing.assert_allclose(beside.searches[0].costs, whole.searches[0].costs, rtol=1e-9)
+
+
+def test_anything_of_a_scenario_is_tuned_by_a_function_of_the_outcome() -> None:
+    """The mass of a plant, found from where it is after the run: the search ends near the mass that was used."""
+    scenario = Scenario(stop=0.2, step=0.01)
+    scenario.add("train", model="locomotive", **{"as": "block3"}, parameters={"train_speed": 10.0, "effort": 5e4})
+    true = scenario.copy().set("train.mass", 80e3).run()["train.speed"][-1]
+
+    def off(outcome: Outcome) -> float:
+        return float(abs(outcome["train.speed"][-1] - true))
+
+    found = tune(scenario, {"train.mass": (60e3, 120e3)}, method="hand", cost=off, iterations=12)
+    assert found.best["train.mass"] == pytest.approx(80e3, rel=1e-2)
+    assert "train" in found.how
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"parameters": {}}, "Nothing is tuned"),
+        ({"parameters": {"process_varianc[1]": (1.0, 2.0)}}, "did you mean 'process_variance'"),
+        ({"parameters": {"process_variance": (1.0, 2.0)}}, "vector with 4 elements"),
+        ({"parameters": {"process_variance[5]": (1.0, 2.0)}}, "no such element"),
+        ({"parameters": {"process_variance[1,2]": (1.0, 2.0)}}, "the diagonal is tuned"),
+        ({"parameters": {"sample_period[1]": (1.0, 2.0)}}, "has no elements"),
+        ({"parameters": {"process_variance[1]": (1.0, float("inf"))}}, "finite bounds"),
+        ({"parameters": {"process_variance[1]": (0.0, 1.0, True)}}, "above zero"),
+        ({"parameters": {"process_variance[1]": 3.0}}, "expected .low, high."),
+        ({"seeds": [0, 1], "judge": [1, 2]}, "Seeds 1 stand among"),
+        ({"seeds": []}, "no training seeds"),
+        ({"seed_names": ["motr.seed"]}, "did you mean 'motor.seed'"),
+        ({"method": "bob"}, "did you mean bbo"),
+        ({"options": {"populaton": 3}}, "populaton"),
+        ({"cost": "expectation"}, "say which"),
+        ({"cost": "state:current_d"}, "expected estimate=component.signal"),
+        ({"resume": True}, "resumed from its folder"),
+        ({"observer": "fliter"}, "unknown observer"),
+        ({"cost": "nothing_rms"}, "no measure"),
+        ({"cost": "state:current_d=motor.curent_d"}, "did you mean"),
+    ],
+)
+def test_what_cannot_be_is_told_before_a_search(changes: dict[str, Any], words: str) -> None:
+    with pytest.raises(ScenarioError, match=words):
+        tuned(drive(0.001), **changes)
