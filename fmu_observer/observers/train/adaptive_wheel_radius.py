@@ -75,7 +75,7 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
     mean creep of a pulling or braking wheel counts as wheel radius unless `creep_per_effort` tells how much of it an
     effort makes [ours: ``odometer / (1 + creep_per_effort effort)`` stands for the reading], and a wheel that locks or
     spins spoils the estimate (give an axle that does neither). At standstill nothing is learnt: below
-    `least_excitation` the constant is held and `wheel_radius_learnt` is 0. Without balises the standard deviations grow.
+    `least_excitation` the constant is held and `wheel_radius_learnt` is 0. Without balises the deviations grow.
 
     Gains [ours]: mu 0.03 1/s, forgetting 0.003 1/s. Errors of position and constant die out at any gaps.
     """
