@@ -23,6 +23,7 @@ from cosim import Outcome, Scenario
 from cosim.evaluation.error_table import error_text
 from cosim.evaluation.metrics import phase_metrics
 from cosim.expectations.registry import EXPECTATIONS
+from cosim.fmu_filter.settings import FilterTable
 from cosim.report.figures.main_picture import main_picture
 from cosim.scenario import network_table, schema, tables
 from cosim.scenario.model_name import ModelName
@@ -173,6 +174,7 @@ def schema_tables() -> dict[str, Any]:
     return {
         "scenario": schema.ScenarioTable,
         "component": tables.ComponentTable,
+        "filter": FilterTable,
         "connection": tables.ConnectionTable,
         "master": tables.MasterTable,
         "iteration": tables.IterationTable,

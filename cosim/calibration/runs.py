@@ -107,7 +107,7 @@ class FmuRuns:
         for name, series in recorded.inputs.items():
             u[:, model.inputs.index(name)] = series
         held = u if self._between == "hold" else np.vstack([0.5 * (u[1:] + u[:-1]), u[-1:]])
-        model.parameters.update(values)
+        model.set_parameters(values)
         found = np.empty((len(time), len(places)))
         model.restart(float(time[0]), np.zeros(0), u[0])
         found[0] = model.read()[1][places]

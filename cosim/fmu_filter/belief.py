@@ -116,6 +116,8 @@ class FmuFilter(ABC):
 
     def _from_inputs(self, t: float, h: float, x: Array, u: Array) -> Array:
         """Covariance that the noises of the inputs add over a step, shape (n, n), by central differences."""
+        if not len(self._noisy):
+            return np.zeros((len(x), len(x)))
         columns = []
         for i in self._noisy:
             size = np.zeros(len(u))
@@ -190,7 +192,7 @@ class UnscentedFilter(FmuFilter):
     def predict(self, belief: Belief, t: float, h: float, u: Array) -> Belief:
         """The belief a step later; arguments as for `FmuFilter`."""
         w = self._weights
-        points = unscented.sigma_points(belief.x, factor(belief.P), w.spread)
+        points = unscented.sigma_points(belief.x, _root(belief.P), w.spread)
         found = unscented.scattered(lambda at: self.model.transition(t, h, at, u)[0], points)
         P = kalman.symmetric(unscented.covariance(found, found, w)) + h * self.noises.intensity
         P = P + self._from_inputs(t, h, belief.x, u)
@@ -199,8 +201,16 @@ class UnscentedFilter(FmuFilter):
     def correct(self, belief: Belief, t: float, u: Array, seen: Sequence[int], y: Array, R: Array) -> Belief:
         """The belief after a measurement; arguments as for `FmuFilter`."""
         w, chosen = self._weights, list(seen)
-        points = unscented.sigma_points(belief.x, factor(belief.P), w.spread)
+        points = unscented.sigma_points(belief.x, _root(belief.P), w.spread)
         states = unscented.scattered(lambda at: at, points)
         looks = unscented.scattered(lambda at: self.model.values_at(t, at, u)[1][chosen], points)
         found = unscented.correct(belief.x, belief.P, states, looks, y, R, w)
         return self._corrected(belief, found, y - unscented.mean(looks, w))
+
+
+def _root(P: Array) -> Array:
+    """Lower factor of a covariance; the quick one of a library where nothing is known exactly."""
+    try:
+        return np.linalg.cholesky(P)
+    except np.linalg.LinAlgError:
+        return np.asarray(factor(P))

@@ -109,8 +109,8 @@ class ParticleFilter(FmuFilter):
         model, states, columns = self.model, [], []
         draws = np.random.default_rng([self._seed, 0]).standard_normal((self._count, len(self._spreads)))
         for row in draws:
-            for (name, spread), draw in zip(self._spreads.items(), row, strict=True):
-                model.parameters[name] = self._starts[name] + spread * float(draw)
+            drawn = zip(self._spreads.items(), row, strict=True)
+            model.set_parameters({name: self._starts[name] + spread * float(draw) for (name, spread), draw in drawn})
             model.restart(0.0, np.zeros(0), model.start_inputs)
             states.append(Saved(model.instance))
             columns.append(model.read()[1])

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from cosim.fmu_model.quick_restarts import quicken_restarts
 from cosim.fmu_model.sealed import FAR, SealedModel
+from fmus.fmi.ports import is_native
 
 
 class CoSimulationModel(SealedModel):
@@ -24,3 +26,7 @@ class CoSimulationModel(SealedModel):
     def _enter(self, t: float) -> None:
         self.instance.enter_initialization(t, t + FAR)
         self.instance.exit_initialization()
+
+    def _quicken(self) -> None:
+        if is_native(self.instance.slave):
+            quicken_restarts(self.instance.slave, self.instance.fmi_version)

@@ -78,6 +78,13 @@ class SealedModel(ABC):
         self.parameters = {name: value for name, value in self.parameters.items() if name not in self.states}
         names = [*self.parameters, *(self.states if all(map(self._has_start, self.states)) else ())]
         self._write_starts, self._starts = instance.writer(names)
+        self._settings = len(self.parameters)
+        self._starts[: self._settings] = list(self.parameters.values())
+        self._quicken()
+
+    def _quicken(self) -> None:
+        """Prepare calls that are made often; by default nothing."""
+        return
 
     def _begun(self) -> tuple[Array, Array]:
         """States and inputs where the FMU itself begins under its parameters."""
@@ -86,6 +93,15 @@ class SealedModel(ABC):
         begin = getattr(self.instance.description.defaultExperiment, "startTime", None)
         self._enter(float(begin or 0.0))
         return self.instance.read(list(self.states)), self.instance.read(list(self.inputs))
+
+    def set_parameters(self, values: Mapping[str, float]) -> None:
+        """Other values of parameters, from the next restart on.
+
+        Args:
+            values: by name, of parameters that the model was opened with.
+        """
+        self.parameters.update(values)
+        self._starts[: self._settings] = list(self.parameters.values())
 
     # -- one point ----------------------------------------------------------------------------------------------------
 
@@ -103,9 +119,7 @@ class SealedModel(ABC):
     def _restart(self, t: float, x: Array, u: Array) -> None:
         instance = self.instance
         instance.reset()
-        count = len(self.parameters)
-        self._starts[:count] = list(self.parameters.values())
-        self._starts[count:] = x[: len(self._starts) - count]
+        self._starts[self._settings :] = x[: len(self._starts) - self._settings]
         if len(self._starts):
             self._write_starts()
         if len(self.inputs):
@@ -138,13 +152,13 @@ class SealedModel(ABC):
     def read(self) -> tuple[Array, Array]:
         """States, shape (n,), and outputs, shape (q,), where the instance stands."""
 
-        def read() -> None:
-            self._read_states()
-            if len(self.outputs):
-                self._read_outputs()
-
-        self.told(read)
+        self.told(self._read)
         return self._states_read.copy(), self._outputs_read.copy()
+
+    def _read(self) -> None:
+        self._read_states()
+        if len(self.outputs):
+            self._read_outputs()
 
     @abstractmethod
     def advance(self, t: float, h: float) -> None:

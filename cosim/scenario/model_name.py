@@ -117,3 +117,12 @@ def _validated(given: Any, info: ValidationInfo) -> ModelName:
 
 
 Model = Annotated[ModelName, PlainValidator(_validated), PlainSerializer(str, when_used="json")]
+
+
+def named(model: Any) -> Any:
+    """A class or an instance as a name that remembers it; anything else as it is.
+
+    Args:
+        model: as a user gives it.
+    """
+    return model if isinstance(model, str) or not is_model(model) else ModelName.of(model)

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from cosim.components.component import Component
 from cosim.coupling.connection import Connection, split_name
 from cosim.errors import CosimError, ScenarioError, nearest
+from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.scenario.schema import ScenarioTable
 from cosim.scenario.tables import BalisesTable
 from plant_models.hybrid.units import UnitError, conversion, parse_unit
@@ -135,3 +136,26 @@ def _check_signal(name: str, unit: str, components: Mapping[str, Component], wha
             conversion(declared, parse_unit(unit))
     except UnitError as error:
         raise ScenarioError(f"{what}: {name} is not in {unit} or convertible to it: {error}.") from error
+
+
+def report_spec(table: ScenarioTable) -> ReportSpec:
+    """What the report is told of a run.
+
+    Args:
+        table: of the scenario, with its roles.
+    """
+    report, components = table.report, table.components
+    observers = [n for n, c in components.items() if c.observer is not None]
+    return ReportSpec(
+        title=table.title,
+        **{role: getattr(report, role) for role in ROLES},
+        observers=observers if report.observers is None else report.observers,
+        other_trains=report.other_trains,
+        labels={n: c.label for n, c in components.items() if c.label is not None},
+        phases=[Phase(p.name, p.start, p.end) for p in report.phases],
+        zones=report.zones,
+        evaluate_after=report.evaluate_after,
+        published=report.published,
+        independent=report.independent,
+        notes=report.notes,
+    )

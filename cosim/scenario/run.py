@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, replace
-from itertools import pairwise
+from dataclasses import asdict
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -24,11 +23,7 @@ from cosim.coupling.plan import Plan, make_plan
 from cosim.diagnostics.call_log import CallLog
 from cosim.diagnostics.messages import in_order
 from cosim.errors import CosimError
-from cosim.evaluation.balise_gaps import gap_errors
-from cosim.evaluation.consistency import filter_consistency
-from cosim.evaluation.fault_detection import fault_detection
 from cosim.evaluation.result_warnings import result_warnings
-from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.expectations.check import check_expectations
 from cosim.expectations.judge import judge
 from cosim.master.algorithms.choose import AlgorithmChoice, choose_algorithm
@@ -40,11 +35,12 @@ from cosim.network.service import NetworkService
 from cosim.process.interruption import Interruption
 from cosim.process.sentinel import limited_calls
 from cosim.results.recorder import Recorder
-from cosim.results.result import BaliseRecord, Result, SignalInfo
+from cosim.results.result import Result, SignalInfo
 from cosim.results.si import InFormerUnits, in_si
 from cosim.results.stream import Stream
 from cosim.scenario.after_run import warnings_after
 from cosim.scenario.balise_service import Choice, choose_method, find_receivers, make_service, watched_plant
+from cosim.scenario.balise_summary import all_telegrams, balise_summary
 from cosim.scenario.certificates import check_certificates, expected_gap
 from cosim.scenario.connections import parse_connections
 from cosim.scenario.coupling_warnings import coupling_warnings, interpolation_note, late_telegram_warnings
@@ -55,17 +51,14 @@ from cosim.scenario.models import component_factories, protocol_parameters
 from cosim.scenario.network import Network, connect_over, make_network, network_summary, network_warnings
 from cosim.scenario.outcome import INTERRUPTED, Outcome
 from cosim.scenario.premises import premise_findings
-from cosim.scenario.roles import ROLES, check_roles, inferred_roles, signals_to_record, with_roles
+from cosim.scenario.roles import check_roles, inferred_roles, report_spec, signals_to_record, with_roles
 from cosim.scenario.schema import ScenarioTable, step_count
 from cosim.scenario.starts import start_values
-from cosim.scenario.summary import first_summary, run_summary
+from cosim.scenario.summary import first_summary, judged_summary, run_summary
 from cosim.structure.divergence import explained_failure
 from fmus.fmi.capabilities import tool_warning
 from fmus.fmi.sense import doubled_names
 from plant_models.hybrid.units import Unit
-
-if TYPE_CHECKING:
-    from cosim.results.stream import Stream
 
 LOG = logging.getLogger("cosim")
 CALL_LOG = Path("calls.log")
@@ -158,11 +151,9 @@ class _Setup:
         table = self.table
         for text in idle_settings(table.master):
             self._warn(text)
-        layout = (
-            None
-            if table.balises is None
-            else make_layout(table.balises, table.start, table.stop, self.folder, self.where)
-        )
+        layout = None
+        if table.balises is not None:
+            layout = make_layout(table.balises, table.start, table.stop, self.folder, self.where)
         pairs = parse_connections(table.connections, self.where)
         self._load_components()
         clocks, pairs = connect_clocks(pairs, self.components)
@@ -173,9 +164,8 @@ class _Setup:
         check_roles(table, known, self.where)
         roles = inferred_roles(table, self.components, connections, plant)
         table = with_roles(table, roles)
-        self.notes += (
-            [f"Roles that the report was not told: {', '.join(map(' = '.join, roles.items()))}."] if roles else []
-        )
+        if roles:
+            self.notes.append(f"Roles that the report was not told: {', '.join(map(' = '.join, roles.items()))}.")
         table = self.table = check_expectations(table, known, receivers, self.where)
         stepped = [c for c in routed if c.source[0] != NETWORK]
         groups = stepping_groups(table, self.components, stepped, plant, receivers)
@@ -257,26 +247,23 @@ class _Setup:
         for warning in (*master.control.warnings(), *left):
             self._warn(warning)
         summary = run_summary(self.name, self.table, self.plan, master, self.setup_seconds)
-        events = [] if self.service is None else self._all_telegrams(self.service)
-        spec, (table, signals) = self._report_spec(), self._in_si()
+        events = [] if self.service is None else all_telegrams(self.service)
+        spec, (table, signals) = report_spec(self.table), self._in_si()
         for warning in result_warnings(Result(table, signals, failure=failure), spec):
             self._warn(warning)
         for warning in warnings_after(self.components, events, changed_in_steps, recorded):
             self._warn(warning)
         if self.call_log is not None and self.call_log.broken is not None:
             self._warn(self.call_log.broken)
-        summary |= self._balise_summary([e.stamp for e in events if e.kind == "true"])
+        found, beyond = balise_summary(self.choice, self.service, self.certificates, self.axis.start, events)
+        for warning in beyond:
+            self._warn(warning)
+        summary |= found
         summary |= {"certificates": self.certificates, "premises": premises} | {
             "warnings": self.warnings,
             "notes": self.notes,
         }
-        if faults := fault_detection(Result(table, signals, events, failure=failure), spec):
-            summary["fault_detection"] = [found.to_data() for found in faults]
-        if (gaps := gap_errors(Result(table, signals, events, failure=failure), spec)).errors:
-            summary["balise_gaps"] = gaps.to_data()
-        if filters := filter_consistency(Result(table, signals, failure=failure), spec):
-            summary["consistency"] = [found.to_data() for found in filters]
-        summary["report"] = asdict(spec)  # so that the folder tells which signal plays which role
+        summary |= judged_summary(Result(table, signals, events, failure=failure), spec)
         if interruption.came:
             failure = failure or INTERRUPTED
         messages = in_order(component.messages for component in self.components.values())
@@ -384,7 +371,7 @@ class _Setup:
         """From here on what is recorded, told and logged is in the folder as well."""
         if self.streaming is None:
             return
-        summary = first_summary(self.name, self.table, master.plan) | {"report": asdict(self._report_spec())}
+        summary = first_summary(self.name, self.table, master.plan) | {"report": asdict(report_spec(self.table))}
         summary |= {"certificates": self.certificates, "warnings": self.warnings, "notes": self.notes}
         events = [] if self.service is None else self.service.mailbox.log
         logs = [component.messages for component in self.components.values()]
@@ -410,52 +397,3 @@ class _Setup:
             return in_si(table, self.plan.signals, self._unit)
         self.stream.finish()
         return table, self.stream.signals
-
-    def _all_telegrams(self, service: BaliseService) -> list[BaliseRecord]:
-        """Everything that was passed: told, missed, and still on its way at the end."""
-        names = [r.planned.component.name for r in service.receivers]
-        waiting = [replace(e, outcomes=dict.fromkeys(names, "undelivered")) for e in service.mailbox.waiting]
-        return [*service.mailbox.log, *waiting]
-
-    def _balise_summary(self, stamps: list[float]) -> dict[str, Any]:
-        """Method, probe, and the gaps that really occurred against what is certified."""
-        if self.choice is None or self.service is None:
-            return {
-                "localisation": None,
-                "probe": None,
-                "redo_differences": None,
-                "largest_gap": None,
-                "undelivered": 0,
-            }
-        gap = max((b - a for a, b in pairwise([self.axis.start, *sorted(stamps)])), default=None)
-        for name, certificate in self.certificates.items():
-            limit = certificate["aperiodic_limit"]
-            certificate["largest_gap_seen"] = gap
-            if limit is not None and gap is not None and gap > limit and certificate["holds"] is not False:
-                self._warn(f"{name}: the longest gap between balises was {gap:.3g} s, certified are {limit:.3g} s.")
-        return {
-            "localisation": self.choice.to_dict(),
-            "probe": None if self.choice.probe is None else self.choice.probe.to_dict(),
-            "redo_differences": self.service.localiser.watch.redo_differences,
-            "largest_gap": gap,
-            "undelivered": len(self.service.mailbox.waiting),
-        }
-
-    def _report_spec(self) -> ReportSpec:
-        table = self.table.report
-        observers = table.observers
-        if observers is None:
-            observers = [n for n, t in self.table.components.items() if t.observer is not None]
-        return ReportSpec(
-            title=self.table.title,
-            **{role: getattr(table, role) for role in ROLES},
-            observers=observers,
-            other_trains=table.other_trains,
-            labels={n: t.label for n, t in self.table.components.items() if t.label is not None},
-            phases=[Phase(p.name, p.start, p.end) for p in table.phases],
-            zones=table.zones,
-            evaluate_after=table.evaluate_after,
-            published=table.published,
-            independent=table.independent,
-            notes=table.notes,
-        )

@@ -36,6 +36,47 @@ def streaming_to(directory: str | Path, origin: Origin) -> Streaming:
     return check_writable(directory), begun
 
 
+def where_to(
+    stream: str | Path | None, spare: str | Path | None, origin: Origin
+) -> tuple[Path | None, Streaming | None]:
+    """The results folder that a run streams to, and what it needs to stream to that or to the spare one.
+
+    Args:
+        stream: results folder; None for none. spare: folder for rows in case the process dies; None for none.
+        origin: of the run.
+
+    Raises:
+        OutputError: the folder cannot be written.
+    """
+    if stream is not None:
+        folder = Path(stream).absolute()  # an FMU may change the working directory
+        return folder, streaming_to(folder, origin)
+    return None, None if spare is None else (Path(spare).absolute(), lambda: None)
+
+
+def ending(
+    origin: Origin,
+    folder: Path | None,
+    warn: Callable[[str], None],
+    finished: Callable[[Outcome], None] | None,
+) -> Callable[[Outcome], Outcome]:
+    """What is done with an outcome before the components are closed.
+
+    Args:
+        origin: of the run. folder: that it was streamed to, or None. warn: called with each warning.
+        finished: told of the outcome; None for nobody.
+    """
+
+    def finish(outcome: Outcome) -> Outcome:
+        outcome = replace(outcome, origin=origin)
+        outcome = outcome if folder is None else finish_stream(outcome, folder, warn)
+        if finished is not None:
+            finished(outcome)
+        return outcome
+
+    return finish
+
+
 def finish_stream(outcome: Outcome, directory: str | Path, warn: Callable[[str], None]) -> Outcome:
     """Write what only the end of a run tells. Where the disk refuses, the folder keeps what was streamed, and a warning
     says so.

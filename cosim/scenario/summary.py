@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from datetime import UTC, datetime
 from typing import Any
 
 from cosim.components.component import Component
 from cosim.coupling.plan import Plan
 from cosim.diagnostics.call_statistics import call_statistics_table
+from cosim.evaluation.balise_gaps import gap_errors
+from cosim.evaluation.consistency import filter_consistency
+from cosim.evaluation.fault_detection import fault_detection
+from cosim.evaluation.spec import ReportSpec
 from cosim.master.master import Master
+from cosim.results.result import Result
 from cosim.scenario.schema import ScenarioTable
 from cosim.scenario.tables import ComponentTable
 from fmus.versions import versions
@@ -90,3 +96,19 @@ def _component(component: Component, table: ComponentTable) -> dict[str, Any]:
         "message_counts": dict(component.messages.counts),
         "events": None if outcomes is None else dict(outcomes),
     }
+
+
+def judged_summary(result: Result, spec: ReportSpec) -> dict[str, Any]:
+    """What the report is told, and what is judged by it: faults, position errors at balises, consistency of filters.
+
+    Args:
+        result: the run. spec: roles of its signals.
+    """
+    found: dict[str, Any] = {"report": asdict(spec)}  # so that the folder tells which signal plays which role
+    if faults := fault_detection(result, spec):
+        found["fault_detection"] = [fault.to_data() for fault in faults]
+    if (gaps := gap_errors(result, spec)).errors:
+        found["balise_gaps"] = gaps.to_data()
+    if filters := filter_consistency(result, spec):
+        found["consistency"] = [one.to_data() for one in filters]
+    return found

@@ -6,7 +6,6 @@ import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import deepcopy
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -14,7 +13,7 @@ from cosim import ssp, studies
 from cosim.errors import CosimError, ScenarioError
 from cosim.scenario.includes import Key, attribute, find_file, read_tables
 from cosim.scenario.manifest import read_manifest
-from cosim.scenario.model_name import ModelName, is_model, settings_of
+from cosim.scenario.model_name import named, settings_of
 from cosim.scenario.origin import Origin
 from cosim.scenario.outcome import Outcome
 from cosim.scenario.override import case_values, override
@@ -25,7 +24,7 @@ from cosim.scenario.save import plain, save_scenario, scenario_text
 from cosim.scenario.schema import ScenarioTable, parse_scenario
 from cosim.scenario.shipped import shipped_scenarios
 from cosim.scenario.single import single_tables
-from cosim.scenario.streaming import finish_stream, streaming_to
+from cosim.scenario.streaming import ending, where_to
 from cosim.scenario.structure import scenario_structure
 from cosim.structure.structure import Structure
 
@@ -208,7 +207,7 @@ class Scenario:
         """
         if name in self._data["components"]:
             raise ScenarioError(f"{self.where}: there is a component {name!r} already.")
-        given = {key: _given(table[key]) for key in MODEL_KEYS if key in table}
+        given = {key: named(table[key]) for key in MODEL_KEYS if key in table}
         for model in given.values():
             for key, settings in settings_of(getattr(model, "given", "")).items():
                 table[key] = {**settings, **table.get(key, {})}
@@ -268,7 +267,7 @@ class Scenario:
             ScenarioError: there is no such component or table.
         """
         key = name.rpartition(".")[2] if name.count(".") == 1 else ""
-        value = _given(value) if key in MODEL_KEYS else plain(value)
+        value = named(value) if key in MODEL_KEYS else plain(value)
         if key in COMPONENT_PATHS:
             value = absolute(str(value), ".")  # given here, so relative to where the user stands
         if key in MODEL_KEYS and isinstance(value, str):
@@ -386,18 +385,8 @@ class Scenario:
         with self._places_named():
             place = scenario.name, self.folder, self.where
             origin = Origin.of(table, *place, self._files)
-            folder = None if stream is None else Path(stream).absolute()  # an FMU may change the working directory
-            streaming = None if folder is None else streaming_to(folder, origin)
-            if streaming is None and spare is not None:
-                streaming = Path(spare).absolute(), lambda: None
-
-            def finish(outcome: Outcome) -> Outcome:
-                outcome = replace(outcome, origin=origin)
-                outcome = outcome if folder is None else finish_stream(outcome, folder, warn or LOG.warning)
-                if finished is not None:
-                    finished(outcome)
-                return outcome
-
+            folder, streaming = where_to(stream, spare, origin)
+            finish = ending(origin, folder, warn or LOG.warning, finished)
             return run_scenario(
                 table, *place, progress, warn, log, building, doubts=self._doubts, stream=streaming, finish=finish
             )
@@ -422,8 +411,3 @@ class Scenario:
         except CosimError as error:
             error.args = (attribute(str(error), self.where, self._places), *error.args[1:])
             raise
-
-
-def _given(model: Any) -> Any:
-    """A class or an instance as a name that remembers it; anything else as it is."""
-    return model if isinstance(model, str) or not is_model(model) else ModelName.of(model)

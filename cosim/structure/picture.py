@@ -17,7 +17,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.patches import Circle, FancyBboxPatch, PathPatch, Polygon
-from matplotlib.path import Path as Curve
 from matplotlib.textpath import TextPath
 
 from cosim.drawing.style import (
@@ -40,6 +39,7 @@ from cosim.drawing.style import (
     styled,
 )
 from cosim.errors import OutputError
+from cosim.structure.curves import CORNER, back_curve, forward_curves
 from cosim.structure.layout import EVENT_PORT, lay_out
 from cosim.structure.shapes import FOOT, PAD, Box, Edge, Frame, Layout, Size, Wire
 
@@ -59,7 +59,6 @@ FILLS = {"FMU": PALE_BLUE, "block": PALE_YELLOW}
 NAME, SMALL, PORT = 9.5, 7.3, 8.0  # font sizes [pt]
 MARGIN, HEAD, KEY_ROW, KEY_LINE = 0.22, 0.62, 0.22, 0.42  # [inch]
 SIDE, MIDDLE, BADGE, ARROW = 0.12, 0.34, 0.105, 0.075  # within a box [inch]
-CORNER = 0.07
 FORMATS = ("png", "svg", "pdf")
 PNG_DPI = 160
 MAX_PIXELS = 12000
@@ -326,43 +325,6 @@ def _draw_wire(ax: Axes, wire: Wire, drawn: set[object]) -> None:
     x, y = wire.points[-1]
     tip = [(x, y), (x - ARROW * 1.5, y - ARROW / 1.6), (x - ARROW * 1.5, y + ARROW / 1.6)]
     ax.add_patch(Polygon(tip, closed=True, facecolor=COLOURS[kind], edgecolor="none", zorder=1.6))
-
-
-def forward_curves(points: Sequence[tuple[float, float]]) -> list[Curve]:
-    """Straight across columns, swinging between them; one piece each.
-
-    Args:
-        points: corners of the wire in the figure.
-    """
-    pieces = []
-    for number, ((x, y), (u, v)) in enumerate(pairwise(points)):
-        if (x, y) == (u, v):
-            continue
-        if number % 2 == 0:
-            pieces.append(Curve([(x, y), (u, v)], [Curve.MOVETO, Curve.LINETO]))
-        else:
-            corners = [(x, y), ((x + u) / 2, y), ((x + u) / 2, v), (u, v)]
-            pieces.append(Curve(corners, [Curve.MOVETO, *[Curve.CURVE4] * 3]))
-    return pieces
-
-
-def back_curve(points: Sequence[tuple[float, float]]) -> Curve:
-    """Along right angles with rounded corners.
-
-    Args:
-        points: corners of the wire in the figure.
-    """
-    vertices, codes = [points[0]], [Curve.MOVETO]
-    for before, corner, after in zip(points, points[1:], points[2:], strict=False):
-        vertices += [_towards(corner, before), corner, _towards(corner, after)]
-        codes += [Curve.LINETO, Curve.CURVE3, Curve.CURVE3]
-    return Curve([*vertices, points[-1]], [*codes, Curve.LINETO])
-
-
-def _towards(corner: tuple[float, float], other: tuple[float, float]) -> tuple[float, float]:
-    length = abs(other[0] - corner[0]) + abs(other[1] - corner[1])
-    share = min(CORNER, length / 2) / length if length else 0.0
-    return corner[0] + share * (other[0] - corner[0]), corner[1] + share * (other[1] - corner[1])
 
 
 # -- words ------------------------------------------------------------------------------------------------------------

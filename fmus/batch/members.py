@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
-from functools import lru_cache
 from math import isfinite
 from weakref import finalize
 
@@ -14,7 +13,7 @@ from numpy.typing import ArrayLike
 from fmus.batch.error import BatchError
 from fmus.batch.library import Columns, Events, load_batch
 from fmus.batch.schedule import Schedule
-from fmus.build import Plan, plan_fmu
+from fmus.build import plan_fmu
 from fmus.recipes import recipe
 from plant_models.hybrid import HybridSystem
 
@@ -51,7 +50,7 @@ class Batch:
         self.system = recipe(system) if isinstance(system, str) else system
         self.members = members
         self.time: float | None = None
-        plan = _planned(self.system, preset)
+        plan = plan_fmu(self.system, 3, preset)
         self._variables = {v.name: int(v.valueReference) for v in plan.description.modelVariables}
         self._vectors = _vectors(self._variables)
         self._library = load_batch(plan)
@@ -243,12 +242,6 @@ class Batch:
         for i, values in enumerate(columns.values()):
             stacked[:, :, i] = values
         return np.broadcast_to(stacked, (self.members, count, len(columns)))
-
-
-@lru_cache(maxsize=8)
-def _planned(system: HybridSystem, preset: str | None) -> Plan:
-    """The plan of a system, which is traced once for several batches."""
-    return plan_fmu(system, 3, preset)
 
 
 def _vectors(variables: Mapping[str, int]) -> dict[str, list[int]]:

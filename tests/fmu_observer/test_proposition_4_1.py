@@ -20,7 +20,7 @@ from fmu_observer.design.proposition_4_1 import (
 )
 from fmu_observer.observers.parameter_values import parameter_values
 from fmu_observer.observers.train import DiscreteMeasurementObserver
-from fmu_observer.observers.train.held_odometer_observer import error_matrix, error_slopes, first_gain
+from fmu_observer.observers.train.held_odometer_error import error_matrix, error_slopes, first_gain
 from fmu_observer.observers.train.held_odometer_presets import HELD_ODOMETER_PRESETS
 
 W1, C = 0.04, (1.0, 0.0, 0.0)

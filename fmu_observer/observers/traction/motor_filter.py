@@ -68,7 +68,7 @@ class MotorFilter(HybridSystem):
         self.states = primed_memory(
             *(memory(f"estimated_{s.name}", s.unit, 0.0, f"Estimate: {s.description}") for s in estimated),
             memory(
-                "covariance",
+                "estimate_covariance",
                 "1",
                 tuple(map(float, np.diag(start_variance).ravel())),
                 "Covariance P, row by row, SI units",

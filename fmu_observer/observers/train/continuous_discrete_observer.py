@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from fmu_observer.observers.train.held_odometer_observer import HeldOdometerObserver, gain_level, gain_norm
+from fmu_observer.observers.train.held_odometer_error import gain_level, gain_norm
+from fmu_observer.observers.train.held_odometer_observer import HeldOdometerObserver
 from plant_models.hybrid.system import Array
 
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import reduce
 from math import sqrt
 from typing import Any, ClassVar, Literal
 
@@ -16,16 +15,22 @@ import numpy as np
 from fmu_observer.bounds import ErrorBounds
 from fmu_observer.bounds.carried import (
     PACKED,
-    decay_proven,
     first_component,
     level,
     level_of_box,
-    level_squared,
     unpacked,
 )
 from fmu_observer.bounds.formulas import improved_dmo_bound
-from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampled_error, with_switching_noted
+from fmu_observer.certificates import Certificate, certify_sampled_error, with_switching_noted
 from fmu_observer.observers.parameter_values import Value, parameter_values
+from fmu_observer.observers.train.held_odometer_error import (
+    error_matrix,
+    error_slopes,
+    first_gain,
+    position_error,
+    proven,
+    unknown_level,
+)
 from fmu_observer.observers.train.held_odometer_presets import HELD_ODOMETER_PRESETS
 from fmu_observer.observers.train.train_observer import POSITION, SPEED, Estimate, TrainObserver
 from fmu_observer.observers.train.train_resistance import rolling_drag
@@ -196,7 +201,7 @@ class HeldOdometerObserver(TrainObserver):
             acceleration,
             x[3] + p.gain[1] * residual,
             p.gain[2] * residual - decay,
-            reading + _unknown_level(p) + own - p.bound_decay * x[LEVEL],
+            reading + unknown_level(p) + own - p.bound_decay * x[LEVEL],
             told,
         )
 
@@ -274,13 +279,13 @@ class HeldOdometerObserver(TrainObserver):
     def requirements(self, p: Any) -> dict[str, Array]:
         """Bounds of the numbers that the bounds rest on, and the proof of the decay at both ends of the drag slopes."""
         slowest, fastest = error_slopes(p)
-        proven = [_proven(a11, p) for a11 in (slowest, fastest)]
+        shown = [proven(a11, p) for a11 in (slowest, fastest)]
         limited = tuple(s for s in self.estimator_parameters if s.min is not None)
-        return super().requirements(p) | within_bounds(limited, p) | {PROOF: proven[0] * proven[1]}
+        return super().requirements(p) | within_bounds(limited, p) | {PROOF: shown[0] * shown[1]}
 
     def error_certificate(self, max_gap: float, p: Any) -> Certificate:
         """Certificate of ``de = (A - K C) e`` with the position behind it, for all drag slopes up to `speed_max`."""
-        vertices = tuple(_position_error(a11, p) for a11 in dict.fromkeys(map(float, error_slopes(p))))
+        vertices = tuple(position_error(a11, p) for a11 in dict.fromkeys(map(float, error_slopes(p))))
         model = (
             f"error of position, speed, disturbance and its rate over gaps between balises, drag slopes up to "
             f"{float(p.speed_max):g} m/s, constant over a gap; the motion since an odometer sample is an input to it, "
@@ -304,7 +309,7 @@ class HeldOdometerObserver(TrainObserver):
         """
         p = self.unpack_parameters(parameter_values(self, parameters, preset, "to bound its error"))
         slopes = tuple(map(float, error_slopes(p)))
-        if not all(_proven(a11, p) for a11 in slopes):
+        if not all(proven(a11, p) for a11 in slopes):
             gain = [float(k) for k in p.gain]
             raise ValueError(f"{self.name}: {PROOF} (bound_decay = {float(p.bound_decay):g} 1/s, gain = {gain}).")
         gains = [np.array([float(first_gain(z, p)), *map(float, p.gain[1:])]) for z in (0.0, float(p.speed_max))]
@@ -339,73 +344,3 @@ class HeldOdometerObserver(TrainObserver):
     def _moves(self, t: Array, x: Array, p: Any) -> Array:
         """1 where the train cannot have stopped since the held reading."""
         return np.where(x[HELD_SPEED] > p.bound_min_speed + self._since_reading(t, x, p), 1.0, 0.0)
-
-
-def first_gain(z: Array, p: Any) -> Array:
-    """``gain[1] + gain_schedule (b + c z) / m`` [1/s].
-
-    Args:
-        z: speed that schedules it [m/s]. p: parameters, as in `HybridSystem.flow`.
-    """
-    return p.gain[0] + p.gain_schedule * (p.davis_b + p.davis_c * z) / p.mass
-
-
-def error_slopes(p: Any) -> tuple[Array, Array]:
-    """Smallest and largest entry 11 of the error matrix [1/s], over true, estimated and scheduling speeds from 0 to
-    `speed_max`: ``-(b + c (v + v_estimated)) / m - first_gain(z)``.
-
-    Args:
-        p: parameters, as in `HybridSystem.flow`.
-    """
-    fixed = -p.gain[0] - (1.0 + p.gain_schedule) * p.davis_b / p.mass
-    drag, schedule = p.davis_c / p.mass * 2.0 * p.speed_max, p.gain_schedule * p.davis_c / p.mass * p.speed_max
-    smallest = fixed - np.maximum(drag, 0.0) - np.maximum(schedule, 0.0)
-    return smallest, fixed - np.minimum(drag, 0.0) - np.minimum(schedule, 0.0)
-
-
-def error_matrix(a11: float, p: Any) -> np.ndarray:
-    """``A - K C`` of speed, disturbance and its rate, shape (3, 3).
-
-    Args:
-        a11: entry 11 [1/s], see `error_slopes`. p: parameters, as in `HybridSystem.flow`.
-    """
-    return np.array([[a11, -1.0, 0.0], [-float(p.gain[1]), 0.0, 1.0], [-float(p.gain[2]), 0.0, 0.0]])
-
-
-def gain_level(p: Any, *speeds: Array) -> Array:
-    """Largest level of the gain at scheduling speeds, and between them, for it is convex [1/s].
-
-    Args:
-        p: parameters, as in `HybridSystem.flow`. speeds: those speeds [m/s].
-    """
-    return _largest_root([level_squared(p.lyapunov_matrix, first_gain(z, p), p.gain[1], p.gain[2]) for z in speeds])
-
-
-def gain_norm(p: Any, *speeds: Array) -> Array:
-    """Largest Euclidean norm of the gain at scheduling speeds, and between them, for it is convex [1/s].
-
-    Args:
-        p: parameters, as in `HybridSystem.flow`. speeds: those speeds [m/s].
-    """
-    return _largest_root([first_gain(z, p) ** 2 + p.gain[1] ** 2 + p.gain[2] ** 2 for z in speeds])
-
-
-def _largest_root(squares: Sequence[Array]) -> Array:
-    return np.sqrt(reduce(np.maximum, squares))
-
-
-def _proven(a11: Array, p: Any) -> Array:
-    """1 where the matrix proves the decay for an entry 11 of the error matrix, else 0."""
-    return decay_proven(p.lyapunov_matrix, a11, (p.gain[1], p.gain[2]), p.bound_decay)
-
-
-def _unknown_level(p: Any) -> Array:
-    P = p.lyapunov_matrix
-    return np.sqrt(P[0]) * p.unknown_acceleration + np.sqrt(P[3]) * p.unknown_jerk + np.sqrt(P[5]) * p.unknown_jerk_rate
-
-
-def _position_error(a11: float, p: Any) -> ImpulsiveError:
-    generator = np.zeros((4, 4))
-    generator[0, 1] = 1.0
-    generator[1:, 1:] = error_matrix(a11, p)
-    return ImpulsiveError.of(generator, np.diag([0.0, 1.0, 1.0, 1.0]), (0, 1, 2, 3))

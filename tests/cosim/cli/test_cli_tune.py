@@ -11,7 +11,6 @@ from cosim import Scenario
 from cosim.cli import main
 from cosim.cli.tune import _seeds
 
-
 RUNNING = {"train_speed": 10.0, "wheel_rate": 10.0 / 0.575, "effort": 5e4}
 
 

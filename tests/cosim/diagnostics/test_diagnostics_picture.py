@@ -18,8 +18,9 @@ from matplotlib.transforms import Bbox
 
 from cosim.errors import OutputError
 from cosim.structure import picture
+from cosim.structure.curves import forward_curves
 from cosim.structure.layout import EVENT_PORT, lay_out
-from cosim.structure.picture import COLOURS, box_size, forward_curves, structure_figure, text_width, wires_of
+from cosim.structure.picture import COLOURS, box_size, structure_figure, text_width, wires_of
 from cosim.structure.shapes import Box, Layout, Wire
 from cosim.structure.structure import Balises, Link, Structure
 

@@ -1,0 +1,186 @@
+"""Descriptions: a hybrid system as an fmpy `ModelDescription`.
+
+One description serves the Python block and the exported FMU, so that names, value references, starts, units and
+dependencies cannot drift apart. Uses fmpy's data classes and the hybrid system; touches no files.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable
+
+from fmpy.model_description import (
+    BaseUnit,
+    Category,
+    CoSimulation,
+    DefaultExperiment,
+    DisplayUnit,
+    ModelDescription,
+    ModelExchange,
+    ModelVariable,
+    Unit,
+    Unknown,
+)
+
+from fmu_observer.description.dependencies import traced_facts, unknowns, while_running
+from fmu_observer.description.variable_table import VariableTable, referenced
+from fmu_observer.description.variables import FmiVersion, late_policy_type, model_variables
+from fmu_observer.event_protocol import EventProtocol
+from plant_models.hybrid import HybridSystem
+from plant_models.hybrid.units import BASE_SYMBOLS, conversion, parse_unit
+
+LOG_CATEGORIES = {
+    "logStatusError": "Calls that were refused, and why",
+    "logStatusDiscard": "Steps that could not be done and were undone",
+    "logStatusWarning": "Events that came too late or were lost",
+    "logEvents": "Events that were applied",
+}
+
+VERSION_STRINGS = {2: "2.0", 3: "3.0"}
+TOKEN_ATTRIBUTES = (
+    "name",
+    "valueReference",
+    "type",
+    "causality",
+    "variability",
+    "initial",
+    "start",
+    "min",
+    "max",
+    "unit",
+    "displayUnit",
+)
+
+
+def describe(
+    system: HybridSystem,
+    fmi_version: FmiVersion,
+    *,
+    preset: str | None = None,
+    model_name: str | None = None,
+    protocol: EventProtocol | None = None,
+    model_exchange: bool = False,
+) -> ModelDescription:
+    """The model description of a system as a co-simulation FMU.
+
+    Args:
+        system: the hybrid system.
+        fmi_version: 2 or 3.
+        preset: preset whose values become the start values; None for the system's default.
+        model_name: name to show; None for the system's own.
+        protocol: how it is told of triggered events; by default as is usual in the FMI version.
+        model_exchange: whether it is a model exchange FMU as well; only a traceable system without communication events
+            can be.
+
+    Raises:
+        ValueError: the preset or the version of FMI is unknown, or the protocol is none of this version.
+    """
+    if fmi_version not in VERSION_STRINGS:
+        raise ValueError(f"{system.name}: FMI version {fmi_version!r} is unknown; use 2 or 3.")
+    protocol = protocol or EventProtocol()
+    variables = model_variables(system, fmi_version, preset, protocol)
+    # text, as fmpy reads it from a file
+    experiment = DefaultExperiment(startTime="0.0", stopTime="10.0", stepSize="0.01")
+    description = ModelDescription(
+        fmiVersion=VERSION_STRINGS[fmi_version],
+        modelName=model_name or system.name,
+        description=" ".join(system.description.split()),
+        generationTool="fmu-observer",
+        variableNamingConvention="structured",
+        coSimulation=_co_simulation(system, protocol.counts(fmi_version)),
+        modelExchange=_model_exchange(system) if model_exchange else None,
+        typeDefinitions=[late_policy_type()] if system.triggered_events else [],
+        defaultExperiment=experiment,
+        logCategories=[Category(name=name, description=text) for name, text in LOG_CATEGORIES.items()],
+        unitDefinitions=_unit_definitions(variables),
+        modelVariables=variables,
+    )
+    table = VariableTable.of(system)
+    facts = traced_facts(system)
+    outputs = unknowns(variables, table.outputs, facts["output"])
+    derivatives = unknowns(variables, table.derivatives, facts["derivative"])
+    # A master that is told nothing of these takes each to depend on every input, and sees algebraic loops where there
+    # are none.
+    description.initialUnknowns = [*outputs, *derivatives]
+    description.outputs, description.derivatives = (
+        [while_running(system, u) for u in group] for group in (outputs, derivatives)
+    )
+    indicators = referenced(variables, table.indicators, len(system.frictions) + len(system.switchings))
+    description.eventIndicators = [Unknown(index=v.valueReference, variable=v) for v in indicators]
+    description.numberOfContinuousStates, description.numberOfEventIndicators = system.continuous_count, len(indicators)
+    description.instantiationToken = _token(system, description, facts["equations"])
+    return description
+
+
+def can_exchange(system: HybridSystem) -> bool:
+    """Whether a system can be a model exchange FMU: its equations can be traced, and no master's steps are part of
+    them.
+    """
+    return system.traceable and not system.communication_events
+
+
+def _model_exchange(system: HybridSystem) -> ModelExchange:
+    if not can_exchange(system):
+        raise ValueError(
+            f"{system.name}: a system with communication events, or one that cannot be traced, has no model exchange."
+        )
+    return ModelExchange(
+        modelIdentifier=system.name,
+        canGetAndSetFMUstate=True,
+        canSerializeFMUstate=True,
+        providesDirectionalDerivative=True,
+        completedIntegratorStepNotNeeded=True,
+    )
+
+
+def _co_simulation(system: HybridSystem, counts_events: bool) -> CoSimulation:
+    return CoSimulation(
+        modelIdentifier=system.name,
+        canHandleVariableCommunicationStepSize=True,
+        canGetAndSetFMUstate=True,
+        canSerializeFMUstate=True,
+        providesDirectionalDerivative=system.traceable,
+        hasEventMode=bool(system.triggered_events) and not counts_events,
+        mightReturnEarlyFromDoStep=bool(system.periodic_events),
+    )
+
+
+def _unit_definitions(variables: Iterable[ModelVariable]) -> list[Unit]:
+    displayed: dict[str, set[str]] = {}
+    for variable in variables:
+        if variable.unit is not None:
+            displayed.setdefault(variable.unit, set())
+            if variable.displayUnit is not None:
+                displayed[variable.unit].add(variable.displayUnit)
+    return [_unit_definition(name, sorted(shown)) for name, shown in sorted(displayed.items())]
+
+
+def _unit_definition(name: str, shown: list[str]) -> Unit:
+    unit = parse_unit(name)
+    powers = dict(zip(BASE_SYMBOLS, unit.exponents, strict=True))
+    base = BaseUnit(**powers, factor=unit.factor, offset=unit.offset)
+    display = []
+    for display_name in shown:
+        factor, offset = conversion(unit, parse_unit(display_name))
+        display.append(DisplayUnit(name=display_name, factor=factor, offset=offset))
+    return Unit(name=name, baseUnit=base, displayUnits=display)
+
+
+def _token(system: HybridSystem, description: ModelDescription, equations: str) -> str:
+    """A name for the content: other equations, variables, starts, options or events, another token."""
+    content: list[object] = [
+        description.fmiVersion,
+        system.name,
+        system.method,
+        sorted(map(str, system.options.items())),
+    ]
+    content += [
+        [getattr(v, name) for name in TOKEN_ATTRIBUTES] + list(v.clocks or ()) for v in description.modelVariables
+    ]
+    content += [[e.name, e.period, e.offset, len(e.noises)] for e in system.periodic_events]
+    structure = (*description.outputs, *description.derivatives)
+    content += [[u.variable.name, *(known.name for known in u.dependencies)] for u in structure]
+    content += [equations]
+    digest = hashlib.sha256(json.dumps(content).encode()).hexdigest()
+    return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"

@@ -1,0 +1,99 @@
+"""The error of observers whose odometer reading is held: their gain at a speed, its sizes, the error matrix. Pure
+functions of speeds and parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import reduce
+from typing import Any
+
+import numpy as np
+
+from fmu_observer.bounds.carried import decay_proven, level_squared
+from fmu_observer.certificates import ImpulsiveError
+from plant_models.hybrid.system import Array
+
+
+def first_gain(z: Array, p: Any) -> Array:
+    """``gain[1] + gain_schedule (b + c z) / m`` [1/s].
+
+    Args:
+        z: speed that schedules it [m/s]. p: parameters, as in `HybridSystem.flow`.
+    """
+    return p.gain[0] + p.gain_schedule * (p.davis_b + p.davis_c * z) / p.mass
+
+
+def error_slopes(p: Any) -> tuple[Array, Array]:
+    """Smallest and largest entry 11 of the error matrix [1/s], over true, estimated and scheduling speeds from 0 to
+    `speed_max`: ``-(b + c (v + v_estimated)) / m - first_gain(z)``.
+
+    Args:
+        p: parameters, as in `HybridSystem.flow`.
+    """
+    fixed = -p.gain[0] - (1.0 + p.gain_schedule) * p.davis_b / p.mass
+    drag, schedule = p.davis_c / p.mass * 2.0 * p.speed_max, p.gain_schedule * p.davis_c / p.mass * p.speed_max
+    smallest = fixed - np.maximum(drag, 0.0) - np.maximum(schedule, 0.0)
+    return smallest, fixed - np.minimum(drag, 0.0) - np.minimum(schedule, 0.0)
+
+
+def error_matrix(a11: float, p: Any) -> np.ndarray:
+    """``A - K C`` of speed, disturbance and its rate, shape (3, 3).
+
+    Args:
+        a11: entry 11 [1/s], see `error_slopes`. p: parameters, as in `HybridSystem.flow`.
+    """
+    return np.array([[a11, -1.0, 0.0], [-float(p.gain[1]), 0.0, 1.0], [-float(p.gain[2]), 0.0, 0.0]])
+
+
+def gain_level(p: Any, *speeds: Array) -> Array:
+    """Largest level of the gain at scheduling speeds, and between them, for it is convex [1/s].
+
+    Args:
+        p: parameters, as in `HybridSystem.flow`. speeds: those speeds [m/s].
+    """
+    return _largest_root([level_squared(p.lyapunov_matrix, first_gain(z, p), p.gain[1], p.gain[2]) for z in speeds])
+
+
+def gain_norm(p: Any, *speeds: Array) -> Array:
+    """Largest Euclidean norm of the gain at scheduling speeds, and between them, for it is convex [1/s].
+
+    Args:
+        p: parameters, as in `HybridSystem.flow`. speeds: those speeds [m/s].
+    """
+    return _largest_root([first_gain(z, p) ** 2 + p.gain[1] ** 2 + p.gain[2] ** 2 for z in speeds])
+
+
+def _largest_root(squares: Sequence[Array]) -> Array:
+    return np.sqrt(reduce(np.maximum, squares))
+
+
+def proven(a11: Array, p: Any) -> Array:
+    """1 where the matrix proves the decay for an entry 11 of the error matrix, else 0.
+
+    Args:
+        a11: entry 11 [1/s], see `error_slopes`. p: parameters, as in `HybridSystem.flow`.
+    """
+    return decay_proven(p.lyapunov_matrix, a11, (p.gain[1], p.gain[2]), p.bound_decay)
+
+
+def unknown_level(p: Any) -> Array:
+    """Largest level of what the model does not know: an acceleration, its rate and the rate of that [m/s2].
+
+    Args:
+        p: parameters, as in `HybridSystem.flow`.
+    """
+    P = p.lyapunov_matrix
+    return np.sqrt(P[0]) * p.unknown_acceleration + np.sqrt(P[3]) * p.unknown_jerk + np.sqrt(P[5]) * p.unknown_jerk_rate
+
+
+def position_error(a11: float, p: Any) -> ImpulsiveError:
+    """Error of position, speed, disturbance and its rate, of which a balise ends the first.
+
+    Args:
+        a11: entry 11 [1/s], see `error_slopes`. p: parameters, as in `HybridSystem.flow`.
+    """
+    generator = np.zeros((4, 4))
+    generator[0, 1] = 1.0
+    generator[1:, 1:] = error_matrix(a11, p)
+    return ImpulsiveError.of(generator, np.diag([0.0, 1.0, 1.0, 1.0]), (0, 1, 2, 3))
