@@ -4,7 +4,7 @@ SciPy where a filter is judged.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -91,28 +91,35 @@ def filter_consistency(result: Result, spec: ReportSpec) -> list[FilterConsisten
 
 
 def consistency_warnings(result: Result, spec: ReportSpec) -> Iterator[str]:
-    """Texts for filters whose covariance does not fit, one an observer: of NIS or of NEES; of single quantities only
-    where it tells neither, since each further test raises false alarms.
+    """Texts for filters whose covariance does not fit, one an observer.
+
+    Each test more raises false alarms, so an observer that tells NIS is warned of by NIS, and by NEES where that says
+    that it trusts itself too much; one that tells no NIS by NEES, and one without a covariance by single quantities.
 
     Args:
         result: the run. spec: observers, roles and labels.
     """
-    told: set[str] = set()
     entries = filter_consistency(result, spec)
-    whole = {e.observer for e in entries if e.kind != "error"}
-    for entry in entries:
-        if entry.kind == "error" and entry.observer in whole:
+    for observer in spec.observers:
+        entry = next((e for e in _deciding(entries, observer) if e.found.verdict in ADVICE), None)
+        if entry is None:
             continue
-        advice = ADVICE.get(entry.found.verdict)
-        if advice is None or entry.observer in told:
-            continue
-        told.add(entry.observer)
         found = entry.found
         yield (
             f"{label(spec, entry.observer)} is {found.verdict}: its {entry.name} is {number(found.mean)} on average "
             f"where {number(found.degrees)} is expected ({number(found.band.low)} to {number(found.band.high)} for 99 "
-            f"% of consistent filters): {advice}; see docs/consistency.md."
+            f"% of consistent filters): {ADVICE[found.verdict]}; see docs/consistency.md."
         )
+
+
+def _deciding(entries: Sequence[FilterConsistency], observer: str) -> list[FilterConsistency]:
+    """Entries of an observer that may warn."""
+    nis, nees, single = (
+        [e for e in entries if e.observer == observer and e.kind == kind] for kind in ("NIS", "NEES", "error")
+    )
+    if nis:
+        return nis + [e for e in nees if e.found.verdict == "overconfident"]
+    return nees or single
 
 
 def true_value(result: Result, spec: ReportSpec, quantity: str) -> np.ndarray | None:
