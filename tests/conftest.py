@@ -77,6 +77,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         used |= set(fitting)
         if (fitting and lines[max(fitting, key=len)]) or item.get_closest_marker("browser"):
             item.add_marker(pytest.mark.slow)
+    # pages and gallery, the longest tests, come first, so that no worker waits for one at the end
+    items.sort(key=lambda item: not item.nodeid.startswith("tests/project/"))
     idle = [line for line in lines if line not in used and line.partition("::")[0] in sampled]
     if idle and not any("::" in argument for argument in config.args):
         raise pytest.UsageError(f"{SECOND_TIER.name}: no test begins with: {'; '.join(idle)}")
