@@ -206,7 +206,8 @@ class AdaptiveObserver(GatedObserver, GapCertified):
             f"at a constant gap of {max_gap:.4g} s the states keep {left.states:.2g} of the first error after "
             f"{HORIZON:g} s, the constants {of_constants}; {LEFT:g} of it in the states is allowed"
         )
-        longest = adaptation_limit(self, values, min(found.constant_limit, LONGEST_PERIOD))
+        known = first_unstable_gap([self.known_error(float(p.mu))], LONGEST_PERIOD)
+        longest = adaptation_limit(self, values, min(known, LONGEST_PERIOD))
         return replace(
             found,
             holds=found.holds and max_gap <= longest and left.states < LEFT,
