@@ -168,13 +168,13 @@ def by_positions(positions: Sequence[float], location_accuracy: float = 0.0) -> 
     return TrackLayout(tuple(Balise(f"B{i + 1}", float(p), location_accuracy) for i, p in enumerate(positions)))
 
 
-def from_csv(path: str | Path) -> TrackLayout:
+def from_csv(path: str | Path, location_accuracy: float = 0.0) -> TrackLayout:
     """Balises from a CSV file with a header: ``position`` [m], optional ``identity`` and ``location_accuracy`` [m].
 
     Other columns are left alone, and so are lines that begin with ``#``: source and licence of the positions.
 
     Args:
-        path: of the file.
+        path: of the file. location_accuracy: Q_LOCACC [m] of balises for which the file tells none.
 
     Raises:
         ScenarioError: the file is missing, has no such column, or a row cannot be read; the row is named.
@@ -190,7 +190,7 @@ def from_csv(path: str | Path) -> TrackLayout:
             if "position" not in (reader.fieldnames or []):
                 raise ScenarioError(f"Balise list {path}: no column 'position' in the header {reader.fieldnames}.")
             balises = [
-                _row_to_balise(path, number, lines[reader.line_num - 1][0], row)
+                _row_to_balise(path, number, lines[reader.line_num - 1][0], row, location_accuracy)
                 for number, row in enumerate(reader, start=1)
             ]
     except (UnicodeDecodeError, csv.Error, OSError) as error:
@@ -243,9 +243,9 @@ def aperiodic(
         instants.append(t)
 
 
-def _row_to_balise(path: Path, number: int, line: int, row: dict[str, str]) -> Balise:
+def _row_to_balise(path: Path, number: int, line: int, row: dict[str, str], usual: float) -> Balise:
     try:
-        accuracy = float(row.get("location_accuracy") or 0.0)
+        accuracy = float(row.get("location_accuracy") or usual)
         return Balise(row.get("identity") or f"B{number}", float(row["position"]), accuracy)
     except (TypeError, ValueError) as error:
         raise ScenarioError(f"Balise list {path}, line {line}: {error}.") from error

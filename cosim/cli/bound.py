@@ -8,14 +8,11 @@ import argparse
 import json
 from typing import Any
 
+from cosim.cli.model_info import declared_model
 from cosim.cli.scenarios import parse_setting
-from cosim.errors import CosimError, ScenarioError, nearest
+from cosim.errors import CosimError
 from cosim.results.summary_file import jsonable
-from cosim.scenario.models import make_declared
-from cosim.scenario.tables import ComponentTable
-from fmu_observer import OBSERVERS
 from fmu_observer.bounds import ErrorBounds, bound_data, bound_text
-from plant_models.user_file import names_code
 
 KEPT, EXCEEDED = 0, 1
 KINDS = ("published", "carried", "exact")
@@ -78,9 +75,7 @@ def execute(options: argparse.Namespace) -> int:
 
 def _bounds(options: argparse.Namespace) -> ErrorBounds:
     name = options.observer
-    if name not in OBSERVERS and not names_code(name):
-        raise ScenarioError(f"There is no observer {name!r}; {nearest(name, OBSERVERS)}")
-    made = make_declared(ComponentTable.model_validate({"observer": name}), "bound")
+    made = declared_model(name, "bound", ("observer",))
     if not hasattr(made, "error_bounds"):
         raise CosimError(
             f"Observer {name!r} tells no bound of its error; discrete_measurement_observer and "

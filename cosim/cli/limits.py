@@ -9,15 +9,12 @@ import json
 from dataclasses import asdict
 from typing import Any
 
+from cosim.cli.model_info import declared_model
 from cosim.cli.scenarios import parse_setting
-from cosim.errors import CosimError, ScenarioError, nearest
+from cosim.errors import CosimError
 from cosim.limits import limit_rows, limit_text
 from cosim.results.summary_file import jsonable
-from cosim.scenario.models import make_declared
-from cosim.scenario.tables import ComponentTable
-from fmu_observer import OBSERVERS
 from plant_models.hybrid import HybridSystem
-from plant_models.user_file import names_code
 
 FEWEST = 4
 
@@ -58,12 +55,9 @@ def execute(options: argparse.Namespace) -> int:
         CosimError: there is no such observer, it has no limits, or an argument is not legal.
     """
     name = options.observer
-    if name not in OBSERVERS and not names_code(name):
-        raise ScenarioError(f"There is no observer {name!r}; {nearest(name, OBSERVERS)}")
     if options.members < FEWEST:
         raise CosimError(f"limits: --members {options.members}: expected {FEWEST} values or more at once.")
-    table = {"observer": name, "options": dict(map(parse_setting, options.option))}
-    made = make_declared(ComponentTable.model_validate(table), "limits")
+    made = declared_model(name, "limits", ("observer",), dict(map(parse_setting, options.option)))
     if not hasattr(made, "limits"):
         raise CosimError(f"Observer {name!r} tells no limits: {_why_none(made)}")
     try:

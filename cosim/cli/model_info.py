@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cosim.errors import ScenarioError, nearest
@@ -12,6 +13,27 @@ from fmus.recipes import legal_values
 from plant_models import PLANTS
 from plant_models.hybrid.signal import Signal
 from plant_models.user_file import names_code
+
+REGISTRIES = {"model": PLANTS, "observer": OBSERVERS}
+
+
+def declared_model(
+    name: str, where: str, kinds: Sequence[str] = tuple(REGISTRIES), options: Mapping[str, Any] | None = None
+) -> Any:
+    """A plant or an observer by what a user calls it.
+
+    Args:
+        name: of one that ships or is installed, ``file.py:Class`` or ``package.module:Class``.
+        where: place for messages. kinds: ``model``, ``observer``. options: of its constructor.
+
+    Raises:
+        ScenarioError: there is none of these kinds, or it cannot be loaded or made.
+    """
+    key = next((kind for kind in kinds if name in REGISTRIES[kind]), kinds[-1])
+    if name not in REGISTRIES[key] and not names_code(name):
+        known = [one for kind in kinds for one in REGISTRIES[kind]]
+        raise ScenarioError(f"There is no {' or '.join(kinds)} {name!r}; {nearest(name, known)}")
+    return make_declared(ComponentTable.model_validate({key: name, "options": options or {}}), where)
 
 
 def describe_model(name: str) -> dict[str, Any]:
@@ -27,10 +49,7 @@ def describe_model(name: str) -> dict[str, Any]:
         ScenarioError: there is no such model, or it cannot be loaded or made.
     """
     registry = PLANTS if name in PLANTS else OBSERVERS
-    if name not in registry and not names_code(name):
-        raise ScenarioError(f"There is no model or observer {name!r}; {nearest(name, [*PLANTS, *OBSERVERS])}")
-    key = "model" if registry is PLANTS else "observer"
-    made = make_declared(ComponentTable.model_validate({key: name}), "info")
+    made = declared_model(name, "info")
     cls = getattr(made, "cls", type(made))  # of plain Python it is the user's
     variables = [*made.inputs, *made.outputs, *made.parameter_signals, *getattr(made, "states", ())]
     return {

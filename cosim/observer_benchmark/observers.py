@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from math import inf
@@ -154,17 +154,14 @@ def benchmark_observers(
         if interrupted:
             notes.append(f"Interrupted; not judged: {', '.join(c.name for c in candidates[len(scores) :])}.")
         tell("done", total, total)
-    title = sides.table.title
-    spec = next((o.spec for o in judge.outcomes.values()), ReportSpec(title=title))
-    return ObserverBenchmark(
-        scenario.name,
-        ReportSpec(**{**vars(spec), "title": title, "observers": []}),
-        tuple(scores),
-        tuple(notes),
-        judge.steps,
-        judge.outcomes,
-        interrupted,
-    )
+    spec = _spec_of_all(sides.table.title, judge.outcomes.values())
+    return ObserverBenchmark(scenario.name, spec, tuple(scores), tuple(notes), judge.steps, judge.outcomes, interrupted)
+
+
+def _spec_of_all(title: str, outcomes: Iterable[Outcome]) -> ReportSpec:
+    """The roles of the recorded run, without observers."""
+    spec = next((outcome.spec for outcome in outcomes), ReportSpec(title=title))
+    return ReportSpec(**{**vars(spec), "title": title, "observers": []})
 
 
 def _record(scenario: Scenario, folder: Path, warn: Callable[[str], None] | None, *, keep: bool) -> None:

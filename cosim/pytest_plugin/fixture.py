@@ -78,24 +78,12 @@ class FmuRegression:
         from cosim.baselines.call import Call  # noqa: PLC0415 - pytest must start fast
 
         path, reason = self._path(name), ""
+        compared: dict[str, Any] = {"signals": signals, "every": every, "ignore": ignore}
+        compared |= {"tolerance": tolerance, "tolerances": tolerances}
+        run: dict[str, Any] = {"start": start, "stop": stop, "step": step, "overrides": overrides}
+        run |= {"inputs": inputs, "parameters": parameters, "record": record}
         try:
-            call = Call.run(
-                what,
-                self._file.parent,
-                path,
-                signals=signals,
-                every=every,
-                tolerance=tolerance,
-                tolerances=tolerances,
-                ignore=ignore,
-                start=start,
-                stop=stop,
-                step=step,
-                inputs=inputs,
-                parameters=parameters,
-                record=record,
-                overrides=overrides,
-            )
+            call = Call.run(what, self._file.parent, path, **compared, **run)
             return self._update(call) if options.mode(self._config) == "update" else self._check(call)
         except CosimError as error:
             reason = str(error)

@@ -74,7 +74,7 @@ def _recorded(table: BalisesTable, start: float, folder: Path) -> RecordedLayout
 
 def _track_layout(table: BalisesTable, folder: Path) -> TrackLayout:
     if table.layout == "csv":
-        return from_csv(folder / str(table.file))
+        return from_csv(folder / str(table.file), table.location_accuracy)
     if table.layout == "positions":
         return by_positions(table.positions or [], table.location_accuracy)
     assert table.spacing is not None

@@ -93,25 +93,8 @@ def recovery_bounds(
     period, noise, theta = float(p.odometer_period), float(p.odometer_noise), float(p.threshold / p.residual_gain)
     samples, late = float(p.recover_samples), period if aggregated else 0.0
     error = _over_a_period(drifts, gains, period)
-    radius = float(np.abs(np.linalg.eigvals(error.middle)).max())
-    steady, settle = inf, inf
-    powers = _powers(error.middle, radius) if radius < 1.0 else np.zeros((1, 3, 3))
-    sums = np.abs(powers).sum(axis=0)
-    loop = sums @ error.spread
-    if radius < 1.0 and float(np.abs(np.linalg.eigvals(loop)).max()) < 1.0:
-        share = float(p.schedule_max) / (float(p.schedule_max) - float(p.schedule_min))
-        # The drag is that of the reading, the train's that of its speed: they part during a period.
-        unlike = abs(drifts[1] - drifts[0])[0, 0] * share * (float(p.acceleration_limit) * period + noise)
-        inputs = np.abs(powers @ error.noise).sum(axis=0) + sums @ error.noise_spread
-        driven = noise * inputs + sums @ (curvature * error.curvature + unlike * error.drag)
-        closed = np.linalg.inv(np.eye(3) - loop)
-        steady = noise + float((closed @ driven)[0])
-        corners = np.array([noise, disturbance_error, rate_error])
-        left = _decay(powers, error.spread, corners)
-        tail = float((closed @ np.abs(powers).max(axis=0) @ left[-1])[0])  # of all that comes after the last period
-        above = np.flatnonzero(left[:, 0] > 0.5 * theta - steady)
-        if steady + tail < 0.5 * theta:
-            settle = period * (int(above[-1]) + 1 if above.size else 0)
+    corners = np.array([noise, disturbance_error, rate_error])
+    steady, settle, radius = _settling(error, p, corners, curvature)
     quiet = settle + float(p.settle_samples) * period
     hold = period * ceil(float(p.hold_limit) / period - 1e-9) + period
     trust = max(quiet, settle + float(p.trust_time) + period)
@@ -124,6 +107,35 @@ def recovery_bounds(
         steady_residual=steady * float(p.residual_gain),
         contraction=radius,
     )
+
+
+def _settling(error: _PeriodError, p: Any, corners: np.ndarray, curvature: float) -> tuple[float, float, float]:
+    """Bound of the steady speed error [m/s], time until the residual of any start within the corners is small for ever
+    [s], and the spectral radius at the middle of the vertices.
+    """
+    period, noise, half = float(p.odometer_period), float(p.odometer_noise), 0.5 * float(p.threshold / p.residual_gain)
+    radius = float(np.abs(np.linalg.eigvals(error.middle)).max())
+    if radius >= 1.0:
+        return inf, inf, radius
+    powers = _powers(error.middle, radius)
+    sums = np.abs(powers).sum(axis=0)
+    loop = sums @ error.spread
+    if float(np.abs(np.linalg.eigvals(loop)).max()) >= 1.0:
+        return inf, inf, radius
+    # The drag is that of the reading, the train's that of its speed: they part during a period.
+    unlike = (
+        abs(float(p.davis_c) / float(p.mass)) * float(p.schedule_max) * (float(p.acceleration_limit) * period + noise)
+    )
+    inputs = np.abs(powers @ error.noise).sum(axis=0) + sums @ error.noise_spread
+    driven = noise * inputs + sums @ (curvature * error.curvature + unlike * error.drag)
+    closed = np.linalg.inv(np.eye(3) - loop)
+    steady = noise + float((closed @ driven)[0])
+    left = _decay(powers, error.spread, corners)
+    tail = float((closed @ np.abs(powers).max(axis=0) @ left[-1])[0])  # of all that comes after the last period
+    if steady + tail >= half:
+        return steady, inf, radius
+    above = np.flatnonzero(left[:, 0] > half - steady)
+    return steady, period * (int(above[-1]) + 1 if above.size else 0), radius
 
 
 @dataclass(frozen=True)
@@ -188,4 +200,4 @@ def _decay(powers: np.ndarray, spread: np.ndarray, corners: np.ndarray) -> np.nd
     left = sizes @ corners
     for k in range(1, len(left)):
         left[k] += np.einsum("jab,jb->a", sizes[k - 1 :: -1], left[:k] @ spread.T)
-    return left
+    return np.asarray(left)

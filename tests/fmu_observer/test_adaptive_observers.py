@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 from fmu_observer.design.adaptive_bounds import adaptive_bounds, gain_bound, settled_gain
 from fmu_observer.models import find_state_affine_model
+from fmu_observer.observers.adaptive_certificate import errors_left
 from fmu_observer.observers.adaptive_law import smallest_eigenvalue, told_excitation
 from fmu_observer.observers.sampled import AdaptiveHold, AdaptivePredictor
 from plant_models.hybrid import state
@@ -117,6 +118,48 @@ def test_the_covariance_is_that_of_the_responses_to_each_sample(make: type[Adapt
     expected = sigma * np.sqrt(np.sum(np.square(responses), axis=0))
     # the same step for both, so what differs is how RK4 treats a product and its factors
     np.testing.assert_allclose([told["rho1_deviation"][-1], told["rho2_deviation"][-1]], expected, rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("make", "gap", "holds"),
+    [
+        (AdaptivePredictor, 0.1, True),
+        (AdaptivePredictor, 0.12, False),  # first failure of the trials, the constants known up to 0.487 s
+        (AdaptivePredictor, 0.2, False),
+        (AdaptiveHold, 0.09, True),
+        (AdaptiveHold, 0.1, False),
+    ],
+)
+def test_the_certificate_counts_with_the_adaptation(
+    make: type[AdaptivePredictor | AdaptiveHold], gap: float, holds: bool
+) -> None:
+    certificate = make().certify(gap)
+    assert certificate.holds == holds
+    assert "of the first error after 40 s, the constants rho1" in certificate.explain()
+    assert (certificate.aperiodic_limit > 0.0) == holds
+
+
+def test_what_the_certificate_says_is_left_is_left() -> None:
+    """The errors are linear: those of a run are within the largest singular value, here a fifth of a standard run."""
+    observer = AdaptivePredictor()
+    left = errors_left(observer, observer.start_parameters(), 0.1)
+    start = np.hypot(*observer.model.example[:2])
+    run = Samples(observer, 0.1, 40.0)
+    late = run["time"] > 32.0
+    found = np.max(run["error"][late]) / np.linalg.norm([start, 10.0, 20.0])
+    assert 0.02 * left.states < found < 10.0 * left.states
+    sampled = AdaptivePredictor("excited_oscillator", "sampled")
+    assert errors_left(sampled, observer.start_parameters(), 0.2).states < 1e-6
+
+
+def test_the_condition_is_the_excitation_that_lasts() -> None:
+    lasting = AdaptivePredictor("excited_oscillator").condition()
+    assert lasting.values["alpha0"] == pytest.approx(2.0 * lasting.values["least_alpha0"], rel=0.3)
+    assert not lasting.holds  # the period of (4.63) is 1e-10 s
+    assert lasting.values["smallest_inverse_R"] == pytest.approx(np.exp(-2.0) * lasting.values["alpha0"])
+    fading = AdaptiveHold().condition()
+    assert not fading.holds
+    assert fading.values["alpha0"] < 2.0 / 16.0 * fading.values["least_alpha0"]  # the Gramian fades as 1/t^4
 
 
 def test_excitation_in_closed_form() -> None:

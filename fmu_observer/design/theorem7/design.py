@@ -134,18 +134,26 @@ def design_theorem7(
     found = _checked(problem, performance, scaled)
     if found is None:
         raise _infeasible(chosen, problem, performance, scaled)
-    candidate, checked = found
+    numbers: dict[str, Any] = {"model": chosen.name, "gap": gap, "eta": eta, "mu": mu}
+    return _design(problem, *found, options | {"performance": performance}, numbers)
+
+
+def _design(
+    problem: Theorem7Problem,
+    candidate: Candidate,
+    checked: Mapping[str, float],
+    options: Mapping[str, Any],
+    numbers: Mapping[str, Any],
+) -> Theorem7Design:
+    """The design in the model's own states."""
     T = problem.T[None, :, None]
     return Theorem7Design(
-        model=chosen.name,
-        gap=gap,
-        eta=eta,
-        mu=mu,
-        gamma=sqrt(candidate.unknowns.gamma2) if performance else inf,
+        **numbers,
+        gamma=sqrt(candidate.unknowns.gamma2) if options["performance"] else inf,
         sampled_gain=candidate.sampled_gain / T,
         continuous_gain=candidate.continuous_gain / T,
         margins=checked,
-        options=options | {"performance": performance},
+        options=options,
         status=candidate.status,
         lyapunov_matrix=candidate.unknowns.P,
     )

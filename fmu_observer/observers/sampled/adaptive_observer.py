@@ -6,15 +6,18 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
 
-from fmu_observer.certificates import ImpulsiveError, first_unstable_gap
-from fmu_observer.design.adaptive_bounds import adaptive_bounds, settled_gain
+from fmu_observer.certificates import Certificate, ImpulsiveError, certify_sampled_error, first_unstable_gap
+from fmu_observer.condition import Condition
+from fmu_observer.design.adaptive_bounds import adaptive_bounds, gain_bound, settled_gain
 from fmu_observer.limits import Limit, PrintedBound
 from fmu_observer.models import STATE_AFFINE_MODELS, StateAffineModel, find_state_affine_model
 from fmu_observer.models.model import stacked
+from fmu_observer.observers.adaptive_certificate import HORIZON, LEFT, errors_left
 from fmu_observer.observers.adaptive_law import (
     Adaptation,
     Gains,
@@ -33,12 +36,14 @@ from fmu_observer.observers.adaptive_law import (
     start_covariance,
 )
 from fmu_observer.observers.adaptive_trial import adaptive_trial
+from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.hybrid import Signal, TriggeredEvent, input_signal, output_signal, parameter, scalar_names, state
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
+LATER, EXCITED = 10.0, 0.5  # [s], [1] [ours]: when the excitation is judged, against that at half the time
 LONGEST_PERIOD = 1.0  # [s] up to which limits are looked for
 NOTHING_KNOWN = 100.0  # [ours] start value of every standard deviation
 LEAST_VARIANCE = 1e-30  # below it a standard deviation is told as 1e-15
@@ -51,7 +56,7 @@ ADAPTIVE_PARAMETERS = (
 )
 
 
-class AdaptiveObserver(GatedObserver):
+class AdaptiveObserver(GatedObserver, GapCertified):
     """Base of the observers of state and unknown constants at once: Hann 2014, chapter 4.
 
     The state is laid out as estimates, constants, adaptation (`adaptive_law.adaptation_states`), then what a subclass
@@ -170,6 +175,77 @@ class AdaptiveObserver(GatedObserver):
             "innovation": innovation[0] if self.sizes.q == 1 else innovation,
         }
 
+    # -- certificate ------------------------------------------------------------------------------------------------
+
+    def known_error(self, mu: float) -> ImpulsiveError:
+        """Error of the observer that knows the constants, its gain settled, A as it is at time 0.
+
+        Args:
+            mu: decay of S [1/s].
+        """
+        K = settled_gain(self.model, mu)
+        decay = self.model.C @ K if self.predicts else np.zeros((self.sizes.q, self.sizes.q))
+        u = np.array([float(s.start_values[0]) for s in self.model.inputs])
+        return ImpulsiveError.with_innovation(np.asarray(self.model.drift(0.0, u)), K, decay, self.model.C)
+
+    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+        """Certificate of the state's error with the constants known, and what the adaptation leaves at `max_gap`."""
+        found = certify_sampled_error(
+            (self.known_error(float(p.mu)),),
+            max_gap,
+            "errors of the states with the constants known, the gain settled and A as it is at time 0; those of the "
+            "adaptation by their linear equation, which no measurement enters, from the start on and at a constant gap "
+            "only; noise is left out",
+        )
+        values = np.concatenate([np.ravel(np.asarray(getattr(p, s.name), float)) for s in self.parameter_signals])
+        left = errors_left(self, values, max_gap)
+        of_constants = ", ".join(
+            f"{s.name} {share:.2g}" for s, share in zip(self.model.unknowns, left.constants, strict=True)
+        )
+        note = (
+            f"at a constant gap of {max_gap:.4g} s the states keep {left.states:.2g} of the first error after "
+            f"{HORIZON:g} s, the constants {of_constants}; {LEFT:g} of it in the states is allowed"
+        )
+        found = replace(found, notes=(*found.notes, note))
+        if left.states < LEFT:
+            return found
+        radius = max(found.spectral_radius, left.states ** (max_gap / HORIZON))
+        limit = min(found.constant_limit, max_gap)
+        return replace(found, holds=False, spectral_radius=radius, constant_limit=limit, aperiodic_limit=0.0)
+
+    def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
+        """Persistent excitation (4.8), and (4.63) where the output is predicted, at the model's `sample_period`.
+
+        Args:
+            parameters: values by name that replace those of the preset. preset: to start from; None for the default.
+
+        Raises:
+            ValueError: a parameter or the preset is unknown, or has another size.
+        """
+        p = self.unpack_parameters(parameter_values(self, parameters, preset, "to judge"))
+        early, late = (adaptive_bounds(self.model, float(p.mu), begin=begin) for begin in (0.5 * LATER, LATER))
+        alpha0 = late.alpha0
+        values = {"alpha0": alpha0, "least_alpha0": EXCITED * early.alpha0}
+        statement = (
+            f"excitation that lasts, alpha0 >= least_alpha0: at {LATER:g} s at least {EXCITED:g} of that at "
+            f"{0.5 * LATER:g} s"
+        )
+        excited = alpha0 > 0.0 and alpha0 >= values["least_alpha0"]
+        if not self.predicts:
+            return Condition(excited, values, statement, "Hann 2014, (4.8); theorem 4.6 prints no period")
+        longest = late.longest_period
+        return Condition(
+            excited and self.model.sample_period <= longest,
+            values
+            | {
+                "smallest_inverse_R": gain_bound(late.window, alpha0),
+                "period": self.model.sample_period,
+                "longest_period": longest,
+            },
+            f"{statement}; period <= longest_period [s], sufficient and ten orders of magnitude too careful",
+            "Hann 2014, (4.8), Lemma 4.3, (4.63)",
+        )
+
     # -- limits -----------------------------------------------------------------------------------------------------
 
     def limits(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> tuple[Limit, ...]:
@@ -182,13 +258,8 @@ class AdaptiveObserver(GatedObserver):
             ValueError: a parameter or the preset is unknown, or has another size.
         """
         values = parameter_values(self, parameters, preset, "to judge")
-        p = self.unpack_parameters(values)
-        mu, model = float(p.mu), self.model
-        bounds = adaptive_bounds(model, mu)
-        K = settled_gain(model, mu)
-        decay = model.C @ K if self.predicts else np.zeros((self.sizes.q, self.sizes.q))
-        drift = np.asarray(model.drift(0.0, np.array([float(s.start_values[0]) for s in model.inputs])))
-        known = ImpulsiveError.with_innovation(drift, K, decay, model.C)
+        mu = float(self.unpack_parameters(values).mu)
+        bounds = adaptive_bounds(self.model, mu)
         return (
             Limit(
                 "period of the samples",
@@ -201,7 +272,7 @@ class AdaptiveObserver(GatedObserver):
                 )
                 if self.predicts
                 else (),
-                exact=first_unstable_gap([known], LONGEST_PERIOD),
+                exact=first_unstable_gap([self.known_error(mu)], LONGEST_PERIOD),
                 exact_test="the observer that knows the constants, its gain settled: no adaptation",
                 trial=adaptive_trial(
                     self, dict(zip(scalar_names(self.parameter_signals), map(float, values), strict=True))

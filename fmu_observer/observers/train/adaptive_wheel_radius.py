@@ -50,6 +50,7 @@ ADAPTIVE = (
     parameter("odometer_deviation", "m/s", 0.05, "Standard deviation of the noise of a reading", min=0.0),
     parameter("odometer_period", "s", 0.2, "Time between readings of independent noise", min=0.0),
     parameter("reading_age", "s", 0.0, "Mean age of the reading that is held", min=0.0),
+    parameter("creep_per_effort", "1/N", 0.0, "Creep of the wheel over the effort; 0 for a free axle", min=0.0),
 )
 
 
@@ -71,9 +72,10 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
 
     `wheel_radius_error_deviation` is the standard deviation of its error, of white noise of the places of balises and
     of the readings, carried exactly between them; `position_deviation` likewise. What is no noise is not in it: the
-    mean creep of a pulling or braking wheel counts as wheel radius, and a wheel that locks or spins spoils the
-    estimate (give an axle that does neither). At standstill nothing is learnt: below `least_excitation` the constant
-    is held and `wheel_radius_learnt` is 0. Without balises the standard deviations grow.
+    mean creep of a pulling or braking wheel counts as wheel radius unless `creep_per_effort` tells how much of it an
+    effort makes [ours: ``odometer / (1 + creep_per_effort effort)`` stands for the reading], and a wheel that locks or
+    spins spoils the estimate (give an axle that does neither). At standstill nothing is learnt: below
+    `least_excitation` the constant is held and `wheel_radius_learnt` is 0. Without balises the deviations grow.
 
     Gains [ours]: mu 0.03 1/s, forgetting 0.003 1/s. Errors of position and constant die out at any gaps.
     """
@@ -82,7 +84,12 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
     description = "Train observer that learns the error of the wheel radius from balises"
     source = "Hann 2014, (4.7); the train case, covariance and holding are ours"
     internal_step = 1e-2
-    inputs: tuple[Signal, ...] = (input_signal("odometer", "m/s", 0.0, "Odometer speed, by the believed wheel radius"),)
+    inputs: tuple[Signal, ...] = (
+        input_signal("odometer", "m/s", 0.0, "Odometer speed, by the believed wheel radius"),
+        input_signal(
+            "effort", "N", 0.0, "Effort, for the creep of a driven axle; not used where creep_per_effort is 0"
+        ),
+    )
     outputs = (
         output_signal("position", "m", "Estimated position"),
         output_signal("speed", "m/s", "Odometer speed, corrected by the estimate", display_unit="km/h"),
@@ -118,9 +125,10 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Position, scale, adaptation and predicted position."""
         adaptation = self._adaptation(x)
-        speed = u.odometer * (1.0 + x[SCALE])
+        reading = _without_creep(u, p)
+        speed = reading * (1.0 + x[SCALE])
         noise = p.odometer_deviation**2 * p.odometer_period * (1.0 + x[SCALE]) ** 2
-        plant = Plant(np.zeros((1, 1)), u.odometer, np.reshape(u.odometer, (1, 1)), C, noise * DISTURBED)
+        plant = Plant(np.zeros((1, 1)), reading, np.reshape(reading, (1, 1)), C, noise * DISTURBED)
         gains = self._gains(adaptation, p)
         c = x[P] - x[PREDICTED]
         drift = error_drift(plant, gains, SIZES, True)
@@ -138,7 +146,7 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
         used = x[self.own_count - 2]
         first = np.where(used > 0.0, 0.0, 1.0)
         covariance, variance = self._adaptation(x).covariance, p.balise_deviation**2
-        told = u.balise_position - p.reading_age * u.odometer * (1.0 + x[SCALE])
+        told = u.balise_position - p.reading_age * _without_creep(u, p) * (1.0 + x[SCALE])
         quickest = x[R] / (1.0 + x[R] * x[L] ** 2 / QUICKEST)
         later = (x[P], told, x[SCALE], quickest, x[L], x[L], x[INVERSE_S], x[EXCITATION])
         begun = (told, told, x[SCALE], p.first_gain, 0.0, 0.0, x[INVERSE_S], 0.0)
@@ -156,9 +164,10 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
         adaptation = self._adaptation(x)
         V = adaptation.covariance
         scale = 1.0 + x[SCALE]
+        reading = _without_creep(u, p)
         return {
-            "position": x[P] + p.reading_age * u.odometer * scale,
-            "speed": u.odometer * scale,
+            "position": x[P] + p.reading_age * reading * scale,
+            "speed": reading * scale,
             "innovation": x[self.own_count - 1],
             "position_deviation": _root(V[0, 0]),
             "wheel_radius_error": 1.0 / scale - 1.0,
@@ -199,6 +208,11 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
 DISTURBED = np.outer([1.0, 0.0, 1.0], [1.0, 0.0, 1.0])  # the odometer's noise moves position and predicted position
 SAME_PLACE = DISTURBED
 OF_SCALE = np.diag([0.0, 1.0, 0.0])
+
+
+def _without_creep(u: Any, p: Any) -> Array:
+    """What the odometer would read of a wheel that rolls freely [m/s]."""
+    return u.odometer / (1.0 + p.creep_per_effort * u.effort)
 
 
 def _root(variance: Array) -> Array:

@@ -104,6 +104,7 @@ def written(folder: Path, text: str, encoding: str = "utf-8") -> Path:
 def test_a_list_is_read(tmp_path: Path, encoding: str) -> None:
     path = written(tmp_path, "position, identity, location_accuracy\n10.5, Nord, 3\n\n20, ,\n", encoding)
     assert from_csv(path).balises == (Balise("Nord", 10.5, 3.0), Balise("B2", 20.0, 0.0))
+    assert from_csv(path, 0.5).balises == (Balise("Nord", 10.5, 3.0), Balise("B2", 20.0, 0.5))
 
 
 def test_lines_that_tell_the_source_are_left_out(tmp_path: Path) -> None:
