@@ -200,4 +200,4 @@ def _decay(powers: np.ndarray, spread: np.ndarray, corners: np.ndarray) -> np.nd
     left = sizes @ corners
     for k in range(1, len(left)):
         left[k] += np.einsum("jab,jb->a", sizes[k - 1 :: -1], left[:k] @ spread.T)
-    return left
+    return np.asarray(left)

@@ -274,30 +274,44 @@ def kind(system: HybridSystem) -> tuple[object, ...]:
     )
 
 
-OF_EACH_KIND = {kind(make_system(name)): name for name in reversed(SHIPPED)}
-"""Both interfaces of FMI stand on one model code: every shipped system is tested as FMI 3.0, the first of each kind as
-FMI 2.0 too.
+OF_EACH_KIND = {
+    kind(make_system(name)): name
+    for name in sorted(SHIPPED, key=lambda name: make_system(name).state_count, reverse=True)
+}
+"""Of each kind the shipped system of the fewest states. Both interfaces of FMI stand on one model code: every shipped
+system is tested as FMI 3.0, those of this table as FMI 2.0 too.
 """
+KEPT = tuple(
+    line.removeprefix("! ")
+    for line in Path(__file__).parents[1].joinpath("second_tier.txt").read_text(encoding="utf-8").splitlines()
+    if line.startswith("! ")
+)
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """FMI 2.0 of what ships: leave out those that are no first of a kind, the others belong to the second tier."""
+    """Of shipped systems, leave out those that are none of `OF_EACH_KIND`: in FMI 2.0, which belongs to the second
+    tier, and in laws of ``each_kind``, where those stay that the list of the second tier names.
+    """
     kinds = set(OF_EACH_KIND.values())
-    again = {item: _shipped_as_fmi2(getattr(item, "callspec", None)) for item in items}
-    beside = [item for item, names in again.items() if names and not names & kinds]
-    for item, names in again.items():
-        if names & kinds:
+    shipped = {item: _shipped(item) for item in items}
+    beside = set()
+    for item, names in shipped.items():
+        as_fmi2 = names and item.callspec.params.get("version") == 2  # type: ignore[attr-defined]
+        by_kind = item.get_closest_marker("each_kind") and not item.nodeid.startswith(KEPT)
+        if names and not names & kinds and (as_fmi2 or by_kind):
+            beside.add(item)
+        elif as_fmi2:
             item.add_marker(pytest.mark.slow)
     if beside:
-        config.hook.pytest_deselected(items=beside)
-        items[:] = [item for item in items if item not in set(beside)]
+        config.hook.pytest_deselected(items=list(beside))
+        items[:] = [item for item in items if item not in beside]
 
 
-def _shipped_as_fmi2(callspec: Any) -> set[str]:
-    if callspec is None or callspec.params.get("version") != 2:
-        return set()
-    return {callspec.params.get("name"), callspec.params.get("system_name")} & set(SHIPPED)
+def _shipped(item: pytest.Item) -> set[str]:
+    """Names of shipped systems among the parameters of a test."""
+    parameters = getattr(getattr(item, "callspec", None), "params", {})
+    return {parameters.get("name"), parameters.get("system_name")} & set(SHIPPED)
 
 
 @pytest.fixture(scope="session")

@@ -52,7 +52,7 @@ def test_the_page_is_well_formed_and_complete(name: str, version: int) -> None:
     for variable in description.modelVariables:
         if variable.causality in {"input", "output", "parameter"}:
             assert variable.name in text
-            assert " ".join((variable.description or "").split()) in text.replace("’", "'")
+            assert " ".join((variable.description or "").replace("`", "").split()) in text.replace("’", "'")
     for words in (
         system.description,
         system.source,

@@ -15,6 +15,7 @@ from plant_models.railway.traction import (
     DriveCycle,
     DriveShaft,
     FieldOrientedControl,
+    Inverter,
     SynchronousMotor,
     SynchronousMotorEuler,
     ThreePhaseMotor,
@@ -212,3 +213,23 @@ def test_a_twisted_shaft_hands_on_the_torque() -> None:
     now = outputs(shaft)
     assert now["load_torque"] == pytest.approx(1000.0)
     assert now["effort"] == pytest.approx(4.0 * 6.5 / 0.575 * 1000.0)
+    shaft.u[3] = now["effort"]
+    assert outputs(shaft)["torque_reference"] == pytest.approx(1000.0)
+
+
+@pytest.mark.parametrize("angle", np.linspace(0.0, 2.0 * np.pi, 13))
+def test_an_inverter_gives_what_its_direct_voltage_allows(angle: float) -> None:
+    """Up to U / sqrt(3) all of it; of much more a corner or an edge of the hexagon."""
+    inverter = Inverter()
+    p = inverter.unpack_parameters(inverter.start_parameters())
+    ask = lambda length: inverter.unpack_inputs(np.array([length * np.cos(angle), length * np.sin(angle), 1.0, 2.0]))  # noqa: E731
+    now = inverter.output(0.0, np.zeros(0), u := ask(28.0 / np.sqrt(3.0)), p)
+    got = (now["voltage_alpha"], now["voltage_beta"])
+    np.testing.assert_allclose(got, u[:2], atol=1e-12)
+    duties = [now[f"duty_{phase}"] for phase in "abc"]
+    assert max(duties) + min(duties) == pytest.approx(1.0)  # centred
+    assert 28.0 * now["direct_current"] == pytest.approx(1.5 * (got[0] + 2.0 * got[1]))
+    far = inverter.output(0.0, np.zeros(0), ask(1e3), p)
+    assert all(0.0 <= far[f"duty_{phase}"] <= 1.0 for phase in "abc")
+    length = np.hypot(far["voltage_alpha"], far["voltage_beta"])
+    assert 28.0 / np.sqrt(3.0) - 1e-9 <= length <= 28.0 * 2.0 / 3.0 + 1e-9

@@ -15,7 +15,8 @@ class DriveShaft(HybridSystem):
 
     One motor stands for `motors` equal ones, each with a shaft of its own. `load_torque` acts on the motor, `effort =
     motors gear_ratio T / r` at the rims of all wheels. Twist and torque are on the side of the motor; the gear has no
-    losses. `estimated_wheel_speed` is the speed of the rims that an estimated motor speed means, twist left out.
+    losses. `estimated_wheel_speed` is the speed of the rims that an estimated motor speed means, `torque_reference` the
+    torque of a motor for `wanted_effort`; twist and inertia of the motor are left out of both.
 
     A motor has states of its own and so has the train: the shaft makes no algebraic loop of the two, and lets them be
     stepped at rates of their own. For that its oscillation, ``sqrt(k / J)`` of the motor, must be slow against the
@@ -35,6 +36,7 @@ class DriveShaft(HybridSystem):
         input_signal(
             "estimated_motor_speed", "rad/s", 0.0, "The same as an observer sees it", display_unit="rpm", optional=True
         ),
+        input_signal("wanted_effort", "N", 0.0, "Effort that is asked of all motors", optional=True),
     )
     outputs = (
         output_signal("load_torque", "N.m", "Torque of the shaft against a motor"),
@@ -42,6 +44,7 @@ class DriveShaft(HybridSystem):
         output_signal(
             "estimated_wheel_speed", "m/s", "Speed of the rims by the estimated motor speed", display_unit="km/h"
         ),
+        output_signal("torque_reference", "N.m", "Torque asked of a motor"),
     )
     parameters = (
         parameter("motors", "1", 4.0, "Number of equal motors", min=1.0),
@@ -64,6 +67,7 @@ class DriveShaft(HybridSystem):
             "load_torque": torque,
             "effort": p.motors * p.gear_ratio * torque / p.wheel_radius,
             "estimated_wheel_speed": u.estimated_motor_speed * p.wheel_radius / p.gear_ratio,
+            "torque_reference": u.wanted_effort * p.wheel_radius / (p.motors * p.gear_ratio),
         }
 
     def requirements(self, p: Any) -> dict[str, Array]:
