@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from cosim.studies.sampling import log_uniform, uniform, whole
     from cosim.studies.sweep import Sweep
     from cosim.studies.sweep_result import SweepResult
+    from cosim.tuning.tune import tune
+    from cosim.tuning.tuning_result import Tuning
 
 __all__ = [
     "Comparison",
@@ -36,6 +38,7 @@ __all__ = [
     "SweepResult",
     "Tolerance",
     "Tolerances",
+    "Tuning",
     "UnmetError",
     "benchmark_observers",
     "compare",
@@ -44,6 +47,7 @@ __all__ = [
     "rerun",
     "save_result",
     "shipped_scenarios",
+    "tune",
     "uniform",
     "whole",
 ]
@@ -58,6 +62,7 @@ _HOMES = {
     "SweepResult": "cosim.studies.sweep_result",
     "Tolerance": "cosim.comparison.tolerance",
     "Tolerances": "cosim.comparison.tolerance",
+    "Tuning": "cosim.tuning.tuning_result",
     "UnmetError": "cosim.errors",
     "benchmark_observers": "cosim.observer_benchmark.observers",
     "compare": "cosim.comparison.compare",
@@ -66,6 +71,7 @@ _HOMES = {
     "rerun": "cosim.provenance",
     "save_result": "cosim.results.save",
     "shipped_scenarios": "cosim.scenario.shipped",
+    "tune": "cosim.tuning.tune",
     "uniform": "cosim.studies.sampling",
     "whole": "cosim.studies.sampling",
 }

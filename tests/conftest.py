@@ -27,6 +27,8 @@ FLAGS = compiling.FLAGS
 QUICK = tuple("-O0" if flag == "-O3" else flag for flag in FLAGS)
 SECOND_TIER = Path(__file__).with_name("second_tier.txt")
 KEPT = "! "
+BEGUN = pytest.StashKey[float]()
+SPENT = "processor time [s]"
 SAMPLE = 16
 """One test in so many is in the sample, by a digest of its name."""
 
@@ -43,6 +45,33 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     in the second tier finds those FMUs built.
     """
     compiling.FLAGS = FLAGS if item.get_closest_marker("slow") else QUICK
+    item.stash[BEGUN] = processor_time()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown(item: pytest.Item) -> Iterator[None]:
+    """Hand the time to the controller, which knows reports only."""
+    yield
+    item.user_properties.append((SPENT, processor_time() - item.stash[BEGUN]))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """In continuous integration, tell which files cost most: processor time says it, however busy the machine is."""
+    if not os.environ.get("CI"):
+        return
+    spent: dict[str, float] = defaultdict(float)
+    for report in terminalreporter.stats.get("", []):
+        spent[report.nodeid.partition("::")[0]] += dict(report.user_properties).get(SPENT, 0.0)
+    dearest = sorted(spent, key=lambda file: -spent[file])[:12]
+    terminalreporter.section(f"processor time of tests: {sum(spent.values()):.0f} s, most of it in")
+    for file in dearest:
+        terminalreporter.write_line(f"{spent[file]:7.1f} s  {file}")
+
+
+def processor_time() -> float:
+    """Of this process and of those that it has waited for [s]."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -77,6 +106,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         used |= set(fitting)
         if (fitting and lines[max(fitting, key=len)]) or item.get_closest_marker("browser"):
             item.add_marker(pytest.mark.slow)
+    # pages and gallery, the longest tests, come first, so that no worker waits for one at the end
+    items.sort(key=lambda item: not item.nodeid.startswith("tests/project/"))
     idle = [line for line in lines if line not in used and line.partition("::")[0] in sampled]
     if idle and not any("::" in argument for argument in config.args):
         raise pytest.UsageError(f"{SECOND_TIER.name}: no test begins with: {'; '.join(idle)}")

@@ -43,6 +43,13 @@ class Runs(Protocol):
             The signals at the instants, shape (q, n).
         """
 
+    def unit(self, name: str) -> str:
+        """Unit of a value that is fitted, empty where it is not known.
+
+        Args:
+            name: of the value.
+        """
+
     def close(self) -> None:
         """Free what was opened."""
 

@@ -103,11 +103,12 @@ class FmuFilter(ABC):
         Args:
             belief: what is believed. t: instant [s]. u: inputs, shape (m,).
         """
-        return self.model.values_at(t, belief.x, u)[1]
+        found: Array = self.model.values_at(t, belief.x, u)[1]
+        return found
 
     def _steps(self, belief: Belief) -> Array:
         deviations = np.sqrt(np.maximum(np.diagonal(belief.P), 0.0))
-        return np.maximum(SHARE * deviations, LEAST * np.maximum(np.abs(belief.x), self._sizes))
+        return np.asarray(np.maximum(SHARE * deviations, LEAST * np.maximum(np.abs(belief.x), self._sizes)))
 
     def _corrected(self, belief: Belief, found: kalman.Corrected, innovation: Array) -> Belief:
         nis = float(kalman.normalised_square(innovation, found.innovation_covariance))
@@ -211,6 +212,6 @@ class UnscentedFilter(FmuFilter):
 def _root(P: Array) -> Array:
     """Lower factor of a covariance; the quick one of a library where nothing is known exactly."""
     try:
-        return np.linalg.cholesky(P)
+        return np.asarray(np.linalg.cholesky(P), dtype=float)
     except np.linalg.LinAlgError:
         return np.asarray(factor(P))

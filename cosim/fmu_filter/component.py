@@ -179,7 +179,7 @@ class FmuFilterModel:
         deviations = np.sqrt(np.diagonal(self._P)).tolist()
         first |= {f"{state}_std": value for state, value in zip(self._estimated, deviations, strict=True)}
         if name in first:
-            return first[name]
+            return float(first[name])
         if name in self._model.outputs:
             _, y = self._model.values_at(0.0, self._start, self._model.start_inputs)
             return float(y[self._model.outputs.index(name)])

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -124,7 +125,7 @@ class ParticleFilter(FmuFilter):
         driven = u[:, None] + ensemble.drawn(self.noises.inputs, draws)
         states, columns = [], []
         for i, saved in enumerate(belief.states):
-            model.told(lambda held=saved: model.instance.restore(held.state))
+            model.told(partial(model.instance.restore, saved.state))
             model.set_inputs(driven[:, i])
             model.advance(t, h)
             states.append(Saved(model.instance))

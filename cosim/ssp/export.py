@@ -172,6 +172,10 @@ class _Exporter:
                 f"the plant "
                 "that was recorded, or leave the recording out and connect its signals in the other tool."
             )
+        if component.filter is not None:
+            raise ScenarioError(
+                f"{place}: a filter over an FMU is no FMU itself, and a system structure package holds FMUs."
+            )
         system = make_system(component, place)
         if system is None and component.fmu is None:
             raise ScenarioError(f"{place}: plain Python is no FMU, and a system structure package holds FMUs.")

@@ -56,7 +56,7 @@ def loaded(command: str, folder: Path) -> set[str]:
     code = f"{command}\nimport json, sys\nprint(json.dumps(sorted(sys.modules)))"
     if command != SCRIPT:
         code = COMMAND.format(package=package, words=words)
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "FMU_OBSERVER_CACHE": str(folder)}
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
     done = subprocess.run(
         [sys.executable, "-c", code], env=environment, cwd=folder, capture_output=True, text=True, check=False
     )

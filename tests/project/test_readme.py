@@ -129,7 +129,9 @@ def test_nothing_is_imported_that_is_not_a_dependency() -> None:
 
     extras = PROJECT["project"]["optional-dependencies"]
     optional = [
-        name for extra in ("hosted", "lmi", "frames", "parquet", "hdf5") for name in requirements(extras[extra])
+        name
+        for extra in ("hosted", "lmi", "frames", "parquet", "hdf5", "tuning")
+        for name in requirements(extras[extra])
     ]
     required = [name.replace("-", "_") for name in requirements(PROJECT["project"]["dependencies"])]
     known = {*required, *optional, *PACKAGES, *sys.stdlib_module_names, "pytest"}  # who loads the plugin has pytest

@@ -13,9 +13,12 @@ class BiogeographyPrinted(Optimiser):
     """Biogeography-based optimisation, Algorithms 3.1 and 3.2.
 
     Migration: habitat i is changed with probability lambda_i; then each habitat j gives it, with probability mu_j, the
-    value of one parameter chosen at random. Mutation: the parameters of habitat i are chosen with the probability P_i
-    of its number of species, and a chosen one is drawn anew with ``m_i = m_max (1 - P_i / P_max)``; P is the steady
-    state of the linear rates with I = E, a binomial distribution. The best habitat is put back where it was lost.
+    value of one parameter chosen at random. Mutation: each parameter of habitat i is drawn anew with the probability
+    ``m_i = m_max (1 - P_i / P_max)``, P_i that of its number of species; P is the steady state of the linear rates with
+    I = E, a binomial distribution. The best habitat is put back where it was lost.
+
+    Algorithm 3.2 chooses a parameter "with probability P_i" before that. Read as one more factor, nothing mutates with
+    more than 1 in 200, and the search stands still; so P_i acts through m_i alone, as in Simon 2008.
 
     Args:
         lower, upper: bounds, shape (d,). seed: of the generator.
@@ -33,8 +36,8 @@ class BiogeographyPrinted(Optimiser):
         self.population = population
         species = np.arange(population, 0, -1)  # the best habitat has the most
         self._emigration = species / population
-        self._chances = scipy.stats.binom.pmf(species, population, 0.5)
-        self._rates = mutation * (1.0 - self._chances / self._chances.max())
+        chances = scipy.stats.binom.pmf(species, population, 0.5)
+        self._rates = mutation * (1.0 - chances / chances.max())
         self._habitats: Array | None = None
         self._costs = np.empty(0)
 
@@ -50,9 +53,8 @@ class BiogeographyPrinted(Optimiser):
         for j in range(n):  # in this order, since a later one overwrites an earlier one
             takers = np.flatnonzero(changed & given[:, j])
             moved[takers, places[takers, j]] = self._habitats[j, places[takers, j]]
-        chosen = self.random.random((n, d)) < self._chances[:, np.newaxis]
         mutates = self.random.random((n, d)) < self._rates[:, np.newaxis]
-        return np.where(chosen & mutates, self.uniform(n), moved)
+        return np.where(mutates, self.uniform(n), moved)
 
     def learn(self, candidates: Array, costs: Array, gradients: Array | None) -> None:
         """Take the costs in, see `Optimiser.learn`."""

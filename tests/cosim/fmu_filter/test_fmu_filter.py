@@ -11,6 +11,7 @@ from test_fmus.build import linear_fmu
 
 import cosim
 import fmus
+from cosim.errors import ScenarioError
 from cosim.fmu_filter.component import FmuFilterModel
 from cosim.fmu_filter.settings import FilterTable
 from cosim.fmu_model.sealed import FmuModelError
@@ -185,6 +186,12 @@ def test_in_a_scenario(path: Path, tmp_path: Path) -> None:
     assert error[-1] < 1e-3  # the readings are exact, the model is the plant
     assert outcome["filter.train_position_std"][-1] < outcome["filter.train_position_std"][1]
     assert any(part.name == "filter" for part in scenario.structure().parts)
+    scenario.save(tmp_path / "saved.toml")
+    again = cosim.Scenario.load(tmp_path / "saved.toml").run()
+    np.testing.assert_array_equal(again["filter.speed"], outcome["filter.speed"])
+    scenario.set("connections", [])
+    with pytest.raises(ScenarioError, match="a filter over an FMU is no FMU itself"):
+        scenario.export_ssp(tmp_path / "filtered.ssp")
 
 
 @pytest.mark.parametrize(
