@@ -146,8 +146,8 @@ def ratio(found: dict[str, np.ndarray]) -> Ratio:
 
 NOT_PRINTED = (
     "the thesis prints no number, no noise and no start; these are ours, and the independent runs are of other seeds. "
-    "At 1 ms the filters are equal; the unscented one gains for the double pendulum at 10 ms and, in the mean, where the "
-    "angle is hardly measured; for the single one at 50 ms the difference lies within the spread of the seeds"
+    "At 1 ms the filters are equal; the unscented one gains for the double pendulum at 10 ms and, in the mean, where "
+    "the angle is hardly measured; for the single one at 50 ms the difference lies within the spread of the seeds"
 )
 
 
