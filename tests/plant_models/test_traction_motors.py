@@ -226,6 +226,8 @@ def test_an_inverter_gives_what_its_direct_voltage_allows(angle: float) -> None:
     now = inverter.output(0.0, np.zeros(0), u := ask(28.0 / np.sqrt(3.0)), p)
     got = (now["voltage_alpha"], now["voltage_beta"])
     np.testing.assert_allclose(got, u[:2], atol=1e-12)
+    duties = [now[f"duty_{phase}"] for phase in "abc"]
+    assert max(duties) + min(duties) == pytest.approx(1.0)  # centred
     assert 28.0 * now["direct_current"] == pytest.approx(1.5 * (got[0] + 2.0 * got[1]))
     far = inverter.output(0.0, np.zeros(0), ask(1e3), p)
     assert all(0.0 <= far[f"duty_{phase}"] <= 1.0 for phase in "abc")

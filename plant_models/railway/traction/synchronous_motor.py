@@ -56,7 +56,7 @@ class SynchronousMotor(HybridSystem):
     source = "Allaoui 2024, (4.27)-(4.38), Annex C"
     internal_step = 1e-4
     state_signal: ClassVar[Callable[..., Signal]] = staticmethod(state)
-    parameters = MOTOR_PARAMETERS
+    parameters: tuple[Signal, ...] = MOTOR_PARAMETERS
     presets: Mapping[str, Mapping[str, Any]] = {"exact": {}, "traction_200kw": TRACTION_200_KW}
     default_preset = "exact"
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {"frame": FRAMES, "noise": ("none", "sampled")}
