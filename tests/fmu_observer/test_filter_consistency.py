@@ -13,13 +13,13 @@ from fmu_observer.filtering.consistency import (
     normalised_squares,
 )
 
-SEEDS, SAMPLES = 200, 400
+SEEDS, SAMPLES = 100, 400
 F, H = np.array([[1.0, 0.1], [0.0, 1.0]]), np.array([[1.0, 0.0]])
 Q, R = 0.1 * np.array([[1e-3 / 3.0, 0.5e-2], [0.5e-2, 0.1]]), np.array([[0.04]])
 
 
 def runs(process: float = 1.0, measurement: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-    """NIS and NEES of 200 runs of a position filter, shape (runs, samples), that is told these multiples of Q and R."""
+    """NIS and NEES of 100 runs of a position filter, shape (runs, samples), that is told these multiples of Q and R."""
     random = np.random.default_rng(0)
     x = random.multivariate_normal(np.zeros(2), np.eye(2), SEEDS)
     estimate, P = np.zeros((SEEDS, 2)), np.eye(2)
@@ -47,7 +47,7 @@ def matched() -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_matched_filters_are_flagged_at_the_stated_rate(matched: tuple[np.ndarray, np.ndarray]) -> None:
-    """1 % of runs; of 200 at most 7 in 99.9 % of cases (binomial). NEES knows its independent samples only roughly."""
+    """1 % of runs; of 100 at most 5 in 99.9 % of cases (binomial). NEES knows its independent samples only roughly."""
     nis, nees = matched
     most = float(stats.binom.ppf(0.999, SEEDS, 0.01)) / SEEDS
     assert sum(flagged(nis, 1.0, white=True).values()) <= most

@@ -83,7 +83,7 @@ def growth(k: int, x: np.ndarray) -> np.ndarray:
 
 
 def test_particles_know_two_peaks_where_the_extended_filter_fails() -> None:
-    runs, length, count, errors = 10, 60, 200, {"ekf": 0.0, "particles": 0.0}
+    runs, length, count, errors = 4, 60, 100, {"ekf": 0.0, "particles": 0.0}
     nees = []
     for seed in range(runs):
         random = np.random.default_rng(seed)

@@ -1,0 +1,306 @@
+"""Train observer: extended Kalman filter of an odometer at its period and balises when they come."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fmu_observer.certificates import Certificate
+from fmu_observer.filtering.kalman import correct, log_likelihood, normalised_square, predicted_covariance
+from fmu_observer.observers.gap_certified import GapCertified
+from fmu_observer.observers.gated_observer import GatedObserver
+from fmu_observer.observers.train.train_observer import BALISE, POSITION, SPEED
+from fmu_observer.observers.train.train_resistance import rolling_drag
+from plant_models.hybrid import PeriodicEvent, Signal, input_signal, memory, output_signal, parameter, state, vector
+from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid.system import Array
+
+ORDER = 4
+P, V, D, CREEP = range(ORDER)  # places of the estimates
+PAIRS = [(i, j) for i in range(ORDER) for j in range(i, ORDER)]  # the covariance as remembered, row by row
+COVARIANCE = ORDER
+LAST_TIME, INNOVATION, NIS, LIKELIHOOD, FAULT = (ORDER + len(PAIRS) + i for i in range(5))
+FIRST_DEVIATIONS = (100.0, 2.0, 0.1, 0.1)  # before any measurement, [m], [m/s], [m/s2], [m/s] [ours]
+SIGMAS = 3.0  # standard deviations of the position that the gate of balise telegrams grants [ours]
+SETTLING = 400  # readings after which a certificate takes the covariance for settled, and four gaps at least
+HORIZON = 60.0  # longest gap that a certificate looks at unasked [s]
+CERTIFIED_AT = 20.0  # speed of the certificate [m/s]
+
+ODOMETER_ROW = np.array([[0.0, 1.0, 0.0, 1.0]])
+BALISE_ROW = np.array([[1.0, 0.0, 0.0, 0.0]])
+
+TUNABLE = (
+    parameter("acceleration_density", "m2/s3", 1e-4, "Spectral density of the noise of the acceleration", min=0.0),
+    parameter("disturbance_density", "m2/s5", 1e-6, "Spectral density of the drift of the disturbance", min=1e-15),
+    parameter("creep_share", "1", 0.01, "Standard deviation of the wheels' creep, a share of the speed", min=0.0),
+    parameter("creep_time", "s", 20.0, "Correlation time of the creep", min=1e-3),
+    parameter("odometer_deviation", "m/s", 0.1, "Standard deviation of the noise of a reading", min=1e-6),
+    parameter("balise_deviation", "m", 0.5, "Standard deviation of the place of a balise as read", min=1e-6),
+    parameter("odometer_gate", "1", 4.0, "Standard deviations beyond which a reading is not used", min=0.1),
+)
+OWN_PARAMETERS = (
+    parameter("mass", "kg", 90000.0, "Train mass", min=1.0),
+    parameter("davis_a", "N", 900.0, "Running resistance, constant term", min=0.0),
+    parameter("davis_b", "N.s/m", 32.4, "Running resistance, linear term", min=0.0),
+    parameter("davis_c", "N.s2/m2", 1.65287, "Running resistance, quadratic term", min=0.0),
+    parameter("odometer_period", "s", 0.1, "Time between two readings of the odometer", min=1e-4),
+    parameter("reading_age", "s", 0.0, "Age of a reading when it is sampled", min=0.0),
+    *TUNABLE,
+)
+
+
+class Transition(NamedTuple):
+    """What happens to the error between two events.
+
+    Attributes:
+        F: transition of the error, shape (4, 4). QN: covariance that it gets, shape (4, 4).
+    """
+
+    F: Array
+    QN: Array
+
+
+class BaliseOdometerEkf(GatedObserver, GapCertified):
+    """Extended Kalman filter of a train with its covariance exact between events: equations of Allaoui 2024, section
+    II.5; the train case is ours.
+
+    ``dp = v``, ``dv = (F - a sgn(v) - b v - c v|v|)/M + d``, ``dd = w_d``, ``dz = -z / creep_time + w_z``: position,
+    speed, an unknown acceleration and the creep of the wheel that carries the odometer, whose stationary deviation is
+    `creep_share` of the speed. The odometer reads ``v + z`` every `odometer_period`, a balise p at its own stamp.
+    Estimates flow; the covariance moves at events, by the transition over the time since the last one (drag slope held,
+    series to the third order of its product with that time; noise as if there were no drag), and is corrected in Joseph
+    form.
+
+    A reading whose innovation is beyond `odometer_gate` of its own standard deviations is not used: a wheel that locks
+    or spins. Then the covariance grows and with it what is believed, so no lie lasts for ever and no truth is refused
+    for ever. A balise passes the common gate, which is granted three standard deviations of the position.
+
+    It knows wheels that creep for about `creep_time`. A creep that lasts the whole gap between two balises, or a jam
+    that holds a wheel for long, it follows more than the observers with rules for jams.
+    """
+
+    name = "balise_odometer_ekf"
+    description = "Extended Kalman filter of odometer and balises, with disturbance and creep"
+    source = "Allaoui 2024, section II.5; the train case is ours"
+    internal_step = 1e-2
+    frictions = (SPEED.name,)
+    inputs: tuple[Signal, ...] = (
+        input_signal("effort", "N", 0.0, "Applied effort at the wheel rim: traction positive, brake negative"),
+        input_signal("odometer", "m/s", 0.0, "Odometer speed"),
+    )
+    outputs = (
+        output_signal("position", "m", "Estimated position"),
+        output_signal("speed", "m/s", "Estimated speed", display_unit="km/h"),
+        output_signal("disturbance", "m/s2", "Estimated acceleration that effort and resistance do not explain"),
+        output_signal("creep", "m/s", "Estimated creep of the wheel, odometer minus speed"),
+        output_signal("innovation", "m", "Estimated minus true position at the last balise", variability="discrete"),
+        output_signal("position_std", "m", "Standard deviation of the position's error"),
+        output_signal("speed_std", "m/s", "Standard deviation of the speed's error"),
+        output_signal("nis", "1", "Normalised innovation squared of the last measurement used", variability="discrete"),
+        output_signal(
+            "innovation_likelihood", "1", "Logarithm of the likelihood of all innovations", variability="discrete"
+        ),
+        output_signal("odometer_fault", "1", "1 while the last reading was not used", variability="discrete"),
+    )
+    events = (
+        BALISE,
+        PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read"),
+    )
+    parameters = OWN_PARAMETERS
+
+    def __init__(self) -> None:
+        start = tuple(FIRST_DEVIATIONS[i] ** 2 if i == j else 0.0 for i, j in PAIRS)
+        self.states = (
+            POSITION,
+            SPEED,
+            state("estimated_disturbance", "m/s2", 0.0, "Unknown acceleration d"),
+            state("estimated_creep", "m/s", 0.0, "Creep z of the wheel"),
+            memory("estimate_covariance", "1", start, "Covariance at the last event, upper triangle", size=len(PAIRS)),
+            memory("last_time", "s", 0.0, "Time of the last event"),
+            memory("last_innovation", "m", 0.0, "Position error seen at the last balise"),
+            memory("last_nis", "1", 0.0, "Last normalised innovation squared"),
+            memory("log_likelihood", "1", 0.0, "Logarithm of the likelihood of all innovations so far"),
+            memory("reading_refused", "1", 0.0, "1 where the last reading was not used"),
+        )
+        super().__init__()
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """The parameters lie within their bounds."""
+        return super().requirements(p) | within_bounds(TUNABLE, p)
+
+    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Position, speed, disturbance and creep, shape (4,)."""
+        return vector(x[V], _free_acceleration(x, u, p), 0.0 * x[D], -x[CREEP] / p.creep_time)
+
+    def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Constant resistance and brake [m/s2], shape (1,)."""
+        return vector((p.davis_a + np.maximum(-u.effort, 0.0)) / p.mass)
+
+    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Covariance over the time since the last event, then correction by the reading or the balise."""
+        moved = transition(t - x[LAST_TIME], x[V], p)
+        before = predicted_covariance(_covariance(x), moved.F, moved.QN)
+        estimate = x[:ORDER]
+        if event == BALISE.name:
+            error, row, deviation = u.balise_position - x[P], BALISE_ROW, p.balise_deviation
+        else:
+            rate = _free_acceleration(x, u, p) - self.friction(t, x, u, p)[0]
+            now = u.odometer + p.reading_age * np.where(x[V] > 0.0, rate, 0.0)
+            error, row, deviation = now - x[V] - x[CREEP], ODOMETER_ROW, p.odometer_deviation
+        innovation = vector(error)
+        after = correct(estimate, before, innovation, row, np.reshape(deviation**2, (1, 1)))
+        nis = normalised_square(innovation, after.innovation_covariance)
+        told = log_likelihood(innovation, after.innovation_covariance)
+        refused = 0.0 * nis if event == BALISE.name else np.where(nis > p.odometer_gate**2, 1.0, 0.0)
+        kept = [np.where(refused > 0.0, estimate[i], after.estimate[i]) for i in range(ORDER)]
+        kept[V] = np.maximum(kept[V], 0.0)  # the odometer has no sign, and a train that stands is not pushed back
+        covariance = [np.where(refused > 0.0, before[i, j], after.covariance[i, j]) for i, j in PAIRS]
+        return vector(
+            *kept,
+            *covariance,
+            t + 0.0 * nis,
+            -error if event == BALISE.name else x[INNOVATION],
+            np.where(refused > 0.0, x[NIS], nis),
+            x[LIKELIHOOD] + np.where(refused > 0.0, 0.0, told),
+            x[FAULT] if event == BALISE.name else refused,
+        )
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """The estimates, their deviations now, and how the last measurement fits."""
+        moved = transition(t - x[LAST_TIME], x[V], p)
+        now = predicted_covariance(_covariance(x), moved.F, moved.QN)
+        return {
+            "position": x[P],
+            "speed": x[V],
+            "disturbance": x[D],
+            "creep": x[CREEP],
+            "innovation": x[INNOVATION],
+            "position_std": np.sqrt(np.maximum(now[P, P], 0.0)),
+            "speed_std": np.sqrt(np.maximum(now[V, V], 0.0)),
+            "nis": x[NIS],
+            "innovation_likelihood": x[LIKELIHOOD],
+            "odometer_fault": x[FAULT],
+        }
+
+    def odometer_of(self, u: Any) -> Array:
+        """The odometer [m/s]."""
+        return u.odometer
+
+    def own_bound(self, x: Array, p: Any) -> Array:
+        """Three standard deviations of the position at the last event [m]."""
+        return SIGMAS * np.sqrt(np.maximum(x[COVARIANCE], 0.0))
+
+    def error_certificate(self, max_gap: float, p: Any) -> Certificate:
+        """Certificate by the filter's own function ``e' inv(P) e``, which falls over every sequence of gaps.
+
+        Judged is the settled filter at the gap and at the horizon, at 20 m/s: how much the error and that function
+        fall from balise to balise.
+        """
+        horizon = max(HORIZON, max_gap)
+        asked, longest = _settled(max_gap, p), _settled(horizon, p)
+        stable = longest.spectral_radius < 1.0 and longest.margin > 0.0
+        return Certificate(
+            max_gap=max_gap,
+            horizon=horizon,
+            constant_limit=inf if stable else 0.0,
+            aperiodic_limit=inf if stable else 0.0,
+            spectral_radius=asked.spectral_radius,
+            quadratic_margin=asked.margin,
+            holds=stable and asked.spectral_radius < 1.0 and asked.margin > 0.0,
+            error_model="error of position, speed, disturbance and creep of the linear train at 20 m/s, readings at "
+            "their period and a balise at the end of each gap; readings that are refused, and standstill, are left out",
+            notes=("the filter's own function e' inv(P) e grows over no sequence of gaps, whatever they are",),
+            lyapunov_matrix=tuple(tuple(map(float, row)) for row in np.linalg.inv(asked.covariance)),
+        )
+
+    def deciding_parameters(self) -> tuple[Signal, ...]:
+        """Noises and the odometer's period."""
+        return tuple(s for s in self.parameters if s in TUNABLE or s.name == "odometer_period")
+
+
+def transition(elapsed: Array, speed: Array, p: Any) -> Transition:
+    """Transition of the error over a time, and the covariance that it gets on the way.
+
+    Args:
+        elapsed: time since the last event [s]. speed: [m/s]. p: parameters of `BaliseOdometerEkf`.
+    """
+    T = elapsed
+    slope = -(p.davis_b + 2.0 * p.davis_c * np.abs(speed)) / p.mass
+    z = slope * T
+    fade = np.exp(-T / p.creep_time)
+    stays = 1.0 + z * (1.0 + z * (0.5 + z / 6.0))
+    once, twice = T * (1.0 + z * (0.5 + z / 6.0)), 0.5 * T * T * (1.0 + z / 3.0)
+    zero = 0.0 * T
+    one = 1.0 + zero
+    F = np.vstack(
+        [
+            np.hstack([one, once, twice, zero]),
+            np.hstack([zero, stays, once, zero]),
+            np.hstack([zero, zero, one, zero]),
+            np.hstack([zero, zero, zero, fade]),
+        ]
+    )
+    a, d = p.acceleration_density, p.disturbance_density
+    T2 = T * T
+    pp, pv, pd = a * T * T2 / 3.0 + d * T2 * T2 * T / 20.0, 0.5 * a * T2 + d * T2 * T2 / 8.0, d * T * T2 / 6.0
+    vv, vd, dd = a * T + d * T * T2 / 3.0, 0.5 * d * T2, d * T
+    creep = np.square(p.creep_share * speed) * (1.0 - fade * fade)
+    QN = np.vstack(
+        [
+            np.hstack([pp, pv, pd, zero]),
+            np.hstack([pv, vv, vd, zero]),
+            np.hstack([pd, vd, dd, zero]),
+            np.hstack([zero, zero, zero, creep]),
+        ]
+    )
+    return Transition(F, QN)
+
+
+def _free_acceleration(x: Array, u: Any, p: Any) -> Array:
+    """Acceleration without dry friction [m/s2]."""
+    return (np.maximum(u.effort, 0.0) - rolling_drag(x[V], p)) / p.mass + x[D]
+
+
+def _covariance(x: Array) -> Array:
+    """Covariance as remembered, shape (4, 4)."""
+    place = {pair: COVARIANCE + k for k, pair in enumerate(PAIRS)}
+    return np.vstack([np.hstack([x[place[min(i, j), max(i, j)]] for j in range(ORDER)]) for i in range(ORDER)])
+
+
+class Settled(NamedTuple):
+    """The filter where every gap is the same.
+
+    Attributes:
+        covariance: after a balise, shape (4, 4). spectral_radius: of the error from balise to balise [1]. margin: share
+            by which ``e' inv(P) e`` falls at least [1].
+    """
+
+    covariance: np.ndarray
+    spectral_radius: float
+    margin: float
+
+
+def _settled(gap: float, p: Any) -> Settled:
+    """The settled filter at a constant gap [s], readings at their period."""
+    readings = max(round(gap / float(p.odometer_period)), 1)
+    moved = transition(gap / readings, CERTIFIED_AT, p)
+    F, QN = np.asarray(moved.F, dtype=float), np.asarray(moved.QN, dtype=float)
+    reading, balise = float(p.odometer_deviation) ** 2, float(p.balise_deviation) ** 2
+    first, after = np.eye(ORDER), np.diag(np.square(FIRST_DEVIATIONS))
+    monodromy = np.eye(ORDER)
+    for _ in range(max(SETTLING // readings, 4)):
+        first, monodromy = after, np.eye(ORDER)
+        for _ in range(readings):
+            after, monodromy = _corrected(F @ after @ F.T + QN, F @ monodromy, ODOMETER_ROW, reading)
+        after, monodromy = _corrected(after, monodromy, BALISE_ROW, balise)
+    shrunk = np.linalg.solve(np.linalg.cholesky(after), monodromy @ np.linalg.cholesky(first))
+    radius = float(np.abs(np.linalg.eigvals(monodromy)).max())
+    return Settled(after, radius, 1.0 - float(np.linalg.norm(shrunk, 2)) ** 2)
+
+
+def _corrected(P: np.ndarray, M: np.ndarray, row: np.ndarray, variance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Covariance and transition of the error after a measurement, shapes (4, 4)."""
+    after = correct(np.zeros(ORDER), P, np.zeros(1), row, np.array([[variance]]))
+    return np.asarray(after.covariance), M - np.asarray(after.gain) @ (row @ M)
