@@ -57,11 +57,11 @@ def pytest_runtest_teardown(item: pytest.Item) -> Iterator[None]:
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """In continuous integration, tell which files cost most: processor time says it, however busy the machine is."""
-    if not os.environ.get("CI"):
-        return
     spent: dict[str, float] = defaultdict(float)
     for report in terminalreporter.stats.get("", []):
         spent[report.nodeid.partition("::")[0]] += dict(report.user_properties).get(SPENT, 0.0)
+    if not spent or not os.environ.get("CI"):
+        return
     dearest = sorted(spent, key=lambda file: -spent[file])[:12]
     terminalreporter.section(f"processor time of tests: {sum(spent.values()):.0f} s, most of it in")
     for file in dearest:

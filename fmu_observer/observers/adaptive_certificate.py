@@ -12,7 +12,9 @@ import numpy as np
 from plant_models.hybrid import HybridSystem, Runtime, scalar_names
 
 HORIZON = 40.0  # [s]; the second regressor of the printed example has faded long before
+COARSE = 0.01  # [s], internal step: RK4 of frequencies of 20 rad/s to 1e-5
 LEFT = 0.02  # share of the first error that may be left in the states
+SHORTEST, BISECTIONS = 0.02, 6  # [s], [1] of the search for the longest period
 LAST_PART = 0.8  # of the horizon; what is left after it counts
 
 
@@ -27,6 +29,28 @@ class Left(NamedTuple):
     constants: tuple[float, ...]
 
 
+def adaptation_limit(observer: Any, parameters: np.ndarray, high: float) -> float:
+    """Longest period [s] at which the adaptation leaves no more than `LEFT`, to 5 %, rounded down.
+
+    By bisection, which takes what fails once for what fails from there on.
+
+    Args:
+        observer, parameters: as `errors_left`. high: from which on it is not looked for [s].
+    """
+    key = (observer.name, observer.model.name, observer.sizes, high, tuple(float(v) for v in parameters))
+    if key not in _LIMITS:
+        low, top = SHORTEST, high
+        for _ in range(BISECTIONS):
+            middle = float(np.sqrt(low * top))
+            kept = errors_left(observer, parameters, middle).states < LEFT
+            low, top = (middle, top) if kept else (low, middle)
+        _LIMITS[key] = low
+    return _LIMITS[key]
+
+
+_LIMITS: dict[Any, float] = {}  # of this process; a run of 40 s takes a quarter of a second
+
+
 def errors_left(observer: Any, parameters: np.ndarray, period: float) -> Left:
     """Errors after `HORIZON`, samples coming each `period`, inputs at their starts, no noise.
 
@@ -37,7 +61,9 @@ def errors_left(observer: Any, parameters: np.ndarray, period: float) -> Left:
     n, m = observer.sizes[:2]
     runtime = Runtime(system)
     runtime.p[:] = parameters
-    runtime.p[scalar_names(system.parameter_signals).index("noise_deviation")] = 0.0
+    names = scalar_names(system.parameter_signals)
+    runtime.p[names.index("noise_deviation")] = 0.0
+    runtime.p[names.index("internal_step")] = max(runtime.p[names.index("internal_step")], COARSE)
     places = [i for i, name in enumerate(scalar_names(system.states)) if name.startswith("error_covariance")]
     size = observer.sizes.error
     diagonal = [places[i * size - i * (i - 1) // 2] for i in range(n + m)]

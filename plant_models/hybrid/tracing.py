@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -22,6 +22,7 @@ from plant_models.hybrid import integration
 from plant_models.hybrid.system import HybridSystem
 
 SYMBOLIC = ca.ArrayInterface.SX
+Expression = TypeVar("Expression")
 FOUNDATION = Path(__file__).parent
 WRITTEN_AS = {
     "state_derivative": "flow",
@@ -222,11 +223,12 @@ class TracedSystem:
         method = partial(getattr(self.system, function), *arguments, t, x, u, p)
         return self._once((function, *arguments), lambda: self._guarded(function, method))
 
-    def _once(self, key: tuple[str, ...], compute: Callable[[], Any]) -> Any:
+    def _once(self, key: tuple[str, ...], compute: Callable[[], Expression]) -> Expression:
         """An expression of the symbols, of which several functions are made: computed once."""
         if key not in self._expressions:
             self._expressions[key] = compute()
-        return self._expressions[key]
+        known: Expression = self._expressions[key]
+        return known
 
     def _step_expression(self) -> ca.SX:
         t, h, x, u, p = self._arrays()

@@ -91,7 +91,7 @@ def test_the_first_example_makes_sense_from_the_first_balise_on(
     monkeypatch.chdir(tmp_path)
     assert fmus.cli.main(["build", "locomotive", "--fmi", "2", "-o", "vendor.fmu"]) == 0
     code = next(b.code for b in blocks(README) if b.language == "python" and "vendor.fmu" in b.code)
-    exec(compile(code.partition("s.run()")[0] + "outcome = s.run()", str(README), "exec"), names := {})
+    exec(compile(code.partition("print(")[0], str(README), "exec"), names := {})
     outcome = names["outcome"]
     assert outcome.warnings == []
     measures = error_measures(outcome)

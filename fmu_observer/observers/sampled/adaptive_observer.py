@@ -17,7 +17,7 @@ from fmu_observer.design.adaptive_bounds import adaptive_bounds, gain_bound, set
 from fmu_observer.limits import Limit, PrintedBound
 from fmu_observer.models import STATE_AFFINE_MODELS, StateAffineModel, find_state_affine_model
 from fmu_observer.models.model import stacked
-from fmu_observer.observers.adaptive_certificate import HORIZON, LEFT, errors_left
+from fmu_observer.observers.adaptive_certificate import HORIZON, LEFT, adaptation_limit, errors_left
 from fmu_observer.observers.adaptive_law import (
     Adaptation,
     Gains,
@@ -206,12 +206,16 @@ class AdaptiveObserver(GatedObserver, GapCertified):
             f"at a constant gap of {max_gap:.4g} s the states keep {left.states:.2g} of the first error after "
             f"{HORIZON:g} s, the constants {of_constants}; {LEFT:g} of it in the states is allowed"
         )
-        found = replace(found, notes=(*found.notes, note))
-        if left.states < LEFT:
-            return found
-        radius = max(found.spectral_radius, left.states ** (max_gap / HORIZON))
-        limit = min(found.constant_limit, max_gap)
-        return replace(found, holds=False, spectral_radius=radius, constant_limit=limit, aperiodic_limit=0.0)
+        known = first_unstable_gap([self.known_error(float(p.mu))], LONGEST_PERIOD)
+        longest = adaptation_limit(self, values, min(known, LONGEST_PERIOD))
+        return replace(
+            found,
+            holds=found.holds and max_gap <= longest and left.states < LEFT,
+            spectral_radius=max(found.spectral_radius, left.states ** (max_gap / HORIZON)),
+            constant_limit=min(found.constant_limit, longest),
+            aperiodic_limit=min(found.aperiodic_limit, longest),
+            notes=(*found.notes, note),
+        )
 
     def condition(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Condition:
         """Persistent excitation (4.8), and (4.63) where the output is predicted, at the model's `sample_period`.

@@ -87,7 +87,11 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
     inputs: tuple[Signal, ...] = (
         input_signal("odometer", "m/s", 0.0, "Odometer speed, by the believed wheel radius"),
         input_signal(
-            "effort", "N", 0.0, "Effort, for the creep of a driven axle; not used where creep_per_effort is 0"
+            "effort",
+            "N",
+            0.0,
+            "Effort, for the creep of a driven axle; not used where creep_per_effort is 0",
+            optional=True,
         ),
     )
     outputs = (

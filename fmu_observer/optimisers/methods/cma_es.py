@@ -67,7 +67,7 @@ class CovarianceMatrixAdaptation(Optimiser):
         if self._strategy.stop():
             return np.empty((0, self.dimension))
         self._units = self._strategy.ask()
-        return self.lower + np.array(self._units) * (self.upper - self.lower)
+        return np.asarray(self.lower + np.array(self._units) * (self.upper - self.lower))
 
     def learn(self, candidates: Array, costs: Array, gradients: Array | None) -> None:
         """Take the costs in, see `Optimiser.learn`."""

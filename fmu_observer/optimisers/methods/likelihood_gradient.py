@@ -68,7 +68,7 @@ class LikelihoodGradient(Optimiser):
             moves = DIFFERENCE * np.eye(self.dimension)
             around = np.concatenate([np.zeros((1, self.dimension)), moves, -moves])
             units = np.clip(units[:, np.newaxis] + around, 0.0, 1.0).reshape(-1, self.dimension)
-        return self.lower + units * (self.upper - self.lower)
+        return np.asarray(self.lower + units * (self.upper - self.lower))
 
     def learn(self, candidates: Array, costs: Array, gradients: Array | None) -> None:
         """Take the costs in, see `Optimiser.learn`."""

@@ -42,7 +42,8 @@ class ParticleSwarm(Optimiser):
         self._positions = self.uniform(population)
         reach = START_SPEED * (self.upper - self.lower)
         self._velocities = self.random.uniform(-reach, reach, self._positions.shape)
-        self._own_best, self._own_costs = self._positions, None
+        self._own_best = self._positions
+        self._own_costs: Array | None = None
 
     def propose(self) -> Array:
         """Where the particles are next, shape (population, d)."""

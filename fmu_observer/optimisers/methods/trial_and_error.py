@@ -43,7 +43,7 @@ class TrialAndError(Optimiser):
         if self._cost is None:
             return self._centre[np.newaxis]
         moves = np.diag(self._steps)
-        return self._centre + np.concatenate([moves, -moves])
+        return np.asarray(self._centre + np.concatenate([moves, -moves]))
 
     def learn(self, candidates: Array, costs: Array, gradients: Array | None) -> None:
         """Take the costs in, see `Optimiser.learn`."""
