@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property, partial
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -15,7 +15,14 @@ from fmu_observer.limits import Limit
 from fmu_observer.models import MODELS, ObserverModel, find_model
 from fmu_observer.observers.delay_memory import at_age, integral_weights
 from fmu_observer.observers.delayed_limits import delay_limit, packet_limit
+from fmu_observer.observers.delayed_state_memory import (
+    DelayedStateMemory,
+    MemorySizes,
+    declared_memory,
+    prediction_starts,
+)
 from fmu_observer.observers.finite_time_predictor import Prediction, moved_on
+from fmu_observer.observers.measurement_nodes import nodes_of_measurements, turns_of_nodes
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from fmu_observer.observers.sampled.high_gain_sampled import HighGainSampled
 from fmu_observer.observers.sampled.sampled_observer import per_measurement
@@ -24,7 +31,6 @@ from plant_models.hybrid import (
     Signal,
     TriggeredEvent,
     input_signal,
-    memory,
     output_signal,
     parameter,
     state,
@@ -39,22 +45,6 @@ BETWEEN: tuple[Between, ...] = ("predicted", "held")
 DELAY, MEMORY_PERIOD, MEMORY_PLACES = 0.1, 0.01, 20  # [s], [s], [1] [ours]: one predictor remembers 0.2 s
 THETA_PUBLISHED, THETA_REPAIRED = 1.0, 5.0  # [1/s]
 MOST_PREDICTORS = 8
-
-
-class _Past(NamedTuple):
-    """Memory of the observer: mean inputs by place, input that acts, signed roots, predictions and rates by predictor,
-    offset and its rate, instant of the last reading, and whether there was one.
-    """
-
-    means: list[list[Array]]
-    acting: list[Array]
-    roots: list[list[Array]]
-    predictions: list[list[Array]]
-    rates: list[list[list[Array]]]
-    offset: list[Array]
-    drift: list[Array]
-    read_at: Array
-    begun: Array
 
 
 class DelayedStateObserver(HighGainSampled):
@@ -121,53 +111,14 @@ class DelayedStateObserver(HighGainSampled):
             raise ValueError(
                 f"{self.name}: unknown between_samples {between_samples!r}; choose one of: {', '.join(BETWEEN)}."
             )
-        self.predictors, self.memory_places, self.predicts_output = (
-            predictors,
-            memory_places,
-            between_samples == "predicted",
+        self.predictors, self.memory_places = predictors, memory_places
+        self.predicts_output = between_samples == "predicted"
+        self.node_of = nodes_of_measurements("delayed_state_observer", chosen, nodes)
+        self._sizes = MemorySizes(
+            chosen.order, len(chosen.inputs), predictors, memory_places, max(predictors, 1) * memory_places + 2
         )
-        self.node_of = self._nodes(chosen, nodes)
-        n, m = chosen.order, len(chosen.inputs)
-        self.extra_memory = tuple(
-            memory(name, "1", 0.0 if start is None else start, text, size=size)
-            for name, size, start, text in (
-                ("past_input", m * self.input_places, None, "Mean inputs of the last periods, the newest first"),
-                ("delayed_input", m, None, "Mean inputs a delay ago, which act on the delayed state"),
-                ("distance_root", n * predictors, None, "Signed roots of the distances s of the predictors"),
-                (
-                    "prediction",
-                    n * predictors,
-                    tuple(float(s.start_values[0]) for s in chosen.states) * predictors,
-                    "Predicted states at the last reading, predictor by predictor",
-                ),
-                ("past_rate", n * predictors * memory_places, None, "Rates f of the predictors, the newest first"),
-                (
-                    "prediction_offset",
-                    n if predictors else 0,
-                    None,
-                    "State now less the delayed one, at the last reading",
-                ),
-                ("prediction_offset_rate", n if predictors else 0, None, "Rate of it"),
-                ("reading_time", 1, None, "Instant of the last reading"),
-                ("reading_begun", 1, None, "1 after the first reading"),
-            )
-            if size
-        )
-        self.extra_outputs = (
-            *(
-                output_signal(f"delayed_{s.name}", s.unit, f"Estimate of a delay ago: {s.description}")
-                for s in chosen.states
-            ),
-            *(
-                (
-                    output_signal(
-                        "reaching_time", "s", "Time until the last predictor is reached", variability="discrete"
-                    ),
-                )
-                if predictors
-                else ()
-            ),
-        )
+        self.extra_memory = declared_memory(chosen, self._sizes)
+        self.extra_outputs = self._outputs(chosen)
         super().__init__(
             chosen,
             predictors=predictors,
@@ -181,6 +132,16 @@ class DelayedStateObserver(HighGainSampled):
 
     # -- declarations -----------------------------------------------------------------------------------------------
 
+    def _outputs(self, model: ObserverModel) -> tuple[Signal, ...]:
+        delayed = [
+            output_signal(f"delayed_{s.name}", s.unit, f"Estimate of a delay ago: {s.description}")
+            for s in model.states
+        ]
+        if not self.predictors:
+            return tuple(delayed)
+        text = "Time until the last predictor is reached"
+        return (*delayed, output_signal("reaching_time", "s", text, variability="discrete"))
+
     @property
     def total_places(self) -> int:
         """Longest delay in memory periods."""
@@ -189,7 +150,7 @@ class DelayedStateObserver(HighGainSampled):
     @property
     def input_places(self) -> int:
         """Mean inputs that are remembered."""
-        return self.total_places + 2
+        return self._sizes.input_places
 
     def theta_parameters(self) -> tuple[Signal, ...]:
         """Theta, the delay, and how the past is remembered."""
@@ -306,22 +267,10 @@ class DelayedStateObserver(HighGainSampled):
     def _rate(self, x: list[Array], known: Array) -> Array:
         return self.model.flow(vector(*x), known)
 
-    def _past(self, x: Array) -> _Past:
-        n, m, k = self.model.order, len(self.model.inputs), self.predictors
-        cursor = n + self.outputs_count + m
-
-        def take(count: int) -> list[Array]:
-            nonlocal cursor
-            cursor += count
-            return [x[i] for i in range(cursor - count, cursor)]
-
-        means = [take(self.input_places) for _ in range(m)]
-        acting = take(m)
-        roots, predictions = [take(n) for _ in range(k)], [take(n) for _ in range(k)]
-        rates = [[take(self.memory_places) for _ in range(n)] for _ in range(k)]
-        offset, drift = (take(n), take(n)) if k else ([], [])
-        read_at, begun = take(2)
-        return _Past(means, acting, roots, predictions, rates, offset, drift, read_at, begun)
+    def _past(self, x: Array) -> DelayedStateMemory:
+        first = self.model.order + self.outputs_count + len(self.model.inputs)
+        size = sum(entry.size for entry in self.extra_memory)
+        return self._sizes.unpack([x[i] for i in range(first, first + size)])
 
     # -- certificate ------------------------------------------------------------------------------------------------
 
@@ -404,7 +353,7 @@ class DelayedStateObserver(HighGainSampled):
     @property
     def prediction_starts(self) -> tuple[float, ...]:
         """Starts of the predictions, predictor by predictor."""
-        return tuple(float(s.start_values[0]) for s in self.model.states) * self.predictors
+        return prediction_starts(self.model, self.predictors)
 
     def linearised_drift(self) -> np.ndarray:
         """Jacobian of the model at its start, shape (n, n)."""
@@ -424,7 +373,7 @@ class DelayedStateObserver(HighGainSampled):
     @cached_property
     def turns(self) -> tuple[tuple[int, ...], ...]:
         """Measurements of each node, from 0: the turns of a round."""
-        return tuple(tuple(i for i, of in enumerate(self.node_of) if of == node) for node in sorted(set(self.node_of)))
+        return turns_of_nodes(self.node_of)
 
     @property
     def node_events(self) -> tuple[str, ...]:
@@ -438,28 +387,10 @@ class DelayedStateObserver(HighGainSampled):
         return (*(self._numbered(event) for event in super()._events()), reading)
 
     def _numbered(self, event: TriggeredEvent) -> TriggeredEvent:
-        node = input_signal(
-            f"{event.name}_node",
-            "1",
-            0.0,
-            "Node that the packet is from, from 1; 0: it has all measurements",
-            variability="discrete",
-        )
+        meaning = "Node that the packet is from, from 1; 0: it has all measurements"
+        node = input_signal(f"{event.name}_node", "1", 0.0, meaning, variability="discrete")
         text = "A packet arrives, a delay after its measurement"
         return TriggeredEvent(event.name, (node, *event.payload), text, event.verdict)
-
-    @staticmethod
-    def _nodes(model: ObserverModel, nodes: Sequence[int]) -> tuple[int, ...]:
-        count = len(model.measurements)
-        if not nodes:
-            return tuple(range(1, count + 1))
-        require_whole("delayed_state_observer", **{f"nodes, entry {i}": node for i, node in enumerate(nodes, 1)})
-        if len(nodes) != count:
-            raise ValueError(
-                f"delayed_state_observer: nodes has {len(nodes)} entries; expected one for each of the {count} "
-                f"measurements of the model {model.name!r}: {', '.join(s.name for s in model.measurements)}."
-            )
-        return tuple(map(int, nodes))
 
 
 def _flat(rows: Any) -> list[Array]:
