@@ -26,7 +26,8 @@ def compare_packets(reference: Result, result: Result, tolerance: Tolerance, len
     sides = (reference, result)
     if any(side.packets for side in sides) and not all(map(keeps_packets, sides)):
         return EventComparison(compared=False)
-    return compare_events(*([_event(packet) for packet in side.packets] for side in sides), tolerance, length)
+    ours, theirs = ([_event(packet) for packet in side.packets] for side in sides)
+    return compare_events(ours, theirs, tolerance, length)
 
 
 def _event(packet: PacketRecord) -> Event:

@@ -33,8 +33,8 @@ def compare_telegrams(reference: Result, result: Result, tolerance: Tolerance, l
     """
     if not keeps_telegrams(reference) or not keeps_telegrams(result):
         return EventComparison(compared=False)
-    sides = ([_event(record) for record in side.events] for side in (reference, result))
-    return compare_events(*sides, tolerance, length)
+    ours, theirs = ([_event(record) for record in side.events] for side in (reference, result))
+    return compare_events(ours, theirs, tolerance, length)
 
 
 def telegram_limits(reference: Sequence[BaliseRecord], tolerance: Tolerance, length: float) -> Limits:

@@ -269,7 +269,7 @@ class DelayedStateObserver(HighGainSampled):
 
     def _past(self, x: Array) -> DelayedStateMemory:
         first = self.model.order + self.outputs_count + len(self.model.inputs)
-        size = sum(entry.size for entry in self.extra_memory)
+        size = sum(entry.size or 1 for entry in self.extra_memory)
         return self._sizes.unpack([x[i] for i in range(first, first + size)])
 
     # -- certificate ------------------------------------------------------------------------------------------------
