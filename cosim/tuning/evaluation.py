@@ -35,13 +35,16 @@ ROWS = 500
 
 @dataclass(frozen=True)
 class Evaluated:
-    """The cost of one candidate with one seed.
+    (
+        """The cost of one candidate with one seed.
 
     Args:
         cost: infinite where the run failed. failure: why, or None. estimates: of the observer at some instants, in
             units of their own sizes, where they were asked for.
         unreadable: whether a run that ended does not show the cost: no other candidate will.
-    """""
+    """
+        ""
+    )
 
     cost: float
     failure: str | None = None
