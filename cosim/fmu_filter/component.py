@@ -99,7 +99,9 @@ class FmuFilterModel:
         if self._seen and (period is None or now >= self._origin + self._next * period - SAME):
             y = np.array([inputs[MEASURED + name] for name in table.measurements], dtype=float)
             known = np.flatnonzero(np.isfinite(y))  # NaN is a missing measurement
-            if len(known):
+            if len(known) == len(y):
+                journal.correct(now, self._u, self._seen, y, self._R)
+            elif len(known):
                 seen = [self._seen[i] for i in known]
                 journal.correct(now, self._u, seen, y[known], self._R[np.ix_(known, known)])
             if period is not None:
