@@ -107,13 +107,13 @@ class FmuFilter(ABC):
         return found
 
     def _steps(self, belief: Belief) -> Array:
-        deviations = np.sqrt(np.maximum(np.diagonal(belief.P), 0.0))
+        deviations = np.sqrt(np.maximum(belief.P.diagonal(), 0.0))
         return np.asarray(np.maximum(SHARE * deviations, LEAST * np.maximum(np.abs(belief.x), self._sizes)))
 
     def _corrected(self, belief: Belief, found: kalman.Corrected, innovation: Array) -> Belief:
         nis = float(kalman.normalised_square(innovation, found.innovation_covariance))
         counted = belief.count + 1
-        return replace(belief, x=found.estimate, P=found.covariance, nis=nis, degrees=len(innovation), count=counted)
+        return Belief(found.estimate, found.covariance, nis, len(innovation), counted)
 
     def _from_inputs(self, t: float, h: float, x: Array, u: Array) -> Array:
         """Covariance that the noises of the inputs add over a step, shape (n, n), by central differences."""
@@ -153,8 +153,10 @@ class ExtendedFilter(FmuFilter):
         points, apart = _about(x, steps)
         ends = self.model.states_after(t, h, points, u)
         F = _slopes(ends, apart)
-        P = kalman.predicted_covariance(belief.P, F, h * self.noises.intensity) + self._from_inputs(t, h, x, u)
-        return replace(belief, x=ends[:, 0].copy(), P=P, count=belief.count + 1)
+        P = kalman.predicted_covariance(belief.P, F, h * self.noises.intensity)
+        if len(self._noisy):
+            P = P + self._from_inputs(t, h, x, u)
+        return Belief(ends[:, 0].copy(), P, belief.nis, belief.degrees, belief.count + 1)
 
     def correct(self, belief: Belief, t: float, u: Array, seen: Sequence[int], y: Array, R: Array) -> Belief:
         """The belief after a measurement; arguments as for `FmuFilter`."""
@@ -187,8 +189,9 @@ class UnscentedFilter(FmuFilter):
         points = unscented.sigma_points(belief.x, _root(belief.P), w.spread)
         found = _scattered(self.model.states_after(t, h, points, u))
         P = kalman.symmetric(unscented.covariance(found, found, w)) + h * self.noises.intensity
-        P = P + self._from_inputs(t, h, belief.x, u)
-        return replace(belief, x=np.asarray(unscented.mean(found, w)), P=P, count=belief.count + 1)
+        if len(self._noisy):
+            P = P + self._from_inputs(t, h, belief.x, u)
+        return Belief(np.asarray(unscented.mean(found, w)), P, belief.nis, belief.degrees, belief.count + 1)
 
     def correct(self, belief: Belief, t: float, u: Array, seen: Sequence[int], y: Array, R: Array) -> Belief:
         """The belief after a measurement; arguments as for `FmuFilter`."""
@@ -201,9 +204,11 @@ class UnscentedFilter(FmuFilter):
 
 def _about(x: Array, steps: Array) -> tuple[Array, Array]:
     """A state and both its neighbours along each axis, shape (n, 2 n + 1), and how far these are apart, shape (n,)."""
-    away = np.diag(steps)
-    above, below = x[:, None] + away, x[:, None] - away
-    return np.concatenate([x[:, None], above, below], axis=1), above.diagonal() - below.diagonal()
+    n = len(x)
+    points = np.repeat(x, 2 * n + 1).reshape(n, 2 * n + 1)
+    above, below = x + steps, x - steps
+    points[:, 1 : n + 1].flat[:: n + 1], points[:, n + 1 :].flat[:: n + 1] = above, below
+    return points, above - below
 
 
 def _slopes(values: Array, apart: Array) -> Array:

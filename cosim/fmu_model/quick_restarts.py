@@ -62,13 +62,15 @@ def prepared_restart(
     set_up = slave.enterInitializationMode if three else slave.setupExperiment
     enter = None if three else slave.enterInitializationMode
 
+    began = ("enterInitializationMode" if three else "setupExperiment") + words
+
     def restart(t: float, x: NDArray, u: NDArray) -> None:
         what = "reset"
         try:
             reset()
             instance.note_reset(t)
             write(x, u)
-            what = ("enterInitializationMode" if three else "setupExperiment") + words
+            what = began
             set_up(startTime=t, stopTime=t + far, **more)
             if enter is not None:
                 what = "enterInitializationMode"

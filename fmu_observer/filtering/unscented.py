@@ -108,7 +108,8 @@ def covariance(found: Scattered, other: Scattered, w: Weights) -> Array:
     Args:
         found: values of the one, m of them. other: values of the other, k of them. w: weights.
     """
-    bend = w.bend * np.outer(shift(found, w), shift(other, w))
+    apart = shift(found, w)
+    bend = w.bend * np.outer(apart, apart if other is found else shift(other, w))
     return w.each * (found.deviations @ other.deviations.T) + bend
 
 
