@@ -32,7 +32,9 @@ SETTINGS: dict[str, dict[str, Any]] = {
 def main() -> None:
     """Print a line for each filter."""
     path = cached_fmu(PLANTS["locomotive"](), fmi_version=3)
-    print(f"{'filter':<10}{'calls':>8}{'calls [us]':>12}{'filter [us]':>13}{'ratio: least':>14}{'median':>8}{'most':>8}")
+    print(
+        f"{'filter':<10}{'calls':>8}{'calls [us]':>12}{'filter [us]':>13}{'ratio: least':>14}{'median':>8}{'most':>8}"
+    )
     for kind, more in SETTINGS.items():
         table = FilterTable.model_validate({"kind": kind, "measurements": {"wheel_speed": 0.05}, "members": 50} | more)
         filter_ = FmuFilterModel(path, table, START)
