@@ -48,7 +48,7 @@ def main() -> None:
         ratios = sorted(whole / alone for alone, whole in pairs)
         print(
             f"{kind:<10}{len(calls) // SAMPLES:>8}{alone:>12.0f}{whole:>13.0f}"
-            f"{ratios[0]:>14.2f}{median(ratios):>8.2f}{ratios[-1]:>8.2f}",
+            f"{ratios[0]:>13.2f}{median(ratios):>8.2f}{ratios[-1]:>8.2f}",
             flush=True,
         )
 
