@@ -100,7 +100,7 @@ class Call:
             found: what was found.
         """
         lines = [_line(signal) for signal in found.failed]
-        lines += [difference.text for difference in found.events.differences]
+        lines += [difference.text for difference in found.event_differences]
         return [*lines[:WORST], *found.notes]
 
 

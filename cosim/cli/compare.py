@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from cosim.results.result import Result
 
 EQUAL, DIFFERENT = 0, 1
-NO_TELEGRAMS = "Telegrams were not compared (--no-telegrams)."
+NO_TELEGRAMS = "Telegrams and packets were not compared (--no-telegrams)."
 EPILOG = (
     'A tolerance file is TOML: [default] with absolute, relative, time and time_relative; [signals."train.*"] with the '
     "same "
@@ -55,7 +55,9 @@ def register(commands: Any) -> None:
     allowed.add_argument(
         "--signals", action="append", metavar="PATTERN", help="compare these signals only; may be repeated"
     )
-    allowed.add_argument("--no-telegrams", action="store_true", help="do not compare the balise telegrams")
+    allowed.add_argument(
+        "--no-telegrams", action="store_true", help="do not compare balise telegrams and packets of a network"
+    )
     allowed.add_argument("--extra-fails", action="store_true", help="signals that only B has are a difference")
     output = parser.add_argument_group("output")
     output.add_argument("--json", action="store_true", help="print the comparison as JSON instead of text")
@@ -88,7 +90,8 @@ def _compare(options: argparse.Namespace, asked: Asked) -> Comparison:
         reference, result = _chosen(reference, result, options.signals)
     odd = list(other.notes) if other is not None else []
     if options.no_telegrams:
-        reference, result, odd = replace(reference, events=()), replace(result, events=()), [*odd, NO_TELEGRAMS]
+        reference, result = (replace(side, events=(), packets=()) for side in (reference, result))
+        odd = [*odd, NO_TELEGRAMS]
     if baseline is not None:
         regression = check(result, replace(baseline, result=reference), tolerances, label=options.result)
         return replace(regression, reference=options.reference, notes=[*regression.notes, *odd])

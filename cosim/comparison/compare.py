@@ -1,4 +1,4 @@
-"""Compare a result with a reference: signals in tolerance tubes, telegrams as events."""
+"""Compare a result with a reference: signals in tolerance tubes, telegrams and packets as events."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from cosim.comparison.curve import Curve, check_time, looks_held, rows_to_keep
 from cosim.comparison.notes import notes, tells_no_units
+from cosim.comparison.packets import compare_packets
 from cosim.comparison.signal import Task, compare_signal
 from cosim.comparison.telegrams import compare_telegrams
 from cosim.comparison.tolerance import Tolerance, Tolerances
@@ -44,7 +45,7 @@ def compare_results(
         curves: whether to keep what pictures need; False saves time and memory.
 
     Returns:
-        One entry for each signal, the telegrams, and notes.
+        One entry for each signal, the telegrams, the packets, and notes.
 
     Raises:
         ComparisonError: a run is empty, its times fall, or the two have no signal or no time in common.
@@ -64,6 +65,7 @@ def compare_results(
         compare_telegrams(reference, result, tolerances.default, pair.length),
         notes(reference, result, tolerances, labels),
         extra_fails,
+        compare_packets(reference, result, tolerances.default, pair.length),
     )
 
 

@@ -1,34 +1,16 @@
-"""Balise telegrams compared as events: matched, missing, extra, late, or with another content."""
+"""Balise telegrams compared as events."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from math import isfinite, isnan
-from typing import Literal
+from collections.abc import Sequence
 
-import numpy as np
-import scipy
-
-from cosim.comparison.span import rounding
+from cosim.comparison.events import Event, Limits, compare_events, event_limits
 from cosim.comparison.tolerance import Tolerance
-from cosim.comparison.verdict import EventComparison, EventDifference
+from cosim.comparison.verdict import EventComparison
 from cosim.results.result import BaliseRecord, Result
 
 TIMES = {"stamp": "passed", "delivered_at": "delivered"}
 PAYLOAD = {"position": "m", "true_position": "m", "odometer_reading": "m/s", "location_accuracy": "m"}
-LARGEST_GROUP = 1000  # telegrams with one name: more of them are paired in order, not by the best assignment
-NEAR_STEPS = 0.01  # of the length: how far off a telegram with another name may be the same
-
-Pair = tuple[BaliseRecord, BaliseRecord]
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What two telegrams may differ by: `time` [s], and `payload` by field in its unit."""
-
-    time: float
-    payload: dict[str, float]
 
 
 def keeps_telegrams(result: Result) -> bool:
@@ -51,14 +33,8 @@ def compare_telegrams(reference: Result, result: Result, tolerance: Tolerance, l
     """
     if not keeps_telegrams(reference) or not keeps_telegrams(result):
         return EventComparison(compared=False)
-    limits = telegram_limits(reference.events, tolerance, length)
-    pairs, missing, extra = _match(reference.events, result.events, max(10.0 * limits.time, NEAR_STEPS * length))
-    differences = [d for pair in pairs for d in _differences(*pair, limits)]
-    differences += [EventDifference("missing", one, None, f"{_name(one)} is missing") for one in missing]
-    differences += [EventDifference("extra", None, two, f"{_name(two)} is only in the result") for two in extra]
-    differences.sort(key=lambda d: (d.reference or d.result).stamp)  # type: ignore[union-attr]  # one of them is there
-    shift = max((abs(two.stamp - one.stamp) for one, two in pairs), default=0.0)
-    return EventComparison(len(pairs), differences, shift)
+    sides = ([_event(record) for record in side.events] for side in (reference, result))
+    return compare_events(*sides, tolerance, length)
 
 
 def telegram_limits(reference: Sequence[BaliseRecord], tolerance: Tolerance, length: float) -> Limits:
@@ -69,94 +45,16 @@ def telegram_limits(reference: Sequence[BaliseRecord], tolerance: Tolerance, len
         tolerance: what is allowed.
         length: of the run [s].
     """
-    payload = {}
-    for name in PAYLOAD:
-        values = [v for record in reference if isfinite(v := getattr(record, name))]
-        spread = max(values) - min(values) if values else 0.0
-        payload[name] = tolerance.value_for(spread or max(map(abs, values), default=0.0))
-    return Limits(tolerance.time_for(length), payload)
+    return event_limits([_event(record) for record in reference], tolerance, length)
 
 
-def _match(
-    reference: Sequence[BaliseRecord], result: Sequence[BaliseRecord], window: float
-) -> tuple[list[Pair], list[BaliseRecord], list[BaliseRecord]]:
-    """Pairs of telegrams: first of the same name and kind, then what is left by nearest stamp."""
-    pairs: list[Pair] = []
-    missing: list[BaliseRecord] = []
-    extra: list[BaliseRecord] = []
-    one, two = _groups(reference), _groups(result)
-    for key in {**one, **two}:
-        found, left, right = _assign(one.get(key, []), two.get(key, []))
-        pairs, missing, extra = pairs + found, missing + left, extra + right
-    found, missing, extra = _assign(missing, extra)
-    for pair in found:
-        if abs(pair[0].stamp - pair[1].stamp) <= window:
-            pairs.append(pair)
-        else:
-            missing.append(pair[0])
-            extra.append(pair[1])
-    return sorted(pairs, key=lambda p: p[0].stamp), missing, extra
-
-
-def _groups(records: Iterable[BaliseRecord]) -> dict[tuple[str, str], list[BaliseRecord]]:
-    groups: dict[tuple[str, str], list[BaliseRecord]] = {}
-    for record in sorted(records, key=lambda r: r.stamp):
-        groups.setdefault((record.identity, record.kind), []).append(record)
-    return groups
-
-
-def _assign(
-    one: list[BaliseRecord], two: list[BaliseRecord]
-) -> tuple[list[Pair], list[BaliseRecord], list[BaliseRecord]]:
-    """Pairs with the least sum of time differences, and what is left on either side."""
-    count = min(len(one), len(two))
-    rows = columns = np.arange(count)
-    if len(one) != len(two) and count and max(len(one), len(two)) <= LARGEST_GROUP:
-        stamps = [np.array([record.stamp for record in side]) for side in (one, two)]
-        rows, columns = scipy.optimize.linear_sum_assignment(np.abs(stamps[0][:, None] - stamps[1]))
-    taken = set(rows.tolist()), set(columns.tolist())
-    pairs = [(one[int(i)], two[int(j)]) for i, j in zip(rows, columns, strict=True)]
-    left, right = (
-        [r for k, r in enumerate(side) if k not in done] for side, done in zip((one, two), taken, strict=True)
+def _event(record: BaliseRecord) -> Event:
+    return Event(
+        record,
+        f"telegram {record.identity!r} ({record.kind}) of {record.stamp:.9g} s",
+        {"identity": record.identity, "kind": record.kind},
+        {what: getattr(record, name) for name, what in TIMES.items()},
+        {name: getattr(record, name) for name in PAYLOAD},
+        record.outcomes,
+        PAYLOAD,
     )
-    return pairs, left, right
-
-
-def _differences(one: BaliseRecord, two: BaliseRecord, limits: Limits) -> list[EventDifference]:
-    times = [text for name in TIMES if (text := _time_text(name, one, two, limits.time))]
-    contents = [text for name in PAYLOAD if (text := _payload_text(name, one, two, limits.payload[name]))]
-    contents += [f"{name} {a!r} instead of {b!r}" for name, a, b in _words(one, two) if a != b]
-    kinds: tuple[tuple[Literal["time", "payload"], list[str]], ...] = (("time", times), ("payload", contents))
-    return [EventDifference(kind, one, two, f"{_name(one)}: {', '.join(texts)}") for kind, texts in kinds if texts]
-
-
-def _time_text(field: str, one: BaliseRecord, two: BaliseRecord, allowed: float) -> str:
-    a, b = getattr(one, field), getattr(two, field)
-    if isnan(a) or isnan(b):
-        return (
-            ""
-            if isnan(a) and isnan(b)
-            else f"{TIMES[field]} {'never' if isnan(b) else f'at {b:.9g} s, in the reference never'}"
-        )
-    if abs(b - a) <= allowed + rounding(a, b):
-        return ""
-    return f"{TIMES[field]} {abs(b - a):.4g} s {'late' if b > a else 'early'} (allowed {allowed:.4g} s)"
-
-
-def _payload_text(field: str, one: BaliseRecord, two: BaliseRecord, allowed: float) -> str:
-    a, b = getattr(one, field), getattr(two, field)
-    if a == b or (isnan(a) and isnan(b)) or abs(b - a) <= allowed:
-        return ""
-    return (
-        f"{field} {b:.9g} {PAYLOAD[field]} instead of {a:.9g} {PAYLOAD[field]} (allowed {allowed:.4g} {PAYLOAD[field]})"
-    )
-
-
-def _words(one: BaliseRecord, two: BaliseRecord) -> list[tuple[str, str, str]]:
-    words = [("identity", two.identity, one.identity), ("kind", two.kind, one.kind)]
-    both = [name for name in one.outcomes if name in two.outcomes]
-    return words + [(f"outcome at {name}", two.outcomes[name], one.outcomes[name]) for name in both]
-
-
-def _name(record: BaliseRecord) -> str:
-    return f"telegram {record.identity!r} ({record.kind}) of {record.stamp:.9g} s"

@@ -6,13 +6,13 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from math import isnan
 
-from cosim.comparison.verdict import Comparison, Finding, SignalComparison
+from cosim.comparison.verdict import Comparison, EventComparison, Finding, SignalComparison
 from fmus.text_table import text_table
 
 HEAD = ("signal", "unit", "max error", "at [s]", "allowed", "shift [s]", "outside", "verdict")
 SPAN = ("starts_early", "starts_late", "ends_early", "ends_late", "gap")
 LONGEST_NAME = 48
-FINDINGS_SHOWN, TELEGRAMS_SHOWN, FAILED_SHOWN = 4, 10, 40
+FINDINGS_SHOWN, EVENTS_SHOWN, FAILED_SHOWN = 4, 10, 40
 
 
 def comparison_text(comparison: Comparison, verbose: bool = False) -> str:
@@ -20,7 +20,7 @@ def comparison_text(comparison: Comparison, verbose: bool = False) -> str:
 
     Args:
         comparison: what was found.
-        verbose: all signals, findings and telegrams; else those that fail, a few findings each.
+        verbose: all signals, findings, telegrams and packets; else those that fail, a few findings each.
     """
     shared = _shared(comparison)
     shown = _shown(comparison, verbose, shared)
@@ -34,7 +34,7 @@ def comparison_text(comparison: Comparison, verbose: bool = False) -> str:
         lines += ["", f"  all {count} signals: {text}"]
     for signal in shown[:limit]:
         lines += _details(signal, verbose, shared)
-    lines += _telegrams(comparison, verbose)
+    lines += _events(comparison, verbose)
     if comparison.notes:
         lines += ["", *(f"note: {note}" for note in comparison.notes)]
     return "\n".join(lines)
@@ -72,12 +72,20 @@ def _headline(comparison: Comparison) -> str:
         "ignored": "ignored",
     }
     counts = [f"{statuses.count(s)} {word}" for s, word in words.items() if s in statuses]
-    events = comparison.events
-    told = f"{events.matched} telegrams match" if events.compared else "telegrams not compared: one side keeps none"
-    if events.differences:
-        told = f"{events.matched} telegrams paired, {len(events.differences)} differences"
+    told = _events_told("telegrams", comparison.events)
+    packets = comparison.packets
+    if packets.matched or packets.differences or not packets.compared:
+        told += f"; {_events_told('packets', packets)}"
     verdict = "agrees with" if comparison.equal else "DIFFERS from"
     return f"{comparison.result} {verdict} {comparison.reference}: {', '.join(counts)}; {told}."
+
+
+def _events_told(what: str, events: EventComparison) -> str:
+    if not events.compared:
+        return f"{what} not compared: one side keeps none"
+    if events.differences:
+        return f"{events.matched} {what} paired, {len(events.differences)} differences"
+    return f"{events.matched} {what} match"
 
 
 def _table(signals: Sequence[SignalComparison]) -> list[str]:
@@ -124,10 +132,13 @@ def _details(signal: SignalComparison, verbose: bool, shared: Mapping[str, int])
     return lines
 
 
-def _telegrams(comparison: Comparison, verbose: bool) -> list[str]:
-    differences = comparison.events.differences
-    if not differences:
-        return []
-    limit = len(differences) if verbose else TELEGRAMS_SHOWN
-    lines = ["", "telegrams:", *(f"  {difference.text}" for difference in differences[:limit])]
-    return [*lines, f"  ... and {len(differences) - limit} more"] if len(differences) > limit else lines
+def _events(comparison: Comparison, verbose: bool) -> list[str]:
+    lines: list[str] = []
+    for what, events in (("telegrams", comparison.events), ("packets", comparison.packets)):
+        differences = events.differences
+        limit = len(differences) if verbose else EVENTS_SHOWN
+        if differences:
+            lines += ["", f"{what}:", *(f"  {difference.text}" for difference in differences[:limit])]
+        if len(differences) > limit:
+            lines.append(f"  ... and {len(differences) - limit} more")
+    return lines

@@ -9,7 +9,9 @@ from typing import Any, Literal
 import numpy as np
 
 from cosim.comparison.tolerance import Tolerance
-from cosim.results.result import BaliseRecord
+from cosim.results.result import BaliseRecord, PacketRecord
+
+Record = BaliseRecord | PacketRecord
 
 Kind = Literal[
     "value",  # outside the tube
@@ -122,29 +124,29 @@ class SignalComparison:
 
 @dataclass(frozen=True, slots=True)
 class EventDifference:
-    """One telegram that is not as in the reference.
+    """One telegram or packet that is not as in the reference.
 
     Args:
         kind: ``missing``, ``extra``, ``time`` (stamp or delivery) or ``payload``.
-        reference, result: the telegrams; None where there is none.
+        reference, result: the telegrams or packets; None where there is none.
         text: one line for people.
     """
 
     kind: Literal["missing", "extra", "time", "payload"]
-    reference: BaliseRecord | None
-    result: BaliseRecord | None
+    reference: Record | None
+    result: Record | None
     text: str
 
 
 @dataclass(frozen=True)
 class EventComparison:
-    """The comparison of two tables of telegrams.
+    """The comparison of two tables of telegrams or packets.
 
     Args:
-        matched: number of telegrams that are in both.
+        matched: number of those that are in both.
         differences: what is missing, extra or different.
         max_shift: largest difference of two stamps [s].
-        compared: False where one side keeps no telegrams at all (a plain CSV file, say), so that nothing was compared.
+        compared: False where one side keeps none at all (a plain CSV file, say), so that nothing was compared.
     """
 
     matched: int = 0
@@ -160,7 +162,7 @@ class Comparison:
     Args:
         reference, result: what they are called.
         signals: one entry for each signal, in the order of the reference, extra ones last.
-        events: of the telegrams.
+        events: of the telegrams. packets: of the packets of a network.
         notes: what to know beside it: other versions, other parameters, unused tolerances.
         extra_fails: whether signals that only the result has count as a difference.
     """
@@ -171,11 +173,17 @@ class Comparison:
     events: EventComparison = field(default_factory=EventComparison)
     notes: Sequence[str] = ()
     extra_fails: bool = False
+    packets: EventComparison = field(default_factory=EventComparison)
 
     @property
     def equal(self) -> bool:
         """Whether everything is within tolerance."""
-        return not self.failed and not self.events.differences
+        return not self.failed and not self.event_differences
+
+    @property
+    def event_differences(self) -> list[EventDifference]:
+        """Telegrams, then packets, that are not as in the reference."""
+        return [*self.events.differences, *self.packets.differences]
 
     @property
     def failed(self) -> list[SignalComparison]:
@@ -203,12 +211,8 @@ class Comparison:
             "reference": self.reference,
             "result": self.result,
             "signals": [_signal_data(s) for s in self.signals],
-            "events": {
-                "compared": self.events.compared,
-                "matched": self.events.matched,
-                "max_shift": self.events.max_shift,
-                "differences": [{"kind": d.kind, "text": d.text} for d in self.events.differences],
-            },
+            "events": _event_data(self.events),
+            "packets": _event_data(self.packets),
             "notes": list(self.notes),
         }
 
@@ -218,6 +222,11 @@ def _badness(signal: SignalComparison) -> float:
         return float("inf")
     ratios = [f.size / f.allowed if f.allowed > 0.0 else float("inf") for f in signal.findings if f.kind == "value"]
     return max(ratios, default=1.0)
+
+
+def _event_data(events: EventComparison) -> dict[str, Any]:
+    told = {name: getattr(events, name) for name in ("compared", "matched", "max_shift")}
+    return told | {"differences": [{"kind": d.kind, "text": d.text} for d in events.differences]}
 
 
 def _signal_data(signal: SignalComparison) -> dict[str, Any]:

@@ -259,8 +259,23 @@ class NetworkService:
 
     # -- what came out ----------------------------------------------------------------------------------------------
 
-    def records(self) -> list[PacketRecord]:
-        """All packets in the order of sending, duplicates behind theirs."""
+    def settled(self, first: int) -> list[PacketRecord]:
+        """Packets in the order of sending, up to the first that is still on its way or not yet used where it was told.
+
+        Args:
+            first: number of packets at the begin that are left out.
+        """
+        until = min((packet.place for packet in self.mailbox.waiting), default=len(self.entries))
+        if any(listener.receiver is not None and listener.receiver.busy for listener in self.listeners):
+            return []
+        return self.records(first, until)
+
+    def records(self, first: int = 0, until: int | None = None) -> list[PacketRecord]:
+        """Packets in the order of sending, duplicates behind theirs.
+
+        Args:
+            first: number of packets at the begin that are left out. until: number of the first that is left out behind.
+        """
         names = [node.signals for node in self.settings.nodes]
         return [
             PacketRecord(
@@ -272,7 +287,7 @@ class NetworkService:
                 entry.packet.kind,  # type: ignore[arg-type] # as `_transmit` names it
                 self._outcomes(entry),
             )
-            for entry in self.entries
+            for entry in self.entries[first:until]
         ]
 
     def _outcomes(self, entry: Entry) -> dict[str, str]:

@@ -38,7 +38,7 @@ class Rerun:
     Args:
         directory: the results folder. manifest: what it says of itself.
         outcome: of the new run. comparison: of the new run with the stored results.
-        verdict: ``bit-identical`` where every number and every telegram is the same.
+        verdict: ``bit-identical`` where every number, telegram and packet is the same.
         changes: what is not as it was: versions, files, models, settings; one line each.
         paths: where the new results were written, by kind; empty where they were not.
         stored_failure: why the stored run ended early, or None.
@@ -66,7 +66,7 @@ class Rerun:
         failed = self.comparison.failed
         lines += [f"  {signal.name}: {_worst(signal)}" for signal in failed[:LOUDEST]]
         lines += [f"  and {len(failed) - LOUDEST} signals more"] if len(failed) > LOUDEST else []
-        lines += [f"  {difference.text}" for difference in self.comparison.events.differences[:LOUDEST]]
+        lines += [f"  {difference.text}" for difference in self.comparison.event_differences[:LOUDEST]]
         if self.verdict == "within tolerance":
             largest = max((s.max_error for s in self.comparison.signals if s.status == "within"), default=0.0)
             lines.append(f"  the largest difference is {largest:.3g} in the unit of its signal")
@@ -175,7 +175,8 @@ def _as_far_as(stored: Result, result: Result) -> Result:
         return result
     end = float(stored.time[-1])
     events = [event for event in result.events if not event.delivered_at > end][: len(stored.events)]
-    return replace(result, table=result.table[: len(stored.table)], events=events)
+    packets = result.packets[: len(stored.packets)]  # what is kept in order of sending
+    return replace(result, table=result.table[: len(stored.table)], events=events, packets=packets)
 
 
 def _changes(manifest: Manifest, outcome: Outcome) -> list[str]:

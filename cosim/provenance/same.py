@@ -7,19 +7,24 @@ from dataclasses import astuple
 
 import numpy as np
 
-from cosim.results.result import BaliseRecord, Result
+from cosim.results.result import BaliseRecord, PacketRecord, Result
 
 CHUNK = 65536
 
 
 def same_result(first: Result, second: Result) -> bool:
-    """Whether tables and telegrams agree in every bit; one NaN is as good as another, since text files keep no more of
-    it.
+    """Whether tables, telegrams and packets agree in every bit.
+
+    One NaN is as good as another, since text files keep no more of it.
 
     Args:
         first: one of them. second: the other.
     """
-    return same_table(first.table, second.table) and same_events(first.events, second.events)
+    return (
+        same_table(first.table, second.table)
+        and same_events(first.events, second.events)
+        and same_events(first.packets, second.packets)
+    )
 
 
 def same_table(first: np.ndarray, second: np.ndarray) -> bool:
@@ -38,8 +43,8 @@ def same_table(first: np.ndarray, second: np.ndarray) -> bool:
     )
 
 
-def same_events(first: Sequence[BaliseRecord], second: Sequence[BaliseRecord]) -> bool:
-    """Whether two lists of telegrams are the same.
+def same_events(first: Sequence[BaliseRecord | PacketRecord], second: Sequence[BaliseRecord | PacketRecord]) -> bool:
+    """Whether two lists of telegrams or packets are the same.
 
     Args:
         first: one of them. second: the other.

@@ -131,7 +131,8 @@ def _read(folder: Path, table_name: str | None = None) -> tuple[ResultData, Mapp
         raise ValueError(f"{SUMMARY} has layout {content.get('layout')!r}, this version reads layout {LAYOUT}.")
     signals = [SignalInfo(**signal) for signal in content["signals"]]
     if not content.get("ended", True):  # it was streamed here, and its program died
-        return read_unfinished(folder / usual_file("npy"), folder / EVENTS, folder / MESSAGES, content), content
+        rows, events, logged, sent = (folder / name for name in (usual_file("npy"), EVENTS, MESSAGES, PACKETS))
+        return read_unfinished(rows, events, logged, sent, content), content
     table = _table(folder, table_name)
     messages = read_messages(folder / MESSAGES) if (folder / MESSAGES).exists() else []  # older results have none
     packets = read_packets(folder / PACKETS) if (folder / PACKETS).exists() else []

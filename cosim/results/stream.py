@@ -1,8 +1,9 @@
 """The stream: the results folder of a run that is still going on, so that what was computed outlives the program.
 
 ``table.npy`` is a whole NumPy file after every flush: rows are written first, their number in its header afterwards.
-Rows are in SI. Those since the last flush are in the block, a file as well. Telegrams are appended, messages are few
-and written anew. Until the run ends ``summary.json`` says that it has not. Touches only the folder it is given.
+Rows are in SI. Those since the last flush are in the block, a file as well. Telegrams and packets are appended,
+messages are few and written anew. Until the run ends ``summary.json`` says that it has not. Touches only the folder it
+is given.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 import csv
 import io
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -20,11 +21,12 @@ import numpy as np
 from cosim.diagnostics.messages import MessageLog, in_order, write_messages
 from cosim.errors import OutputError
 from cosim.results.block_file import BLOCK_FILE, BlockFile
-from cosim.results.data import BaliseRecord, SignalInfo
+from cosim.results.data import BaliseRecord, PacketRecord, SignalInfo
 from cosim.results.events_file import record_row, write_events
-from cosim.results.folder import EVENTS, LAYOUT, MESSAGES, SUMMARY, check_writable
+from cosim.results.folder import EVENTS, LAYOUT, MESSAGES, PACKETS, SUMMARY, check_writable
 from cosim.results.formats.catalogue import table_files, usual_file
 from cosim.results.formats.growing_npy import growing_header
+from cosim.results.packets_file import packet_row, write_packets
 from cosim.results.row_file import RowFile
 from cosim.results.si import UnitOf, convert, described, foreign_units
 from cosim.results.summary_file import write_summary
@@ -45,7 +47,8 @@ class Stream:
         signals: what is recorded, in the components' own units. unit_of: the unit of a column, None where there is
             none.
         summary: what is known before the run.
-        events: the telegrams so far, which only grow. logs: what the components have logged so far.
+        events: the telegrams so far, which only grow. packets: those of the network beyond so many, as far as it is
+            known what became of them; None where there is no network. logs: what the components have logged so far.
 
     `signals` describes the columns as they are in the file, in SI; `units` are those of the columns that are converted.
 
@@ -61,13 +64,14 @@ class Stream:
         summary: Mapping[str, Any],
         events: Callable[[], Sequence[BaliseRecord]],
         logs: Sequence[MessageLog],
+        packets: Callable[[int], Sequence[PacketRecord]] | None = None,
     ) -> None:
         self.seconds = SECONDS
         self.directory = check_writable(directory)
         self.units = foreign_units(signals, unit_of)
         self.signals = described(signals, self.units)
-        self._events, self._logs = events, logs
-        self._told = self._logged = 0
+        self._events, self._logs, self._packets = events, logs, packets
+        self._told = self._logged = self._sent = 0
         self._file: _StreamFile | None = None
         self._block: BlockFile | None = None
         self._begin(summary)
@@ -106,24 +110,31 @@ class Stream:
         return self._block
 
     def append(self) -> None:
-        """Bring the telegrams and messages into the folder that are not there yet.
+        """Bring the telegrams, packets and messages into the folder that are not there yet.
 
         Raises:
             OSError: the disk refuses.
         """
         events = self._events()
         if len(events) > self._told:
-            text = io.StringIO()
-            csv.writer(text, lineterminator="\n").writerows(_cells(event) for event in events[self._told :])
-            with (self.directory / EVENTS).open("a", encoding="utf-8", newline="") as file:
-                file.write(text.getvalue())
+            self._add_rows(EVENTS, (_cells(event) for event in events[self._told :]))
             self._told = len(events)
+        packets = () if self._packets is None else self._packets(self._sent)
+        if packets:
+            self._add_rows(PACKETS, (packet_row(packet).values() for packet in packets))
+            self._sent += len(packets)
         total = sum(log.total for log in self._logs)
         if total > self._logged:
             draft = self.directory / f".{MESSAGES}"
             write_messages(draft, in_order(self._logs))
             draft.replace(self.directory / MESSAGES)
             self._logged = total
+
+    def _add_rows(self, name: str, rows: Iterable[Iterable[str]]) -> None:
+        text = io.StringIO()
+        csv.writer(text, lineterminator="\n").writerows(rows)
+        with (self.directory / name).open("a", encoding="utf-8", newline="") as file:
+            file.write(text.getvalue())
 
     def finish(self) -> None:
         """Give back the space that was reserved and not used; what is in the folder stays."""
@@ -138,9 +149,11 @@ class Stream:
         """
         folder = self.directory
         try:
-            for name in (SUMMARY, "report.html", BLOCK_FILE, *table_files().values()):
+            for name in (SUMMARY, "report.html", BLOCK_FILE, PACKETS, *table_files().values()):
                 (folder / name).unlink(missing_ok=True)
             write_events(folder / EVENTS, ())
+            if self._packets is not None:
+                write_packets(folder / PACKETS, ())
             write_messages(folder / MESSAGES, ())
             content = {
                 "layout": LAYOUT,

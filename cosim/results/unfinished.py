@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,10 @@ import numpy as np
 
 from cosim.diagnostics.messages import read_messages
 from cosim.results.block_file import BLOCK_FILE, read_block
-from cosim.results.data import BaliseRecord, ResultData, SignalInfo
-from cosim.results.events_file import read_events
+from cosim.results.data import ResultData, SignalInfo
+from cosim.results.events_file import Record, read_events
 from cosim.results.formats.growing_npy import read_grown
+from cosim.results.packets_file import read_packets
 
 SPARE = ".unfinished"
 """The folder, within that of the results, to which a run is streamed in case its process dies."""
@@ -25,11 +27,12 @@ EXPLAINED = (
 )
 
 
-def read_unfinished(table: Path, events: Path, messages: Path, content: dict[str, Any]) -> ResultData:
+def read_unfinished(table: Path, events: Path, messages: Path, packets: Path, content: dict[str, Any]) -> ResultData:
     """Everything that was whole when the program died.
 
     Args:
-        table, events, messages: the files. content: of ``summary.json``; how far the run came is added to it.
+        table, events, messages, packets: the files; the last two may be missing.
+        content: of ``summary.json``; how far the run came is added to it.
 
     Raises:
         ValueError: a file is not what a stream writes. OSError: it cannot be read.
@@ -42,7 +45,8 @@ def read_unfinished(table: Path, events: Path, messages: Path, content: dict[str
     )
     signals = [SignalInfo(**signal) for signal in content["signals"]]
     logged = read_messages(messages) if messages.exists() else []
-    return ResultData(rows, signals, _whole_lines(events), messages=logged)
+    sent = _whole_lines(packets, read_packets) if packets.exists() else []
+    return ResultData(rows, signals, _whole_lines(events, read_events), messages=logged, packets=sent)
 
 
 def _all_rows(table: Path) -> np.ndarray:
@@ -58,12 +62,12 @@ def _all_rows(table: Path) -> np.ndarray:
     return np.concatenate([rows, new]) if len(new) else rows
 
 
-def _whole_lines(path: Path) -> list[BaliseRecord]:
-    """The telegrams but for a last line that was not written to its end."""
+def _whole_lines(path: Path, read: Callable[[Path], list[Record]]) -> list[Record]:
+    """The telegrams or packets but for a last line that was not written to its end."""
     content = path.read_bytes()
     if content.endswith(b"\n") or b"\n" not in content:
-        return read_events(path)
+        return read(path)
     with tempfile.TemporaryDirectory() as scratch:
         whole = Path(scratch) / path.name
         whole.write_bytes(content[: content.rindex(b"\n") + 1])
-        return read_events(whole)
+        return read(whole)

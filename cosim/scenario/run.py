@@ -376,7 +376,8 @@ class _Setup:
         events = [] if self.service is None else self.service.mailbox.log
         logs = [component.messages for component in self.components.values()]
         folder, begun = self.streaming
-        self.stream = Stream(folder, master.plan.signals, self._unit, summary, lambda: events, logs)
+        packets = None if self.packets is None else self.packets.settled
+        self.stream = Stream(folder, master.plan.signals, self._unit, summary, lambda: events, logs, packets)
         master.recorder = Recorder(master.plan.signals, 0, every=self.table.master.record_every, stream=self.stream)
         begun()
 

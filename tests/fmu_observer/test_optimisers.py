@@ -137,6 +137,15 @@ def test_cma_es_is_that_of_its_package() -> None:
         ours.tell(ours.ask(), bowl(points))
 
 
+def test_cma_es_takes_a_single_coordinate() -> None:
+    """Its package fails where the only deviation grows beyond a third of the bounds."""
+    search = CovarianceMatrixAdaptation([-3.0], [0.0])
+    for _ in range(30):
+        points = search.ask()
+        search.tell(points, (points[:, 0] + 0.01) ** 2)
+    assert search.best == pytest.approx([-0.01], abs=1e-3)
+
+
 def test_the_descent_is_that_of_scipy() -> None:
     start, width = np.array([-0.5, 1.0, 2.0]), HIGH - LOW
     optimiser = LikelihoodGradient(LOW, HIGH, start=start, gradients=True)

@@ -163,6 +163,7 @@ def comparison_page(comparison: Comparison, pictures: Mapping[str, bytes]) -> st
         pictures=pictures,
         not_drawn=sum(s.curves is not None for s in comparison.failed) - len(pictures),
         differences=_cut([d.text for d in comparison.events.differences], EVENTS_SHOWN),
+        packet_differences=_cut([d.text for d in comparison.packets.differences], EVENTS_SHOWN),
         table=_table(comparison),
     )
 
@@ -175,7 +176,7 @@ def _cut(lines: list[str], most: int = FINDINGS_SHOWN, rest: str = "and {} more"
 def _facts(comparison: Comparison) -> list[Fact]:
     """The numbers at the head of the page."""
     compared = [s for s in comparison.signals if s.status in ("equal", "within", "differs")]
-    failed, events = comparison.failed, comparison.events
+    failed = comparison.failed
     used = max(map(_use_of_tolerance, comparison.signals), default=-1.0)
     cards: list[Fact] = [
         (
@@ -188,15 +189,10 @@ def _facts(comparison: Comparison) -> list[Fact]:
     ]
     if not failed and used >= 0.0:
         cards.append(("Tolerance", f"{number(100.0 * used, 2)} %", "used at most", ""))
-    if events.compared and (events.matched or events.differences):
-        cards.append(
-            (
-                "Balise telegrams",
-                f"{events.matched} match",
-                f"{len(events.differences)} differences",
-                _mood(not events.differences),
-            )
-        )
+    for what, events in (("Balise telegrams", comparison.events), ("Packets", comparison.packets)):
+        if events.compared and (events.matched or events.differences):
+            told = f"{events.matched} match", f"{len(events.differences)} differences"
+            cards.append((what, *told, _mood(not events.differences)))
     return cards
 
 
@@ -211,9 +207,11 @@ def verdict_text(comparison: Comparison) -> str:
         comparison: what was found.
     """
     compared = [s for s in comparison.signals if s.status in ("equal", "within", "differs")]
-    failed, telegrams = comparison.failed, comparison.events
+    failed, telegrams, packets = comparison.failed, comparison.events, comparison.packets
     text = f"{len(compared)} signals were compared; "
     text += "all are within tolerance." if not failed else f"{len(failed)} are not as in the reference."
+    if packets.differences:
+        text += f" Of the packets {packets.matched} match, and {len(packets.differences)} differences were found."
     if not telegrams.compared:
         return text + " Telegrams were not compared: one side keeps none."
     if telegrams.differences:

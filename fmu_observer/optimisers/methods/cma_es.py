@@ -54,6 +54,8 @@ class CovarianceMatrixAdaptation(Optimiser):
             "verbose": -9,
             "verb_log": 0,
         }
+        if self.dimension == 1:
+            settings["maxstd"] = np.inf  # the package fails where it limits the only deviation there is
         if population is not None:
             settings["popsize"] = population
         unit = np.clip((first - self.lower) / (self.upper - self.lower), 0.0, 1.0)

@@ -11,6 +11,8 @@ from toys import STOP, run, scenario
 
 from cosim import Outcome, Scenario
 from cosim.errors import CosimError
+from cosim.results import stream as stream_module
+from cosim.results.load import load_result
 from cosim.results.packets_file import read_packets, write_packets
 
 ROUGH: dict[str, Any] = {
@@ -220,3 +222,33 @@ def test_packets_are_kept_to_the_last_bit(tmp_path: object) -> None:
     write_packets(path, packets)
     again = read_packets(path)
     assert [repr(p) for p in again] == [repr(p) for p in packets]  # nan is nan
+
+
+def test_what_was_sent_outlives_a_run_that_dies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the folder are the packets until the first that was still on its way, and none of a former run."""
+    monkeypatch.setattr(stream_module, "SECONDS", 0.0)
+    whole = run(0.01, **ROUGH).result.packets
+    (tmp_path / "packets.csv").write_text("of a former run")
+
+    def die(t: float, _stop: float) -> None:
+        if t > 1.0:
+            raise RuntimeError("the program dies")
+
+    with pytest.raises(RuntimeError, match="dies"):
+        scenario(0.01, **ROUGH).run(warn=lambda _: None, stream=tmp_path, progress=die)
+    found = load_result(tmp_path)
+    count = len(found.packets)
+    assert 1.0 <= found.time[-1] < STOP  # progress is told now and then
+    assert [repr(p) for p in found.packets] == [repr(p) for p in whole[:count]]
+    assert whole[count].delivered_at > found.time[-1]
+    assert any(p.kind == "lost" for p in found.packets)
+    ended = scenario(0.01, **ROUGH).run(warn=lambda _: None, stream=tmp_path)
+    assert [repr(p) for p in load_result(tmp_path).packets] == [repr(p) for p in ended.result.packets]
+
+
+def test_doubling_packets_loses_no_other_ones() -> None:
+    """Loss depends on the seed and the number of the transmission, not on how many packets came before."""
+    once, twice = (run(0.1, duplicate_fraction=fraction, **ROUGH).result.packets for fraction in (0.0, 0.7))
+    assert any(p.kind == "duplicate" for p in twice)
+    rest = [[(p.number, p.kind, p.stamp) for p in side if p.kind != "duplicate"] for side in (once, twice)]
+    assert rest[0] == rest[1]

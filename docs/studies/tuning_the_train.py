@@ -1,0 +1,183 @@
+"""Observers of the train on the line Amsterdam - Utrecht before and after tuning, judged with seeds that no search saw.
+
+``python docs/studies/tuning_the_train.py`` prints the table of docs/tuning_the_train.md, with ``--write`` it puts it
+there. The scenario is the file ``drawn.toml`` of that page; the values are those that the commands there found.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+from cosim import Scenario
+from cosim.studies.groups import mean_of
+from cosim.studies.measures import error_measures
+
+PAGE = Path(__file__).parents[1] / "tuning_the_train.md"
+JUDGES = range(10, 16)  # searches saw 0 and 1
+
+EKF, THETA, JAMS = "balise_odometer_ekf", "adaptive_gain_cdo", "quasi_lpv_uio"
+
+
+class Tuned(NamedTuple):
+    """An observer with what a search found.
+
+    Attributes:
+        observer: component of the scenario. label: of the row. values: parameters by name; none as it stands there.
+    """
+
+    observer: str
+    label: str
+    values: Mapping[str, float]
+
+
+ROUNDS: tuple[tuple[Tuned, ...], ...] = (
+    (
+        Tuned(EKF, "EKF, guessed", {}),
+        Tuned(THETA, "adaptive gain, as in the scenario", {}),
+        Tuned(JAMS, "jam rules, as in the scenario", {}),
+    ),
+    (
+        Tuned(
+            EKF,
+            "EKF, CMA-ES: preset `tuned`",
+            {
+                "acceleration_density": 2.99e-4,
+                "disturbance_density": 5.19e-4,
+                "creep_share": 0.0925,
+                "creep_time": 16.9,
+                "odometer_deviation": 0.0276,
+                "odometer_gate": 5.79,
+            },
+        ),
+        Tuned(THETA, "adaptive gain, CMA-ES", {"theta_max": 1.0, "theta_min": 0.333, "ratio": 1.64}),
+        Tuned(JAMS, "jam rules, CMA-ES", {"threshold": 0.35, "disturbance_bound": 0.023}),
+    ),
+    (
+        Tuned(
+            EKF,
+            "EKF, BBO",
+            {
+                "acceleration_density": 3.05e-4,
+                "disturbance_density": 3.97e-4,
+                "creep_share": 0.0726,
+                "creep_time": 8.06,
+                "odometer_deviation": 0.161,
+                "odometer_gate": 4.2,
+            },
+        ),
+    ),
+    (
+        Tuned(
+            EKF,
+            "EKF, likelihood",
+            {
+                "acceleration_density": 7.66e-5,
+                "disturbance_density": 2.34e-7,
+                "creep_share": 0.00103,
+                "creep_time": 96.6,
+                "odometer_deviation": 0.0111,
+            },
+        ),
+    ),
+)
+"""Observers that are judged in the same runs; those of the first round stand as in the scenario."""
+
+
+def drawn_faults() -> Scenario:
+    """The scenario of the page: the shipped one with three observers and faults that are drawn from a seed."""
+    found = re.search(r"^```toml\n# drawn\.toml\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+    if found is None:
+        sys.exit(f"{PAGE.name} has no toml block that begins with '# drawn.toml'")
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "drawn.toml"
+        file.write_text(found[1], encoding="utf-8")
+        return Scenario.load(file)
+
+
+def judged(
+    chosen: Sequence[Tuned], seeds: Sequence[int] = JUDGES, stop: float | None = None
+) -> dict[str, list[dict[str, float]]]:
+    """Measures of observers with each seed, by observer; names are without that of the observer.
+
+    Args:
+        chosen: observers and values. seeds: of the faults. stop: end of the run [s]; None for the whole line.
+
+    Raises:
+        RuntimeError: a run failed.
+    """
+    scenario = drawn_faults()
+    for tuned in chosen:
+        for name, value in tuned.values.items():
+            scenario.set(f"{tuned.observer}.{name}", value)
+    if stop is not None:
+        scenario.set("stop", stop)
+    rows: dict[str, list[dict[str, float]]] = {tuned.observer: [] for tuned in chosen}
+    for seed in seeds:
+        outcome = scenario.set("drawn_wheel.seed", seed).run(warn=lambda _text: None)
+        if outcome.failure is not None:
+            raise RuntimeError(outcome.failure)
+        found = error_measures(outcome).items()
+        for name, kept in rows.items():
+            kept.append({key.removeprefix(f"{name}."): v for key, v in found if key.startswith(f"{name}.")})
+    return rows
+
+
+def row(tuned: Tuned, before: Sequence[Mapping[str, float]], after: Sequence[Mapping[str, float]]) -> list[str]:
+    """Cells of the table, means over the seeds with 95 % intervals.
+
+    Args:
+        tuned: observer and label. before, after: measures with each seed, of the scenario as it is and of these values.
+    """
+    cells = [tuned.label]
+    gain = [b["position_error_rms"] - a["position_error_rms"] for b, a in zip(before, after, strict=True)]
+    cells.append(mean_of([a["position_error_rms"] for a in after]).text())
+    cells.append(mean_of(gain).text() if tuned.values else "–")
+    cells += [f"{max(a['gap_error_max'] for a in after):.1f}", mean_of([a["speed_error_rms"] for a in after]).text()]
+    if "missed_faults" in after[0]:
+        faults, missed, false = (sum(a[name] for a in after) for name in ("faults", "missed_faults", "false_alarms"))
+        cells.append(f"{missed:.0f} of {faults:.0f}, {false:.0f}")
+    else:
+        cells.append("–")
+    for name in ("nis", "position_nees", "speed_nees"):
+        cells.append(mean_of([a[name] for a in after]).text(digits=2) if name in after[0] else "–")
+    return cells
+
+
+def table(seeds: Sequence[int] = JUDGES, stop: float | None = None) -> str:
+    """The table of the page, in markdown.
+
+    Args:
+        seeds: of the faults. stop: see `judged`.
+    """
+    head = ["", "rms of position [m]", "better by [m]", "largest at a gap's end [m]", "rms of speed [m/s]"]
+    head += ["missed faults, false alarms", "NIS", "NEES position", "NEES speed"]
+    found = [judged(chosen, seeds, stop) for chosen in ROUNDS]
+    lines = [head, ["---"] * len(head)]
+    for first in ROUNDS[0]:
+        for chosen, measured in zip(ROUNDS, found, strict=True):
+            mine = [tuned for tuned in chosen if tuned.observer == first.observer]
+            lines += [row(tuned, found[0][tuned.observer], measured[tuned.observer]) for tuned in mine]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def main() -> None:
+    """Print the table, or write it into the page."""
+    made = table()
+    if "--write" not in sys.argv:
+        print(made)
+        return
+    page = PAGE.read_text(encoding="utf-8")
+    part = r"(<!-- study: judged -->\n).*?(<!-- end -->)"
+    page, count = re.subn(part, lambda m: f"{m[1]}{made}\n{m[2]}", page, flags=re.DOTALL)
+    if count != 1:
+        sys.exit(f"{PAGE.name} has {count} parts '<!-- study: judged -->' ... '<!-- end -->'")
+    PAGE.write_text(page, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
