@@ -370,6 +370,19 @@ def test_a_model_that_a_filter_cannot_have_is_no_traceback(options: dict[str, ob
         scenario.run()
 
 
+def test_an_observer_without_true_values_gets_no_row_of_dashes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "slope.toml"
+    path.write_text(
+        'stop = 0.2\nstep = 0.1\n[components.slope]\nobserver = "levant_differentiator"\nas = "block3"\n'
+        "[components.other]\n"
+        'observer = "levant_differentiator"\nas = "block3"\n'
+    )
+    assert main(["run", str(path), "--no-report", "--out", str(tmp_path / "out")]) == 0
+    assert "rms v" not in capsys.readouterr().out
+
+
 def test_an_interruption_while_a_command_is_loaded_is_no_traceback(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
