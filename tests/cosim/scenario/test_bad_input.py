@@ -368,3 +368,14 @@ def test_a_model_that_a_filter_cannot_have_is_no_traceback(options: dict[str, ob
     scenario = Scenario(stop=1.0, step=0.1).add("filter", observer="extended_kalman_filter", options=options)
     with pytest.raises(CosimError, match=message):
         scenario.run()
+
+
+def test_an_interruption_while_a_command_is_loaded_is_no_traceback(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(*_arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("cosim.cli.make_parser", interrupted)
+    assert main(["tune"]) == 2
+    assert capsys.readouterr().err == "cosim: interrupted.\n"

@@ -18,6 +18,7 @@ from cosim.tuning.evaluation import EARLIER, JOURNAL, Evaluator
 from cosim.tuning.parameters import tunable
 from cosim.tuning.study import at_bounds
 from cosim.tuning.tune import tune
+from cosim.tuning.tuning_files import convergence_figure
 from cosim.tuning.tuning_result import Tuning
 from fmu_observer.optimisers.search_space import Bounded, SearchSpace
 
@@ -197,3 +198,8 @@ def test_a_search_that_is_not_resumed_keeps_the_one_before(tmp_path: Path) -> No
     Evaluator({}, tunable(drive(), "filter", VARIANCES), LikelihoodCost("filter"), tmp_path)
     assert (tmp_path / EARLIER).read_text() == '{"key": "one"}\n'
     assert not (tmp_path / JOURNAL).read_text()
+
+
+def test_the_picture_says_what_the_cost_is(found: Tuning) -> None:
+    axes = convergence_figure(found)
+    assert (axes.get_title(), axes.get_ylabel()) == (found.cost, "Cost")
