@@ -8,9 +8,12 @@ import ctypes
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from fmus.fmi.native_calls import prepared_call
+
+Array = NDArray[np.float64]
 
 
 def quicken_restarts(slave: Any, fmi_version: int) -> None:
@@ -43,8 +46,8 @@ def quicken_restarts(slave: Any, fmi_version: int) -> None:
 
 
 def prepared_restart(
-    instance: Any, write: Callable[[NDArray, NDArray], None], far: float
-) -> Callable[[float, NDArray, NDArray], None]:
+    instance: Any, write: Callable[[Array, Array], None], far: float
+) -> Callable[[float, Array, Array], None]:
     """Reset, values and initialisation in one call, with the words of an error told only where there is one.
 
     Args:
@@ -64,7 +67,7 @@ def prepared_restart(
 
     began = ("enterInitializationMode" if three else "setupExperiment") + words
 
-    def restart(t: float, x: NDArray, u: NDArray) -> None:
+    def restart(t: float, x: Array, u: Array) -> None:
         what = "reset"
         try:
             reset()

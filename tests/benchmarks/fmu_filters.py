@@ -11,6 +11,7 @@ from __future__ import annotations
 import ctypes
 import time
 from collections.abc import Callable
+from functools import partial
 from statistics import median
 from typing import Any
 
@@ -41,9 +42,7 @@ def main() -> None:
         advance(filter_, 0, 2)
         state = filter_.get_state()
         calls = recorded(filter_, state)
-        pairs = [
-            (timed(lambda c=calls: made(c)), timed(lambda f=filter_, s=state: again(f, s))) for _ in range(REPEATS)
-        ]
+        pairs = [(timed(partial(made, calls)), timed(partial(again, filter_, state))) for _ in range(REPEATS)]
         alone, whole = (1e6 / SAMPLES * min(column) for column in zip(*pairs, strict=True))
         ratios = sorted(whole / alone for alone, whole in pairs)
         print(
