@@ -147,9 +147,10 @@ def calibrate(
     idle = [name for i, name in enumerate(names) if not np.any(found.jacobian[..., i])]
     if idle:
         signals = ", ".join(recorded.measured)
+        driven = ", ".join(recorded.inputs) or "none"
         raise CalibrationError(
-            f"{', '.join(idle)} changes nothing in {signals}: it cannot be calibrated from this recording. Leave it "
-            "out, or record signals, or a run, that it acts on."
+            f"{', '.join(idle)}: changes nothing in {signals} and cannot be calibrated from this recording. Leave it "
+            f"out, or record signals, or a run, that it acts on. Inputs that the recording drives: {driven}."
         )
     units = {name: runs.unit(name) for name in names}
     return Calibration(

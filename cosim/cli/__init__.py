@@ -58,10 +58,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _main(arguments: Sequence[str]) -> int:
     description = "Co-simulate train observers with train plant FMUs, balise events exact."
-    parser = make_parser("cosim", description, COMMANDS, arguments)
-    options = parser.parse_args(arguments)
-    options.command_line = shlex.join(["cosim", *arguments])
-    try:
+    try:  # reading the words loads the command, which may be interrupted too
+        parser = make_parser("cosim", description, COMMANDS, arguments)
+        options = parser.parse_args(arguments)
+        options.command_line = shlex.join(["cosim", *arguments])
         with ends_like_ctrl_c():
             code = int(options.execute(options))
         sys.stdout.flush()

@@ -82,6 +82,8 @@ def execute(options: argparse.Namespace) -> int:
     Raises:
         CosimError: the model cannot be linearised, or the file cannot be written.
     """
+    if not options.at >= 0.0:
+        raise ScenarioError(f"--at {options.at:g}: expected an instant from 0 s on.")
     settings = {name: _number(name, value) for name, value in map(parse_setting, options.settings)}
     is_file = str(options.model).lower().endswith(".fmu")
     found = _of_fmu(options, settings) if is_file else _of_model(options, settings)

@@ -192,7 +192,7 @@ def _tell(outcome: Outcome, study: Any, paths: dict[str, Path], options: argpars
         return
     print(_headline(summary))
     if outcome.result.table.size:
-        metrics = phase_metrics(outcome.result, outcome.spec)
+        metrics = [m for m in phase_metrics(outcome.result, outcome.spec) if m.speed or m.position]
         if metrics:
             print(error_text(metrics, outcome.spec))
         faults = fault_text(fault_detection(outcome.result, outcome.spec), outcome.spec)

@@ -38,7 +38,7 @@ class Before:
         given = self.table.report.observers
         if given is not None:
             return list(given)
-        return [n for n, t in self.table.components.items() if t.observer is not None]
+        return [n for n, t in self.table.components.items() if t.observer is not None or t.filter is not None]
 
     def demand_within(self, key: str, value: float | None) -> None:
         """An instant lies within the run.
@@ -48,7 +48,10 @@ class Before:
         """
         first, last = self.table.start, self.table.stop
         if value is not None and not first - SLACK <= value <= last + SLACK:
-            raise ScenarioError(f"{key!r} ({value:g} s) lies outside the run, which lasts from {first:g} to {last:g} s")
+            raise ScenarioError(
+                f"{key!r} ({value:g} s) lies outside the run, which lasts from {first:g} to {last:g} s; for a shorter "
+                "run leave expectations out: --set expect=[]"
+            )
 
     def demand_window(self, start: float | None, end: float | None, otherwise: float) -> None:
         """A window lies within the run, and holds at least one point that is recorded.

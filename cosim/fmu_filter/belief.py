@@ -107,13 +107,13 @@ class FmuFilter(ABC):
         return found
 
     def _steps(self, belief: Belief) -> Array:
-        deviations = np.sqrt(np.maximum(np.diagonal(belief.P), 0.0))
+        deviations = np.sqrt(np.maximum(belief.P.diagonal(), 0.0))
         return np.asarray(np.maximum(SHARE * deviations, LEAST * np.maximum(np.abs(belief.x), self._sizes)))
 
     def _corrected(self, belief: Belief, found: kalman.Corrected, innovation: Array) -> Belief:
         nis = float(kalman.normalised_square(innovation, found.innovation_covariance))
         counted = belief.count + 1
-        return replace(belief, x=found.estimate, P=found.covariance, nis=nis, degrees=len(innovation), count=counted)
+        return Belief(found.estimate, found.covariance, nis, len(innovation), counted)
 
     def _from_inputs(self, t: float, h: float, x: Array, u: Array) -> Array:
         """Covariance that the noises of the inputs add over a step, shape (n, n), by central differences."""
@@ -150,15 +150,13 @@ class ExtendedFilter(FmuFilter):
             moved, F = self._directional.transition_with_slope(t, h, x, u)
             P = kalman.predicted_covariance(belief.P, F, h * self.noises.intensity) + self._from_inputs(t, h, x, u)
             return replace(belief, x=moved, P=P, count=belief.count + 1)
-        F = np.empty((len(x), len(x)))
-        for i, step in enumerate(steps):
-            away = np.zeros(len(x))
-            away[i] = step
-            above, below = x + away, x - away
-            ends = [self.model.transition(t, h, at, u)[0] for at in (above, below)]
-            F[:, i] = (ends[0] - ends[1]) / (above[i] - below[i])
-        P = kalman.predicted_covariance(belief.P, F, h * self.noises.intensity) + self._from_inputs(t, h, x, u)
-        return replace(belief, x=self.model.transition(t, h, x, u)[0], P=P, count=belief.count + 1)
+        points, apart = _about(x, steps)
+        ends = self.model.states_after(t, h, points, u)
+        F = _slopes(ends, apart)
+        P = kalman.predicted_covariance(belief.P, F, h * self.noises.intensity)
+        if len(self._noisy):
+            P = P + self._from_inputs(t, h, x, u)
+        return Belief(ends[:, 0].copy(), P, belief.nis, belief.degrees, belief.count + 1)
 
     def correct(self, belief: Belief, t: float, u: Array, seen: Sequence[int], y: Array, R: Array) -> Belief:
         """The belief after a measurement; arguments as for `FmuFilter`."""
@@ -168,15 +166,10 @@ class ExtendedFilter(FmuFilter):
             expected = self.model.values_at(t, x, u)[1][chosen]
             slopes = self._directional.slopes([self.model.outputs[i] for i in chosen])
             return self._corrected(belief, kalman.correct(x, belief.P, y - expected, slopes, R), y - expected)
-        H = np.empty((len(chosen), len(x)))
-        for i, step in enumerate(steps):
-            away = np.zeros(len(x))
-            away[i] = step
-            above, below = x + away, x - away
-            ends = [self.model.values_at(t, at, u)[1][chosen] for at in (above, below)]
-            H[:, i] = (ends[0] - ends[1]) / (above[i] - below[i])
-        innovation = y - self.model.values_at(t, x, u)[1][chosen]
-        return self._corrected(belief, kalman.correct(x, belief.P, innovation, H, R), innovation)
+        points, apart = _about(x, steps)
+        looks = self.model.outputs_at(t, points, u, chosen)
+        innovation = y - looks[:, 0]
+        return self._corrected(belief, kalman.correct(x, belief.P, innovation, _slopes(looks, apart), R), innovation)
 
 
 class UnscentedFilter(FmuFilter):
@@ -194,19 +187,39 @@ class UnscentedFilter(FmuFilter):
         """The belief a step later; arguments as for `FmuFilter`."""
         w = self._weights
         points = unscented.sigma_points(belief.x, _root(belief.P), w.spread)
-        found = unscented.scattered(lambda at: self.model.transition(t, h, at, u)[0], points)
+        found = _scattered(self.model.states_after(t, h, points, u))
         P = kalman.symmetric(unscented.covariance(found, found, w)) + h * self.noises.intensity
-        P = P + self._from_inputs(t, h, belief.x, u)
-        return replace(belief, x=np.asarray(unscented.mean(found, w)), P=P, count=belief.count + 1)
+        if len(self._noisy):
+            P = P + self._from_inputs(t, h, belief.x, u)
+        return Belief(np.asarray(unscented.mean(found, w)), P, belief.nis, belief.degrees, belief.count + 1)
 
     def correct(self, belief: Belief, t: float, u: Array, seen: Sequence[int], y: Array, R: Array) -> Belief:
         """The belief after a measurement; arguments as for `FmuFilter`."""
         w, chosen = self._weights, list(seen)
         points = unscented.sigma_points(belief.x, _root(belief.P), w.spread)
-        states = unscented.scattered(lambda at: at, points)
-        looks = unscented.scattered(lambda at: self.model.values_at(t, at, u)[1][chosen], points)
+        states, looks = _scattered(points), _scattered(self.model.outputs_at(t, points, u, chosen))
         found = unscented.correct(belief.x, belief.P, states, looks, y, R, w)
         return self._corrected(belief, found, y - unscented.mean(looks, w))
+
+
+def _about(x: Array, steps: Array) -> tuple[Array, Array]:
+    """A state and both its neighbours along each axis, shape (n, 2 n + 1), and how far these are apart, shape (n,)."""
+    n = len(x)
+    points = np.repeat(x, 2 * n + 1).reshape(n, 2 * n + 1)
+    above, below = x + steps, x - steps
+    points[:, 1 : n + 1].flat[:: n + 1], points[:, n + 1 :].flat[:: n + 1] = above, below
+    return points, above - below
+
+
+def _slopes(values: Array, apart: Array) -> Array:
+    """Central differences of values at the points of `_about`, shape (k, n)."""
+    n = len(apart)
+    return np.asarray((values[:, 1 : n + 1] - values[:, n + 1 :]) / apart)
+
+
+def _scattered(values: Array) -> unscented.Scattered:
+    """Values at sigma points, the centre first."""
+    return unscented.Scattered(values[:, 0], values[:, 1:] - values[:, :1])
 
 
 def _root(P: Array) -> Array:

@@ -73,6 +73,8 @@ class FmuFilterModel:
         self.inputs = [_signal(model, name, "input", name) for name in model.inputs]
         self.inputs += [_signal(model, name, "input", MEASURED + name) for name in table.measurements]
         self.outputs = self._output_signals()
+        self._measured_inputs = [MEASURED + name for name in table.measurements]
+        self._deviations = [f"{name}_std" for name in self._estimated]
         self._journal: Journal | None = None
         self._next = 0
         self._u = model.start_inputs.copy()
@@ -97,9 +99,12 @@ class FmuFilterModel:
         now = t + dt
         period = table.sample_period
         if self._seen and (period is None or now >= self._origin + self._next * period - SAME):
-            y = np.array([inputs[MEASURED + name] for name in table.measurements], dtype=float)
-            known = np.flatnonzero(np.isfinite(y))  # NaN is a missing measurement
-            if len(known):
+            y = np.array([inputs[name] for name in self._measured_inputs], dtype=float)
+            finite = np.isfinite(y)  # NaN is a missing measurement
+            if finite.all():
+                journal.correct(now, self._u, self._seen, y, self._R)
+            elif finite.any():
+                known = np.flatnonzero(finite)
                 seen = [self._seen[i] for i in known]
                 journal.correct(now, self._u, seen, y[known], self._R[np.ix_(known, known)])
             if period is not None:
@@ -155,10 +160,11 @@ class FmuFilterModel:
         assert self._journal is not None
         belief, model = self._journal.belief, self._model
         found = dict(zip(model.outputs, self._engine.outputs(belief, t, self._u).tolist(), strict=True))
-        found |= dict(zip(self._estimated, belief.x.tolist(), strict=True))
-        deviations = np.sqrt(np.maximum(np.diagonal(belief.P), 0.0))
-        found |= {f"{name}_std": float(value) for name, value in zip(self._estimated, deviations, strict=True)}
-        return found | {"nis": belief.nis, "nis_degrees": float(belief.degrees)}
+        found.update(zip(self._estimated, belief.x.tolist(), strict=True))
+        deviations = np.sqrt(np.maximum(belief.P.diagonal(), 0.0))
+        found.update(zip(self._deviations, deviations.tolist(), strict=True))
+        found["nis"], found["nis_degrees"] = belief.nis, float(belief.degrees)
+        return found
 
     def _output_signals(self) -> list[Signal]:
         model = self._model

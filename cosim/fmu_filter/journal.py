@@ -54,7 +54,7 @@ class Journal:
         Args:
             h: how far [s]. u: inputs, held, shape (m,).
         """
-        self._do(Entry(self.belief, self.t, u.copy(), h=h))
+        self._done(Entry(self.belief, self.t, u.copy(), h=h))
         oldest = self.t - self._horizon - SAME
         while self._entries and self._entries[0].t + self._entries[0].h < oldest:
             self._entries.pop(0)
@@ -70,7 +70,7 @@ class Journal:
             Whether it was taken; one from before the horizon is not.
         """
         if stamp >= self.t - SAME:
-            self._do(Entry(self.belief, self.t, u.copy(), seen=tuple(seen), y=y.copy(), R=R))
+            self._done(Entry(self.belief, self.t, u.copy(), seen=tuple(seen), y=y.copy(), R=R))
             return True
         place = next((i for i, e in enumerate(self._entries) if e.h > 0.0 and e.t <= stamp < e.t + e.h - SAME), None)
         if place is None:
@@ -87,7 +87,10 @@ class Journal:
         return True
 
     def _do(self, entry: Entry) -> None:
-        entry = replace(entry, before=self.belief, t=self.t)
+        self._done(replace(entry, before=self.belief, t=self.t))
+
+    def _done(self, entry: Entry) -> None:
+        """What an entry that begins here and now does."""
         self._entries.append(entry)
         if entry.y is None:
             self.belief = self._engine.predict(self.belief, self.t, entry.h, entry.u)

@@ -41,15 +41,15 @@ class EnsembleFilter(FmuFilter):
         """The belief a step later; arguments as for `FmuFilter`."""
         members, count = _points(belief), belief.count + 1
         driven = u[:, None] + ensemble.drawn(self.noises.inputs, self._draws(2 * count, len(u)))
-        columns = [self.model.transition(t, h, members[:, i], driven[:, i])[0] for i in range(self._count)]
+        moved = self.model.states_after(t, h, members, driven)
         added = ensemble.drawn(h * self.noises.intensity, self._draws(2 * count + 1, len(belief.x)))
-        return self._summed(replace(belief, points=np.array(columns).T + added, count=count))
+        return self._summed(replace(belief, points=moved + added, count=count))
 
     def correct(self, belief: Belief, t: float, u: Array, seen: Sequence[int], y: Array, R: Array) -> Belief:
         """The belief after a measurement; arguments as for `FmuFilter`."""
         members, count = _points(belief), belief.count + 1
         chosen = list(seen)
-        looks = np.array([self.model.values_at(t, members[:, i], u)[1][chosen] for i in range(self._count)]).T
+        looks = self.model.outputs_at(t, members, u, chosen)
         found = ensemble.correct_members(members, looks, y, R, self._draws(2 * count, len(y)))
         return self._summed(replace(belief, points=found.members, nis=float(found.nis), degrees=len(y), count=count))
 

@@ -40,6 +40,10 @@ def linearise_system(
         u = filled(dict(zip(part.inputs, part.start_inputs, strict=True)), inputs, f"{system.name}: input")
     except ValueError as error:
         raise FmuModelError(str(error)) from error
+    if not part.states:
+        raise FmuModelError(
+            f"{system.name}: it has no continuous states, so nothing of it can be linearised; name a model with states."
+        )
     signals = (*system.states, *system.inputs, *system.outputs)
     return Linearisation(
         system.name,

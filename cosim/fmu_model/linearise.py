@@ -205,7 +205,10 @@ def _directional(model: ExchangeModel, function: Function, x: Array, u: Array) -
     except RuntimeError as error:
         return None, f"Its directional derivatives are not used: {error}."
     if outcome.verdict is not Verdict.PASS:
-        return None, f"Its directional derivatives are wrong and not used: {outcome.detail}."
+        return None, (
+            f"Its directional derivatives are not used: {outcome.detail}. They are wrong, or the model has a kink here "
+            "(a train that stands or switches), where there is no slope: try a point beside it."
+        )
     return np.array([told[name] for name in knowns]).T, ""
 
 

@@ -11,6 +11,7 @@ import weakref
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from itertools import repeat
 from pathlib import Path
 from typing import Any, Literal
 
@@ -80,6 +81,7 @@ class SealedModel(ABC):
         self._write_starts, self._starts = instance.writer(names)
         self._settings = len(self.parameters)
         self._starts[: self._settings] = list(self.parameters.values())
+        self._state_starts = self._starts[self._settings :]
         self._quicken()
 
     def _quicken(self) -> None:
@@ -114,18 +116,24 @@ class SealedModel(ABC):
         Raises:
             FmuModelError: the FMU refuses.
         """
-        self.told(lambda: self._restart(t, x, u))
+        try:
+            self._restart(t, x, u)
+        except SlaveError as error:
+            raise self._in_words(error) from error
 
     def _restart(self, t: float, x: Array, u: Array) -> None:
-        instance = self.instance
-        instance.reset()
-        self._starts[self._settings :] = x[: len(self._starts) - self._settings]
-        if len(self._starts):
+        self.instance.reset()
+        self._write_point(x, u)
+        self._enter(t)
+
+    def _write_point(self, x: Array, u: Array) -> None:
+        """Parameters, states and inputs, before initialisation."""
+        if self._starts.size:
+            self._state_starts[:] = x[: self._state_starts.size]
             self._write_starts()
-        if len(self.inputs):
+        if self.inputs:
             self._inputs[:] = u
             self._write_inputs()
-        self._enter(t)
 
     def set_inputs(self, u: Array) -> None:
         """Write the inputs where the instance stands.
@@ -180,6 +188,43 @@ class SealedModel(ABC):
         self.restart(t, x, u)
         self.advance(t, h)
         return self.read()
+
+    # -- many points --------------------------------------------------------------------------------------------------
+
+    def states_after(self, t: float, h: float, points: Array, u: Array) -> Array:
+        """States after a step from each of several states; outputs are not read.
+
+        Args:
+            t: begin of the step [s]. h: its length [s]. points: states, shape (n, N).
+            u: inputs, held, shape (m,), or (m, N) for inputs of each point.
+
+        Returns:
+            States at its end, shape (n, N).
+        """
+        found = np.empty((points.shape[1], len(self.states)))
+        for row, x, driven in zip(found, points.T, repeat(u) if u.ndim == 1 else u.T, strict=False):
+            self.restart(t, x, driven)
+            self.advance(t, h)
+            self.told(self._read_states)
+            row[:] = self._states_read
+        return found.T
+
+    def outputs_at(self, t: float, points: Array, u: Array, chosen: Sequence[int]) -> Array:
+        """Outputs just after a restart at each of several states; states are not read back.
+
+        Args:
+            t: instant [s]. points: states, shape (n, N). u: inputs, shape (m,). chosen: which outputs, k of them.
+
+        Returns:
+            Outputs, shape (k, N).
+        """
+        found = np.empty((points.shape[1], len(self.outputs)))
+        for row, x in zip(found, points.T, strict=True):
+            self.restart(t, x, u)
+            if self.outputs:
+                self.told(self._read_outputs)
+            row[:] = self._outputs_read
+        return np.ascontiguousarray(found[:, chosen]).T
 
     @abstractmethod
     def _enter(self, t: float) -> None:
@@ -258,7 +303,10 @@ class SealedModel(ABC):
         try:
             return call()
         except SlaveError as error:
-            raise FmuModelError(f"{self.path}: {error}.") from error
+            raise self._in_words(error) from error
+
+    def _in_words(self, error: SlaveError) -> FmuModelError:
+        return FmuModelError(f"{self.path}: {error}.")
 
 
 def real_names(instance: Instance, causality: str) -> list[str]:

@@ -214,8 +214,12 @@ def _block_arguments(table: ComponentTable) -> dict[str, Any]:
 
 
 def _made(model: type[HybridSystem], options: Mapping[str, Any], where: str) -> HybridSystem:
+    """The system with these options."""
     if model.__module__.partition(".")[0] in OWN_PACKAGES:
-        return model(**options)
+        try:
+            return model(**options)
+        except ValueError as error:  # options that no list of choices can check, such as the model of a filter
+            raise ScenarioError(f"{where}: {model.name}: {error}") from error
     try:
         made: HybridSystem = make(model, options)
     except UserFileError as error:

@@ -145,7 +145,7 @@ def report_spec(table: ScenarioTable) -> ReportSpec:
         table: of the scenario, with its roles.
     """
     report, components = table.report, table.components
-    observers = [n for n, c in components.items() if c.observer is not None]
+    observers = [n for n, c in components.items() if c.observer is not None or c.filter is not None]
     return ReportSpec(
         title=table.title,
         **{role: getattr(report, role) for role in ROLES},

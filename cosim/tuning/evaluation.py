@@ -27,22 +27,29 @@ from cosim.tuning.parameters import Tunable
 from cosim.tuning.replays import Replays, make_replays
 
 JOURNAL = "evaluations.jsonl"
+EARLIER = "evaluations.earlier.jsonl"
+"""Those of the search before, which was not resumed."""
 ROWS = 500
 """Of a run, for the directions that change nothing: so many tell enough."""
 
 
 @dataclass(frozen=True)
 class Evaluated:
-    """The cost of one candidate with one seed.
+    (
+        """The cost of one candidate with one seed.
 
     Args:
         cost: infinite where the run failed. failure: why, or None. estimates: of the observer at some instants, in
             units of their own sizes, where they were asked for.
+        unreadable: whether a run that ended does not show the cost: no other candidate will.
     """
+        ""
+    )
 
     cost: float
     failure: str | None = None
     estimates: np.ndarray | None = None
+    unreadable: bool = False
 
 
 @dataclass(frozen=True)
@@ -83,6 +90,8 @@ class Evaluator:
         self._journal = directory / JOURNAL
         self._known = {entry["key"]: entry for entry in read_lines(self._journal)} if resume else {}
         if not resume:
+            if self._journal.is_file() and self._journal.stat().st_size:
+                self._journal.replace(directory / EARLIER)  # whoever forgot to resume has lost nothing
             write_lines(self._journal, "w", [])
         self._keys: dict[int, str] = {}
         self._bases: dict[int, Scenario] = {}
@@ -128,6 +137,9 @@ class Evaluator:
             candidates: values by name; None for the scenario as it is. seeds: of the benches.
             label: what the journal says of them besides.
             tell: called after each run.
+
+        Raises:
+            ScenarioError: a run that ended does not show the cost.
         """
         found = np.full((len(candidates), len(seeds)), nan)
         open_: dict[str, list[tuple[int, int]]] = {}  # equal candidates are run once
@@ -146,6 +158,8 @@ class Evaluator:
         for number, answer in self._answers(jobs):
             key = keys[number]
             i, j = open_[key][0]
+            if answer.unreadable:
+                raise ScenarioError(f"cost: {answer.failure}")
             for place in open_[key]:
                 found[place] = answer.cost
                 tell()
@@ -252,7 +266,7 @@ def _judged(outcome: Outcome, job: _Job) -> Evaluated:
     try:
         cost = job.cost.of(outcome)
     except ScenarioError as error:
-        return Evaluated(inf, str(error), estimates)
+        return Evaluated(inf, str(error), estimates, unreadable=True)
     return Evaluated(cost, None, estimates) if isfinite(cost) else Evaluated(inf, "the cost is not finite", estimates)
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from inspect import signature
 from typing import Any
 
-from cosim.errors import ScenarioError
+from cosim.errors import ScenarioError, nearest
 from cosim.simulation.scenario import Scenario
 from cosim.studies.sweep_journal import write_lines
 from cosim.tuning.evaluation import Evaluator
@@ -18,6 +19,8 @@ from fmu_observer.optimisers.registry import find_optimiser
 from fmu_observer.optimisers.search_space import SearchSpace
 
 ITERATIONS = "iterations.jsonl"
+NEAR_BOUND = 1e-3
+"""Share of the range of a parameter within which a value counts as standing at its end."""
 NOTHING_BETTER = "No candidate is better with the training seeds than the scenario as it is; its values are kept."
 
 
@@ -105,6 +108,7 @@ class Study:
             how="as members of a batch over what the observer heard" if self.evaluator.replayed else how,
             warnings=[
                 *([NOTHING_BETTER] if kept else []),
+                *([] if kept else at_bounds(self.asked.space, best, why)),
                 *self._warnings(shown, None if interrupted or kept else self._directions(best)),
             ],
             fixed=why,
@@ -183,6 +187,25 @@ class Study:
         return told + [f"{count} runs failed: {reason}" for reason, count in self.evaluator.failures.items()]
 
 
+def at_bounds(space: SearchSpace, best: Mapping[str, float], held: Mapping[str, str]) -> list[str]:
+    """What is said of values that a search left at the end of their range.
+
+    Args:
+        space: names and bounds. best: values found, by name. held: parameters that were not searched.
+    """
+    told = []
+    point = space.coordinates([best[name] for name in space.names])
+    for p, value, low, high in zip(space.parameters, point, space.lower, space.upper, strict=True):
+        near = NEAR_BOUND * (high - low)
+        if p.name not in held and (value - low <= near or high - value <= near):
+            end = "lower" if value - low <= near else "upper"
+            told.append(
+                f"{p.name} ends at its {end} bound, {p.low if end == 'lower' else p.high:g}: the best value may lie "
+                "beyond. Widen the bounds, where that makes sense."
+            )
+    return told
+
+
 def make_optimiser(method: str, space: SearchSpace, seed: int, options: Mapping[str, Any]) -> Optimiser:
     """An optimiser of a search space.
 
@@ -192,11 +215,27 @@ def make_optimiser(method: str, space: SearchSpace, seed: int, options: Mapping[
     Raises:
         ScenarioError: there is none of this name, an option is unknown, or its package is not installed.
     """
+    _demand_options(method, options)
     try:
         made: Optimiser = find_optimiser(method)(space.lower, space.upper, seed=seed, **options)
     except (ValueError, TypeError, ImportError) as error:
         raise ScenarioError(f"method {method}: {error}") from error
     return made
+
+
+def _demand_options(method: str, options: Mapping[str, Any]) -> None:
+    """Every option is a keyword of the method.
+
+    Raises:
+        ScenarioError: one is not; the nearest are named.
+    """
+    try:
+        known = [n for n in signature(find_optimiser(method)).parameters if n not in {"lower", "upper", "seed"}]
+    except ValueError as error:
+        raise ScenarioError(f"method {method}: {error}") from error
+    for name in options:
+        if name not in known:
+            raise ScenarioError(f"method {method}: no option {name!r}; {nearest(name, known)}")
 
 
 def _never_finite(count: int, failures: Mapping[str, int]) -> str:

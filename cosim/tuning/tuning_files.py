@@ -78,6 +78,7 @@ def convergence_figure(tuning: Tuning, ax: Axes | None = None) -> Axes:
     if min([before, *(cost for search in tuning.searches for cost in search.costs)]) > 0.0:
         ax.set_yscale("log")
     ax.set_xlabel("Candidates")
-    ax.set_ylabel(f"Cost: {tuning.cost}")
+    ax.set_ylabel("Cost")
+    ax.set_title(tuning.cost, fontsize="medium")  # too long for the side of the axes
     ax.legend()
     return ax

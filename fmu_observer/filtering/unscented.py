@@ -9,6 +9,7 @@ positive.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,11 @@ from fmu_observer.filtering.square_root import corrected_by, factor, triangular
 from plant_models.hybrid.system import Array
 
 Function = Callable[[Array], Array]  # (state of shape (n,)) -> shape (m,)
+
+
+@cache
+def _ones(count: int) -> Array:
+    return np.ones(count)
 
 
 class Weights(NamedTuple):
@@ -90,7 +96,7 @@ def shift(found: Scattered, w: Weights) -> Array:
     Args:
         found: values at the points. w: weights.
     """
-    return w.each * (found.deviations @ np.ones(found.deviations.shape[1]))
+    return w.each * (found.deviations @ _ones(found.deviations.shape[1]))
 
 
 def mean(found: Scattered, w: Weights) -> Array:
@@ -108,7 +114,8 @@ def covariance(found: Scattered, other: Scattered, w: Weights) -> Array:
     Args:
         found: values of the one, m of them. other: values of the other, k of them. w: weights.
     """
-    bend = w.bend * np.outer(shift(found, w), shift(other, w))
+    apart = shift(found, w)
+    bend = w.bend * np.outer(apart, apart if other is found else shift(other, w))
     return w.each * (found.deviations @ other.deviations.T) + bend
 
 

@@ -87,6 +87,20 @@ class Slave(Instance):
         super().reset()
         self.time, self.next_event = math.nan, NEVER
 
+    def note_reset(self, t: float) -> None:
+        """Follow a reset that a prepared call made.
+
+        Args:
+            t: instant at which it is initialised next [s].
+        """
+        self._forget()
+        self.terminated = self._running = False
+        self.time, self.next_event = t, NEVER
+
+    def note_initialised(self) -> None:
+        """Follow the end of initialisation that a prepared call made."""
+        self._running = True
+
     def enter_initialization(self, start_time: float, stop_time: float) -> None:
         """Begin initialisation.
 

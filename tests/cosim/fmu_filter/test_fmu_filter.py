@@ -186,6 +186,8 @@ def test_in_a_scenario(path: Path, tmp_path: Path) -> None:
     assert error[-1] < 1e-3  # the readings are exact, the model is the plant
     assert outcome["filter.train_position_std"][-1] < outcome["filter.train_position_std"][1]
     assert any(part.name == "filter" for part in scenario.structure().parts)
+    assert outcome.spec.observers == ["filter"]
+    assert [entry["observer"] for entry in outcome.result.summary["consistency"]] == ["filter"]  # judged as documented
     scenario.save(tmp_path / "saved.toml")
     again = cosim.Scenario.load(tmp_path / "saved.toml").run()
     np.testing.assert_array_equal(again["filter.speed"], outcome["filter.speed"])

@@ -137,6 +137,7 @@ def test_command(locomotive: Path, tmp_path: Path, capsys: pytest.CaptureFixture
         (["--inputs", "efort"], "did you mean 'effort'"),
         (["-o", "a.txt"], "expected one of: .json, .npz, .mat"),
         (["--set", "mass=heavy"], "expected a number"),
+        (["--at", "-1"], "expected an instant from 0 s on"),
     ],
 )
 def test_mistakes_are_told(
@@ -145,3 +146,12 @@ def test_mistakes_are_told(
     words = [str(tmp_path / word) if word == "a.txt" else word for word in words]
     assert main(["linearise", str(locomotive), *words]) == 2
     assert told in capsys.readouterr().err
+
+
+def test_a_model_without_states_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["linearise", "inverter"]) == 2
+    assert "inverter: it has no continuous states" in capsys.readouterr().err
+
+
+def test_a_kink_is_not_called_a_lie(locomotive: Path) -> None:
+    assert "the model has a kink here" in linearise_fmu(locomotive).remarks[0]  # the train stands

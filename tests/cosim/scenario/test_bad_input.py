@@ -355,3 +355,40 @@ def test_a_name_under_the_wrong_key_is_told_the_right_one(written: str, meant: s
     scenario = Scenario(stop=1.0, step=0.1)
     with pytest.raises(CosimError, match=f"write {meant} = '{name}'"):
         (scenario.add("part", model=name) if written == "model" else scenario.add("part", observer=name)).run()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"model": "pendulm"}, "components.filter: extended_kalman_filter: Unknown model 'pendulm'"),
+        ({"model": "longitudinal_train", "outputs": ["sped"]}, "output 'sped' is unknown"),
+    ],
+)
+def test_a_model_that_a_filter_cannot_have_is_no_traceback(options: dict[str, object], message: str) -> None:
+    scenario = Scenario(stop=1.0, step=0.1).add("filter", observer="extended_kalman_filter", options=options)
+    with pytest.raises(CosimError, match=message):
+        scenario.run()
+
+
+def test_an_observer_without_true_values_gets_no_row_of_dashes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "slope.toml"
+    path.write_text(
+        'stop = 0.2\nstep = 0.1\n[components.slope]\nobserver = "levant_differentiator"\nas = "block3"\n'
+        "[components.other]\n"
+        'observer = "levant_differentiator"\nas = "block3"\n'
+    )
+    assert main(["run", str(path), "--no-report", "--out", str(tmp_path / "out")]) == 0
+    assert "rms v" not in capsys.readouterr().out
+
+
+def test_an_interruption_while_a_command_is_loaded_is_no_traceback(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(*_arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("cosim.cli.make_parser", interrupted)
+    assert main(["tune"]) == 2
+    assert capsys.readouterr().err == "cosim: interrupted.\n"

@@ -13,8 +13,14 @@ from small_scenarios import small
 from cosim import Scenario
 from cosim.errors import ScenarioError
 from cosim.scenario.outcome import Outcome
+from cosim.tuning.costs import LikelihoodCost
+from cosim.tuning.evaluation import EARLIER, JOURNAL, Evaluator
+from cosim.tuning.parameters import tunable
+from cosim.tuning.study import at_bounds
 from cosim.tuning.tune import tune
+from cosim.tuning.tuning_files import convergence_figure
 from cosim.tuning.tuning_result import Tuning
+from fmu_observer.optimisers.search_space import Bounded, SearchSpace
 
 CURRENTS = "state:current_d=motor.current_d,current_q=motor.current_q"
 VARIANCES = {
@@ -170,10 +176,30 @@ def test_anything_of_a_scenario_is_tuned_by_a_function_of_the_outcome() -> None:
         ({"cost": "state:current_d"}, "expected estimate=component.signal"),
         ({"resume": True}, "resumed from its folder"),
         ({"observer": "fliter"}, "unknown observer"),
-        ({"cost": "nothing_rms"}, "no measure"),
-        ({"cost": "state:current_d=motor.curent_d"}, "did you mean"),
+        ({"cost": "nothing_rms"}, "^cost: .*no measure"),
+        ({"cost": "state:current_d=motor.curent_d"}, "^cost: .*did you mean 'motor.current_d'"),
+        ({"options": {"popultion": 3}}, "no option 'popultion'; did you mean 'population'"),
     ],
 )
 def test_what_cannot_be_is_told_before_a_search(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(ScenarioError, match=words):
         tuned(drive(0.001), **changes)
+
+
+def test_values_at_the_end_of_their_range_are_told() -> None:
+    space = SearchSpace([Bounded("q", 1e-6, 1.0, True), Bounded("r", 0.0, 2.0), Bounded("held", 0.0, 1.0)])
+    told = at_bounds(space, {"q": 1e-6, "r": 1.0, "held": 0.0}, {"held": "it changes nothing"})
+    assert [text.partition(":")[0] for text in told] == ["q ends at its lower bound, 1e-06"]
+    assert "r ends at its upper bound, 2" in at_bounds(space, {"q": 0.1, "r": 2.0, "held": 0.0}, {"held": ""})[0]
+
+
+def test_a_search_that_is_not_resumed_keeps_the_one_before(tmp_path: Path) -> None:
+    (tmp_path / JOURNAL).write_text('{"key": "one"}\n')
+    Evaluator({}, tunable(drive(), "filter", VARIANCES), LikelihoodCost("filter"), tmp_path)
+    assert (tmp_path / EARLIER).read_text() == '{"key": "one"}\n'
+    assert not (tmp_path / JOURNAL).read_text()
+
+
+def test_the_picture_says_what_the_cost_is(found: Tuning) -> None:
+    axes = convergence_figure(found)
+    assert (axes.get_title(), axes.get_ylabel()) == (found.cost, "Cost")
