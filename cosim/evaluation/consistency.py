@@ -26,6 +26,10 @@ ADVICE = {
     "that of the measurements where the sensor is worse than told; a wrong model or a bias looks alike",
     "underconfident": "its errors are smaller than it tells. Decrease the covariances of process or measurements",
 }
+COLOURED = (
+    "Innovations look small because the error lasts (a wheel that creeps, a bias): give it a state, or increase the "
+    "covariance of the process noise"
+)
 
 
 @dataclass(frozen=True)
@@ -105,11 +109,25 @@ def consistency_warnings(result: Result, spec: ReportSpec) -> Iterator[str]:
         if entry is None:
             continue
         found = entry.found
+        larger = next((e for e in entries if e.observer == observer and _is_error(e, "overconfident")), None)
+        if entry.kind == "NIS" and found.verdict == "underconfident" and larger is not None:
+            yield (
+                f"{label(spec, observer)} leaves out an error that is not white: its {entry.name} is "
+                f"{number(found.mean)} on average where {number(found.degrees)} is expected, yet its {larger.name} is "
+                f"{number(larger.found.mean)} where {number(larger.found.degrees)} is. {COLOURED}; see "
+                f"docs/consistency.md."
+            )
+            continue
         yield (
             f"{label(spec, entry.observer)} is {found.verdict}: its {entry.name} is {number(found.mean)} on average "
             f"where {number(found.degrees)} is expected ({number(found.band.low)} to {number(found.band.high)} for 99 "
             f"% of consistent filters): {ADVICE[found.verdict]}; see docs/consistency.md."
         )
+
+
+def _is_error(entry: FilterConsistency, verdict: str) -> bool:
+    """Whether an entry judges errors from the truth, and so."""
+    return entry.kind != "NIS" and entry.found.verdict == verdict
 
 
 def _deciding(entries: Sequence[FilterConsistency], observer: str) -> list[FilterConsistency]:

@@ -60,6 +60,15 @@ def test_one_that_trusts_itself_too_much_is_warned_of_once_with_what_to_do() -> 
     assert "Decrease" in warning
 
 
+def test_small_innovations_beside_large_errors_are_not_answered_by_smaller_covariances() -> None:
+    lasting = run(4.0)
+    lasting.table["kf.nis"] /= 16.0
+    (warning,) = [w for w in result_warnings(lasting, SPEC) if w.startswith("Filter")]
+    assert "leaves out an error that is not white" in warning
+    assert "give it a state, or increase the covariance of the process noise" in warning
+    assert "Decrease" not in warning
+
+
 def test_what_is_told_decides_what_is_judged() -> None:
     """Without NIS and covariance single quantities are, and then they warn."""
     alone = run(4.0, nis=False, covariance=False)
