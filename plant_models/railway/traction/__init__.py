@@ -1,4 +1,4 @@
-"""What drives a train: traction motors, their control, and the transforms between their frames."""
+"""What pulls a train: traction motors, their control, and the transforms between their frames."""
 
 from plant_models.registry import lazy_names
 
