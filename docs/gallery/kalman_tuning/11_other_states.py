@@ -11,7 +11,10 @@ from fmu_observer.observers.traction import MotorEkf, MotorEkfStator
 
 FINALS = {"hand": (612.0, 57.0), "pso_20": (8.1, 5.3), "ga_20": (8.0, 5.4), "bbo_20": (9.2, 6.0)}
 CURVES = "curves only; ten seeds here and there, not the same noise"
-DEAD = "the angle is the integral of the estimated speed, and noise of 1e-3 a sample walks 3.2 rad in a second"
+DEAD = (
+    "the angle is the integral of the estimated speed, and noise of 1e-3 a sample walks 3.2 rad in a second: 5 rad2 on "
+    "average over 1000 seeds, 11.6 over these ten"
+)
 SCALE = "P(0) = I is not scaled with them; nothing else differs"
 RANK = "no current along d or q depends on the angle"
 MISPRINT = "no statement which Jacobian was used; the currents cannot tell"
