@@ -70,7 +70,8 @@ def normalised_squares(errors: np.ndarray, covariances: np.ndarray) -> np.ndarra
     """
     diagonal = covariances if covariances.ndim == 2 else np.einsum("rii->ri", covariances)
     with np.errstate(invalid="ignore"):
-        usable = np.isfinite(covariances).reshape(len(errors), -1).all(axis=1) & (diagonal > 0.0).all(axis=1)
+        finite = np.isfinite(covariances).all(axis=tuple(range(1, covariances.ndim)))  # of no rows too
+        usable = finite & (diagonal > 0.0).all(axis=1)
     found = np.full(len(errors), nan)
     deviations = np.sqrt(diagonal[usable])
     scaled = errors[usable] / deviations

@@ -109,3 +109,9 @@ def test_too_little_and_infinite_are_told() -> None:
     assert judge(np.full(100, 0.1), 1.0, white=True).verdict == "underconfident"
     missing = np.where(np.arange(100) % 2 == 0, 1.0, 2.0)  # a sample may have one or two measurements
     assert judge(missing, missing, white=True).verdict == "consistent"
+
+
+def test_no_rows_have_no_squares() -> None:
+    """A run that ends before the time from which it is evaluated."""
+    assert normalised_squares(np.zeros((0, 1)), np.zeros((0, 1))).shape == (0,)
+    assert normalised_squares(np.zeros((0, 2)), np.zeros((0, 2, 2))).shape == (0,)
