@@ -123,8 +123,9 @@ def gap_error_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -
             alpha=0.75,
             label=found.labels[name],
         )
-    way = np.linspace(*ax.get_xlim(), 50)  # balises at one distance are one column of marks, and the line is seen still
-    ax.plot(way, np.clip(envelope(np.maximum(way, 0.0)), SMALLEST, LARGEST), color=MARK, linewidth=1.2, label=GRANTED)
+    # from zero on, so that balises at one distance are a column of marks on a scale that can be read
+    way = np.linspace(0.0, max(1.05 * float(np.max(lengths, initial=0.0, where=np.isfinite(lengths))), 1.0), 50)
+    ax.plot(way, np.clip(envelope(way), SMALLEST, LARGEST), color=MARK, linewidth=1.2, label=GRANTED)
     ax.set_xlim(way[0], way[-1])
     ax.set_yscale("log")
     ax.set_xlabel("Way since the last balise [m]")
