@@ -4,7 +4,7 @@ SciPy where a filter is judged.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -201,8 +201,16 @@ def _degrees(result: Result, observer: str, names: list[str]) -> np.ndarray:
     told = estimate(result, observer, "nis_degrees")
     if told is not None:
         return told
-    innovations = [name for name in names if name.startswith("innovation") and not _ends(name)]
-    return np.full(len(result.time), float(max(len(innovations), 1)))
+    return np.full(len(result.time), float(measurement_count(names)))
+
+
+def measurement_count(outputs: Iterable[str]) -> int:
+    """How many measurements the innovations of an observer are of; 1 where it tells none of them.
+
+    Args:
+        outputs: names of its outputs, vectors element by element.
+    """
+    return max(len([name for name in outputs if name.startswith("innovation") and not _ends(name)]), 1)
 
 
 def _ends(name: str) -> bool:

@@ -10,6 +10,7 @@ from math import inf, isfinite, log
 import numpy as np
 
 from cosim.errors import ScenarioError, nearest
+from cosim.evaluation.consistency import measurement_count
 from cosim.evaluation.metrics import judged_size, within
 from cosim.evaluation.roles import estimation_error
 from cosim.evaluation.spec import Phase
@@ -130,11 +131,12 @@ class NisCost(Cost):
     Twice too large counts as much as twice too small: ``log(mean / q)^2``.
 
     Args:
-        observer: component with the output `nis`. measurements: q.
+        observer: component with the output `nis`. measurements: q, or None where the observer tells it sample by sample
+            as `nis_degrees`.
     """
 
     observer: str
-    measurements: int = 1
+    measurements: int | None = 1
 
     @property
     def text(self) -> str:
@@ -143,19 +145,20 @@ class NisCost(Cost):
 
     @property
     def signals(self) -> tuple[str, ...]:
-        """The normalised innovation squared."""
-        return (f"{self.observer}.nis",)
+        """The normalised innovation squared, and its degrees of freedom where they are told."""
+        return (*self.seen, *(() if self.measurements else (f"{self.observer}.nis_degrees",)))
 
     @property
     def seen(self) -> tuple[str, ...]:
         """The normalised innovation squared."""
-        return self.signals
+        return (f"{self.observer}.nis",)
 
     def of(self, outcome: Outcome) -> float:
         """The cost, see `Cost.of`."""
         rows = _evaluated(outcome)
-        mean = float(np.mean(_of(outcome.result, self.signals[0])[rows]))
-        return log(mean / self.measurements) ** 2 if mean > 0.0 and isfinite(mean) else inf
+        nis, *told = (float(np.mean(_of(outcome.result, name)[rows])) for name in self.signals)
+        expected = told[0] if told else float(self.measurements or 1)
+        return log(nis / expected) ** 2 if nis > 0.0 < expected and isfinite(nis) else inf
 
 
 @dataclass(frozen=True)
@@ -228,7 +231,9 @@ class OwnCost(Cost):
         return float(self.function(outcome))
 
 
-def make_cost(given: str | Cost | Callable[[Outcome], float], observer: str | None, measurements: int = 1) -> Cost:
+def make_cost(
+    given: str | Cost | Callable[[Outcome], float], observer: str | None, outputs: Sequence[str] = ()
+) -> Cost:
     """The cost that is meant.
 
     Args:
@@ -236,7 +241,7 @@ def make_cost(given: str | Cost | Callable[[Outcome], float], observer: str | No
             ``expectation:NUMBER or part of its text``, the name of a measure (``speed_error_rms``,
             ``observer.gap_error_max``), with ``-`` in front where the largest is wanted; or a function of the outcome.
         observer: the component that is tuned; None where there is none.
-        measurements: of the observer, for ``nis``.
+        outputs: names of the observer's, which tell ``nis`` how many measurements there are.
 
     Raises:
         ScenarioError: it needs an observer and none is named, or it cannot be read.
@@ -256,6 +261,7 @@ def make_cost(given: str | Cost | Callable[[Outcome], float], observer: str | No
             raise ScenarioError(f"The cost {kind!r} is that of an observer; name it (--observer NAME).")
         if kind == "state":
             return StateCost(observer, tuple(_pair(part, observer) for part in rest.split(",")) if colon else ())
+        measurements = None if "nis_degrees" in outputs else measurement_count(outputs)
         return LikelihoodCost(observer) if kind == "likelihood" else NisCost(observer, measurements)
     if colon:
         raise ScenarioError(f"cost {given!r}: {nearest(kind, KINDS)}")

@@ -81,7 +81,7 @@ def tune(
     training, judging = _seeds(seeds, judge)
     if resume and directory is None:
         raise ScenarioError("A search is resumed from its folder: give directory=...")
-    judged_by = make_cost(cost, observer, _measurements(scenario, observer))
+    judged_by = make_cost(cost, observer, _outputs(scenario, observer))
     drawn = seed_settings(scenario, seed_names)
     if len(training) + len(judging) > 1 and not drawn:
         raise ScenarioError(
@@ -132,15 +132,13 @@ def _seeds(seeds: Sequence[int], judge: Sequence[int]) -> tuple[list[int], list[
     return training, judging
 
 
-def _measurements(scenario: Scenario, observer: str | None) -> int:
-    """How many measurements the innovations of an observer have; 1 where it does not say."""
+def _outputs(scenario: Scenario, observer: str | None) -> list[str]:
+    """Names of the outputs of the observer that is tuned; none where none is named."""
     if observer is None:
-        return 1
+        return []
     table = scenario.table().components[observer]
     described = describe_component(observer, table, scenario.folder, f"{scenario.where}: components.{observer}")
-    outputs = described.names("output")
-    found = [name for name in outputs if name == "innovation" or name.startswith("innovation[")]
-    return max(len(found), len([name for name in outputs if name.endswith("_innovation")]), 1)
+    return list(described.names("output"))
 
 
 @contextmanager

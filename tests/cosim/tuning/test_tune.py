@@ -12,15 +12,19 @@ from small_scenarios import small
 
 from cosim import Scenario
 from cosim.errors import ScenarioError
+from cosim.evaluation.spec import ReportSpec
+from cosim.results.result import Result
 from cosim.scenario.outcome import Outcome
-from cosim.tuning.costs import LikelihoodCost
+from cosim.tuning.costs import LikelihoodCost, make_cost
 from cosim.tuning.evaluation import EARLIER, JOURNAL, Evaluator
 from cosim.tuning.parameters import tunable
 from cosim.tuning.study import at_bounds
 from cosim.tuning.tune import tune
 from cosim.tuning.tuning_files import convergence_figure
 from cosim.tuning.tuning_result import Tuning
+from fmu_observer import OBSERVERS
 from fmu_observer.optimisers.search_space import Bounded, SearchSpace
+from plant_models.hybrid import scalar_names
 
 CURRENTS = "state:current_d=motor.current_d,current_q=motor.current_q"
 VARIANCES = {
@@ -95,6 +99,19 @@ def test_the_likelihood_needs_no_true_values_and_sees_the_scale() -> None:
     assert "only their ratios" not in " ".join(found.warnings)
     nis = tuned(parameters=some, cost="nis", seeds=[0], iterations=1, options={"population": 4})
     assert 0.0 <= nis.after[0] < 10.0
+
+
+@pytest.mark.parametrize("observer", ["motor_ekf", "extended_kalman_filter", "ensemble_kalman_filter"])
+def test_nis_is_judged_by_the_measurements_of_the_observer(observer: str) -> None:
+    """Two currents of a motor, one angle of a pendulum; and a filter that tells its degrees itself."""
+    rows = np.zeros(50, [("time", "f8"), ("filter.nis", "f8"), ("filter.nis_degrees", "f8")])
+    rows["time"], rows["filter.nis_degrees"] = np.arange(50.0), 3.0
+    expected = {"motor_ekf": 2.0, "extended_kalman_filter": 1.0, "ensemble_kalman_filter": 3.0}[observer]
+    rows["filter.nis"] = expected
+    cost = make_cost("nis", "filter", scalar_names(OBSERVERS[observer]().outputs))
+    assert cost.of(Outcome(Result(rows, []), ReportSpec())) == 0.0
+    rows["filter.nis"] *= np.e
+    assert cost.of(Outcome(Result(rows, []), ReportSpec())) == pytest.approx(1.0, rel=1e-12)
 
 
 def test_an_interrupted_search_keeps_what_it_found_and_goes_on(tmp_path: Path, found: Tuning) -> None:
