@@ -69,7 +69,7 @@ def test_a_locked_wheel_is_not_believed_and_the_reading_after_it_is() -> None:
     bench = running()
     bench.set("x", {"estimated_speed": 20.0})
     bench.runtime.start(0.0)
-    told = {}
+    told, nis, likelihood = {}, [], {}
     for k in range(1, 200):
         t = k * PERIOD
         speed = 20.0 + (EFFORT - DRAG * 20.0) / MASS * t
@@ -77,10 +77,66 @@ def test_a_locked_wheel_is_not_believed_and_the_reading_after_it_is() -> None:
         bench.runtime.advance(t)
         values = bench.outputs()
         told[round(t, 1)] = (values["odometer_fault"], values["speed"] - speed)
+        nis.append(values["nis"])
+        likelihood[round(t, 1)] = values["innovation_likelihood"]
     assert [fault for t, (fault, _) in told.items() if 8.05 < t < 8.95] == [1.0] * 9
+    assert max(nis) <= 4.0**2  # of readings that were used: the gate is at four standard deviations
+    during = [likelihood[round(8.0 + 0.1 * i, 1)] for i in range(10)]
+    assert len(set(during)) == 1  # refused readings say nothing of how likely the others were
     assert not any(fault for t, (fault, _) in told.items() if 2.0 < t < 8.0 or t > 9.05)
     # the true drag falls short of the linear one of the test's speed by 0.06 m/s in 20 s
     assert max(abs(error) for t, (_, error) in told.items() if t > 5.0) < 0.1
+
+
+def test_an_old_reading_is_moved_by_the_acceleration_since() -> None:
+    """Readings are those of 0.4 s ago, on a train that gains 0.4 m/s each second."""
+    off = {}
+    for age in (0.0, 0.4):
+        bench = running(davis_b=0.0, reading_age=age, odometer_deviation=0.01)
+        bench.set("x", {"estimated_speed": 20.0})
+        bench.set("u", {"odometer": 20.0 - 0.4 * 0.4})
+        bench.runtime.start(0.0)
+        for k in range(1, 300):
+            bench.set("u", {"odometer": 20.0 + 0.4 * (k * PERIOD - 0.4)})
+            bench.runtime.advance(k * PERIOD)
+        off[age] = bench.outputs()["speed"] - (20.0 + 0.4 * 299 * PERIOD)
+    assert off[0.4] == pytest.approx(0.0, abs=1e-6)
+    assert off[0.0] < -0.01  # part of the 0.16 m/s, the rest is taken for creep
+
+
+def test_a_train_that_stands_is_not_believed_to_run_backwards() -> None:
+    bench = running(odometer_gate=100.0)
+    bench.set("x", {"estimated_speed": 0.1, "estimated_creep": 1.0})
+    bench.set("u", {"odometer": 0.0, "effort": 0.0})
+    bench.runtime.start(0.0)
+    assert bench.state("estimated_speed") == 0.0
+
+
+def test_the_gate_of_telegrams_is_told_three_standard_deviations() -> None:
+    bench = running()
+    x = np.zeros(bench.runtime.system.state_count)
+    x[4] = 7.0**2
+    assert bench.runtime.system.own_bound(x, None) == pytest.approx(21.0)
+
+
+def test_the_certificate_is_that_of_the_riccati_equation() -> None:
+    """A balise at each reading: the settled filter is that of one equation with both measurements."""
+    system = OBSERVERS["balise_odometer_ekf"]()
+    values = {"acceleration_density": 1e-3, "disturbance_density": 1e-4, "davis_b": 0.0, "davis_c": 0.0}
+    found = system.certify(PERIOD, values)
+    F, QN = exact(PERIOD, 0.0, (1e-3, 1e-4))
+    fade = np.exp(-PERIOD / 20.0)
+    F[3, 3], QN[3, 3] = fade, (0.01 * 20.0) ** 2 * (1.0 - fade**2)
+    C, RN = np.array([[0, 1.0, 0, 1.0], [1.0, 0, 0, 0]]), np.diag([0.1**2, 0.5**2])
+    P = scipy.linalg.solve_discrete_are(F.T, C.T, QN, RN)
+    K = P @ C.T @ np.linalg.inv(C @ P @ C.T + RN)
+    after = (np.eye(4) - K @ C) @ P
+    M = (np.eye(4) - K @ C) @ F
+    assert found.spectral_radius == pytest.approx(np.abs(np.linalg.eigvals(M)).max(), rel=1e-6)
+    root = scipy.linalg.sqrtm(after).real
+    decrease = 1.0 - np.linalg.eigvalsh(root @ M.T @ np.linalg.inv(after) @ M @ root).max()
+    assert found.quadratic_margin == pytest.approx(decrease, rel=1e-3)
+    assert np.array(found.lyapunov_matrix) == pytest.approx(np.linalg.inv(after), rel=1e-4, abs=1e-3)
 
 
 def test_a_covariance_of_zero_is_refused_in_words() -> None:

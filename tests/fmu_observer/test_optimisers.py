@@ -190,3 +190,26 @@ def test_logarithmic_coordinates_go_forth_and_back() -> None:
         Bounded("q", 0.0, 1.0, True)
     with pytest.raises(ValueError, match="different names"):
         SearchSpace([Bounded("q", 0.0, 1.0)] * 2)
+
+
+def test_a_fifth_of_the_habitats_stays_where_all_new_ones_are_worse() -> None:
+    searching = Biogeography(LOW, HIGH, seed=3, absorption=0.0, mutation=1.0)
+    first = searching.ask()
+    searching.tell(first, bowl(first))
+    second = searching.ask()
+    assert not np.isin(second, first).any()
+    searching.tell(second, 1e6 + bowl(second))
+    searching.mutation = 0.0  # what is proposed now are the habitats themselves
+    best = first[np.argsort(bowl(first))[:4]]
+    np.testing.assert_array_equal(searching.ask()[:4], best)
+
+
+def test_parents_are_drawn_by_the_root_of_their_rank() -> None:
+    """Without crossover and mutation children are copies: 400 draws against the sum of the chances."""
+    searching = Genetic(LOW[:1], HIGH[:1], seed=3, population=400, crossover=0.0, mutation=0.0, elite=0)
+    first = searching.ask()
+    searching.tell(first, first[:, 0])
+    chances = 1.0 / np.sqrt(np.arange(1, 401))
+    expected = chances[:100].sum() / chances.sum()
+    share = np.mean(searching.ask()[:, 0] <= np.sort(first[:, 0])[99])
+    assert share == pytest.approx(expected, abs=4.0 * np.sqrt(expected * (1.0 - expected) / 400))

@@ -80,6 +80,27 @@ def test_costs_are_those_of_runs_of_the_scenario(found: Tuning) -> None:
     assert sum(found.after) < sum(found.before)
 
 
+def test_a_candidate_costs_the_mean_over_its_seeds_and_the_best_search_counts(found: Tuning) -> None:
+    assert found.searches[0].costs[-1] == pytest.approx(np.mean(found.after), rel=1e-12)
+    several = tuned(drive_with_poor_guess(), seeds=[0], searches=3, iterations=0)
+    ends = [search.costs[-1] for search in several.searches]
+    assert len(set(ends)) == 3
+    assert several.after[0] == min(ends) < several.before[0]
+
+
+def test_values_that_no_candidate_beats_are_kept() -> None:
+    """The cost is the distance from what the scenario as it is gives."""
+    present = float(np.mean(drive_with_poor_guess().run()["filter.current_d"]))
+    found = tuned(
+        drive_with_poor_guess(),
+        cost=lambda outcome: abs(float(np.mean(outcome["filter.current_d"])) - present),
+        iterations=0,
+    )
+    assert found.before == found.after == [0.0]
+    assert found.best == found.start
+    assert found.searches[0].costs[-1] > 0.0
+
+
 def test_what_changes_nothing_is_held_and_said() -> None:
     """The angle's noise moves no current: rank 3 of 4."""
     found = tuned(drive_with_poor_guess(), iterations=0, options={"population": 3})
