@@ -53,6 +53,12 @@ def register(commands: Any) -> None:
         dest="settings",
         help="a state, an input or a parameter; a state that is set is not taken from the run",
     )
+    parser.add_argument(
+        "--states",
+        nargs="+",
+        metavar="NAME",
+        help="of an FMU that declares no continuous states: the variables that hold its state",
+    )
     parser.add_argument("--preset", metavar="NAME", help="of a model of ours: values to start from")
     parser.add_argument("--inputs", nargs="+", metavar="NAME", help="inputs of B and D (default: all)")
     parser.add_argument("--outputs", nargs="+", metavar="NAME", help="outputs of C and D (default: all)")
@@ -97,13 +103,15 @@ def _of_fmu(options: argparse.Namespace, settings: dict[str, float]) -> Linearis
     if options.preset is not None:
         raise ScenarioError("--preset belongs to models of ours; set the parameters of an FMU by --set NAME=VALUE.")
     described = describe_fmu(options.model, Path(options.model).stem)
-    states, inputs = set(declared_states(described)), set(described.names("input"))
+    states = set(options.states or declared_states(described))
+    inputs = set(described.names("input"))
     return linearise_fmu(
         options.model,
         t=options.at,
         states={name: value for name, value in settings.items() if name in states},
         inputs={name: value for name, value in settings.items() if name in inputs},
         parameters={name: value for name, value in settings.items() if name not in states | inputs},
+        state_names=options.states,
         by_inputs=options.inputs,
         outputs=options.outputs,
         interface=options.interface,
@@ -122,6 +130,8 @@ def _of_model(options: argparse.Namespace, settings: dict[str, float]) -> Linear
         raise ScenarioError(f"{name}: plain Python has no equations that could be linearised.")
     states = {n for signal in system.states for n in signal.scalar_names}
     inputs = {n for signal in system.inputs for n in signal.scalar_names}
+    if options.states:
+        raise ScenarioError("--states belongs to FMUs; a model of ours declares its own.")
     found = linearise_system(
         system,
         t=options.at,

@@ -10,6 +10,7 @@ import numpy as np
 
 from cosim.errors import ScenarioError
 from fmu_observer.filtering.consistency import Consistency, judge
+from fmu_observer.filtering.kalman import integrated_noise
 from fmu_observer.filtering.smoothing import extended_pass, smooth
 
 JERK = 0.1  # spectral density of the train's jerk [m2/s5] [ours]
@@ -147,9 +148,8 @@ def _moved(x: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
 
 def _process(dt: float, density: float) -> np.ndarray:
     """Covariance of integrated white jerk over a step, and of the drift of the odometer."""
-    powers = np.array([[dt**5 / 20.0, dt**4 / 8.0, dt**3 / 6.0], [0.0, dt**3 / 3.0, dt**2 / 2.0], [0.0, 0.0, dt]])
     Q = np.zeros((4, 4))
-    Q[:3, :3] = density * (np.triu(powers) + np.triu(powers, 1).T)
+    Q[:3, :3] = integrated_noise(3, dt, density)
     Q[3, 3] = DRIFT * dt
     return Q
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import fmpy
 import numpy as np
@@ -28,6 +29,7 @@ def linearise_fmu(
     states: Mapping[str, float] | None = None,
     inputs: Mapping[str, float] | None = None,
     parameters: Mapping[str, float] | None = None,
+    state_names: list[str] | None = None,
     simulate: bool = True,
     by_inputs: list[str] | None = None,
     outputs: list[str] | None = None,
@@ -44,6 +46,7 @@ def linearise_fmu(
         states: values by name; those left out are where a run from time zero arrives at `t`, or at their starts.
         inputs: values by name; those left out at their starts. Held during the run to `t`.
         parameters: start values by name.
+        state_names: of a co-simulation that declares no continuous states: the variables that hold its state.
         simulate: whether states come from a run to `t`; else from their starts.
         by_inputs: inputs of B and D; None for all real ones. outputs: those of C and D; None for all real ones.
         interface: ``model-exchange`` or ``co-simulation``; None for model exchange where the FMU has it.
@@ -55,7 +58,7 @@ def linearise_fmu(
     Raises:
         FmuLoadError: the FMU cannot be opened. FmuModelError: it has no states, or a name is unknown.
     """
-    model = _opened(path, interface, outputs, parameters)
+    model = _opened(path, interface, states=state_names, outputs=outputs, parameters=parameters)
     try:
         u = _filled(model, "input", model.inputs, model.start_inputs, inputs or {})
         x = model.start.copy()
@@ -135,18 +138,16 @@ def right_slopes(model: ExchangeModel) -> bool:
     return found is not None
 
 
-def _opened(
-    path: str | Path, interface: Interface | None, outputs: list[str] | None, parameters: Mapping[str, float] | None
-) -> SealedModel:
+def _opened(path: str | Path, interface: Interface | None, **named: Any) -> SealedModel:
     """The model by the interface asked for; model exchange where there is a choice."""
     if interface is not None:
-        return open_model(path, interface, outputs=outputs, parameters=parameters)
+        return open_model(path, interface, **named)
     try:
-        return open_model(path, "model-exchange", outputs=outputs, parameters=parameters)
+        return open_model(path, "model-exchange", **named)
     except FmuModelError as error:
         if "it has no model-exchange" not in str(error):
             raise
-    return open_model(path, "co-simulation", outputs=outputs, parameters=parameters)
+    return open_model(path, "co-simulation", **named)
 
 
 def _continuous(model: ExchangeModel, t: float) -> Function:

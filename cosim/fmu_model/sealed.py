@@ -258,7 +258,8 @@ class SealedModel(ABC):
             if what == "state" and not own:
                 raise FmuModelError(
                     f"{self.path}: its description declares no continuous state (no derivative of a variable). Name "
-                    "the variables that hold its state; an FMU without any has no memory that a filter could estimate."
+                    "the variables that hold its state (states); an FMU without any has no memory that a filter could "
+                    "estimate."
                 )
             return own
         for name in given:

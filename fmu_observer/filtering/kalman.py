@@ -6,7 +6,7 @@ They serve the linear and the extended filter alike: what the matrices are Jacob
 
 from __future__ import annotations
 
-from math import log, pi
+from math import factorial, log, pi
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -73,6 +73,30 @@ def predicted_covariance(P: Array, F: Array, QN: Array, W: Array | None = None) 
         Shape (n, n), exactly symmetric.
     """
     return symmetric(F @ P @ F.T) + through(QN, W)
+
+
+def integrated_noise(order: int, elapsed: Array, density: Array) -> Array:
+    """Covariance of a chain of integrators that white noise drives: ``dx_i = x_(i+1)``, the last one the noise.
+
+    Entries are ``density T^(2n-1-i-j) / ((n-1-i)! (n-1-j)! (2n-1-i-j))`` with i, j from 0 (Bar-Shalom, Li, Kirubarajan:
+    Estimation with applications to tracking and navigation, section 6.2).
+
+    Args:
+        order: n, number of integrators. elapsed: T, time [s]. density: spectral density of the noise.
+
+    Returns:
+        Shape (n, n).
+    """
+    powers = [elapsed + 0.0]
+    while len(powers) < 2 * order - 1:
+        powers.append(powers[-1] * elapsed)
+    rows = []
+    for i in range(order - 1, -1, -1):
+        entries = []
+        for j in range(order - 1, -1, -1):
+            entries.append(density * powers[i + j] / (factorial(i) * factorial(j) * (i + j + 1)))
+        rows.append(np.hstack(entries))
+    return np.vstack(rows)
 
 
 def correct(

@@ -6,6 +6,7 @@ import casadi as ca
 import filterpy.kalman
 import numpy as np
 import pytest
+import scipy
 
 from fmu_observer.filtering import kalman, square_root, unscented
 
@@ -171,3 +172,12 @@ def test_formulas_trace() -> None:
     np.testing.assert_allclose(found, joseph(c["x"], P, c["innovation"]), rtol=1e-10)
     found = traced(lambda x, P: unscented.unscented_transform(x, P, bent, w)[1], c["x"], P)
     np.testing.assert_allclose(found, unscented.unscented_transform(c["x"], P, bent, w)[1], rtol=1e-7)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_integrated_noise_is_that_of_the_chain_of_integrators(order: int) -> None:
+    A, noise = np.eye(order, k=1), np.zeros((order, order))
+    noise[-1, -1] = 0.3
+    both = scipy.linalg.expm(0.7 * np.block([[-A, noise], [np.zeros((order, order)), A.T]]))  # Van Loan 1978
+    exact = both[order:, order:].T @ both[:order, order:]
+    np.testing.assert_allclose(kalman.integrated_noise(order, 0.7, 0.3), exact, rtol=1e-12)

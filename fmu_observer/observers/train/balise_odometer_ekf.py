@@ -9,7 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fmu_observer.certificates import Certificate
-from fmu_observer.filtering.kalman import correct, log_likelihood, normalised_square, predicted_covariance
+from fmu_observer.filtering.kalman import (
+    correct,
+    integrated_noise,
+    log_likelihood,
+    normalised_square,
+    predicted_covariance,
+)
 from fmu_observer.observers.gap_certified import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.train.train_observer import BALISE, POSITION, SPEED
@@ -254,19 +260,14 @@ def transition(elapsed: Array, speed: Array, p: Any) -> Transition:
             np.hstack([zero, zero, zero, fade]),
         ]
     )
-    a, d = p.acceleration_density, p.disturbance_density
-    T2 = T * T
-    pp, pv, pd = a * T * T2 / 3.0 + d * T2 * T2 * T / 20.0, 0.5 * a * T2 + d * T2 * T2 / 8.0, d * T * T2 / 6.0
-    vv, vd, dd = a * T + d * T * T2 / 3.0, 0.5 * d * T2, d * T
+    by_acceleration = integrated_noise(2, T, p.acceleration_density)
+    by_disturbance = integrated_noise(3, T, p.disturbance_density)
     creep = np.square(p.creep_share * speed) * (1.0 - fade * fade)
-    QN = np.vstack(
-        [
-            np.hstack([pp, pv, pd, zero]),
-            np.hstack([pv, vv, vd, zero]),
-            np.hstack([pd, vd, dd, zero]),
-            np.hstack([zero, zero, zero, creep]),
-        ]
-    )
+    rows = []
+    for i in range(3):
+        shared = [by_acceleration[i, j] if max(i, j) < 2 else zero for j in range(3)]
+        rows.append(np.hstack([*(by_disturbance[i, j] + shared[j] for j in range(3)), zero]))
+    QN = np.vstack([*rows, np.hstack([zero, zero, zero, creep])])
     return Transition(F, QN)
 
 

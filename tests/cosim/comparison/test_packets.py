@@ -8,6 +8,7 @@ from math import nan
 import pytest
 from made_results import compared, made
 
+from cosim.comparison.packets import keeps_packets
 from cosim.comparison.text import comparison_text
 from cosim.comparison.verdict import Comparison
 from cosim.provenance.same import same_result
@@ -72,3 +73,8 @@ def test_what_keeps_no_packets_is_not_compared() -> None:
         assert "packets not compared: one side keeps none" in comparison_text(comparison)
     assert len(compared(result(PACKETS), result([])).packets.differences) == 5
     assert "packets" not in comparison_text(compared(result([]), result([])))
+
+
+def test_packets_in_memory_are_kept_whatever_the_summary_says() -> None:
+    assert keeps_packets(result(PACKETS, {}))
+    assert not keeps_packets(result([], {}))

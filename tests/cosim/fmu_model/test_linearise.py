@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -100,6 +101,20 @@ def test_honest_foreign_fmu_in_the_order_of_its_own_state_vector(liar: Path) -> 
     assert found.states == ("position", "speed")
     assert found.method == "directional derivatives"
     np.testing.assert_allclose(found.A, [[0.0, 1.0], [0.0, -0.5]], atol=1e-12)
+
+
+def test_states_that_are_not_declared_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """As FMUs of pythonfmu have them: outputs with exact starts, and no derivatives."""
+    xml = re.sub(r"<Derivatives>.*</Derivatives>|<InitialUnknowns>.*</InitialUnknowns>", "", lying_fmus.description())
+    path = lying_fmus.build(tmp_path, xml=re.sub(r' derivative="\d"', "", xml))
+    assert main(["linearise", str(path)]) == 2
+    assert "Name the variables that hold its state (states)" in capsys.readouterr().err
+    found = linearise_fmu(path, state_names=["position", "speed"], step=0.05)
+    assert found.A[1, 1] == pytest.approx(np.exp(-0.5 * 0.05), rel=1e-6)  # the rate of the speed is -0.5
+    assert main(["linearise", str(path), "--states", "position", "speed", "--set", "speed=2", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["states"]
+    assert main(["linearise", "pendulum", "--states", "angle"]) == 2
+    assert "belongs to FMUs" in capsys.readouterr().err
 
 
 def test_wrong_directional_derivatives_are_not_used(tmp_path: Path) -> None:
