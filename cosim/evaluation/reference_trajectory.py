@@ -94,24 +94,8 @@ def reference_trajectory(
     Raises:
         ScenarioError: too few readings, no balise, or a number that is not positive.
     """
-    for name, number in {"odometer_std": odometer_std, "jerk_density": jerk_density, "scale_std": scale_std}.items():
-        if not number > 0.0:
-            raise ScenarioError(f"{name} = {number:g}; expected a positive number.")
-    if not np.all(np.asarray(balise_std) > 0.0):
-        raise ScenarioError("balise_std holds a number that is not positive; expected metres above zero.")
-    if len(time) < 3 or not len(stamps):
-        raise ScenarioError(
-            f"there are {len(time)} odometer readings and {len(stamps)} balises; a trajectory needs 3 and 1 at least."
-        )
-    instants = np.union1d(time, stamps)
-    samples = np.full((len(instants), 2), np.nan)
-    samples[np.searchsorted(instants, time), 0] = odometer
-    at = np.searchsorted(instants, stamps)
-    samples[at, 1] = positions
-    spreads = np.full(len(instants), 1.0)
-    spreads[at] = balise_std
-    R = np.zeros((len(instants), 2, 2))
-    R[:, 0, 0], R[:, 1, 1] = odometer_std**2, spreads**2
+    _check(len(time), len(stamps), odometer_std, balise_std, jerk_density, scale_std)
+    instants, samples, R = _samples(time, odometer, stamps, positions, odometer_std, balise_std)
     steps = np.diff(instants)
     first = float(odometer[0])
     run = float(np.ptp(instants)) * max(float(np.abs(odometer).max()), 1.0)
@@ -138,6 +122,49 @@ def reference_trajectory(
     return ReferenceTrajectory(
         instants, smoothed.estimates, smoothed.deviations, len(time), there - used, balises, found
     )
+
+
+def _check(
+    readings: int,
+    balises: int,
+    odometer_std: float,
+    balise_std: float | np.ndarray,
+    jerk_density: float,
+    scale_std: float,
+) -> None:
+    """Refuse what no trajectory follows from."""
+    for name, number in {"odometer_std": odometer_std, "jerk_density": jerk_density, "scale_std": scale_std}.items():
+        if not number > 0.0:
+            raise ScenarioError(f"{name} = {number:g}; expected a positive number.")
+    if not np.all(np.asarray(balise_std) > 0.0):
+        raise ScenarioError("balise_std holds a number that is not positive; expected metres above zero.")
+    if readings < 3 or not balises:
+        raise ScenarioError(
+            f"there are {readings} odometer readings and {balises} balises; a trajectory needs 3 and 1 at least."
+        )
+
+
+def _samples(
+    time: np.ndarray,
+    odometer: np.ndarray,
+    stamps: np.ndarray,
+    positions: np.ndarray,
+    odometer_std: float,
+    balise_std: float | np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """All instants, shape (n,), reading and position at each, NaN where there is none, shape (n, 2), and their
+    covariance, shape (n, 2, 2).
+    """
+    instants = np.union1d(time, stamps)
+    samples = np.full((len(instants), 2), np.nan)
+    samples[np.searchsorted(instants, time), 0] = odometer
+    at = np.searchsorted(instants, stamps)
+    samples[at, 1] = positions
+    spreads = np.full(len(instants), 1.0)
+    spreads[at] = balise_std
+    R = np.zeros((len(instants), 2, 2))
+    R[:, 0, 0], R[:, 1, 1] = odometer_std**2, spreads**2
+    return instants, samples, R
 
 
 def _moved(x: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
