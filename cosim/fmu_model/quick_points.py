@@ -60,7 +60,7 @@ class QuickPoints:
         """Reset, values, initialisation, a step where one is asked for, and what is read, in one call.
 
         Args:
-            names: what is read. read: reads it at the end; None for nothing. step: whether a communication step is made.
+            names: what is read. read: reads it at the end; None for nothing. step: whether a step is made.
 
         Returns:
             The call. It says False where the step was discarded, ended early or met an event: then do it in the
