@@ -1,0 +1,5 @@
+"""Observers and detectors that read the graphical signature of a window of samples."""
+
+from plant_models.registry import lazy_names
+
+__getattr__ = lazy_names(__name__)
