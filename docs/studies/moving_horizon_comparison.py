@@ -60,6 +60,7 @@ class FactorGraphSmoother(BaliseMovingHorizon):
 
     name = "factor_graph_smoother"
     traceable = False
+    internal_step = 0.1
 
     def __init__(self, lag: float = WINDOW * PERIOD) -> None:
         super().__init__(window=1, loss="geman_mcclure")
