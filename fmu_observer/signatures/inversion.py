@@ -50,10 +50,11 @@ def interpolated(nodes: np.ndarray, values: Array, place: Array) -> Array:
     """Table at a place, linear between equidistant nodes, the end value beyond them.
 
     Args:
-        nodes: increasing at equal distances, shape (a,). values: shape (a, ...). place: a number.
+        nodes: increasing at equal distances, shape (a,). values: numbers or arrays, one a node. place: a number, or an
+            array that broadcasts with the values.
 
     Returns:
-        Shape (...).
+        Of the shape of one value times a weight.
     """
     inside = np.clip(place, nodes[0], nodes[-1])
     weights = [np.maximum(1.0 - np.abs(inside - node) / (nodes[1] - nodes[0]), 0.0) for node in nodes]

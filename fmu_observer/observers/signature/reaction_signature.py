@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -70,7 +69,7 @@ class ReactionSignature(SignatureObserver):
     }
 
     def __init__(
-        self, candidates: int = 6, corrections: int = 4, nodes: int = 5, next_scaling: NextScaling = "literal"
+        self, candidates: int = 6, corrections: int = 3, nodes: int = 5, next_scaling: NextScaling = "literal"
     ) -> None:
         require_whole(self.name, 3, 11, candidates=candidates)
         require_whole(self.name, 0, 6, corrections=corrections)
@@ -79,18 +78,16 @@ class ReactionSignature(SignatureObserver):
         self.rates = np.linspace(*RATES, candidates)
         self.nodes = np.linspace(0.0, LARGEST, nodes)
         middle = float(np.mean(RATES))
-        self.scaling = next_scaling
-        table = self.built(1e-2, 1e-2)
+        self.plant, self.scaling = GasPhaseReaction(), next_scaling
+        table = self._built(1e-2, 1e-2)
         self.declare(
-            GasPhaseReaction(),
+            self.plant,
             ORDER + POINTS,
             next_scaling,
             gain=0.2,
             eps=1e-2,
             own_parameters=(
-                parameter(
-                    "table", "1", tuple(table), "sqrt(-r1 / b) over x1, then r2 over x1 and x2", size=len(table)
-                ),
+                parameter("table", "1", tuple(table), "sqrt(-r1 / b) over x1, then r2 over x1 and x2", size=len(table)),
             ),
             own_memory=(
                 memory("estimated_rate", "1/s", middle, "Estimate: rate of the reaction"),
@@ -104,6 +101,86 @@ class ReactionSignature(SignatureObserver):
         )
         super().__init__(candidates=candidates, corrections=corrections, nodes=nodes, next_scaling=next_scaling)
 
-    @cached_property
-    def _equations(self) -> GasPhaseReaction:
-        return GasPhaseReaction()
+    def properties(self, state: Array, rate: Array, period: Array, eps: Array) -> tuple[Array, Array]:
+        """``sqrt(-r1 / b)`` and r2 of the window that begins with a state, shape (2, ...), and the window, shape
+        (N_O, ...), by the exact solution.
+
+        Args:
+            state: shape (2, ...). rate: b [1/s], shape (...). period: tau [s]. eps: regularisation.
+        """
+        total = state[0] + 2.0 * state[1]
+        firsts = [state[0] / (1.0 + 2.0 * k * period * rate * state[0]) for k in range(ORDER + POINTS)]
+        window = np.stack([0.5 * (first + total) for first in firsts])
+        return self._read(window, rate, eps), window
+
+    def tabulated(
+        self, parameters: Mapping[str, Value] | None = None, preset: str | None = None
+    ) -> dict[str, np.ndarray]:
+        """The table for other parameters, to be set together with them.
+
+        Args:
+            parameters: values by name; sampling period and regularisation matter. preset: to start from.
+
+        Raises:
+            ValueError: a parameter is unknown, or the table cannot be inverted; the message names the quantity and
+                where.
+        """
+        p = self.model_values(parameters, preset)
+        return {"table": self._built(float(p.sample_period), float(p.regularisation))}
+
+    def inverted(self, past: Sequence[Array], x: Array, p: Any) -> Inverted:
+        """The state for each candidate of the rate, and the candidate that fits the window best."""
+        states, residuals = self.search(past[0], p)
+        best = best_candidate(self.rates, residuals)
+        chosen = [
+            interpolated(self.rates, values, best.values)
+            for values in (*states.values, np.minimum(states.outside, 1e3))
+        ]
+        before = x[self._places["estimated_rate"]]
+        smoothed = (before + p.gain * best.values) / (1.0 + p.gain)
+        return Inverted(np.stack(chosen[:2]), np.maximum(chosen[2], best.outside), (smoothed, best.values))
+
+    def search(self, window: Array, p: Any) -> tuple[Found, Array]:
+        """State at the oldest sample, were each candidate the rate, shape (2, c), and the residuals that it leaves, of
+        which J_r is the sum of squares, shape (N_O, c).
+
+        Args:
+            window: samples of y, shape (N_O,). p: parameters.
+        """
+        each = np.stack([window] * len(self.rates), axis=1)
+        target = self._read(each, self.rates, p.regularisation)
+
+        def again(state: Array) -> Array:
+            return self.properties(state, self.rates, p.sample_period, p.regularisation)[0]
+
+        states = corrected_inverse(lambda r: self._looked_up(r, p.table), again, target, self.corrections, 0.0, LARGEST)
+        return states, each - self.properties(states.values, self.rates, p.sample_period, p.regularisation)[1]
+
+    def model_parameters(self, own: Sequence[Array], p: Any) -> Any:
+        """The rate as estimated."""
+        return _Model(own[0], p.sample_period)
+
+    # -- internals --------------------------------------------------------------------------------------------------
+
+    def _read(self, window: Array, rate: Array, eps: Array) -> Array:
+        points = self.points(window, ORDER, eps)
+        lowest = np.minimum(np.min(points[0], axis=0), 0.0)
+        return np.stack([np.sqrt(-lowest / rate), np.min(points[1], axis=0)])
+
+    def _looked_up(self, properties: Array, table: Array) -> Found:
+        a, c = len(self.nodes), len(self.rates)
+        first = monotone_inverse(self.nodes, table[:a], properties[0])
+        rows = [np.stack([table[a + i * a : a + i * a + a]] * c, axis=1) for i in range(a)]
+        second = monotone_inverse(self.nodes, interpolated(self.nodes, rows, first.values), properties[1])
+        return Found(np.stack([first.values, second.values]), np.maximum(first.outside, second.outside))
+
+    def _built(self, period: float, eps: float) -> np.ndarray:
+        grid = np.stack(np.meshgrid(self.nodes, self.nodes, indexing="ij"))
+        rate = float(np.mean(RATES))
+        properties = self.properties(grid, rate, period, eps)[0]
+        own = properties[0].mean(axis=1)
+        require_monotone("x1", self.nodes, own, f"at rate {rate:g}")
+        require_monotone(
+            "x2", self.nodes, properties[1].T[:, 1:], f"at rate {rate:g}, with x1 of {self.nodes[1]:g} to {LARGEST:g}"
+        )
+        return np.concatenate([own, properties[1].ravel()])

@@ -115,11 +115,17 @@ class SignatureObserver(HybridSystem):
                 )
                 for s in named
             ),
-            output_signal("window_full", "1", "1 once the window is full, and estimates are corrected", variability="discrete"),
+            output_signal(
+                "window_full", "1", "1 once the window is full, and estimates are corrected", variability="discrete"
+            ),
             output_signal("window_count", "1", "Full windows so far", variability="discrete"),
             output_signal("outside_count", "1", "Full windows beyond the table so far", variability="discrete"),
             output_signal(
-                "mostly_outside", "1", "1 where most windows were beyond the table", variability="discrete", warning=MOSTLY
+                "mostly_outside",
+                "1",
+                "1 where most windows were beyond the table",
+                variability="discrete",
+                warning=MOSTLY,
             ),
             *own_outputs,
         )
@@ -133,7 +139,9 @@ class SignatureObserver(HybridSystem):
             *own_parameters,
         )
         self.events = (PeriodicEvent("sampling", "sample_period", description="A sample is read"),)
-        self._places = {s.name: i for s, i in zip(self.states, np.cumsum([0, *(s.width for s in self.states)]))}
+        self._places = {
+            s.name: i for s, i in zip(self.states, np.cumsum([0, *(s.width for s in self.states)]), strict=False)
+        }
 
     # -- what a subclass writes -------------------------------------------------------------------------------------
 
@@ -174,20 +182,18 @@ class SignatureObserver(HybridSystem):
         """
         states = [start]
         for _ in range(steps):
-            states.append(
-                rk4_step(lambda t, x: self.plant.flow(t, x, None, p), 0.0, p.sample_period, states[-1])
-            )
+            states.append(rk4_step(lambda t, x: self.plant.flow(t, x, None, p), 0.0, p.sample_period, states[-1]))
         return states, states[-1]
 
-    def points(self, samples: Array, order: int, eps: Array) -> Array:
-        """Points of a signature, shape (2, M, ...).
+    def points(self, samples: Array, order: int, eps: Array) -> tuple[Array, Array]:
+        """Abscissas and ordinates of a signature, shape (M, ...) each.
 
         Args:
             samples: the oldest first, shape (M + N, ...). order: N. eps: regularisation.
         """
         count = len(samples) - order
         found = [pencil_point(samples[i : i + order], samples[i + order], eps, self.scaling) for i in range(count)]
-        return np.stack([np.stack([point[0] for point in found]), np.stack([point[1] for point in found])])
+        return np.stack([point[0] for point in found]), np.stack([point[1] for point in found])
 
     def model_values(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Any:
         """Named tuple of all parameters, some replaced.
