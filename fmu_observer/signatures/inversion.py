@@ -61,31 +61,51 @@ def interpolated(nodes: np.ndarray, values: Array, place: Array) -> Array:
     return sum(weights[i] * values[i] for i in range(len(nodes)))
 
 
-def curve_distances(curves: Array, point: Array) -> Array:
+def curve_distances(curves: Sequence[Array], point: Array) -> Array:
     """Distances of a point from polygonal lines.
 
     Args:
-        curves: abscissas and ordinates of the corners of c curves, shape (2, c, s). point: shape (2,).
+        curves: abscissas and ordinates of the corners of c curves, shape (c, s) each. point: shape (2,).
 
     Returns:
         Shape (c,).
     """
-    start, along = curves[:, :, :-1], curves[:, :, 1:] - curves[:, :, :-1]
-    to = [point[i] - start[i] for i in range(2)]
+    along = [values[:, 1:] - values[:, :-1] for values in curves]
+    to = [point[i] - curves[i][:, :-1] for i in range(2)]
     share = (to[0] * along[0] + to[1] * along[1]) / (along[0] * along[0] + along[1] * along[1] + TINY)
     share = np.clip(share, 0.0, 1.0)
     square = (to[0] - share * along[0]) ** 2 + (to[1] - share * along[1]) ** 2
     return np.sqrt(np.min(square, axis=1))
 
 
-def soft_inverse(labels: np.ndarray, curves: Array, point: Array, sharpness: Array) -> Array:
+def place_on_curve(nodes: np.ndarray, curve: Array, point: Array) -> Array:
+    """Label of the point of a polygonal line that is nearest to a point, linear between corners.
+
+    Args:
+        nodes: labels of the corners, shape (s,). curve: shape (2, s). point: shape (2,).
+    """
+    best: tuple[Array, ...] | None = None
+    for i in range(len(nodes) - 1):
+        along, to = [curve[k, i + 1] - curve[k, i] for k in range(2)], [point[k] - curve[k, i] for k in range(2)]
+        share = (to[0] * along[0] + to[1] * along[1]) / (along[0] * along[0] + along[1] * along[1] + TINY)
+        share = np.clip(share, 0.0, 1.0)
+        square = (to[0] - share * along[0]) ** 2 + (to[1] - share * along[1]) ** 2
+        found = (square, nodes[i] + share * (nodes[i + 1] - nodes[i]))
+        best = (
+            found if best is None else tuple(np.where(square < best[0], a, b) for a, b in zip(found, best, strict=True))
+        )
+    assert best is not None
+    return best[1]
+
+
+def soft_inverse(labels: np.ndarray, curves: Sequence[Array], point: Array, sharpness: Array) -> Array:
     """Mean of labels of curves, weighted by nearness: Omar 2012, (4.6.5) with the distance that (4.6.6) means.
 
     (4.6.6) prints the smallest distance over the curves; it is that over the points of a curve. Weights are
     ``exp(-mu Delta_j)``, of which a common factor is left out so that they do not all vanish.
 
     Args:
-        labels: quantity that is constant on each curve, shape (c,). curves: shape (2, c, s), see `curve_distances`.
+        labels: quantity that is constant on each curve, shape (c,). curves: see `curve_distances`.
         point: shape (2,). sharpness: mu [1], of distances on axes scaled to [0, 1].
     """
     distance = curve_distances(curves, point)
@@ -94,7 +114,7 @@ def soft_inverse(labels: np.ndarray, curves: Array, point: Array, sharpness: Arr
 
 
 def network_inverse(
-    first: np.ndarray, second: np.ndarray, network: Array, point: Array, extrapolated: float = 0.0
+    first: np.ndarray, second: np.ndarray, network: Sequence[Array], point: Array, extrapolated: float = 0.0
 ) -> Found:
     """Place in a network of quadrilaterals, the curvilinear look-up: Omar 2012, sections 4.6.1 and 4.7.
 
@@ -103,7 +123,7 @@ def network_inverse(
 
     Args:
         first: nodes of the first quantity, shape (a,). second: of the second, shape (b,).
-        network: both properties at the nodes, shape (2, a, b). point: properties looked up, shape (2,).
+        network: both properties at the nodes, shape (a, b) each. point: properties looked up, shape (2,).
         extrapolated: how far the place may lie beyond its cell, in cells [1].
 
     Returns:
@@ -112,9 +132,11 @@ def network_inverse(
     best: tuple[Array, ...] | None = None
     for i in range(len(first) - 1):
         for j in range(len(second) - 1):
-            corner, right = network[:, i, j], network[:, i + 1, j] - network[:, i, j]
-            up = network[:, i, j + 1] - corner
-            twist = network[:, i + 1, j + 1] - network[:, i + 1, j] - up
+            corner, next_first, next_second, opposite = (
+                np.stack([values[a, b] for values in network])
+                for a, b in ((i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1))
+            )
+            right, up, twist = next_first - corner, next_second - corner, opposite - next_first - next_second + corner
             s, t = 0.5, 0.5
             for _ in range(2):
                 error = point - (corner + s * right + t * up + s * t * twist)

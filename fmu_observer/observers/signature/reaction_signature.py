@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -26,13 +26,6 @@ from plant_models.hybrid.system import Array
 ORDER, POINTS = 2, 9  # printed N; N_O = 11
 LARGEST = 3.0  # printed set [0, 3]^2
 RATES = (0.10, 0.35)  # printed range of b [1/s]
-
-
-class _Model(NamedTuple):
-    """Parameters of the equations, with candidates in place of the rate."""
-
-    rate: Array
-    sample_period: Array
 
 
 class ReactionSignature(SignatureObserver):
@@ -158,7 +151,7 @@ class ReactionSignature(SignatureObserver):
 
     def model_parameters(self, own: Sequence[Array], p: Any) -> Any:
         """The rate as estimated."""
-        return _Model(own[0], p.sample_period)
+        return self._model(own[0], p.sample_period)
 
     # -- internals --------------------------------------------------------------------------------------------------
 

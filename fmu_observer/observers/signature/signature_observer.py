@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections import namedtuple
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,6 +28,7 @@ from plant_models.hybrid import (
 )
 from plant_models.hybrid.integration import rk4_step
 from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid.scan import enclosed, scan
 from plant_models.hybrid.system import Array
 
 OUTSIDE_CELLS = 0.5
@@ -92,6 +95,8 @@ class SignatureObserver(HybridSystem):
             known: names of parameters of the plant that are not parameters of the observer.
         """
         self.plant, self.window, self.scaling = plant, window, scaling
+        names = [s.name for s in plant.parameters if s.name not in NO_MODEL]
+        self._model = namedtuple("Model", [*names, "sample_period"])
         named = plant.plain_outputs[: len(plant.moving)]
         measured = plant.outputs[len(plant.plain_outputs) :]
         self.state_names = tuple(s.name for s in named)
@@ -171,19 +176,37 @@ class SignatureObserver(HybridSystem):
 
     # -- what it may use --------------------------------------------------------------------------------------------
 
-    def moved(self, start: Array, steps: int, p: Any) -> tuple[list[Array], Array]:
-        """States of the model over some periods, and the last one.
+    def moved(self, start: Array, steps: int, model: Any) -> list[Array]:
+        """States of the model over some periods, the start first, ``steps + 1`` of them.
 
         Args:
-            start: shape (n,) or (n, members). steps: periods. p: parameters of the equations and `sample_period`.
-
-        Returns:
-            ``steps + 1`` states, the start first, and the last of them.
+            start: shape (n,) or (n, ...). steps: periods. model: parameters of the equations and `sample_period`.
         """
         states = [start]
         for _ in range(steps):
-            states.append(rk4_step(lambda t, x: self.plant.flow(t, x, None, p), 0.0, p.sample_period, states[-1]))
-        return states, states[-1]
+            states.append(
+                rk4_step(lambda t, x: self.plant.flow(t, x, None, model), 0.0, model.sample_period, states[-1])
+            )
+        return states
+
+    def brought(self, start: Array, steps: int, model: Any) -> Array:
+        """The last of these states alone, shape (n,); a loop in the generated C.
+
+        Args:
+            start: shape (n,). steps: periods. model: see `moved`.
+        """
+
+        def row(carry: Any, _row: Any, shared: Any) -> Any:
+            return (
+                self.moved(carry[0], 1, self._model(*(shared[0][i] for i in range(len(self._model._fields)))))[-1],
+            ), ()
+
+        def loop(state: Array, values: Array) -> tuple[Array, ...]:
+            carry, _ = scan(row, (state,), [(np.zeros(1),)] * steps, (values,))
+            return (carry[0],)
+
+        values = vector(*(getattr(model, name) for name in self._model._fields))
+        return enclosed(loop, start, values)[0]
 
     def points(self, samples: Array, order: int, eps: Array) -> tuple[Array, Array]:
         """Abscissas and ordinates of a signature, shape (M, ...) each.
@@ -218,9 +241,9 @@ class SignatureObserver(HybridSystem):
             past.append(np.hstack([x[first + 1 : first + width], np.stack([getattr(u, name) + 0.0 * held])]))
         count = np.minimum(held + 1.0, float(width))
         full = np.where(count > width - 0.5, 1.0, 0.0)
-        ahead = np.where(held > 0.5, self.moved(x[:n], 1, self.model_parameters(own, p))[1], x[:n])
+        ahead = np.where(held > 0.5, self.moved(x[:n], 1, self.model_parameters(own, p))[-1], x[:n])
         told = self.inverted(past, x, p)
-        now = self.adopted(self.moved(told.state, width - 1, self.model_parameters(told.own, p))[1], u)
+        now = self.adopted(self.brought(told.state, width - 1, self.model_parameters(told.own, p)), u)
         estimate = blended(ahead, now, p.gain, full)
         shown = np.where(full > 0.5, now, ahead)
         beyond = full * np.where(told.outside > OUTSIDE_CELLS, 1.0, 0.0)
@@ -250,6 +273,12 @@ class SignatureObserver(HybridSystem):
         return super().requirements(p) | within_bounds([s for s in self.parameters if s.name != "table"], p)
 
     # -- internals --------------------------------------------------------------------------------------------------
+
+    def _fill_table(self) -> None:
+        """Start values of `table`, for the parameters at theirs; the end of the constructor."""
+        start = tuple(map(float, self.tabulated()["table"]))
+        self.parameters = tuple(replace(s, start=start) if s.name == "table" else s for s in self.parameters)
+        self.__dict__.pop("parameter_signals", None)
 
     def _counts(self, x: Array) -> tuple[Array, Array, Array, list[Array]]:
         first = self._places["samples_held"]
