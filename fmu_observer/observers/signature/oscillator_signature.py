@@ -31,8 +31,8 @@ class OscillatorSignature(SignatureObserver):
 
     With N = 2 the second coordinate is the weight of the second vertex (see `polygon`): exact arithmetic leaves no
     ordinate, and the thesis read rounding errors of 1e-17. eps and mu are not printed; here eps =
-    0.1 with ``literal`` scaling and 10 with ``norm``, mu = 200 [ours], none is validated. Polygonal lines take the place
-    of splines.
+    0.1 with ``literal`` scaling and 10 with ``norm``, mu = 200 [ours], none is validated. Polygonal lines replace
+    splines.
 
     The table belongs to the parameters it was built with: set what `tabulated` returns together with others.
 

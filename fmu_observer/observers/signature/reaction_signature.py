@@ -19,8 +19,9 @@ from fmu_observer.signatures.inversion import (
 )
 from fmu_observer.signatures.pencil import NextScaling
 from plant_models.benchmarks.gas_phase_reaction import GasPhaseReaction
-from plant_models.hybrid import memory, output_signal, parameter
+from plant_models.hybrid import memory, output_signal, parameter, vector
 from plant_models.hybrid.option import require_whole
+from plant_models.hybrid.scan import enclosed, scan
 from plant_models.hybrid.system import Array
 
 ORDER, POINTS = 2, 9  # printed N; N_O = 11
@@ -127,7 +128,7 @@ class ReactionSignature(SignatureObserver):
         best = best_candidate(self.rates, residuals)
         chosen = [
             interpolated(self.rates, values, best.values)
-            for values in (*states.values, np.minimum(states.outside, 1e3))
+            for values in (states.values[0], states.values[1], np.minimum(states.outside, 1e3))
         ]
         before = x[self._places["estimated_rate"]]
         smoothed = (before + p.gain * best.values) / (1.0 + p.gain)
@@ -140,14 +141,26 @@ class ReactionSignature(SignatureObserver):
         Args:
             window: samples of y, shape (N_O,). p: parameters.
         """
-        each = np.stack([window] * len(self.rates), axis=1)
-        target = self._read(each, self.rates, p.regularisation)
 
-        def again(state: Array) -> Array:
-            return self.properties(state, self.rates, p.sample_period, p.regularisation)[0]
+        def candidate(_carry: Any, row: Any, shared: Any) -> Any:
+            samples, table, (period, eps), rate = shared[0], shared[1], (shared[2][0], shared[2][1]), row[0][0]
+            target = self._read(samples, rate, eps)
 
-        states = corrected_inverse(lambda r: self._looked_up(r, p.table), again, target, self.corrections, 0.0, LARGEST)
-        return states, each - self.properties(states.values, self.rates, p.sample_period, p.regularisation)[1]
+            def again(state: Array) -> Array:
+                return self.properties(state, rate, period, eps)[0]
+
+            found = corrected_inverse(
+                lambda r: self._looked_up(r, table), again, target, self.corrections, 0.0, LARGEST
+            )
+            left = samples - self.properties(found.values, rate, period, eps)[1]
+            return (), (np.hstack([found.values, np.stack([found.outside]), left]),)
+
+        def search(*shared: Array) -> tuple[Array, ...]:
+            results = scan(candidate, (), [(np.array([rate]),) for rate in self.rates], shared)[1]
+            return tuple(result[0] for result in results)
+
+        columns = np.stack(enclosed(search, window, p.table, vector(p.sample_period, p.regularisation)), axis=1)
+        return Found(columns[:2], columns[2]), columns[3:]
 
     def model_parameters(self, own: Sequence[Array], p: Any) -> Any:
         """The rate as estimated."""
@@ -161,10 +174,11 @@ class ReactionSignature(SignatureObserver):
         return np.stack([np.sqrt(-lowest / rate), np.min(points[1], axis=0)])
 
     def _looked_up(self, properties: Array, table: Array) -> Found:
-        a, c = len(self.nodes), len(self.rates)
-        first = monotone_inverse(self.nodes, table[:a], properties[0])
-        rows = [np.stack([table[a + i * a : a + i * a + a]] * c, axis=1) for i in range(a)]
-        second = monotone_inverse(self.nodes, interpolated(self.nodes, rows, first.values), properties[1])
+        count = len(self.nodes)
+        first = monotone_inverse(self.nodes, table[:count], properties[0])
+        rows = np.reshape(table[count:], (count, count))
+        column = interpolated(self.nodes, [rows[i] for i in range(count)], first.values)
+        second = monotone_inverse(self.nodes, column, properties[1])
         return Found(np.stack([first.values, second.values]), np.maximum(first.outside, second.outside))
 
     def _built(self, period: float, eps: float) -> np.ndarray:
