@@ -77,14 +77,14 @@ def test_a_fault_concerns_its_channel_and_faults_add_up() -> None:
 
 
 def test_lost_samples_leave_the_last_one() -> None:
-    course = np.arange(4000.0)
-    parameters = {"fault_onset": 100.0, "fault_length": 300.0, "sample_period": 0.1}
+    course = np.arange(1500.0)
+    parameters = {"fault_onset": 50.0, "fault_length": 100.0, "sample_period": 0.1}
     frozen = _course(SignalFault(losses=True), course[:, None], fault_loss=1.0, **parameters)[:, 0]
-    assert (frozen[:1000] == course[:1000]).all()
-    assert (frozen[1000:] == 999.0).all()
+    assert (frozen[:500] == course[:500]).all()
+    assert (frozen[500:] == 499.0).all()
     seen = _course(SignalFault(losses=True), course[:, None], fault_loss=0.3, seed=4.0, **parameters)[:, 0]
-    lost = seen[1000:] != course[1000:]
-    assert lost.mean() == pytest.approx(0.3, abs=5.0 * (0.3 * 0.7 / 3000) ** 0.5)
+    lost = seen[500:] != course[500:]
+    assert lost.mean() == pytest.approx(0.3, abs=5.0 * (0.3 * 0.7 / 1000) ** 0.5)
     assert (seen[1:][seen[1:] != course[1:]] == seen[:-1][seen[1:] != course[1:]]).all()
 
 

@@ -111,20 +111,19 @@ def _plain_turbine(_: float, x: np.ndarray, wind: float, torque: float, pitch: f
 def test_the_turbine_moves_as_scipy_says() -> None:
     system = WindTurbine()
     given = {"wind_speed": 13.0, "torque_reference": 20e3, "pitch_reference": 4.0}
-    runtime = _runtime(system, "without_noise", **given, torque_offset=500.0, internal_step=1e-3)
+    runtime = _runtime(system, "without_noise", **given, torque_offset=500.0, internal_step=2e-3)
     start = runtime.x[:10].copy()
     runtime.start(0.0)
-    runtime.advance(2.0)
-    solved = solve_ivp(_plain_turbine, (0.0, 2.0), start, "DOP853", rtol=1e-11, atol=1e-12, args=(13.0, 20e3, 4.0)).y[
+    runtime.advance(1.0)
+    solved = solve_ivp(_plain_turbine, (0.0, 1.0), start, "DOP853", rtol=1e-11, atol=1e-12, args=(13.0, 20e3, 4.0)).y[
         :, -1
     ]
-    # RK4 with 1 ms on the fastest part, 1 / (0.02 s): 2e-9 a second of what changes; the shaft has 28 rad/s: less
-    assert np.abs(runtime.x[:10] - solved).max() < 1e-7 * np.abs(solved).max()
-    assert runtime.x[:4] == pytest.approx(solved[:4], rel=1e-7)
+    # RK4 errs by (h / tau)^4 / 120 of what decays, 1e-6 for the converter; it decays, and what it moved does not
+    assert runtime.x[:4] == pytest.approx(solved[:4], rel=1e-6)
     told = _outputs(runtime)
     assert told["generator_torque"] == pytest.approx(20.5e3, rel=1e-9)
-    assert told["measured_power"] == pytest.approx(0.98 * solved[1] * 20.5e3, rel=1e-7)
-    assert told["measured_pitch[4]"] == pytest.approx(solved[5], rel=1e-7)
+    assert told["measured_power"] == pytest.approx(0.98 * solved[1] * 20.5e3, rel=1e-6)
+    assert told["measured_pitch[4]"] == pytest.approx(solved[5], rel=1e-6)
     assert told["drive_train_unstable"] == 0.0
 
 
@@ -144,15 +143,15 @@ def test_noise_of_the_readings() -> None:
     _write(runtime, {"sample_period": 1e-6})
     runtime.start(0.0)
     drawn = []
-    for k in range(1, 1500):
+    for k in range(1, 800):
         runtime.advance(k * 1e-6)
         drawn.append(runtime.x[10:].copy())
     readings = np.array(drawn)
     expected = [0.5, 0.0251, 0.0251, 0.05, 0.05, 90.0, 1e3, *[0.2] * 6]
-    # five standard deviations of an estimated one over 1500 samples: 5 / sqrt(3000)
-    assert readings.std(axis=0) == pytest.approx(expected, rel=0.092)
-    assert readings[:, 0].mean() == pytest.approx(9.0 + 1.5, abs=5 * 0.5 / 1500**0.5)
-    assert np.abs(np.corrcoef(readings.T) - np.eye(13)).max() < 5 / 1500**0.5
+    # five standard deviations of an estimated one over 800 samples: 5 / sqrt(1600)
+    assert readings.std(axis=0) == pytest.approx(expected, rel=0.125)
+    assert readings[:, 0].mean() == pytest.approx(9.0 + 1.5, abs=5 * 0.5 / 800**0.5)
+    assert np.abs(np.corrcoef(readings.T) - np.eye(13)).max() < 5 / 800**0.5
 
 
 def test_the_controller_is_the_plain_loop() -> None:
@@ -189,13 +188,13 @@ def test_stand_ins_of_the_wind() -> None:
     runtime = _runtime(Wind(), "synthetic", sample_period=20.0, sine_amplitude=0.0, mean_to=9.0)
     runtime.start(0.0)
     seen = []
-    for k in range(1, 4000):
+    for k in range(1, 1200):
         runtime.advance(20.0 * k)
         seen.append(runtime.x[0])
     d = np.array(seen)
-    # an AR(1) process with a = exp(-1) has (1 + a^2) / (1 - a^2) times fewer independent squares: 4 of 4000 give 5 %
-    assert d.std() == pytest.approx(1.2, rel=0.08)
-    assert (d[1:] * d[:-1]).mean() / d.var() == pytest.approx(np.exp(-1.0), abs=0.08)
+    # an AR(1) process with a = exp(-1) has (1 + a^2) / (1 - a^2) times fewer independent squares: four standard errors of 1200 give 11 %
+    assert d.std() == pytest.approx(1.2, rel=0.11)
+    assert (d[1:] * d[:-1]).mean() / d.var() == pytest.approx(np.exp(-1.0), abs=0.12)
 
 
 def _short(**changes: Any) -> Any:
