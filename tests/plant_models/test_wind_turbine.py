@@ -43,6 +43,8 @@ def test_hurwitz_determinants_say_what_eigenvalues_say() -> None:
         for _ in range(30):
             drawn = rng.uniform(0.2, 3.0, 8)
             drive = DriveTrain(*drawn[:2], 2.0, *drawn[2:6], 0.9, printed)
+            _, a, b, c = np.poly(np.array(drive.matrix()))
+            assert drive.hurwitz() == pytest.approx((a, a * b - c, c), rel=1e-9)
             stable = all(value > 0.0 for value in drive.hurwitz())
             assert stable == (_eigenvalues(drive).real.max() < 0.0)
             seen.add(stable)
@@ -192,7 +194,7 @@ def test_stand_ins_of_the_wind() -> None:
         runtime.advance(20.0 * k)
         seen.append(runtime.x[0])
     d = np.array(seen)
-    # an AR(1) process with a = exp(-1) has (1 + a^2) / (1 - a^2) times fewer independent squares: four standard errors of 1200 give 11 %
+    # the squares of an AR(1) process with a^2 = exp(-2) count (1 - a^4) / (1 + a^4) times: four standard errors
     assert d.std() == pytest.approx(1.2, rel=0.11)
     assert (d[1:] * d[:-1]).mean() / d.var() == pytest.approx(np.exp(-1.0), abs=0.12)
 
