@@ -83,10 +83,10 @@ DRIVE_MEMORY = (
     memory("speed_squares", "rad2/s2", 0.0, "Square of the sample before, of each speed sensor", size=4),
     memory("torque_filter", "N.m", 0.0, "Filter of the generator torque", size=2),
     memory("torque_squares", "N2.m2", 0.0, "Squares of the two samples before", size=2),
-    memory("speed_difference", "rad/s", 0.0, "Difference of the sensors of rotor and of generator", size=2),
-    memory("speed_residual", "rad2/s2", 0.0, "Residual of rotor sensors 1, 2, generator sensors 1, 2", size=4),
-    memory("torque_residual", "N2.m2", 0.0, "Residual of the generator torque"),
-    memory("estimated_torsion", "rad", 0.0, "Torsion from the last samples, mean of the sensors"),
+    memory("held_speed_difference", "rad/s", 0.0, "Difference of the sensors of rotor and of generator", size=2),
+    memory("held_speed_residual", "rad2/s2", 0.0, "Residual of rotor sensors 1, 2, generator sensors 1, 2", size=4),
+    memory("held_torque_residual", "N2.m2", 0.0, "Residual of the generator torque"),
+    memory("held_estimated_torsion", "rad", 0.0, "Torsion from the last samples, mean of the sensors"),
 )
 
 
@@ -132,9 +132,9 @@ def sample_speeds(
         **{name: values[1:] for name, values in histories.items()},
         "speed_filter": filters,
         "speed_squares": squares,
-        "speed_difference": [disagreement(rotor[0], rotor[1]), disagreement(generator[0], generator[1])],
-        "speed_residual": residuals,
-        "estimated_torsion": 0.5 * (torsions[0] + torsions[1]) + driving + braking,
+        "held_speed_difference": [disagreement(rotor[0], rotor[1]), disagreement(generator[0], generator[1])],
+        "held_speed_residual": residuals,
+        "held_estimated_torsion": 0.5 * (torsions[0] + torsions[1]) + driving + braking,
     }
 
 
@@ -152,7 +152,7 @@ def sample_torque(m: Any, torque: Array, reference: Array, p: Any, starts: Array
     before = (m.torque_filter[0], m.torque_filter[1])
     out = first_order_residual(coefficients, before, torque, reference, p.converter_time, starts)
     window = windowed_square(m.torque_squares, out.value)
-    return {"torque_filter": out.memory, "torque_squares": window.memory, "torque_residual": window.value}
+    return {"torque_filter": out.memory, "torque_squares": window.memory, "held_torque_residual": window.value}
 
 
 def _weighted(gain: Array, values: Sequence[Array]) -> Array:

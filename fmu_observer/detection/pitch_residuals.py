@@ -34,18 +34,18 @@ PITCH_MEMORY = (
     memory("long_filter", "deg/s2", 0.0, "Filters of the residual over the long window", size=2 * SENSORS),
     memory("long_partial", "deg2/s4", 0.0, "Sums of the block that grows", size=SENSORS),
     memory("long_blocks", "deg2/s4", 0.0, "Sums of the blocks of the long window", size=BLOCKS * SENSORS),
-    memory("pitch_difference", "deg", 0.0, "Difference of the two sensors of each blade", size=BLADES),
-    memory("pitch_single", "deg2/s4", 0.0, "Residual of each pitch sensor, one sample", size=SENSORS),
-    memory("pitch_triple", "deg2/s4", 0.0, "Residual of each pitch sensor, three samples", size=SENSORS),
-    memory("pitch_brief", "deg2/s4", 0.0, "Residual of each blade's actuator, one sample", size=BLADES),
-    memory("pitch_long", "deg2/s4", 0.0, "Residual of each blade's actuator, long window", size=BLADES),
+    memory("held_pitch_difference", "deg", 0.0, "Difference of the two sensors of each blade", size=BLADES),
+    memory("held_pitch_single", "deg2/s4", 0.0, "Residual of each pitch sensor, one sample", size=SENSORS),
+    memory("held_pitch_triple", "deg2/s4", 0.0, "Residual of each pitch sensor, three samples", size=SENSORS),
+    memory("held_pitch_brief", "deg2/s4", 0.0, "Residual of each blade's actuator, one sample", size=BLADES),
+    memory("held_pitch_long", "deg2/s4", 0.0, "Residual of each blade's actuator, long window", size=BLADES),
 )
 
 
 def sample_pitch(m: Any, readings: Array, reference: Array, p: Any, starts: Array) -> dict[str, Any]:
     """Residuals of the pitch after a sample: Omar 2012, (7.6.2), (7.6.9), (7.6.10), (7.6.13), (7.6.14).
 
-    An actuator is judged by the smaller one of the residuals of its two sensors: a fault of one sensor leaves the other.
+    An actuator is judged by the smaller one of the residuals of its two sensors: one sensor's fault leaves the other.
 
     Args:
         m: named memory with `PITCH_MEMORY`. readings: of blades 1, 1, 2, 2, 3, 3 [deg], shape (6,).
@@ -78,10 +78,10 @@ def sample_pitch(m: Any, readings: Array, reference: Array, p: Any, starts: Arra
         **filters,
         "sensor_squares": squares,
         "long_partial": partial,
-        "pitch_difference": [disagreement(readings[2 * i], readings[2 * i + 1]) for i in range(BLADES)],
-        "pitch_single": single,
-        "pitch_triple": triple,
-        "pitch_brief": [np.minimum(quick[2 * i], quick[2 * i + 1]) for i in range(BLADES)],
+        "held_pitch_difference": [disagreement(readings[2 * i], readings[2 * i + 1]) for i in range(BLADES)],
+        "held_pitch_single": single,
+        "held_pitch_triple": triple,
+        "held_pitch_brief": [np.minimum(quick[2 * i], quick[2 * i + 1]) for i in range(BLADES)],
     }
 
 
@@ -102,7 +102,7 @@ def end_block(m: Any) -> dict[str, Any]:
     return {
         "long_blocks": blocks,
         "long_partial": [0.0 * m.long_partial[i] for i in range(SENSORS)],
-        "pitch_long": [np.minimum(sums[2 * i], sums[2 * i + 1]) for i in range(BLADES)],
+        "held_pitch_long": [np.minimum(sums[2 * i], sums[2 * i + 1]) for i in range(BLADES)],
     }
 
 
