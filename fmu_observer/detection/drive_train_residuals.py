@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.diagnosis.actuator_residual import first_order_residual, rate_residual
+from fmu_observer.diagnosis.actuator_residual import centred, first_order_residual, rate_residual
 from fmu_observer.diagnosis.finite_window_observer import finite_window_observer, sampled
 from fmu_observer.diagnosis.redundancy import disagreement
 from fmu_observer.diagnosis.residual_filters import residual_filter
@@ -142,15 +142,18 @@ def sample_torque(m: Any, torque: Array, reference: Array, p: Any, starts: Array
     """Residual of the generator torque over three samples: Omar 2012, 7.8.1.
 
     Args:
-        m: named memory with `DRIVE_MEMORY`. torque: measured [N.m]. reference: asked of the converter [N.m].
-        p: parameters with `DRIVE_PARAMETERS` and `sample_period`. starts: 1 at the first sample, else 0.
+        m: named memory with `DRIVE_MEMORY`, as it was before the sample. torque: measured [N.m].
+        reference: that was held since the last sample [N.m].
+        p: parameters with `DRIVE_PARAMETERS`, `centring` and `sample_period`. starts: 1 at the first sample, else 0.
 
     Returns:
         New values of the memory by name.
     """
     coefficients = residual_filter(p.torque_filter_time, p.sample_period)
     before = (m.torque_filter[0], m.torque_filter[1])
-    out = first_order_residual(coefficients, before, torque, reference, p.converter_time, starts)
+    previous = np.where(starts > 0.0, torque, m.torques[WINDOW - 2])
+    late = centred(torque, previous, p.centring)
+    out = first_order_residual(coefficients, before, late, reference, p.converter_time, starts)
     window = windowed_square(m.torque_squares, out.value)
     return {"torque_filter": out.memory, "torque_squares": window.memory, "held_torque_residual": window.value}
 

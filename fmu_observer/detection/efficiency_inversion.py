@@ -35,21 +35,19 @@ EFFICIENCY_MEMORY = (
     memory("block_samples", "1", 0.0, "Samples in the block that grows"),
     memory("driving_means", "N.m", 0.0, "Mean torque on the rotor in each block", size=BLOCKS),
     memory("braking_means", "N.m", 0.0, "Mean torque of the generator in each block", size=BLOCKS),
-    memory("rotor_starts", "rad/s", 0.0, "Rotor speed at the end of each block", size=BLOCKS),
     memory("generator_starts", "rad/s", 0.0, "Generator speed at the end of each block", size=BLOCKS),
     memory("full_blocks", "1", 0.0, "Blocks since the start"),
     memory("held_efficiency_estimate", "1", 0.97, "Efficiency, smoothed, eta_p"),
     memory("held_efficiency_crossings", "1", 1.0, "Intervals of the grid that bracket the measurement"),
-    memory("last_rotor", "rad/s", 0.0, "Rotor speed of the last sample"),
     memory("last_generator", "rad/s", 0.0, "Generator speed of the last sample"),
 )
 
 
-def sample_torques(m: Any, rotor: Array, generator: Array, driving: Array, braking: Array) -> dict[str, Any]:
+def sample_torques(m: Any, generator: Array, driving: Array, braking: Array) -> dict[str, Any]:
     """A sample is added to the block that grows.
 
     Args:
-        m: named memory with `EFFICIENCY_MEMORY`. rotor: speed [rad/s]. generator: speed [rad/s].
+        m: named memory with `EFFICIENCY_MEMORY`. generator: its speed [rad/s].
         driving: estimated torque of the wind on the rotor [N.m]. braking: measured torque of the generator [N.m].
 
     Returns:
@@ -59,14 +57,11 @@ def sample_torques(m: Any, rotor: Array, generator: Array, driving: Array, braki
         "driving_sum": m.driving_sum + driving,
         "braking_sum": m.braking_sum + braking,
         "block_samples": m.block_samples + 1.0,
-        "last_rotor": rotor,
         "last_generator": generator,
     }
 
 
-def simulated_speed(
-    efficiency: Array, rotor: Array, generator: Array, driving: Any, braking: Any, period: Array, p: Any
-) -> Array:
+def simulated_speed(efficiency: Array, start: Array, driving: Any, braking: Any, period: Array, p: Any) -> Array:
     """Generator speed after the blocks of a window.
 
     The two inertias turn as one, ``(Jr + Ng^2 Jg / eta) w' = tau_r - (Br + Ng^2 Bg / eta) w - Ng tau_g / eta``, exact
@@ -74,7 +69,7 @@ def simulated_speed(
     minute (its time constant is 18 s), so that windows of some minutes do not see it.
 
     Args:
-        efficiency: eta [1]. rotor: speed at the start [rad/s]. generator: its speed there [rad/s].
+        efficiency: eta [1]. start: generator speed where the window begins [rad/s].
         driving: mean torques on the rotor, oldest first [N.m]. braking: of the generator [N.m].
         period: length of a block [s]. p: parameters with `EFFICIENCY_PARAMETERS` and `gear_ratio`.
 
@@ -85,13 +80,12 @@ def simulated_speed(
         Omar 2012, (7.3.3), repaired, reduced to its slow mode.
     """
     ratio = p.gear_ratio / efficiency
-    seen_inertia = p.gear_ratio * ratio * p.generator_inertia
-    inertia = p.rotor_inertia + seen_inertia
+    inertia = p.rotor_inertia + p.gear_ratio * ratio * p.generator_inertia
     friction = p.rotor_friction + p.gear_ratio * ratio * p.generator_friction
     rate = friction / inertia
     kept = np.exp(-rate * period)
     gain = (1.0 - kept) / friction
-    speed = (p.rotor_inertia * rotor + seen_inertia / p.gear_ratio * generator) / inertia
+    speed = start / p.gear_ratio
     for i in range(BLOCKS):
         speed = kept * speed + gain * (driving[i] - ratio * braking[i])
     return p.gear_ratio * speed
@@ -110,17 +104,17 @@ def update_efficiency(m: Any, p: Any) -> dict[str, Any]:
     """
     samples = np.maximum(m.block_samples, 1.0)
     ends = {"driving_means": m.driving_sum / samples, "braking_means": m.braking_sum / samples}
-    ends |= {"rotor_starts": m.last_rotor, "generator_starts": m.last_generator}
+    ends["generator_starts"] = m.last_generator
     moved = {name: [getattr(m, name)[i] for i in range(1, BLOCKS)] + [end] for name, end in ends.items()}
     full_blocks = m.full_blocks + np.where(m.block_samples > 0.0, 1.0, 0.0)
     previous = m.held_efficiency_estimate
     bounds = (p.grid_lowest, p.grid_highest, p.least_efficiency, p.most_efficiency)
     grid = grid_around(previous, VALUES, *bounds)
-    start = (m.rotor_starts[0], m.generator_starts[0])  # where the oldest of the moved blocks began
+    start = m.generator_starts[0]  # where the oldest of the moved blocks began
     torques = (moved["driving_means"], moved["braking_means"])
     found = invert(
         grid,
-        [simulated_speed(eta, *start, *torques, p.update_period, p) - m.last_generator for eta in grid],
+        [simulated_speed(eta, start, *torques, p.update_period, p) - m.last_generator for eta in grid],
         previous,
     )
     full = full_blocks > BLOCKS + 0.5  # the block before the window tells where it begins

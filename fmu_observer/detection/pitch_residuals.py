@@ -4,11 +4,12 @@ for faults of an actuator. Pure functions on a named memory, for the system that
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from fmu_observer.diagnosis.actuator_residual import second_order_residual
+from fmu_observer.diagnosis.actuator_residual import centred, second_order_residual
 from fmu_observer.diagnosis.redundancy import disagreement
 from fmu_observer.diagnosis.residual_filters import residual_filter
 from fmu_observer.diagnosis.windowed_residual import windowed_square
@@ -24,16 +25,25 @@ PITCH_PARAMETERS = (
     parameter("sensor_filter_time", "s", 0.06, "Filter of the residuals of pitch sensors", min=1e-4),
     parameter("brief_filter_time", "s", 0.5, "Filter of the residual of one sample, for pitch actuators", min=1e-4),
     parameter("long_filter_time", "s", 0.6, "Filter of the residual over the long window", min=1e-4),
+    parameter(
+        "centring",
+        "1",
+        1.0,
+        "1: actuators' readings half a sample late, as held references are to Tustin's rule; 0: as printed",
+        min=0.0,
+        max=1.0,
+    ),
     parameter("mean_residual", "deg/s2", 0.0, "Mean of the residual without a fault, Xbar"),
 )
 
 PITCH_MEMORY = (
+    memory("previous_pitch", "deg", 0.0, "Readings of the sample before", size=SENSORS),
     memory("sensor_filter", "deg/s2", 0.0, "Filters of the pitch sensors", size=2 * SENSORS),
     memory("sensor_squares", "deg2/s4", 0.0, "Squares of the two samples before, of each pitch sensor", size=12),
     memory("brief_filter", "deg/s2", 0.0, "Filters of the residual of one sample", size=2 * SENSORS),
     memory("long_filter", "deg/s2", 0.0, "Filters of the residual over the long window", size=2 * SENSORS),
-    memory("long_partial", "deg2/s4", 0.0, "Sums of the block that grows", size=SENSORS),
-    memory("long_blocks", "deg2/s4", 0.0, "Sums of the blocks of the long window", size=BLOCKS * SENSORS),
+    memory("long_partial", "deg2/s4", 0.0, "Sum of the block that grows, of each blade", size=BLADES),
+    memory("long_blocks", "deg2/s4", 0.0, "Sums of the blocks of the long window", size=BLOCKS * BLADES),
     memory("held_pitch_difference", "deg", 0.0, "Difference of the two sensors of each blade", size=BLADES),
     memory("held_pitch_single", "deg2/s4", 0.0, "Residual of each pitch sensor, one sample", size=SENSORS),
     memory("held_pitch_triple", "deg2/s4", 0.0, "Residual of each pitch sensor, three samples", size=SENSORS),
@@ -45,7 +55,8 @@ PITCH_MEMORY = (
 def sample_pitch(m: Any, readings: Array, reference: Array, p: Any, starts: Array) -> dict[str, Any]:
     """Residuals of the pitch after a sample: Omar 2012, (7.6.2), (7.6.9), (7.6.10), (7.6.13), (7.6.14).
 
-    An actuator is judged by the smaller one of the residuals of its two sensors: one sensor's fault leaves the other.
+    An actuator is judged by the smaller one of its two sensors' residuals at each sample: a faulty sensor leaves the
+    other.
 
     Args:
         m: named memory with `PITCH_MEMORY`. readings: of blades 1, 1, 2, 2, 3, 3 [deg], shape (6,).
@@ -59,12 +70,14 @@ def sample_pitch(m: Any, readings: Array, reference: Array, p: Any, starts: Arra
     brief = residual_filter(p.brief_filter_time, p.sample_period)
     slow = residual_filter(p.long_filter_time, p.sample_period)
     filters: dict[str, list[Array]] = {"sensor_filter": [], "brief_filter": [], "long_filter": []}
-    squares, single, triple, quick, partial = [], [], [], [], []
+    squares, single, triple, quick, slow_squares = [], [], [], [], []
     for i in range(SENSORS):
         found = []
+        previous = np.where(starts > 0.0, readings[i], m.previous_pitch[i])
         for name, coefficients in (("sensor_filter", sharp), ("brief_filter", brief), ("long_filter", slow)):
             before = getattr(m, name)
-            model = (readings[i], reference, p.pitch_frequency, p.pitch_damping, starts)
+            late = readings[i] if name == "sensor_filter" else centred(readings[i], previous, p.centring)
+            model = (late, reference, p.pitch_frequency, p.pitch_damping, starts)
             out = second_order_residual(coefficients, (before[2 * i], before[2 * i + 1]), *model)
             filters[name].extend(out.memory)
             found.append(out.value)
@@ -73,15 +86,16 @@ def sample_pitch(m: Any, readings: Array, reference: Array, p: Any, starts: Arra
         single.append(found[0] * found[0])
         triple.append(window.value)
         quick.append((found[1] - p.mean_residual) * (found[1] - p.mean_residual))
-        partial.append(m.long_partial[i] + (found[2] - p.mean_residual) * (found[2] - p.mean_residual))
+        slow_squares.append((found[2] - p.mean_residual) * (found[2] - p.mean_residual))
     return {
         **filters,
+        "previous_pitch": readings,
         "sensor_squares": squares,
-        "long_partial": partial,
+        "long_partial": [m.long_partial[i] + _smaller(slow_squares, i) for i in range(BLADES)],
         "held_pitch_difference": [disagreement(readings[2 * i], readings[2 * i + 1]) for i in range(BLADES)],
         "held_pitch_single": single,
         "held_pitch_triple": triple,
-        "held_pitch_brief": [np.minimum(quick[2 * i], quick[2 * i + 1]) for i in range(BLADES)],
+        "held_pitch_brief": [_smaller(quick, i) for i in range(BLADES)],
     }
 
 
@@ -95,14 +109,14 @@ def end_block(m: Any) -> dict[str, Any]:
         New values of the memory by name.
     """
     blocks, sums = [], []
-    for i in range(SENSORS):
+    for i in range(BLADES):
         kept = [m.long_blocks[i * BLOCKS + j] for j in range(1, BLOCKS)] + [m.long_partial[i]]
         blocks.extend(kept)
         sums.append(sum(kept[1:], kept[0]))
     return {
         "long_blocks": blocks,
-        "long_partial": [0.0 * m.long_partial[i] for i in range(SENSORS)],
-        "held_pitch_long": [np.minimum(sums[2 * i], sums[2 * i + 1]) for i in range(BLADES)],
+        "long_partial": [0.0 * m.long_partial[i] for i in range(BLADES)],
+        "held_pitch_long": sums,
     }
 
 
@@ -126,3 +140,7 @@ def trusted_pitches(readings: Array, limit: Array, residuals: Array) -> Array:
     """
     pairs = ((2 * i, 2 * i + 1) for i in range(BLADES))
     return vector(*(trusted(readings[i], readings[j], limit, residuals[i], residuals[j]) for i, j in pairs))
+
+
+def _smaller(values: Sequence[Array], blade: int) -> Array:
+    return np.minimum(values[2 * blade], values[2 * blade + 1])

@@ -62,15 +62,15 @@ ALARM_NAMES = tuple(f"{g.output}[{i + 1}]" if g.count > 1 else g.output for g in
 """Which alarm stands at which place of `alarm_time`."""
 
 _LIMITS = (
-    ("pitch_difference_limit", "deg", 1.7, "Difference of two pitch sensors"),
+    ("pitch_difference_limit", "deg", 1.9, "Difference of two pitch sensors"),
     ("rotor_difference_limit", "rad/s", 0.21, "Difference of the sensors of the rotor speed"),
     ("generator_difference_limit", "rad/s", 0.42, "Difference of the sensors of the generator speed"),
-    ("pitch_single_limit", "deg2/s4", 3e4, "Residual of a pitch sensor, one sample"),
-    ("pitch_triple_limit", "deg2/s4", 6e4, "Residual of a pitch sensor, three samples"),
-    ("pitch_brief_limit", "deg2/s4", 50.0, "Residual of a pitch actuator, one sample"),
-    ("pitch_long_limit", "deg2/s4", 2e3, "Residual of a pitch actuator, long window"),
-    ("speed_limit", "rad2/s2", 0.02, "Residual of a sensor of rotor or generator speed"),
-    ("torque_limit", "N2.m2", 1e6, "Residual of the generator torque"),
+    ("pitch_single_limit", "deg2/s4", 1.3e5, "Residual of a pitch sensor, one sample"),
+    ("pitch_triple_limit", "deg2/s4", 1.4e5, "Residual of a pitch sensor, three samples"),
+    ("pitch_brief_limit", "deg2/s4", 45.0, "Residual of a pitch actuator, one sample"),
+    ("pitch_long_limit", "deg2/s4", 4.5e3, "Residual of a pitch actuator, long window"),
+    ("speed_limit", "rad2/s2", 8.5e-3, "Residual of a sensor of rotor or generator speed"),
+    ("torque_limit", "N2.m2", 1.2e5, "Residual of the generator torque"),
     ("efficiency_limit", "1", 0.1, "Deviation of the efficiency from the nominal one"),
 )
 _PERSISTENCE = (("sensor", 1.0, 5.0), ("torque", 1.0, 1.0), ("actuator", 1.0, 1.0), ("efficiency", 1.0, 1.0))
@@ -87,6 +87,20 @@ _RESIDUALS = (
     ("estimated_torsion", "rad", None, "Torsion of the shaft from the last five samples"),
     ("efficiency_estimate", "1", None, "Efficiency of the drive train from the last minutes"),
     ("efficiency_crossings", "1", None, "Intervals of the grid that bracket the efficiency; 0: it lies outside"),
+)
+
+
+_MEMORY = NamedMemory(
+    (
+        memory("samples", "1", 0.0, "Samples since the start"),
+        *PITCH_MEMORY,
+        *DRIVE_MEMORY,
+        *EFFICIENCY_MEMORY,
+        memory("undecided_pairs", "1", 0.0, "Pairs of sensors that disagree while no model tells which one is it"),
+        memory("raised", "1", 0.0, "1 for each alarm that is raised", size=ALARMS),
+        memory("contrary", "1", 0.0, "Samples in a row that spoke against each alarm's state", size=ALARMS),
+        memory("since", "s", 0.0, "Last change of each alarm", size=ALARMS),
+    )
 )
 
 
@@ -113,16 +127,7 @@ class WindTurbineDiagnosis(HybridSystem):
     description = "Faults of a wind turbine: sensors, converter, pitch actuators, efficiency of the drive train"
     source = "Omar 2012, sections 7.5-7.8; thresholds ours"
     internal_step = 1e-2  # nothing flows
-    states = (
-        memory("samples", "1", 0.0, "Samples since the start"),
-        *PITCH_MEMORY,
-        *DRIVE_MEMORY,
-        *EFFICIENCY_MEMORY,
-        memory("undecided_pairs", "1", 0.0, "Pairs of sensors that disagree while no model tells which one is it"),
-        memory("raised", "1", 0.0, "1 for each alarm that is raised", size=ALARMS),
-        memory("contrary", "1", 0.0, "Samples in a row that spoke against each alarm's state", size=ALARMS),
-        memory("since", "s", 0.0, "Last change of each alarm", size=ALARMS),
-    )
+    states = _MEMORY.signals
     inputs = (
         input_signal("wind_speed", "m/s", 9.0, "Measured wind speed", display_unit="km/h"),
         input_signal("rotor_speed", "rad/s", 0.0, "Rotor speed, by two sensors", size=2),
@@ -151,6 +156,7 @@ class WindTurbineDiagnosis(HybridSystem):
     parameters = (
         parameter("sample_period", "s", 0.01, "Time between two samples", min=1e-6),
         parameter("block_period", "s", 0.5, "Blocks of the long window, of which it has ten", min=1e-6),
+        parameter("settling_time", "s", 10.0, "Time from the start on in which nothing is judged", min=0.0),
         *PITCH_PARAMETERS,
         *DRIVE_PARAMETERS,
         *EFFICIENCY_PARAMETERS,
@@ -171,10 +177,6 @@ class WindTurbineDiagnosis(HybridSystem):
         PeriodicEvent("efficiency_update", "update_period", description="The efficiency is estimated anew"),
     )
 
-    def __init__(self) -> None:
-        self._memory = NamedMemory(self.states)
-        super().__init__()
-
     def requirements(self, p: Any) -> dict[str, Array]:
         """Parameters keep their bounds, and limits of zero are refused: everything would be a fault."""
         limits: Mapping[str, Array] = {
@@ -185,35 +187,35 @@ class WindTurbineDiagnosis(HybridSystem):
 
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """New residuals and alarms; or the long window, or the window of the efficiency moves on."""
-        m = self._memory.unpack(x)
+        m = _MEMORY.unpack(x)
         if event == "block_end":
-            return self._memory.pack(m, **end_block(m))
+            return _MEMORY.pack(m, **end_block(m))
         if event == "efficiency_update":
-            return self._memory.pack(m, **update_efficiency(m, p))
+            return _MEMORY.pack(m, **update_efficiency(m, p))
         starts = np.where(m.samples > 0.0, 0.0, 1.0)
-        new = {"samples": np.minimum(m.samples + 1.0, 2.0)}
+        new = {"samples": m.samples + 1.0}
         new |= sample_pitch(m, u.pitch, u.pitch_reference, p, starts)
         m = m._replace(**new)
         pitches = trusted_pitches(u.pitch, p.pitch_difference_limit, m.held_pitch_triple)
         rotor = trusted(*_pair(u.rotor_speed, 0), p.rotor_difference_limit, *_pair(m.held_speed_residual, 0))
         aerodynamics = Rotor(p.rotor_radius, p.air_density, p.largest_coefficient)
         driving = aerodynamics.torque(u.wind_speed - p.wind_bias, rotor, [pitches[i] for i in range(BLADES)])
-        new |= sample_speeds(m, u.rotor_speed, u.generator_speed, driving, u.torque, p, starts)
         new |= sample_torque(m, u.torque, u.torque_reference, p, starts)
+        new |= sample_speeds(m, u.rotor_speed, u.generator_speed, driving, u.torque, p, starts)
         m = m._replace(**new)
-        rotor = trusted(*_pair(u.rotor_speed, 0), p.rotor_difference_limit, *_pair(m.held_speed_residual, 0))
         generator = trusted(
             *_pair(u.generator_speed, 0), p.generator_difference_limit, *_pair(m.held_speed_residual, 2)
         )
-        new |= sample_torques(m, rotor, generator, driving, u.torque)
+        new |= sample_torques(m, generator, driving, u.torque)
+        settled = np.where(m.samples * p.sample_period > p.settling_time, 1.0, 0.0)
         exceeds, undecided = _judged(m, p)
-        alarms = _alarms(m, exceeds, t, p)
+        alarms = _alarms(m, [settled * value for value in exceeds], t, p)
         new |= {name: [getattr(alarm, field) for alarm in alarms] for name, field in _ALARM_FIELDS}
-        return self._memory.pack(m, **new, undecided_pairs=undecided)
+        return _MEMORY.pack(m, **new, undecided_pairs=settled * undecided)
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """Alarms, when they changed, and what they rest on."""
-        m = self._memory.unpack(x)
+        m = _MEMORY.unpack(x)
         found: dict[str, Array] = {}
         at = 0
         for group in _GROUPS:

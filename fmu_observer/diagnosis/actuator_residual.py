@@ -58,6 +58,19 @@ def first_order_residual(
     return filtered(coefficients, _started(coefficients, memory, starts, signals), *signals)
 
 
+def centred(reading: Array, before: Array, share: Array = 1.0) -> Array:
+    """A reading half a sample period ago, where Tustin's rule takes a reference to be that is held between samples.
+
+    The rule joins samples by straight lines. A reference that was held over the last period reaches its residual half a
+    period late, and each step of the reference shows as if the actuator were faster than it is. Readings that are as
+    late as that compare with it.
+
+    Args:
+        reading: of this sample. before: of the sample before. share: 1 for half a period, 0 for the reading itself [1].
+    """
+    return reading + 0.5 * share * (before - reading)
+
+
 def rate_residual(
     coefficients: ResidualFilter, memory: tuple[Array, Array], integral: Array, rate: Array, starts: Array = 0.0
 ) -> Filtered:
