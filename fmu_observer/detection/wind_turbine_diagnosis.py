@@ -90,7 +90,7 @@ _RESIDUALS = (
 )
 
 
-_MEMORY = NamedMemory(
+MEMORY = NamedMemory(
     (
         memory("samples", "1", 0.0, "Samples since the start"),
         *PITCH_MEMORY,
@@ -102,6 +102,7 @@ _MEMORY = NamedMemory(
         memory("since", "s", 0.0, "Last change of each alarm", size=ALARMS),
     )
 )
+"""What the diagnosis carries from sample to sample, by name."""
 
 
 class WindTurbineDiagnosis(HybridSystem):
@@ -127,7 +128,7 @@ class WindTurbineDiagnosis(HybridSystem):
     description = "Faults of a wind turbine: sensors, converter, pitch actuators, efficiency of the drive train"
     source = "Omar 2012, sections 7.5-7.8; thresholds ours"
     internal_step = 1e-2  # nothing flows
-    states = _MEMORY.signals
+    states = MEMORY.signals
     inputs = (
         input_signal("wind_speed", "m/s", 9.0, "Measured wind speed", display_unit="km/h"),
         input_signal("rotor_speed", "rad/s", 0.0, "Rotor speed, by two sensors", size=2),
@@ -187,11 +188,11 @@ class WindTurbineDiagnosis(HybridSystem):
 
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """New residuals and alarms; or the long window, or the window of the efficiency moves on."""
-        m = _MEMORY.unpack(x)
+        m = MEMORY.unpack(x)
         if event == "block_end":
-            return _MEMORY.pack(m, **end_block(m))
+            return MEMORY.pack(m, **end_block(m))
         if event == "efficiency_update":
-            return _MEMORY.pack(m, **update_efficiency(m, p))
+            return MEMORY.pack(m, **update_efficiency(m, p))
         starts = np.where(m.samples > 0.0, 0.0, 1.0)
         new = {"samples": m.samples + 1.0}
         new |= sample_pitch(m, u.pitch, u.pitch_reference, p, starts)
@@ -211,11 +212,11 @@ class WindTurbineDiagnosis(HybridSystem):
         exceeds, undecided = _judged(m, p)
         alarms = _alarms(m, [settled * value for value in exceeds], t, p)
         new |= {name: [getattr(alarm, field) for alarm in alarms] for name, field in _ALARM_FIELDS}
-        return _MEMORY.pack(m, **new, undecided_pairs=settled * undecided)
+        return MEMORY.pack(m, **new, undecided_pairs=settled * undecided)
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """Alarms, when they changed, and what they rest on."""
-        m = _MEMORY.unpack(x)
+        m = MEMORY.unpack(x)
         found: dict[str, Array] = {}
         at = 0
         for group in _GROUPS:
