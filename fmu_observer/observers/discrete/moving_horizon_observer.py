@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,23 +13,31 @@ from fmu_observer.filtering.kalman import through
 from fmu_observer.models.filter_model import Known
 from fmu_observer.models.model import stacked
 from fmu_observer.models.system_model import Source
-from fmu_observer.moving_horizon.arrival_cost import arrival_cost_from
-from fmu_observer.moving_horizon.gauss_newton import Limits, Moved, Seen, WindowProblem, passed, solve
+from fmu_observer.moving_horizon.gauss_newton import Limits, Moved, Seen, WindowProblem
+from fmu_observer.moving_horizon.real_time_iteration import (
+    MOST_PASSES,
+    MOST_ROWS,
+    TOLD,
+    iterate,
+    joined,
+    require_window,
+    told,
+    told_outputs,
+    window_memory,
+)
 from fmu_observer.moving_horizon.robust_loss import LOSSES, SCALES, Loss
-from fmu_observer.moving_horizon.window import RowLayout, WindowRow, rows_of
+from fmu_observer.moving_horizon.window import RowLayout, WindowRow
 from fmu_observer.observers.discrete.extended_kalman_filter import ExtendedKalmanFilter
 from fmu_observer.observers.discrete.gaussian_filter import Form
 from fmu_observer.observers.innovation_gate import OFF
 from fmu_observer.observers.model_observer import as_matrix
-from plant_models.hybrid import memory, output_signal, parameter, vector
-from plant_models.hybrid.option import require_whole
+from plant_models.hybrid import parameter, vector
 from plant_models.hybrid.requirements import within_bounds
-from plant_models.hybrid.scan import enclosed
-from plant_models.hybrid.signal import width as width_of
+from plant_models.hybrid.signal import width
 from plant_models.hybrid.system import Array
 
 WINDOW, PASSES = 6, 2  # rows and passes unless told otherwise: small, so that it is built in a second [ours]
-MOST_ROWS = 1000
+REMEMBERED = ("arrival_cost", "window", "window_estimates")
 UNBOUNDED = 1e30  # a bound that is none; FMI knows no infinite start values
 Bounds = Mapping[str, Sequence[float | None]]
 
@@ -67,11 +76,12 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
     description = "Moving-horizon observer: least squares over the last rows, with bounds and robust losses"
     source = "Omar 2012, sections 1.4.8 and 4.2; real-time iteration and arrival cost are ours"
     forms: ClassVar[tuple[Form, ...]] = ("joseph", "short")
+    iterate = staticmethod(iterate)
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
         **ExtendedKalmanFilter.option_choices,
         "form": ("joseph", "short"),
         "window": range(1, MOST_ROWS + 1),
-        "passes": range(1, 21),
+        "passes": range(1, MOST_PASSES + 1),
         "bounds": (),
         "loss": LOSSES,
     }
@@ -86,29 +96,32 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         loss: Loss | Sequence[Loss] = "squares",
         **options: Any,
     ) -> None:
-        require_whole(self.name, 1, MOST_ROWS, window=window)
-        require_whole(self.name, 1, 20, passes=passes)
+        require_window(self.name, window, passes)
         self.window, self.passes, self.bounds, self._loss = window, passes, dict(bounds or {}), loss
         given = {"bounds": {name: list(pair) for name, pair in self.bounds.items()}} if self.bounds else {}
-        told = loss if isinstance(loss, str) else list(loss)
-        super().__init__(model, window=window, passes=passes, loss=told, **given, **options)
+        listed = loss if isinstance(loss, str) else list(loss)
+        super().__init__(model, window=window, passes=passes, loss=listed, **given, **options)
 
     def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """The window with a row more, and the estimates that it gives, shape (own_count,)."""
         n, places = self.model.order, self._places
         filtered = super().update(event, t, x, u, p)
-        primed = x[places["primed"]] > 0.5
-        stored = {name: x[places[name] : places[name] + size] for name, size in self._sizes.items()}
-        start = vector(*(x[i] for i in range(n)), *(x[i] for i in range(n + n * n)))
-        arrival = np.where(primed, stored["arrival_cost"], start)
-        row = self._row(event, t, x, u, p)
-        shared = _flat(self, p)
-        prediction = self._predicted_point(x[:n], row, shared)
-        new = vector(*self.problem.layout.packed(row))
-        arrays = (arrival, stored["window"], stored["window_estimates"], new, prediction, shared)
-        estimate, covariance, *kept, told = enclosed(self._solved, *arrays)
-        values = [estimate, covariance, filtered[n + n * n :], *kept, told]
-        return vector(*(value[i] for value in values for i in range(value.shape[0])))
+        arrival, window, points = (
+            x[places[name] : places[following]] for name, following in pairwise((*REMEMBERED, "last_pass"))
+        )
+        start = joined(x[:n], x[: n + n * n])
+        row, shared = self._row(event, t, x, u, p), _flat(self, p)
+        found = self.iterate(
+            self.problem,
+            self.passes,
+            np.where(x[places["primed"]] > 0.5, arrival, start),
+            window,
+            points,
+            vector(*self.problem.layout.packed(row)),
+            self._predicted_point(x[:n], row, shared),
+            shared,
+        )
+        return joined(found.estimate, found.covariance, filtered[n + n * n :], found.remembered)
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """Estimates within their bounds, what is known of the last innovation, and what the window looks like."""
@@ -116,7 +129,7 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         inside = self.problem.clipped(x[:n], shared)
         values = super().output(t, x, u, p) | {s.name: inside[i] for i, s in enumerate(self.model.states)}
         first = self._places["last_pass"]
-        return values | {name: x[first + i] for i, name in enumerate(TOLD)}
+        return values | told(x[first : first + len(TOLD)])
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Those of the filter; no lowest value above the highest; the scale of the loss within its bounds."""
@@ -145,20 +158,6 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         )
 
     # -- internals --------------------------------------------------------------------------------------------------
-
-    def _solved(
-        self, arrival: Array, window: Array, points: Array, new: Array, prediction: Array, shared: Array
-    ) -> tuple[Array, ...]:
-        """Estimate, covariance, arrival cost, window, its estimates, and what is told of the passes."""
-        n, problem = self.model.order, self.problem
-        width = problem.layout.width
-        rows, states = rows_of(window, width), rows_of(points, n)
-        before = passed(problem, arrival_cost_from(arrival, n), rows[0], states[0], shared)
-        rows, states = [*rows[1:], new], [*states[1:], prediction]
-        found = solve(problem, before, rows, states, shared, self.passes)
-        told = np.hstack([found.residual, found.step, found.moved, problem.layout.count(rows), found.bounds])
-        kept = (np.hstack(list(before)), np.hstack(rows), np.hstack(found.estimates))
-        return found.estimates[-1], found.covariance, *kept, told
 
     def _row(self, event: str, t: Array, x: Array, u: Any, p: Any) -> WindowRow:
         """The row that an event brings."""
@@ -221,40 +220,16 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
                 parameter("upper_bounds", "1", upper, f"Highest values, SI units: {listed}", size=len(bounds)),
             )
         super()._declare()
-        n, width = model.order, RowLayout(len(model.inputs), q).width
-        self._sizes = {
-            "arrival_cost": 2 * n + n * n,
-            "window": self.window * width,
-            "window_estimates": self.window * n,
-        }
-        start = tuple(map(float, np.tile(model.start, self.window)))
-        first = (*map(float, model.start), *map(float, model.start), *map(float, np.eye(n).ravel()))
-        text = "Rows, oldest first: moves, period, time, inputs, measured, used; SI units"
-        self.states += (
-            memory(
-                "arrival_cost", "1", first, "Point, mean and covariance before the window, SI units", size=len(first)
-            ),
-            memory("window", "1", 0.0, text, size=self.window * width),
-            memory("window_estimates", "1", start, "Estimates of the rows, oldest first, SI units", size=len(start)),
-            memory("last_pass", "1", 0.0, "What is told of the passes and the window", size=len(TOLD)),
-        )
-        self._places = {s.name: width_of(self.states[:i]) for i, s in enumerate(self.states)}
-        self.outputs += tuple(output_signal(*words, variability="discrete") for words in TOLD.values())
+        row_width = RowLayout(len(model.inputs), q).width
+        self.states += window_memory(model.start, np.eye(model.order), row_width, self.window)
+        self._places = {s.name: width(self.states[:i]) for i, s in enumerate(self.states)}
+        self.outputs += told_outputs()
 
     def _limits(self, shared: Array) -> Limits:
         if not self.bounds:
             return Limits(np.zeros(0), np.zeros(0))
         p = self.unpack_parameters(shared)
         return Limits(p.lower_bounds, p.upper_bounds)
-
-
-TOLD = {
-    "residual_norm": ("residual_norm", "1", "Root of the mean square of the window's residuals, in their deviations"),
-    "last_step": ("last_step", "1", "Largest change of an estimate in the last pass, in its standard deviations"),
-    "passes_used": ("passes_used", "1", "Passes that changed an estimate by more than 0.001 of its deviation"),
-    "rows_in_window": ("rows_in_window", "1", "Rows of the window with a measurement"),
-    "bounds_active": ("bounds_active", "1", "Bounds at which the estimate is held"),
-}
 
 
 def _losses(who: str, loss: Loss | Sequence[Loss], count: int) -> tuple[Loss, ...]:
