@@ -76,6 +76,7 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
     description = "Moving-horizon observer: least squares over the last rows, with bounds and robust losses"
     source = "Omar 2012, sections 1.4.8 and 4.2; real-time iteration and arrival cost are ours"
     forms: ClassVar[tuple[Form, ...]] = ("joseph", "short")
+    iterate = staticmethod(iterate)
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
         **ExtendedKalmanFilter.option_choices,
         "form": ("joseph", "short"),
@@ -110,7 +111,7 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         )
         start = joined(x[:n], x[: n + n * n])
         row, shared = self._row(event, t, x, u, p), _flat(self, p)
-        found = iterate(
+        found = self.iterate(
             self.problem,
             self.passes,
             np.where(x[places["primed"]] > 0.5, arrival, start),
