@@ -24,7 +24,7 @@ from fmu_observer.filtering.kalman import Form, correct, predicted_covariance, s
 from fmu_observer.moving_horizon.arrival_cost import ArrivalCost
 from fmu_observer.moving_horizon.robust_loss import Loss, weight
 from fmu_observer.moving_horizon.window import RowLayout, WindowRow
-from plant_models.hybrid.scan import Arrays, scan
+from plant_models.hybrid.scan import Arrays, scan_table
 from plant_models.hybrid.system import Array, vector
 
 
@@ -138,9 +138,11 @@ def solve(
     fresh[-1] = 1.0
     for _ in range(passes):
         table = (rows, points, active, fresh)
-        _, swept = scan(_forwards(problem), tuple(arrival), table, (shared,))
+        _, swept = scan_table(_forwards(problem), tuple(arrival), table, (shared,))
         behind = (np.zeros(n), np.zeros(3))
-        (_, sums), (points, active) = scan(_backwards(problem), behind, (*table, *swept), (shared,), backwards=True)
+        (_, sums), (points, active) = scan_table(
+            _backwards(problem), behind, (*table, *swept), (shared,), backwards=True
+        )
         fresh = np.zeros((count, 1))
         used = used + np.where(sums[1:2] > SETTLED, 1.0, 0.0)
     held = np.reshape(np.sum(np.abs(active[-1])), (1,))
@@ -152,11 +154,12 @@ def passed(problem: WindowProblem, arrival: ArrivalCost, row: Array, point: Arra
     """The arrival cost after a row has left the window.
 
     Args:
-        problem: what moves and what is measured. arrival: before the row. row: the oldest, shape (1, width).
-        point: its state, shape (1, n). shared: what all rows share, shape (s,).
+        problem: what moves and what is measured. arrival: before the row. row: the oldest, shape (width,).
+        point: its state, shape (n,). shared: what all rows share, shape (s,).
     """
-    table = (row, point, np.zeros((1, max(len(problem.bounded), 1))), np.zeros((1, 1)))
-    after, _ = scan(_forwards(problem), tuple(arrival), table, (shared,))
+    of_row, at = np.reshape(row, (1, problem.layout.width)), np.reshape(point, (1, problem.order))
+    table = (of_row, at, np.zeros((1, max(len(problem.bounded), 1))), np.zeros((1, 1)))
+    after, _ = scan_table(_forwards(problem), tuple(arrival), table, (shared,))
     return ArrivalCost(*after)
 
 

@@ -108,8 +108,7 @@ def iterate(
     def iterated(*arrays: Array) -> tuple[Array, ...]:
         old, table, states, new, predicted, known = arrays
         count = states.shape[0] // n
-        first, at = np.reshape(table[:width], (1, width)), np.reshape(states[:n], (1, n))
-        before = passed(problem, arrival_cost_from(old, n), first, at, known)
+        before = passed(problem, arrival_cost_from(old, n), table[:width], states[:n], known)
         rows = np.reshape(np.hstack([table[width:], new]), (count, width))
         estimates = np.reshape(np.hstack([states[n:], predicted]), (count, n))
         found = solve(problem, before, rows, estimates, known, passes)

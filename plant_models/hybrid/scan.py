@@ -43,26 +43,42 @@ def enclosed(function: Callable[..., Arrays], *arrays: Array) -> Arrays:
 
 
 def scan(
-    body: Body, carry: Arrays, rows: Arrays, shared: Arrays = (), *, backwards: bool = False
-) -> tuple[Arrays, Arrays]:
+    body: Body, carry: Arrays, rows: Sequence[Arrays], shared: Arrays = (), *, backwards: bool = False
+) -> tuple[Arrays, list[Arrays]]:
     """A loop over rows that hands values on from row to row; inside `enclosed` its body is traced once.
 
     Args:
         body: plain NumPy without branching on values, of its three arguments alone: what the row before handed on,
             shape (c,) each; the row, shape (m,) each; and what all rows share. It returns what it hands on, and the
             results of the row, shape (l,) each.
-        carry: what the first row gets. rows: shape (N, m) each. shared: known to all rows, shape (s,) each.
+        carry: what the first row gets. rows: each of arrays of the same shapes. shared: known to all rows.
         backwards: whether the last row comes first.
+
+    Returns:
+        What the last row of the loop hands on, and the results in the order of the rows.
+    """
+    tables = tuple(np.stack(column) for column in zip(*rows, strict=True))
+    last, found = scan_table(body, carry, tables, shared, backwards=backwards)
+    return last, [tuple(table[i] for table in found) for i in range(len(rows))]
+
+
+def scan_table(
+    body: Body, carry: Arrays, tables: Arrays, shared: Arrays = (), *, backwards: bool = False
+) -> tuple[Arrays, Arrays]:
+    """`scan` over the rows of tables, with tables as results.
+
+    Args:
+        body, carry, shared, backwards: see `scan`. tables: shape (N, m) each, a row is one of each.
 
     Returns:
         What the last row of the loop hands on, and the results in the order of the rows, shape (N, l) each.
     """
-    if _is_symbol("MX", (*carry, *rows, *shared)):
-        return _called(body, carry, rows, shared, backwards)
+    if _is_symbol("MX", (*carry, *tables, *shared)):
+        return _called(body, carry, tables, shared, backwards)
     results: list[Arrays] = []
-    places = range(rows[0].shape[0])
+    places = range(tables[0].shape[0])
     for i in reversed(places) if backwards else places:
-        carry, result = body(carry, tuple(table[i] for table in rows), shared)
+        carry, result = body(carry, tuple(table[i] for table in tables), shared)
         results.append(result)
     ordered = results[::-1] if backwards else results
     return carry, tuple(np.stack(column) for column in zip(*ordered, strict=True))
