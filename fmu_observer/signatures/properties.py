@@ -9,6 +9,8 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from plant_models.hybrid.system import Array
+
 Property = Callable[[np.ndarray], np.ndarray]
 SMALLEST = 1e-3
 """eps of the largest quotient: keeps it finite where an ordinate is 0."""
@@ -56,26 +58,30 @@ def slope(signature: np.ndarray) -> np.ndarray:
     return np.divide((xi * eta).sum(axis=0), spread, out=np.zeros_like(spread), where=spread > 0.0)
 
 
-def branch_tips(signature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def branch_tips(signature: Array, interpolate: bool = False) -> tuple[Array, Array]:
     """Abscissas at which the two right-hand branches turn: the largest and the smallest local maximum of the abscissa.
 
     Local maxima left of the middle between the extremes are of other branches and do not count. This takes the place
     of the printed x_m of Omar 2012, section 2.5, which looks for points at the ordinate of the tip and finds those far
-    left as well.
+    left as well. It traces.
 
     Args:
-        signature: shape (2, M, ...) with M at least 3.
+        signature: abscissas and ordinates, each of shape (M, ...) with M at least 3.
+        interpolate: take the top of the parabola through three points, for coarse samples.
 
     Returns:
         Farthest and nearest tip, each of shape (...); both the largest abscissa where there is no local maximum.
     """
     xi = signature[0]
-    inner = xi[1:-1]
-    top, bottom = xi.max(axis=0), xi.min(axis=0)
-    turns = (inner > xi[:-2]) & (inner >= xi[2:]) & (inner > 0.5 * (top + bottom))
-    found = turns.any(axis=0)
-    far = np.where(turns, inner, -np.inf).max(axis=0)
-    near = np.where(turns, inner, np.inf).min(axis=0)
+    left, inner, right = xi[:-2], xi[1:-1], xi[2:]
+    top, bottom = np.max(xi, axis=0), np.min(xi, axis=0)
+    turns = (inner > left) * (inner >= right) * (inner > 0.5 * (top + bottom))
+    if interpolate:
+        bend = 2.0 * inner - left - right
+        inner = inner + np.where(turns, 0.125 * (right - left) ** 2 / np.where(turns, bend, 1.0), 0.0)
+    far = np.max(np.where(turns, inner, bottom), axis=0)
+    near = np.min(np.where(turns, inner, np.maximum(top, far)), axis=0)
+    found = np.max(np.where(turns, 1.0, 0.0), axis=0) > 0.5
     return np.where(found, far, top), np.where(found, near, top)
 
 
@@ -99,43 +105,29 @@ def length_to_middle(signature: np.ndarray) -> np.ndarray:
     return np.asarray(0.5 * (far + near) - signature[0].min(axis=0))
 
 
-def printed_branch_gap(signature: np.ndarray, tolerance: float = 0.01) -> np.ndarray:
-    """Gap r3 as printed: largest abscissa minus the smallest one at the ordinate of the tip, Omar 2012, section 2.5.
+def printed_branches(signature: Array, tolerance: float = 0.01) -> tuple[Array, Array]:
+    """Largest abscissa x_max, and x_m as printed: the smallest one whose ordinate is nearly that of the largest, Omar
+    2012, section 2.5. It traces.
 
     Args:
-        signature: S1, shape (2, M, ...). tolerance: of the ordinate.
+        signature: S1, abscissas and ordinates, each of shape (M, ...). tolerance: of the ordinate.
     """
-    tip, near = _printed_branches(signature, tolerance)
-    return np.asarray(tip - near)
+    xi, eta = signature[0], signature[1]
+    top, floor = np.max(xi, axis=0), np.min(eta, axis=0)
+    at_top = np.max(np.where(xi >= top, eta, floor), axis=0)
+    return top, np.min(np.where(np.abs(eta - at_top) < tolerance, xi, top), axis=0)
 
 
-def printed_length_to_middle(signature: np.ndarray, tolerance: float = 0.01) -> np.ndarray:
-    """Length r1 as printed: ``(x_max + x_m) / 2 - x_min``, Omar 2012, section 2.5.
+def printed_tip(signature: Array) -> Array:
+    """Abscissa r2 as printed: of the point with the largest second difference of the ordinates, Omar 2012, section
+    2.5. It traces.
 
     Args:
-        signature: S1, shape (2, M, ...). tolerance: of the ordinate.
+        signature: S2, abscissas and ordinates, each of shape (M, ...) with M at least 3.
     """
-    tip, near = _printed_branches(signature, tolerance)
-    return np.asarray(0.5 * (tip + near) - signature[0].min(axis=0))
-
-
-def printed_tip(signature: np.ndarray) -> np.ndarray:
-    """Abscissa r2 as printed: of the point with the largest second difference of the ordinates, Omar 2012, section 2.5.
-
-    Args:
-        signature: S2, shape (2, M, ...).
-    """
-    xi, eta = signature
-    place = np.argmax(eta[2:] - 2.0 * eta[1:-1] + eta[:-2], axis=0) + 1
-    return np.asarray(np.take_along_axis(xi, place[None], axis=0)[0])
-
-
-def _printed_branches(signature: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Largest abscissa, and the smallest one whose ordinate is that of the largest within the tolerance."""
-    xi, eta = signature
-    tip = np.argmax(xi, axis=0)[None]
-    at_tip = np.abs(eta - np.take_along_axis(eta, tip, axis=0)) < tolerance
-    return xi.max(axis=0), np.where(at_tip, xi, np.inf).min(axis=0)
+    xi, eta = signature[0], signature[1]
+    bend = eta[2:] - 2.0 * eta[1:-1] + eta[:-2]
+    return np.max(np.where(bend >= np.max(bend, axis=0), xi[1:-1], np.min(xi, axis=0)), axis=0)
 
 
 PROPERTIES: Mapping[str, Property] = {

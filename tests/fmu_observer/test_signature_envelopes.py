@@ -75,8 +75,9 @@ def test_distances_along_a_line_are_those_of_figures_4_8_and_4_9():
     assert line_distance(above, box, 0.0) == np.inf
     on_border = np.array([box.edges[3], THICKNESS + GAP])  # in one slab, not in two
     assert line_distance(on_border, box, np.pi / 2) == pytest.approx(GAP / THICKNESS, rel=1e-12)
-    # Over all lines: an oblique one through the thin side is longer within than it is outside.
-    assert envelope_distance(above, box) < line_distance(above, box, np.pi / 2)
+    # All lines that cross both sides of the bar give the same quotient, the others a larger one.
+    assert envelope_distance(above, box) == pytest.approx(GAP / THICKNESS, rel=1e-9)
+    assert envelope_distance(beside, box) == pytest.approx(GAP / LENGTH, rel=1e-9)
     assert envelope_distance(beside, box) < envelope_distance(above, box)
 
 
