@@ -184,7 +184,7 @@ def test_saved_states_of_model_exchange_are_measured(tmp_path: Path, monkeypatch
     model = open_model(path, "model-exchange", states=())
     check_saving(model, 0.01)
     monkeypatch.setattr(model.instance, "restore", lambda _state: None)
-    with pytest.raises(FmuModelError, match="restored and stepped again, position is .* restored honestly"):
+    with pytest.raises(FmuModelError, match=r"restored and stepped again, position is .* restored honestly"):
         check_saving(model, 0.01)
     model.close()
 
