@@ -20,6 +20,7 @@ ROOMS = (
     "fmu_observer.observers.continuous",
     "fmu_observer.observers.discrete",
     "fmu_observer.observers.traction",
+    "fmu_observer.observers.signature",
     "fmu_observer.detection",
 )
 

@@ -103,8 +103,7 @@ class FmuFilter(ABC):
         Args:
             belief: what is believed. t: instant [s]. u: inputs, shape (m,).
         """
-        found: Array = self.model.values_at(t, belief.x, u)[1]
-        return found
+        return self.model.outputs_at(t, belief.x.reshape(-1, 1), u, range(len(self.model.outputs)))[:, 0]
 
     def _steps(self, belief: Belief) -> Array:
         deviations = np.sqrt(np.maximum(belief.P.diagonal(), 0.0))
@@ -146,8 +145,9 @@ class ExtendedFilter(FmuFilter):
     def predict(self, belief: Belief, t: float, h: float, u: Array) -> Belief:
         """The belief a step later; arguments as for `FmuFilter`."""
         x, steps = belief.x, self._steps(belief)
-        if self._directional is not None:
-            moved, F = self._directional.transition_with_slope(t, h, x, u)
+        sloped = None if self._directional is None else self._directional.transition_with_slope(t, h, x, u)
+        if sloped is not None:
+            moved, F = sloped
             P = kalman.predicted_covariance(belief.P, F, h * self.noises.intensity) + self._from_inputs(t, h, x, u)
             return replace(belief, x=moved, P=P, count=belief.count + 1)
         points, apart = _about(x, steps)

@@ -1,0 +1,6 @@
+"""Formulas of fault detection and isolation, each once: filters and windows of residuals, alarms, redundant sensors,
+an observer over a finite window, the inversion of a window for one parameter, thresholds and their false alarms.
+
+Those that a detector executes are pure functions in plain NumPy that trace; thresholds and gains are computed before.
+They know no block, no registry and no plant.
+"""

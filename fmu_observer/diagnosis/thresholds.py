@@ -1,0 +1,178 @@
+"""Thresholds from recordings without a fault, and what false alarms they mean: a rate per hour with its interval,
+checked on recordings that the threshold has not seen.
+
+NumPy and SciPy over recordings; nothing of it runs inside a detector.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+HOUR = 3600.0  # [s]
+
+
+@dataclass(frozen=True, slots=True)
+class AlarmRate:
+    """False alarms in fault-free time.
+
+    Attributes:
+        alarms: how many began. hours: fault-free time [h]. rate: per hour [1/h]. low: lower end of its interval [1/h].
+        high: upper end [1/h]. confidence: of the interval, from 0 to 1.
+    """
+
+    alarms: int
+    hours: float
+    rate: float
+    low: float
+    high: float
+    confidence: float
+
+    def __str__(self) -> str:
+        """For a table: the rate with its interval."""
+        return (
+            f"{self.rate:.2g}/h ({self.alarms} in {self.hours:.3g} h, {100 * self.confidence:g} %: "
+            f"{self.low:.2g} to {self.high:.2g})"
+        )
+
+
+def alarm_rate(alarms: int, hours: float, confidence: float = 0.95) -> AlarmRate:
+    """Rate of alarms with its exact Poisson interval (Garwood 1936).
+
+    Args:
+        alarms: how many were counted, not negative. hours: time in which they were [h], positive.
+        confidence: of the two-sided interval, between 0 and 1. Without any alarm the upper end has it one-sided half
+            way: at 95 %, 3.7 alarms in the time.
+
+    Raises:
+        ValueError: an argument is out of its range.
+    """
+    if alarms < 0 or not hours > 0.0 or not 0.0 < confidence < 1.0:
+        raise ValueError(
+            f"alarm_rate({alarms}, {hours}, {confidence}): expected a count from 0, hours above 0, confidence between "
+            "0 and 1."
+        )
+    tail = 0.5 * (1.0 - confidence)
+    low = 0.5 * float(scipy.special.chdtri(2 * alarms, 1.0 - tail)) if alarms else 0.0
+    high = 0.5 * float(scipy.special.chdtri(2 * alarms + 2, tail))
+    return AlarmRate(alarms, hours, alarms / hours, low / hours, high / hours, confidence)
+
+
+def proportion_interval(hits: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
+    """Exact interval of a probability (Clopper and Pearson 1934): of detections among runs with a fault.
+
+    Args:
+        hits: how many trials succeeded. trials: how many there were, at least 1. confidence: between 0 and 1.
+
+    Returns:
+        Lower and upper end, from 0 to 1.
+
+    Raises:
+        ValueError: an argument is out of its range.
+    """
+    if not 0 <= hits <= trials or trials < 1 or not 0.0 < confidence < 1.0:
+        raise ValueError(
+            f"proportion_interval({hits}, {trials}, {confidence}): expected 0 <= hits <= trials, at least one trial, "
+            "and confidence between 0 and 1."
+        )
+    tail = 0.5 * (1.0 - confidence)
+    low = float(scipy.special.betaincinv(hits, trials - hits + 1, tail)) if hits else 0.0
+    high = float(scipy.special.betaincinv(hits + 1, trials - hits, 1.0 - tail)) if hits < trials else 1.0
+    return low, high
+
+
+def count_alarms(exceeds: np.ndarray) -> int:
+    """How many alarms begin in a recording: runs of samples above the threshold, however long each is.
+
+    Args:
+        exceeds: at each sample whether the alarm is raised, shape (samples,).
+    """
+    raised = np.asarray(exceeds, dtype=bool)
+    return int(raised[0]) + int(np.count_nonzero(raised[1:] & ~raised[:-1])) if raised.size else 0
+
+
+def largest_threshold(recordings: Sequence[np.ndarray], margin: float = 1.05) -> float:
+    """Largest residual without a fault, times a margin: Omar 2012, 7.5.1 (iii), with our margin.
+
+    Args:
+        recordings: residuals without a fault, each of shape (samples,). margin: factor [1].
+
+    Raises:
+        ValueError: there is no recording, an empty one, or a value that is not finite.
+    """
+    return margin * max(float(np.max(values)) for values in _checked(recordings))
+
+
+def quantile_threshold(recordings: Sequence[np.ndarray], quantile: float) -> float:
+    """Residual that a fraction of all fault-free samples stays below.
+
+    Args:
+        recordings: residuals without a fault, each of shape (samples,). quantile: fraction, between 0 and 1.
+
+    Raises:
+        ValueError: there is no recording, an empty one, or a value that is not finite.
+    """
+    return float(np.quantile(np.concatenate(_checked(recordings)), quantile))
+
+
+def rate_threshold(recordings: Sequence[np.ndarray], sample_period: float, alarms_per_hour: float) -> float:
+    """Smallest threshold at which fault-free recordings have no more alarms per hour than allowed.
+
+    The rate holds where it was fitted; `checked` says what it is elsewhere. A rate below one alarm in all recordings
+    cannot be fitted: then the threshold is their largest residual.
+
+    Args:
+        recordings: residuals without a fault, each of shape (samples,). sample_period: between their samples [s].
+        alarms_per_hour: allowed [1/h], not negative.
+
+    Raises:
+        ValueError: there is no recording, an empty one, or a value that is not finite.
+    """
+    kept = _checked(recordings)
+    allowed = int(alarms_per_hour * sum(map(len, kept)) * sample_period / HOUR)
+    # An alarm begins where the residual rises past the threshold: each rise from a to b begins one for thresholds
+    # from a up to b. Tried are the values from which rises begin, and where they end.
+    before = np.concatenate([np.concatenate([[-np.inf], values[:-1]]) for values in kept])
+    after = np.concatenate(kept)
+    rising = after > before
+    starts, ends = np.sort(before[rising]), np.sort(after[rising])
+    candidates = np.unique(ends)
+    begun = np.searchsorted(starts, candidates, side="right") - np.searchsorted(ends, candidates, side="right")
+    enough = begun <= allowed
+    last_excess = np.flatnonzero(~enough)
+    # Below low residuals everything is one long alarm: only thresholds above the last excess count.
+    return float(candidates[last_excess[-1] + 1 if last_excess.size else 0])
+
+
+def checked(
+    recordings: Sequence[np.ndarray], threshold: float, sample_period: float, confidence: float = 0.95
+) -> AlarmRate:
+    """False alarms of a threshold on recordings without a fault; take others than those it was made of.
+
+    Args:
+        recordings: residuals without a fault, each of shape (samples,). threshold: of the residual.
+        sample_period: between their samples [s]. confidence: of the interval, between 0 and 1.
+
+    Raises:
+        ValueError: there is no recording, an empty one, or a value that is not finite.
+    """
+    kept = _checked(recordings)
+    alarms = sum(count_alarms(values > threshold) for values in kept)
+    return alarm_rate(alarms, sum(map(len, kept)) * sample_period / HOUR, confidence)
+
+
+def _checked(recordings: Sequence[np.ndarray]) -> list[np.ndarray]:
+    kept = [np.asarray(values, dtype=float).ravel() for values in recordings]
+    if not kept or any(values.size == 0 for values in kept):
+        raise ValueError("A threshold needs at least one recording, and none may be empty.")
+    for number, values in enumerate(kept):
+        if not np.isfinite(values).all():
+            where = int(np.flatnonzero(~np.isfinite(values))[0])
+            raise ValueError(
+                f"Recording {number} is {values[where]} at sample {where}; expected finite residuals. Leave out the "
+                "samples before the window was full."
+            )
+    return kept

@@ -1,0 +1,93 @@
+"""One parameter from one window of past samples: simulate for a grid of values, bracket, interpolate, smooth.
+
+Pure functions that trace. The simulation is the caller's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from plant_models.hybrid.system import Array
+
+
+class Inverted(NamedTuple):
+    """The value at which simulation and measurement agree.
+
+    Attributes:
+        value: of the parameter. crossings: intervals of the grid that bracket it [1]: 1 as it should be; 0 where the
+            grid does not bracket, and the value is the end of the grid nearer to the measurement; 2 or more where the
+            measurement has several explanations, of which the one nearest to the value before is taken.
+    """
+
+    value: Array
+    crossings: Array
+
+
+def grid_around(
+    previous: Array, count: int, lowest: Array = 0.7, highest: Array = 1.7, least: Array = 0.0, most: Array = np.inf
+) -> list[Array]:
+    """Values ``[0.7 p .. 1.7 p]`` in equal steps around the last estimate: Omar 2012, 7.7.7.
+
+    Args:
+        previous: last estimate p, positive. count: of values, at least 2. lowest: factor of the first value [1].
+        highest: factor of the last value [1]. least: smallest value allowed. most: largest value allowed; both move the
+            ends of the grid, so that its values stay apart.
+
+    Raises:
+        ValueError: fewer than two values cannot bracket.
+    """
+    if count < 2:
+        raise ValueError(f"A grid of {count} values brackets nothing; expected at least 2.")
+    low = np.minimum(np.maximum(lowest * previous, least), most)
+    high = np.minimum(np.maximum(highest * previous, least), most)
+    return [low + (high - low) * (i / (count - 1)) for i in range(count)]
+
+
+def invert(grid: Sequence[Array], differences: Sequence[Array], previous: Array) -> Inverted:
+    """The value of the parameter at which the difference is zero, linear between two values of the grid.
+
+    The print takes the two values with the smallest differences (7.7.8), which may lie on one side: then it
+    extrapolates. Here a change of sign decides, and a grid without one is told.
+
+    Args:
+        grid: values, rising. differences: at each value what was simulated at the end of the window minus what was
+            measured there. previous: last estimate.
+
+    Returns:
+        The value, and by how many intervals it was bracketed.
+
+    Raises:
+        ValueError: grid and differences are not equally many, or fewer than two.
+
+    Source:
+        Omar 2012, (7.7.8) repaired.
+    """
+    if len(grid) != len(differences) or len(grid) < 2:
+        raise ValueError(f"{len(grid)} values and {len(differences)} differences; expected equally many, at least 2.")
+    ends = np.where(np.abs(differences[0]) <= np.abs(differences[-1]), grid[0], grid[-1])
+    value, distance, crossings = ends, 0.0 * ends + np.inf, 0.0 * ends
+    for i in range(len(grid) - 1):
+        d0, d1 = differences[i], differences[i + 1]
+        # A zero belongs to the interval on its left; that at the first value to the first.
+        left = np.where(d0 * d1 < 0.0, 1.0, np.where(d1 == 0.0, np.where(d0 == 0.0, 0.0, 1.0), 0.0))
+        inside = np.maximum(left, np.where(d0 == 0.0, 1.0, 0.0)) if i == 0 else left
+        apart = np.where(inside > 0.0, d1 - d0, 1.0)
+        here = grid[i] - np.where(inside > 0.0, d0 * (grid[i + 1] - grid[i]) / np.where(apart == 0.0, 1.0, apart), 0.0)
+        gap = np.abs(here - previous)
+        nearer = np.where(gap < distance, inside, 0.0)
+        value = np.where(nearer > 0.0, here, value)
+        distance = np.where(nearer > 0.0, gap, distance)
+        crossings = crossings + inside
+    return Inverted(value, crossings)
+
+
+def smoothed(previous: Array, raw: Array, gamma: Array = 0.2) -> Array:
+    """``gamma p + (1 - gamma) raw``: Omar 2012, (7.7.8).
+
+    Args:
+        previous: last estimate p. raw: value found now. gamma: weight of the last estimate [1], from 0 to 1.
+    """
+    return gamma * previous + (1.0 - gamma) * raw

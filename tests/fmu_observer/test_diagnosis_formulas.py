@@ -1,0 +1,104 @@
+"""Filters, windows, alarms, redundancy and window inversion: the formulas of fault detection against closed forms."""
+
+import numpy as np
+import pytest
+import scipy
+
+from fmu_observer.diagnosis.redundancy import isolate, larger, outvoted
+from fmu_observer.diagnosis.residual_filters import filtered, residual_filter, settled
+from fmu_observer.diagnosis.window_inversion import grid_around, invert, smoothed
+from fmu_observer.diagnosis.windowed_residual import Alarm, BlockWindow, block_windowed_square, judge, windowed_square
+
+ROUNDING = 1e-12  # relative, of some tens of operations
+
+
+@pytest.mark.parametrize(("order", "tau"), [(0, 0.06), (1, 0.06), (2, 0.06), (2, 0.6), (1, 0.01)])
+def test_filters_are_tustins_of_scipy(order: int, tau: float) -> None:
+    period = 0.01
+    numerator = [1.0] + [0.0] * order
+    b, a = scipy.signal.bilinear(numerator, np.poly([-1.0 / tau] * 2) * tau**2, 1.0 / period)
+    signal = np.random.default_rng(order).normal(size=300)
+    coefficients, memory, found = residual_filter(tau, period), (0.0, 0.0), []
+    for value in signal:
+        given = [0.0, 0.0, 0.0]
+        given[order] = value
+        out = filtered(coefficients, memory, *given)
+        memory = out.memory
+        found.append(out.value)
+    expected = scipy.signal.lfilter(b, a, signal)
+    # A double pole at 0.98 is known to 1e-8 from the coefficients of a polynomial, which scipy goes through.
+    np.testing.assert_allclose(found, expected, atol=1e-7 * np.abs(expected).max())
+
+
+def test_a_settled_filter_has_no_transient() -> None:
+    coefficients = residual_filter(0.6, 0.01)
+    memory = settled(coefficients, level=3.0, first=-2.0, second=5.0)
+    for _ in range(5):
+        value, memory = filtered(coefficients, memory, 3.0, -2.0, 5.0)
+        assert value == pytest.approx(3.0, abs=1e-9)  # s^2 F has gains of 5e4 1/s2, which cancel
+
+
+@pytest.mark.parametrize("samples", [1, 2, 3, 7])
+def test_windows_sum_the_last_squares(samples: int) -> None:
+    residual = np.random.default_rng(samples).normal(size=50)
+    window, blocks = np.zeros(samples - 1), BlockWindow(np.zeros(3), 0.0, 0.0)
+    for k, x in enumerate(residual):
+        value, window = windowed_square(window, x)
+        assert value == pytest.approx(np.sum(residual[max(0, k - samples + 1) : k + 1] ** 2), rel=ROUNDING)
+        total, blocks = block_windowed_square(blocks, x, samples)
+        end = (k + 1) // samples * samples
+        assert total == pytest.approx(np.sum(residual[max(0, end - 3 * samples) : end] ** 2), rel=ROUNDING)
+
+
+def test_an_alarm_waits_for_samples_in_a_row() -> None:
+    above = [1, 1, 0, 1, 1, 1, 0, 1, 0, 0, 1, 0, 0, 0]
+    alarm, raised = Alarm(0.0, 0.0, 0.0), []
+    for k, exceeds in enumerate(above):
+        alarm = judge(alarm, 0.1 * k, exceeds, raise_after=3, clear_after=2)
+        raised.append(int(alarm.raised))
+    assert raised == [0, 0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0, 0]
+    assert alarm.since == pytest.approx(0.9)
+    assert judge(Alarm(0.0, 0.0, 0.0), 7.0, 1.0) == (1.0, 0.0, 7.0)  # without persistence at once
+
+
+def test_sensors_that_disagree_are_told_apart_by_the_model() -> None:
+    assert isolate(1.0, 1.0, 0.0) == (1.0, 0.0, 0.0, 0.0)
+    assert isolate(1.0, 0.0, 1.0) == (0.0, 1.0, 0.0, 0.0)
+    assert isolate(1.0, 1.0, 1.0) == isolate(1.0, 0.0, 0.0) == (0.0, 0.0, 1.0, 0.0)
+    assert isolate(0.0, 1.0, 1.0) == (0.0, 0.0, 0.0, 1.0)
+    assert isolate(0.0, 1.0, 0.0) == (0.0, 0.0, 0.0, 0.0)
+    assert larger(1.0, 9.0, 2.0) == (1.0, 0.0, 0.0, 0.0)
+    assert larger(1.0, 0.5, 0.7) == (0.0, 0.0, 1.0, 0.0)
+    assert larger(0.0, 9.0, 2.0) == (0.0, 0.0, 0.0, 1.0)
+
+
+def test_three_sensors_vote() -> None:
+    limits = [[1.0] * 3] * 3
+    assert outvoted([5.0, 5.5, 9.0], limits) == [0.0, 0.0, 1.0]
+    assert outvoted([5.0, 5.5, 5.9], limits) == [0.0, 0.0, 0.0]
+    assert outvoted([0.0, 5.0, 9.0], limits) == [0.0, 0.0, 0.0]  # two faults: no vote
+    with pytest.raises(ValueError, match="at least three"):
+        outvoted([1.0, 2.0], limits)
+
+
+@pytest.mark.parametrize("true", [0.35, 0.5, 0.62, 0.8])
+def test_a_grid_that_brackets_finds_a_linear_response(true: float) -> None:
+    grid = grid_around(0.5, 5)
+    assert grid == pytest.approx([0.35, 0.475, 0.6, 0.725, 0.85])
+    found = invert(grid, [3.0 * (value - true) for value in grid], 0.5)
+    assert found.value == pytest.approx(true, rel=ROUNDING)
+    assert found.crossings == 1.0
+
+
+def test_a_grid_that_does_not_bracket_is_told() -> None:
+    grid = grid_around(1.0, 3, most=1.5)
+    assert grid == pytest.approx([0.7, 1.1, 1.5])
+    assert invert(grid, [v - 1.9 for v in grid], 1.0) == (1.5, 0.0)
+    assert invert(grid, [v - 0.2 for v in grid], 1.0) == (0.7, 0.0)
+    several = invert([0.0, 1.0, 2.0, 3.0], [-1.0, 1.0, -1.0, 1.0], 2.4)
+    assert several == (2.5, 3.0)  # the explanation nearest to the last estimate
+    assert smoothed(1.0, 0.25, 0.2) == pytest.approx(0.4)
+    with pytest.raises(ValueError, match="brackets nothing"):
+        grid_around(1.0, 1)
+    with pytest.raises(ValueError, match="equally many"):
+        invert([1.0, 2.0], [0.0], 1.0)
