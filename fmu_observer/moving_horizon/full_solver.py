@@ -24,6 +24,9 @@ from fmu_observer.moving_horizon.window_stages import Stages, WindowStages
 SMALLEST_SHARE = 1.0 / 64.0
 """Of a step; where not even this makes the cost smaller, the search has ended."""
 
+LEAST_CURVATURE = 0.25
+"""Of a loss, as a share of its weight: where it is less, steps would be too long."""
+
 KEPT = 1e-6
 """How well a trajectory keeps the transitions to be called feasible, in its own standard deviations."""
 
@@ -213,6 +216,19 @@ class _Search:
         found = [robust_loss.weight(loss, squares[:, j], self.doubts) for j, loss in enumerate(self.problem.losses)]
         return self.used * np.stack(found, axis=1)
 
+    def curvatures(self, point: _Point) -> np.ndarray:
+        """Second derivatives of the losses where they are convex enough, else the weights; shape (N, q).
+
+        With weights alone (iteratively reweighted least squares) the last digits of Geman-McClure take dozens of steps.
+        """
+        weights = self.weights(point)
+        for j, loss in enumerate(self.problem.losses):
+            if loss == "geman_mcclure":
+                share = point.squares[:, j] / self.doubts**2
+                exact = self.used[:, j] * (1.0 - 3.0 * share) / (1.0 + share) ** 3
+                weights[:, j] = np.maximum(exact, LEAST_CURVATURE * weights[:, j])
+        return weights
+
     def whitened(self, point: _Point, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Residuals and Jacobians in standard deviations, weighted; shapes (N, q), (N, q, n)."""
         roots = np.sqrt(weights)
@@ -221,8 +237,10 @@ class _Search:
 
     def programmed(self, point: _Point, doubt: np.ndarray | None) -> Step:
         """The quadratic programme of a step: first without bounds, and with them where it would break one."""
-        residuals, H = self.whitened(point, self.weights(point, doubt))
-        A = np.einsum("kqi,kqj->kij", H, H)
+        weights = self.weights(point, doubt)
+        residuals, H = self.whitened(point, weights)
+        _, bent = self.whitened(point, weights if doubt is not None else self.curvatures(point))
+        A = np.einsum("kqi,kqj->kij", bent, bent)
         b = -np.einsum("kqi,kq->ki", H, residuals)
         stages = point.stages
         given = (A, b, stages.F, stages.G, stages.moved - point.states)

@@ -90,6 +90,7 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
     source = "Omar 2012, (1.4.78), (4.2.2)-(4.2.4); real-time iteration and the train case are ours"
     parameters = (*OWN_PARAMETERS, *WINDOW_PARAMETERS)
     outputs = (*BaliseOdometerEkf.outputs, *told_outputs())
+    iterate = staticmethod(iterate)
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
         "window": range(1, MOST_ROWS + 1),
         "passes": range(1, MOST_PASSES + 1),
@@ -143,7 +144,7 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
         before = np.where(begun, points[-ORDER:], x[:ORDER])
         row = self._row(event, t, x, u, p, before)
         packed = vector(*LAYOUT.packed(row))
-        found = iterate(
+        found = self.iterate(
             self.problem, self.passes, np.where(begun, arrival, start), window, points, packed, known, shared
         )
         covariance = np.reshape(found.covariance, (ORDER, ORDER))
