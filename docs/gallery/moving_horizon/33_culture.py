@@ -17,8 +17,8 @@ GUESS = {"estimated_biomass": 0.05, "estimated_glycerol": 1.6, "estimated_enzyme
 NETWORK = "with norm scaling both quantities move the properties in one direction, here and there"
 CLEAN = "the network is computed for the biomass at hand, 3 x 3 nodes, and inverted between them; there 21 x 21 nodes"
 NOISE = (
-    "the printed level is lost; noise is 1 % of each value, uniform, the mean of six seeds. The independent one does not "
-    "say how its noise was spread"
+    "the printed level is lost; noise is that share of each value, uniform, mean of six seeds. Independent: not said "
+    "how its noise was spread"
 )
 OPEN = "over 3 h to 7 h, guess as there; where its mean ends is not said"
 INDEPENDENT = {
