@@ -11,7 +11,6 @@ import numpy as np
 
 from fmu_observer.moving_horizon.arrival_cost import arrival_cost_from
 from fmu_observer.moving_horizon.gauss_newton import WindowProblem, passed, solve
-from fmu_observer.moving_horizon.window import rows_of
 from plant_models.hybrid import Signal, memory, output_signal
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.scan import enclosed
@@ -108,12 +107,14 @@ def iterate(
 
     def iterated(*arrays: Array) -> tuple[Array, ...]:
         old, table, states, new, predicted, known = arrays
-        rows, estimates = rows_of(table, width), rows_of(states, n)
-        before = passed(problem, arrival_cost_from(old, n), rows[0], estimates[0], known)
-        rows = [*rows[1:], new]
-        found = solve(problem, before, rows, [*estimates[1:], predicted], known, passes)
+        count = states.shape[0] // n
+        before = passed(problem, arrival_cost_from(old, n), table[:width], states[:n], known)
+        rows = np.reshape(np.hstack([table[width:], new]), (count, width))
+        estimates = np.reshape(np.hstack([states[n:], predicted]), (count, n))
+        found = solve(problem, before, rows, estimates, known, passes)
         last = (found.residual, found.step, found.moved, problem.layout.count(rows), found.bounds)
-        return found.estimates[-1], found.covariance, np.hstack([*before, *rows, *found.estimates, *last])
+        kept = (np.reshape(rows, (count * width,)), np.reshape(found.estimates, (count * n,)))
+        return found.estimates[-1], found.covariance, np.hstack([*before, *kept, *last])
 
     estimate, covariance, remembered = enclosed(iterated, arrival, window, points, row, point, shared)
     return Iterated(estimate, covariance, remembered)
