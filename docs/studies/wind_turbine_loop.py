@@ -251,6 +251,9 @@ def _largest(now: Any, name: str, p: Any) -> Array:
     return largest
 
 
+LOOP = WindTurbineLoop()
+"""One system for all batches of a process: traced once."""
+
 INTERVALS = {
     1: (1000.0, 1200.0),
     2: (2500.0, 2700.0),
@@ -293,14 +296,14 @@ def run_members(
         interval: begin and end of the faults [s]; None for those of the benchmark.
         values: parameters, one number for all or shape (members,).
     """
-    batch = fmus.Batch(WindTurbineLoop(), len(faults))
+    batch = fmus.Batch(LOOP, len(faults))
     begins, ends = np.array([interval or INTERVALS.get(f, (0.0, 0.0)) for f in faults]).T
     own = [OWN_ALARM.get(f, 0) for f in faults]
     given = {"fault": faults, "seed": seeds, "onset": begins, "end": ends, "own": own, **values}
     for name, value in given.items():
         batch.set(name, value)
     batch.start()
-    instants = np.arange(0.0, stop + 1e-9, 10.0)
+    instants = np.unique([*np.arange(0.0, stop, 10.0), stop])
     efficiency = batch.run(instants[1:], results=["efficiency"])[:, :, 0]
     if batch.failures:
         raise RuntimeError(f"{batch.failures}")
