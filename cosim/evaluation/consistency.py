@@ -172,7 +172,7 @@ def _of_one(result: Result, spec: ReportSpec, observer: str) -> Iterator[FilterC
     quantities = [name.removesuffix(STD) for name in names if name.endswith(STD)]
     errors: dict[str, np.ndarray] = {}
     for quantity in quantities:
-        true, believed = true_value(result, spec, quantity), estimate(result, observer, quantity)
+        true, believed = true_value(result, spec, quantity), recorded(result, f"{observer}.{quantity}")
         if true is not None and believed is not None:
             with np.errstate(invalid="ignore", over="ignore"):
                 errors[quantity] = (believed - true)[rows]
