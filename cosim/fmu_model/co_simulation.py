@@ -9,7 +9,7 @@ import numpy as np
 
 from cosim.fmu_model.quick_points import Point, QuickPoints
 from cosim.fmu_model.quick_restarts import quicken_restarts
-from cosim.fmu_model.sealed import FAR, Array, SealedModel
+from cosim.fmu_model.sealed import FAR, Array, FmuModelError, SealedModel, Way
 from fmus.check.instance import SlaveError
 from fmus.fmi.ports import is_native
 
@@ -17,7 +17,7 @@ from fmus.fmi.ports import is_native
 class CoSimulationModel(SealedModel):
     """A co-simulation FMU; arguments as for `SealedModel`."""
 
-    way = "restart"
+    way: Way = "restart"
     _quick = False
     """Whether the order of the calls is fixed, so that those of a point are prepared as one."""
     _quick_restart: Point
@@ -81,6 +81,9 @@ class CoSimulationModel(SealedModel):
     def _restart(self, t: float, x: Array, u: Array) -> None:
         if not self._quick:
             super()._restart(t, x, u)
+            if self.way == "step mode":
+                self._late_states[:] = x
+                self._write_late()
             return
         self._state_values[:], self._input_values[:] = x, u
         self._quick_restart(t, 0.0)
@@ -89,12 +92,32 @@ class CoSimulationModel(SealedModel):
         self.instance.enter_initialization(t, t + FAR)
         self.instance.exit_initialization()
 
+    def _demand_settable(self) -> None:
+        """States without start values are set in Step Mode after each restart, where the FMU takes them there."""
+        stuck = [name for name in self.states if not self._has_start(name)]
+        if not stuck:
+            return
+        self.way = "step mode"
+        self._write_late, self._late_states = self.instance.writer(list(self.states))
+        self._late_states[:] = self.start
+        try:
+            self._write_late()
+        except SlaveError as error:
+            variable = self.instance.variables.element(stuck[0]).variable
+            raise FmuModelError(
+                f"{self.path}: the state {stuck[0]!r} has no start value that can be set (causality "
+                f"{variable.causality}, initial {variable.initial or 'not declared'}), and in Step Mode the FMU "
+                f"refuses it ({str(error).rstrip('.')}), so no filter can move it. Name states whose start is exact, "
+                "use the model exchange of the FMU where it has one, or a particle filter over saved states, which "
+                "selects and moves nothing."
+            ) from error
+
     def _quicken(self) -> None:
         instance = self.instance
         if not is_native(instance.slave):
             return
         quicken_restarts(instance.slave, instance.fmi_version)
-        self._quick = not instance.has_event_mode
+        self._quick = not instance.has_event_mode and self.way == "restart"
         if not self._quick:  # initialisation ends in calls that depend on what the FMU answers
             return
         quick = QuickPoints(instance, FAR, self._written, self._write_values)

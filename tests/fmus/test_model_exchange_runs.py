@@ -42,7 +42,14 @@ TOLERANCE = 1e-11
 FLOOR = 2e-10
 """What the solver itself may be wrong by, relative: some tens of steps with local errors of `TOLERANCE`."""
 
-AT_REST = {"gain", "inverter", "signal_fault", "state_feedback", "wind_turbine_controller"}
+AT_REST = {
+    "gain",
+    "inverter",
+    "signal_fault",
+    "state_feedback",
+    "wind_turbine_controller",
+    "culture_signature",
+}  # what they tell follows inputs that are held, or samples of minutes
 """What they tell follows inputs that are held."""
 
 FLOORS = {"decaying_innovation_cdo": 5e-9, "cart_double_pendulum": 1e-8, "three_state_cascade": 5e-8}
