@@ -44,6 +44,9 @@ START = {"estimated_position": 3100.0, "estimated_speed": 27.778}
 NOISES = {s.name: s.start for s in TUNABLE} | {"balise_deviation": MAP_DEVIATION}
 FILTER = {**TRAIN, **START, **NOISES, "odometer_period": PERIOD}
 TYPICAL_SPEED = 30.0  # [m/s] at which the unscented filter takes the creep's deviation
+UNSCENTED_STATES = (
+    ("position", "m", 3100.0), ("speed", "m/s", 27.778), ("disturbance", "m/s2", 0.0), ("creep", "m/s", 0.0),
+)  # fmt: skip
 LIMITS = {"speed_limit": 42.0, "disturbance_limit": 0.2}
 HEADING = (
     "", "position, rms [m]", "before balises, rms [m]", "before balises, largest [m]", "speed, rms [m/s]",
@@ -130,12 +133,7 @@ def unscented() -> UnscentedKalmanFilter:
         name="train_with_creep",
         description="Train as of balise_odometer_ekf",
         source="ours",
-        states=tuple(
-            state(name, unit, start, name)
-            for name, unit, start in (
-                ("position", "m", 3100.0), ("speed", "m/s", 27.778), ("disturbance", "m/s2", 0.0), ("creep", "m/s", 0.0),
-            )
-        ),
+        states=tuple(state(name, unit, start, name) for name, unit, start in UNSCENTED_STATES),
         inputs=(input_signal("effort", "N", 0.0, "Effort"),),
         measurements=(
             input_signal("position", "m", 0.0, "Balise"),
@@ -144,7 +142,7 @@ def unscented() -> UnscentedKalmanFilter:
         moved=moved,
         measured=lambda x, _v, _known: vector(x[0], x[1] + x[3]),
         sample_period=PERIOD,
-    )  # fmt: skip
+    )
     return UnscentedKalmanFilter(model, arrival=["balise", "periodic"])
 
 
