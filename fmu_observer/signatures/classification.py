@@ -179,25 +179,35 @@ def train_classifier(
     return SignatureClassifier(tuple(stages), next(iter(left)), tuple(groups))
 
 
-def best_plane(records: np.ndarray, labels: Sequence[Hashable], space: SearchSpace) -> tuple[Plane, float]:
-    """The pair of coordinates that holds all classes apart best, and the narrowest strip between two of them.
+class Drawn(NamedTuple):
+    """A pair of coordinates that was drawn.
+
+    Attributes:
+        plane: of the pair. points: of the experiments in it, shape (2, n). margin: of the narrowest strip between two
+            classes, as a share of the range across it, negative where they overlap.
+    """
+
+    plane: Plane
+    points: np.ndarray
+    margin: float
+
+
+def drawn_planes(records: np.ndarray, labels: Sequence[Hashable], space: SearchSpace) -> list[Drawn]:
+    """All pairs of a search with the experiments in them, for those who choose by something else than the margin.
 
     Args:
         records: of all experiments, samples first, shape (K, n). labels: class of each. space: what is drawn.
-
-    Returns:
-        The plane, and the width of the strip in units of the ranges, negative where clouds overlap.
 
     Raises:
         ValueError: there are fewer than two classes, or not one label a record.
     """
     records = np.asarray(records, dtype=float)
     groups, values = _groups(records, labels), _table(records, space)
-    narrowest = {
-        pair: min(_isolated(_strips(pair, values, groups), set(groups)).values()) for pair in _draws(values, space)
-    }
-    best = max(narrowest, key=lambda pair: narrowest[pair])
-    return _plane(best, values), narrowest[best]
+    found = list[Drawn]()
+    for pair in _draws(values, space):
+        margin = min(_isolated(_strips(pair, values, groups), set(groups)).values())
+        found.append(Drawn(_plane(pair, values), np.stack([_scaled(c, values) for c in pair]), margin))
+    return found
 
 
 def _groups(records: np.ndarray, labels: Sequence[Hashable]) -> dict[Hashable, np.ndarray]:
