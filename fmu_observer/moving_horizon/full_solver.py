@@ -83,7 +83,7 @@ class FullSolution:
     @property
     def estimate(self) -> np.ndarray:
         """State in the last row, shape (n,)."""
-        return self.states[-1]
+        return np.asarray(self.states[-1])
 
 
 class _Point(NamedTuple):
@@ -226,7 +226,7 @@ class _Search:
             variances = np.where(self.used[-1] > 0.0, point.stages.variances[-1], 1.0)
             squares[-1] *= variances / (variances + spread)
         found = [robust_loss.weight(loss, squares[:, j], self.doubts) for j, loss in enumerate(self.problem.losses)]
-        return self.used * np.stack(found, axis=1)
+        return np.asarray(self.used * np.stack(found, axis=1))
 
     def curvatures(self, point: _Point) -> np.ndarray:
         """Second derivatives of the losses where they are convex enough, else the weights; shape (N, q).
@@ -290,7 +290,7 @@ class _Search:
     def missing(self, point: _Point) -> np.ndarray:
         """What the transitions are off, shape (N, n)."""
         stages = point.stages
-        return point.states - stages.moved - np.einsum("kir,kr->ki", stages.G, point.noises)
+        return np.asarray(point.states - stages.moved - np.einsum("kir,kr->ki", stages.G, point.noises))
 
     def cost(self, point: _Point) -> float:
         """Half the squares of the noises, and the losses."""
