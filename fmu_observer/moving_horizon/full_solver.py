@@ -27,8 +27,9 @@ SMALLEST_SHARE = 1.0 / 64.0
 LEAST_CURVATURE = 0.25
 """Of a loss, as a share of its weight: where it is less, steps would be too long."""
 
-KEPT = 1e-6
-"""How well a trajectory keeps the transitions to be called feasible, in its own standard deviations."""
+KEPT, NEAR = 1e-4, 1e-6
+"""How well a trajectory keeps the transitions to be called feasible, and how near a bound it touches it, in its own
+standard deviations."""
 
 
 class WindowError(ValueError):
@@ -205,7 +206,7 @@ class _Search:
             if share <= SMALLEST_SHARE and size > effort.tolerance:
                 reason = "no part of the last step makes the cost smaller"
                 break
-        return self.told(kept, size, iterations, began, reason)
+        return self.told(kept if reason else point, size, iterations, began, reason)
 
     # -- a step -----------------------------------------------------------------------------------------------------
 
@@ -313,7 +314,7 @@ class _Search:
 
     def active(self, states: np.ndarray) -> int:
         """How many bounds are touched."""
-        near = KEPT * self.scale
+        near = NEAR * self.scale
         return int(((states <= self.lower + near) | (states >= self.upper - near)).sum())
 
     def broken(self, start: np.ndarray) -> str:
