@@ -1,7 +1,8 @@
 """Benchmark: a native observer by signatures beside least squares of SciPy over the same windows.
 
-``python tests/benchmarks/signatures.py [SAMPLES]``. The reaction has two pressures and a rate as unknowns; least squares
-takes its closed form and starts from the truth, 10 % off. Nothing is asserted. Times are CPU seconds of this process.
+``python tests/benchmarks/signatures.py [SAMPLES]``. The reaction has two pressures and a rate as unknowns; least
+squares takes its closed form and starts 10 % beside the truth. Nothing is asserted. Times are CPU seconds of this
+process.
 """
 
 from __future__ import annotations
