@@ -22,7 +22,7 @@ from fmu_observer.detection.train_isolation import (
     WHEEL,
 )
 from fmu_observer.detection.train_memory import Memory
-from fmu_observer.detection.train_residuals import Readings
+from fmu_observer.detection.train_residuals import Readings, tolerance
 from fmu_observer.diagnosis.isolation_table import largest
 from fmu_observer.diagnosis.windowed_residual import Alarm, judge
 from plant_models.hybrid.system import Array
@@ -125,9 +125,14 @@ def contradicted_wheels(m: Memory, read: Readings, wheel: Wheels, p: Any) -> lis
     for k, before in enumerate(m.each("against_wheel")):
         ahead = read.speeds[k] - m["voted_speed"]
         may_be = np.where(ahead < 0.0, wheel.slow, wheel.fast)
-        off = np.where(largest([raised[name] for name in OF_ODOMETER[k]]) > 0.0, read.fitted[k], 0.0)
+        quick, way = largest([raised[name] for name in OF_ODOMETER[k]]), raised[f"way_{k + 1}"]
+        off = np.where(np.maximum(quick, way) > 0.0, read.fitted[k], 0.0)
+        now = np.where(np.abs(ahead) > tolerance(m["voted_speed"], p), 1.0 - may_be, 0.0)
         # Once a wheel cannot explain it the verdict stays until the alarm ends: the same fault goes on under effort.
-        known = np.where(before >= p.contrary_time, p.contrary_time, before + p.sample_period * (1.0 - may_be))
+        known = np.where(before >= p.contrary_time - 1e-9, p.contrary_time, before + p.sample_period * now)
+        # What only a way between balises shows is small and lasts: a scale, no slip.
+        small = np.where(quick > 0.0, 0.0, np.where(m["code"][k] > 0.0, 0.0, way))
+        known = np.where(small > 0.0, p.contrary_time, known)
         times.append(np.where(off > 0.0, known, 0.0))
         wrong.append(np.where(times[k] >= p.contrary_time - 1e-9, 1.0, 0.0))
     m.put(against_wheel=times)

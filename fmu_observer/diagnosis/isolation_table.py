@@ -33,7 +33,7 @@ class IsolationTable:
 
     A residual that a fault *must* move is above its threshold if the fault is large enough and lasts; one that it *may*
     move is so at times. All others stay quiet. A fault explains alarms of which it must or may move each. Of several,
-    those with the fewest residuals that they must move explain them best: they ask least of what has not been seen.
+    those explain them best that must move the fewest residuals which are quiet.
 
     Args:
         residuals: names. must: by fault, the residuals that it moves. may: by fault, those that it moves at times.
@@ -67,20 +67,20 @@ class IsolationTable:
         """
         counted = [alarm * there for alarm, there in zip(alarms, available, strict=True)]
         any_alarm = largest(counted)
-        covers, sizes = [], []
+        covers, missing = [], []
         for fault, there in zip(self.faults, possible, strict=True):
             moved = {*self.must[fault], *self.may.get(fault, ())}
             cover = any_alarm * there
             for name, alarm in zip(self.residuals, counted, strict=True):
                 cover = cover if name in moved else cover * (1.0 - alarm)
             covers.append(cover)
-            needed = [a for name, a in zip(self.residuals, available, strict=True) if name in self.must[fault]]
-            sizes.append(np.maximum(sum(needed, 0.0), 1.0))
+            every = zip(self.residuals, counted, available, strict=True)
+            missing.append(sum((seen - alarm for name, alarm, seen in every if name in self.must[fault]), 0.0))
         none = len(self.residuals) + 1.0
         best = none
-        for cover, size in zip(covers, sizes, strict=True):
-            best = np.minimum(best, np.where(cover > 0.5, size, none))
-        bests = [cover * np.where(size < best + 0.5, 1.0, 0.0) for cover, size in zip(covers, sizes, strict=True)]
+        for cover, quiet in zip(covers, missing, strict=True):
+            best = np.minimum(best, np.where(cover > 0.5, quiet, none))
+        bests = [c * np.where(quiet < best + 0.5, 1.0, 0.0) for c, quiet in zip(covers, missing, strict=True)]
         alone = np.where(sum(bests) < 1.5, 1.0, 0.0)
         return Verdict(
             [one * alone for one in bests],
@@ -97,7 +97,7 @@ class IsolationTable:
         return tuple(fault for fault in self.faults if self._signature(fault, available))
 
     def not_isolable(self, fault: str, available: Collection[str]) -> tuple[str, ...]:
-        """Other faults that explain all that this one must move, and ask for no more.
+        """Other faults that explain all that this one must move, and must move nothing else.
 
         Args:
             fault: that is there. available: names of the residuals that can be computed.
@@ -106,7 +106,7 @@ class IsolationTable:
         others = []
         for other in self.faults:
             its = self._signature(other, available)
-            if other != fault and own and own <= (its | set(self.may.get(other, ()))) and max(len(its), 1) <= len(own):
+            if other != fault and own and its <= own <= (its | set(self.may.get(other, ()))):
                 others.append(other)
         return tuple(others)
 
