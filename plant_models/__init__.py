@@ -25,7 +25,9 @@ ROOMS = (
     "plant_models.railway.traction",
     "plant_models.railway.network",
     "plant_models.railway.control",
+    "plant_models.signals",
     "plant_models.benchmarks",
+    "plant_models.benchmarks.wind_turbine",
 )
 SYSTEM = "plant_models.hybrid.system:HybridSystem"
 

@@ -103,8 +103,7 @@ class FmuFilter(ABC):
         Args:
             belief: what is believed. t: instant [s]. u: inputs, shape (m,).
         """
-        found: Array = self.model.values_at(t, belief.x, u)[1]
-        return found
+        return self.model.outputs_at(t, belief.x.reshape(-1, 1), u, range(len(self.model.outputs)))[:, 0]
 
     def _steps(self, belief: Belief) -> Array:
         deviations = np.sqrt(np.maximum(belief.P.diagonal(), 0.0))

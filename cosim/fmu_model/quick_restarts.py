@@ -5,15 +5,9 @@ arguments allocated once. A filter makes them many times a sample. Touches one s
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fmus.fmi.native_calls import prepared_call
-
-Array = NDArray[np.float64]
 
 
 def quicken_restarts(slave: Any, fmi_version: int) -> None:
@@ -43,47 +37,3 @@ def quicken_restarts(slave: Any, fmi_version: int) -> None:
     else:
         slave.setupExperiment = set_up
         slave.enterInitializationMode = prepared_call(slave, f"{prefix}EnterInitializationMode", held)
-
-
-def prepared_restart(
-    instance: Any, write: Callable[[Array, Array], None], far: float
-) -> Callable[[float, Array, Array], None]:
-    """Reset, values and initialisation in one call, with the words of an error told only where there is one.
-
-    Args:
-        instance: native co-simulation without event mode, its slave quickened.
-        write: writes states, shape (n,), and inputs, shape (m,), before initialisation; guarded by itself.
-        far: time from a restart to the end that is announced [s].
-
-    Returns:
-        The call, of an instant [s], states and inputs.
-    """
-    slave, mistakes = instance.slave, instance.mistakes
-    reset, leave = slave.reset, slave.exitInitializationMode
-    more, words = instance.tolerance_argument()
-    three = instance.fmi_version == 3
-    set_up = slave.enterInitializationMode if three else slave.setupExperiment
-    enter = None if three else slave.enterInitializationMode
-
-    began = ("enterInitializationMode" if three else "setupExperiment") + words
-
-    def restart(t: float, x: Array, u: Array) -> None:
-        what = "reset"
-        try:
-            reset()
-            instance.note_reset(t)
-            write(x, u)
-            what = began
-            set_up(startTime=t, stopTime=t + far, **more)
-            if enter is not None:
-                what = "enterInitializationMode"
-                enter()
-            what = "exitInitializationMode"
-            leave()
-        except mistakes:
-            raise
-        except Exception as error:
-            raise instance.explained(what, error) from error
-        instance.note_initialised()
-
-    return restart

@@ -77,11 +77,13 @@ class SealedModel(ABC):
         self._write_inputs, self._inputs = instance.writer(list(self.inputs))
         self.start, self.start_inputs = self.told(self._begun)
         self.parameters = {name: value for name, value in self.parameters.items() if name not in self.states}
-        names = [*self.parameters, *(self.states if all(map(self._has_start, self.states)) else ())]
-        self._write_starts, self._starts = instance.writer(names)
-        self._settings = len(self.parameters)
-        self._starts[: self._settings] = list(self.parameters.values())
-        self._state_starts = self._starts[self._settings :]
+        starts = self.states if all(map(self._has_start, self.states)) else ()
+        self._settings = [name for name in self.parameters if name not in self.inputs]
+        self._written = [*self._settings, *starts, *self.inputs]  # by one call
+        self._write_values, self._values = instance.writer(self._written)
+        self._state_values = self._values[len(self._settings) : len(self._settings) + len(starts)]
+        self._input_values = self._values[len(self._settings) + len(starts) :]
+        self.set_parameters({})
         self._quicken()
 
     def _quicken(self) -> None:
@@ -103,7 +105,7 @@ class SealedModel(ABC):
             values: by name, of parameters that the model was opened with.
         """
         self.parameters.update(values)
-        self._starts[: self._settings] = list(self.parameters.values())
+        self._values[: len(self._settings)] = [self.parameters[name] for name in self._settings]
 
     # -- one point ----------------------------------------------------------------------------------------------------
 
@@ -128,12 +130,10 @@ class SealedModel(ABC):
 
     def _write_point(self, x: Array, u: Array) -> None:
         """Parameters, states and inputs, before initialisation."""
-        if self._starts.size:
-            self._state_starts[:] = x[: self._state_starts.size]
-            self._write_starts()
-        if self.inputs:
-            self._inputs[:] = u
-            self._write_inputs()
+        self._state_values[:] = x[: len(self._state_values)]
+        self._input_values[:] = self._inputs[:] = u
+        if self._written:
+            self._write_values()
 
     def set_inputs(self, u: Array) -> None:
         """Write the inputs where the instance stands.

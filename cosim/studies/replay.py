@@ -105,6 +105,16 @@ class Replay:
                 rows[0, column], rows[1:, column] = self._first[name], self._inputs[name][:-1]
         return rows
 
+    def parameters(self) -> dict[str, float]:
+        """Values of all parameters in the run, by scalar name."""
+        signals, known = self.system.parameter_signals, scalar_names(self.system.parameter_signals)
+        values = dict(zip(known, map(float, self.system.start_parameters(self._component.preset)), strict=True))
+        told = {signal.name: signal.scalar_names for signal in signals} | {name: [name] for name in known}
+        for name, given in self._component.parameters.items():
+            if name in told:
+                values |= zip(told[name], np.broadcast_to(np.asarray(given, float), len(told[name])), strict=True)
+        return values
+
     # -- internals --------------------------------------------------------------------------------------------------
 
     def _moved(self, late: Mapping[str, int]) -> dict[str, np.ndarray]:

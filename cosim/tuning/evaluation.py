@@ -35,16 +35,13 @@ ROWS = 500
 
 @dataclass(frozen=True)
 class Evaluated:
-    (
-        """The cost of one candidate with one seed.
+    """The cost of one candidate with one seed.
 
     Args:
         cost: infinite where the run failed. failure: why, or None. estimates: of the observer at some instants, in
             units of their own sizes, where they were asked for.
         unreadable: whether a run that ended does not show the cost: no other candidate will.
     """
-        ""
-    )
 
     cost: float
     failure: str | None = None
@@ -179,6 +176,15 @@ class Evaluator:
         jobs = [self._job(candidate, seed, observed) for candidate in candidates]
         answers = dict(self._answers(jobs))
         return [answers[place] for place in range(len(jobs))]
+
+    def replays(self, seeds: Sequence[int]) -> list[Replays]:
+        """The observer beside the recordings of these seeds; none where candidates are not replayed.
+
+        Args:
+            seeds: of the benches.
+        """
+        self.prepare(seeds)
+        return [self._replays[seed] for seed in seeds] if self.replayed else []
 
     def close(self) -> None:
         """Let the worker processes end."""

@@ -13,7 +13,9 @@ from cosim.tuning.evaluation import Evaluator
 from cosim.tuning.identifiability import Directions, covariances, directions, neighbours
 from cosim.tuning.parameters import Tunable
 from cosim.tuning.progress import Bar, Progress
+from cosim.tuning.slopes import LikelihoodSlopes, NoSlopesError
 from cosim.tuning.tuning_result import Searched, Tuning
+from fmu_observer.optimisers.methods.likelihood_gradient import LikelihoodGradient
 from fmu_observer.optimisers.optimiser import Optimiser
 from fmu_observer.optimisers.registry import find_optimiser
 from fmu_observer.optimisers.search_space import SearchSpace
@@ -52,7 +54,8 @@ class Study:
     ) -> None:
         self.scenario, self.asked, self.evaluator, self.observer = scenario, asked, evaluator, observer
         self.training, self.judging = training, judging
-        self.method, self.options, self.iterations = method, options, iterations
+        self.method, self.iterations = method, iterations
+        self.options = {name: value for name, value in options.items() if name != "gradients"}  # found out here
         self.done: list[Searched] = []
         self._bar = Bar(progress)
         make_optimiser(method, asked.space, 0, options)  # refused before anything is run
@@ -68,9 +71,11 @@ class Study:
                 population was done; later, what was found until then is returned.
         """
         self._bar.text = "before"
+        self._slopes: LikelihoodSlopes | None = None
         before = self.evaluator.costs([None], self.training, {"search": "before"}, self._bar.step)[0]
         shown = self._directions(self._inside())
         fixed, why = self._held(shown)
+        gradients = self._differentiated()
         write_lines(self.evaluator.directory / ITERATIONS, "w", [])
         interrupted = False
         try:
@@ -105,7 +110,7 @@ class Study:
             judged_before=judged[0].tolist(),
             judged_after=judged[1].tolist(),
             runs=self.evaluator.runs,
-            how="as members of a batch over what the observer heard" if self.evaluator.replayed else how,
+            how=("as members of a batch over what the observer heard" if self.evaluator.replayed else how) + gradients,
             warnings=[
                 *([NOTHING_BETTER] if kept else []),
                 *([] if kept else at_bounds(self.asked.space, best, why)),
@@ -117,7 +122,8 @@ class Study:
 
     def _search(self, seed: int, space: SearchSpace, fixed: Mapping[str, float]) -> None:
         """One search, from this seed of the optimiser; what is found is kept iteration by iteration."""
-        optimiser = make_optimiser(self.method, space, seed, self.options)
+        exact = {} if self._slopes is None else {"gradients": True}
+        optimiser = make_optimiser(self.method, space, seed, self.options | exact)
         costs: list[float] = []
         counts: list[int] = []
         self._bar.text = f"search {seed}"
@@ -129,7 +135,8 @@ class Study:
             self._bar.expect(len(named) * len(self.training), self.iterations - iteration)
             label = {"search": seed, "iteration": iteration}
             found = self.evaluator.costs(named, self.training, label, self._bar.step)
-            optimiser.tell(candidates, found.mean(axis=1))
+            slopes = None if self._slopes is None else [self._slopes.of(space, values) for values in named]
+            optimiser.tell(candidates, found.mean(axis=1), slopes)
             if optimiser.best is None:
                 raise ScenarioError(_never_finite(len(candidates), self.evaluator.failures))
             costs.append(optimiser.best_cost)
@@ -138,6 +145,16 @@ class Study:
             entry = label | {"evaluations": optimiser.evaluations, "cost": optimiser.best_cost, "best": best}
             write_lines(self.evaluator.directory / ITERATIONS, "a", [entry])
             self.done = [*(s for s in self.done if s.seed != seed), Searched(seed, best, costs, counts)]
+
+    def _differentiated(self) -> str:
+        """Exact gradients for a descent where they are possible, and where its gradients come from in words."""
+        if find_optimiser(self.method).name != LikelihoodGradient.name:
+            return ""
+        try:
+            self._slopes = LikelihoodSlopes(self.evaluator.replays(self.training), self.asked, self.evaluator.cost)
+        except NoSlopesError as error:
+            return f"; gradients by central differences: {error}"
+        return "; exact gradients of the likelihood, by the equations of the filter"
 
     def _whole(self, fixed: Mapping[str, float], found: Mapping[str, float]) -> dict[str, float]:
         """All parameters in the order asked for."""

@@ -1,7 +1,8 @@
 """Optimisers on the published tuning problem: the six variances of the motor's Kalman filter, 30 seeds of every method.
 
-``python docs/studies/optimisers.py`` prints the tables of docs/tuning.md and draws docs/images/optimisers.png; it takes
-about ten minutes. ``--seeds N`` takes the first N seeds.
+``python docs/studies/optimisers.py`` prints the table of docs/tuning.md, with ``--write`` it puts its rows there, and
+draws docs/images/optimisers.png where all methods ran; that takes about twenty minutes. ``--only GA`` runs the methods
+whose label begins so, ``--seeds N`` the first N seeds.
 
 The drive is run once for a noise record of 10 000 samples; candidates are members of a batch over what the filter
 heard, and all see the same record.
@@ -10,6 +11,7 @@ heard, and all see the same record.
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -33,6 +35,7 @@ BUDGET = 600  # evaluations of those that go on until the floor
 ITERATIONS = (0, 5, 10, 15, 20)
 WITHIN = 1.05  # of the floor
 SEEDS = 30
+PAGE = Path(__file__).parents[1] / "tuning.md"
 PICTURE = Path(__file__).parents[1] / "images" / "optimisers.png"
 
 
@@ -65,11 +68,11 @@ class Drive:
 
 @dataclass(frozen=True)
 class Method:
-    """How one line of the tables searches.
+    """How one line of the table searches.
 
     Args:
         label: for people. name: of the optimiser. iterations: after the first population. log: whether in logarithms.
-        options: of the optimiser. seeds: at most so many, where one search costs more than the others.
+        options: of the optimiser.
     """
 
     label: str
@@ -77,7 +80,6 @@ class Method:
     iterations: int
     log: bool = False
     options: Mapping[str, Any] | None = None
-    seeds: int = SEEDS
 
 
 POPULATION = 20
@@ -87,13 +89,11 @@ METHODS = (
     Method("BBO, blended", "bbo", LONG),
     Method("BBO, Algorithms 3.1, 3.2", "biogeography_printed", LONG),
     Method("PSO in logarithms", "pso", LONG, log=True),
-    Method("BBO in logarithms", "bbo", LONG, log=True),
-    Method("CMA-ES in logarithms", "cma", BUDGET // 9, log=True),
-    Method("GA, population 100, start [0, 0.1]", "ga", 20, options={"start": (0.0, 0.1)}, seeds=12),
+    Method("BBO, blended, in logarithms", "bbo", LONG, log=True),
+    Method("CMA-ES in logarithms, population 9", "cma", BUDGET // 9, log=True),
+    Method("GA, population 100, start [0, 0.1]", "ga", 20, options={"start": (0.0, 0.1)}),
 )
-GRADIENT = Method(
-    "gradient of the likelihood, in logarithms", "gradient", 60, log=True, options={"gradients": True}, seeds=10
-)
+GRADIENT = Method("gradient of the likelihood, in logarithms", "gradient", 60, log=True, options={"gradients": True})
 
 
 def space(log: bool) -> SearchSpace:
@@ -162,6 +162,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=SEEDS)
     parser.add_argument("--noise", type=int, default=3, help="seed of the noise record")
     parser.add_argument("--only", default="", help="methods whose label begins so")
+    parser.add_argument("--write", action="store_true", help="put the rows into the page")
     options = parser.parse_args()
     drive, seeds = Drive(options.noise), range(options.seeds)
     floor = drive.floor
@@ -169,18 +170,34 @@ def main() -> None:
     counted = "evaluations to 1.05 floor: quartile, median, quartile"
     print("| method | " + " | ".join(f"it. {k}" for k in ITERATIONS) + f" | 10 % to 90 % at 20 | {counted} | reached |")
     print("|" + "---|" * (len(ITERATIONS) + 4))
-    curves = {}
+    curves, rows = {}, {}
     for method in (m for m in (GRADIENT, *METHODS) if m.label.startswith(options.only)):
-        some = seeds[: method.seeds]
-        found = gradient_searches(drive, some) if method is GRADIENT else searches(drive, method, some)
+        found = gradient_searches(drive, seeds) if method is GRADIENT else searches(drive, method, seeds)
         curves[method.label] = found
         low, _, high = finals(found)
         first, middle, last, reached = to_floor(found, floor)
         cells = [f"{c:.4f}" for c in convergence(found)] + [f"{low:.4f} to {high:.4f}"]
         counts = ", ".join("never" if np.isinf(c) else f"{c:.0f}" for c in (first, middle, last))
-        print(f"| {method.label} | {' | '.join(cells)} | {counts} | {reached} of {len(found)} |", flush=True)
+        rows[method.label] = f"| {method.label} | {' | '.join(cells)} | {counts} | {reached} of {len(found)} |"
+        print(rows[method.label], flush=True)
+    if options.write:
+        write(rows)
     if options.seeds == SEEDS and not options.only:
         draw(curves, floor)
+
+
+def write(rows: Mapping[str, str]) -> None:
+    """Put rows of the table into the page.
+
+    Args:
+        rows: by label.
+    """
+    page = PAGE.read_text(encoding="utf-8")
+    for label, row in rows.items():
+        page, count = re.subn(rf"^\| {re.escape(label)} \|.*$", lambda _m, row=row: row, page, flags=re.MULTILINE)  # type: ignore[misc]
+        if count != 1:
+            sys.exit(f"{PAGE.name} has {count} rows '| {label} |'")
+    PAGE.write_text(page, encoding="utf-8")
 
 
 def draw(curves: Mapping[str, Sequence[Search]], floor: float) -> None:

@@ -49,6 +49,15 @@ def flattened(matrix: Array) -> list[Array]:
     return [matrix[i, j] for i in range(rows) for j in range(columns)]
 
 
+def solved(S: Array, right: Array) -> Array:
+    """``inv(S) right``; a single number divides, which costs a tenth.
+
+    Args:
+        S: covariance, shape (q, q). right: shape (q,) or (q, k).
+    """
+    return right / S[0, 0] if S.shape[0] == 1 else np.linalg.solve(S, right)
+
+
 def through(noise: Array, entry: Array | None) -> Array:
     """Covariance of a noise after the matrix by which it enters: ``W Q W'``, or Q where it is additive.
 
@@ -122,7 +131,7 @@ def correct(
     noise = through(RN, V)
     spread = H @ P
     S = symmetric(spread @ H.T) + noise
-    K = np.linalg.solve(S, spread).T
+    K = solved(S, spread).T
     if form == "short":
         return Corrected(x + K @ innovation, symmetric(P - K @ spread), K, S)
     rest = np.eye(P.shape[0]) - K @ H
@@ -135,7 +144,7 @@ def normalised_square(error: Array, covariance: Array) -> Array:
     Args:
         error: shape (k,). covariance: of it, shape (k, k).
     """
-    return error @ np.linalg.solve(covariance, error)
+    return error @ solved(covariance, error)
 
 
 def log_likelihood(innovation: Array, S: Array) -> Array:

@@ -118,6 +118,7 @@ def generate_model(
         f"/* Generated from the hybrid system '{system.name}': its equations, and the table that describes them. */",
         '#include "model.h"\n',
         f"#define FMI_VERSION {str(description.fmiVersion)[0]}\n",
+        "#include <stddef.h>",
         "#define casadi_int int\n",
         _equations_source(system.name, equations),
         _start_arrays(system, preset),
@@ -148,7 +149,23 @@ def _equations_source(name: str, equations: Equations) -> str:
     for function in equations.functions():
         generator.add(function)
     source = private_source(generator.dump(), {function.name() for function in equations.functions()})
-    return source.strip() + "\n"
+    roomy = [_with_room(function) for function in equations.functions() if _calls(function)]
+    return "\n\n".join([source.strip(), *roomy]) + "\n"
+
+
+def _calls(function: ca.Function) -> bool:
+    """Whether a function calls others, for which it needs room behind its arguments."""
+    return bool(function.sz_arg() > function.n_in() or function.sz_res() > function.n_out())
+
+
+def _with_room(function: ca.Function) -> str:
+    """A function that calls others, with room behind its arguments and results."""
+    lines = [f"static int {_name(function)}(const double **arg, double **res, int *iw, double *w, int mem) {{"]
+    lines += [f"    const double *arguments[{function.sz_arg()}] = {{NULL}};"]
+    lines += [f"    double *results[{function.sz_res()}] = {{NULL}};"]
+    lines += [f"    arguments[{i}] = arg[{i}];" for i in range(function.n_in())]
+    lines += [f"    results[{i}] = res[{i}];" for i in range(function.n_out())]
+    return "\n".join([*lines, f"    return {function.name()}(arguments, results, iw, w, mem);", "}"])
 
 
 # -- tables
@@ -167,7 +184,7 @@ def _start_arrays(system: HybridSystem, preset: str | None) -> str:
 def _event_tables(system: HybridSystem, equations: Equations) -> str:
     positions = {name: i for i, name in enumerate(scalar_names(system.parameter_signals))}
     periodic = [
-        f"{_text(e.name)}, {equations.jumps[e.name].name()}, {positions[e.period]}, "
+        f"{_text(e.name)}, {_name(equations.jumps[e.name])}, {positions[e.period]}, "
         f"{-1 if e.offset is None else positions[e.offset]}, {width(e.noises)}"
         for e in system.periodic_events
     ]
@@ -176,11 +193,11 @@ def _event_tables(system: HybridSystem, equations: Equations) -> str:
     for event in system.triggered_events:
         count = width(event.payload)
         triggered.append(
-            f"{_text(event.name)}, {equations.jumps[event.name].name()}, {payload}, {count}, "
+            f"{_text(event.name)}, {_name(equations.jumps[event.name])}, {payload}, {count}, "
             f"{system.verdict_index(event)}"
         )
         payload += count
-    communications = [equations.jumps[event.name].name() for event in system.communication_events]
+    communications = [_name(equations.jumps[event.name]) for event in system.communication_events]
     tables = (
         ("PeriodicEvent", "periodic", periodic),
         ("TriggeredEvent", "triggered", triggered),
@@ -296,7 +313,10 @@ def _protocol(system: HybridSystem, description: ModelDescription) -> dict[str, 
 
 
 def _name(function: ca.Function | None) -> str:
-    return "NULL" if function is None else str(function.name())
+    """By which the table names a function."""
+    if function is None:
+        return "NULL"
+    return f"{function.name()}_with_room" if _calls(function) else str(function.name())
 
 
 def _table(kind: str, name: str, rows: Iterable[str]) -> str:

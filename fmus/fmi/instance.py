@@ -327,6 +327,7 @@ class Instance(Described):
             except Exception as error:
                 raise self.explained(what, error) from error
 
+        guarded.native = getattr(call, "native", None)  # type: ignore[attr-defined]
         return guarded
 
     def explained(self, what: str, error: Exception, t: float | None = None) -> Exception:

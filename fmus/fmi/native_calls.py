@@ -9,14 +9,29 @@ fmpy.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 from fmpy.fmi1 import FMICallException
 
 WARNING = 1  # FMI status: the last one that is no failure
 FUNCTION: Any = ctypes.CFUNCTYPE(None).__bases__[0]
 BY_REFERENCE = type(ctypes.byref(ctypes.c_int()))
+
+
+class Native(NamedTuple):
+    """What a prepared call calls, for who joins several.
+
+    Attributes:
+        slave: fmpy's slave. name: of the function. function: fmpy's, as long as nobody hangs itself in.
+        raw: the function of the library. typed: its arguments.
+    """
+
+    slave: Any
+    name: str
+    function: Any
+    raw: Callable[..., int]
+    typed: tuple[Any, ...]
 
 
 def prepared_call(slave: Any, name: str, *arguments: Any) -> Callable[[], None]:
@@ -46,7 +61,50 @@ def prepared_call(slave: Any, name: str, *arguments: Any) -> Callable[[], None]:
         if status > WARNING:
             raise FMICallException(name, status)
 
+    call.native = Native(slave, name, function, raw, typed)  # type: ignore[attr-defined]
     return call
+
+
+def joined_calls(slave: Any, calls: Sequence[Callable[[], None]]) -> Callable[[], None]:
+    """Several calls as one: who hangs himself into a call is looked for once, not at every call.
+
+    Args:
+        slave: fmpy's slave, instantiated.
+        calls: in their order; those from `prepared_call` of this slave go to the library without anything between.
+
+    Returns:
+        The call; it raises what the first of them raises that fails.
+    """
+    steps, found = list[tuple[Callable[..., int], tuple[Any, ...], str]](), list[Native]()
+    for call in calls:
+        native: Native | None = getattr(call, "native", None)
+        if native is None or native.slave is not slave:
+            steps.append((_done(call), (), ""))
+        else:
+            found.append(native)
+            steps.append((native.raw, native.typed, native.name))
+    answer, names = slave._functions.__getitem__, [native.name for native in found]
+    expected = [native.function for native in found]
+
+    def join() -> None:
+        if slave.fmiCallLogger is not None or [*map(answer, names)] != expected:
+            for call in calls:
+                call()
+            return
+        for raw, typed, name in steps:
+            status = raw(*typed)
+            if status > WARNING:
+                raise FMICallException(name, status)
+
+    return join
+
+
+def _done(call: Callable[[], None]) -> Callable[[], int]:
+    def done() -> int:
+        call()
+        return 0
+
+    return done
 
 
 def _typed(argument: Any, kind: Any) -> Any:

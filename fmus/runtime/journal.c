@@ -153,7 +153,7 @@ PRIVATE int64_t journal_find(const Journal *journal, const Runtime *runtime, dou
         return BEYOND_HORIZON;
     if (range.first == range.end || stamp < *journal_record(journal, range.first).t - TIME_TOLERANCE)
         return BEYOND_RECORDS;
-    double ulp = nextafter(fabs(stamp), INFINITY) - fabs(stamp);
+    double ulp = runtime_resolution(stamp);
     int64_t found = first_after(journal, stamp + ROUNDING_ULPS * ulp) - 1;
     return found > range.first ? found : range.first;
 }

@@ -37,6 +37,14 @@ class NoisyPlant(HybridSystem):
         """
         raise NotImplementedError
 
+    def measured_under(self, x: Array, p: Any) -> tuple[Array, ...]:
+        """What is measured without noise, for a plant whose measurement depends on parameters.
+
+        Args:
+            x: state, shape (n,) or (n, members). p: parameters.
+        """
+        return self.measured(x)
+
     def plain(self, x: Array, p: Any) -> dict[str, Array]:
         """Values of `plain_outputs` by name.
 
@@ -85,7 +93,9 @@ class NoisyPlant(HybridSystem):
         """Disturb the states, then measure, shape (n + q,) or (n + q, members)."""
         n = len(self.moving)
         moved = vector(*(x[i] + p.process_noise[i] * u.process_normal[i] for i in range(n)))
-        seen = (y + p.measurement_noise[j] * u.measurement_normal[j] for j, y in enumerate(self.measured(moved)))
+        seen = (
+            y + p.measurement_noise[j] * u.measurement_normal[j] for j, y in enumerate(self.measured_under(moved, p))
+        )
         return vector(*(moved[i] for i in range(n)), *seen)
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:

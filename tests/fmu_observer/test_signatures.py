@@ -98,9 +98,9 @@ def test_a_point_traces():
     values = np.random.default_rng(2).normal(size=7)
     for next_scaling in ("norm", "literal"):
         point = pencil_point(symbols[:6], symbols[6], 0.1, next_scaling)
-        traced = ca.Function("point", [symbols.to_casadi()], [point.to_casadi()])
+        traced = ca.Function("point", [symbols.to_casadi()], [ca.SX(point.to_casadi())])
         expected = pencil_point(values[:6], values[6], 0.1, next_scaling)
-        np.testing.assert_allclose(np.ravel(traced(values)), expected, atol=1e-15)
+        np.testing.assert_allclose(traced(values).full().ravel(), expected, atol=1e-15)
 
 
 @pytest.mark.parametrize(

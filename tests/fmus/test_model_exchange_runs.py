@@ -42,10 +42,20 @@ TOLERANCE = 1e-11
 FLOOR = 2e-10
 """What the solver itself may be wrong by, relative: some tens of steps with local errors of `TOLERANCE`."""
 
-AT_REST = {"gain", "inverter", "state_feedback"}  # what they tell follows inputs that are held
-FLOORS = {"decaying_innovation_cdo": 5e-9, "cart_double_pendulum": 1e-8}
-"""The same for what has a second derivative that jumps: the solver's estimate of its error takes it for smooth; and for
-what falls over, multiplying the error of every restart of the solver, one a sample.
+AT_REST = {
+    "gain",
+    "inverter",
+    "signal_fault",
+    "state_feedback",
+    "wind_turbine_controller",
+    "culture_signature",
+}  # what they tell follows inputs that are held, or samples of minutes
+"""What they tell follows inputs that are held."""
+
+FLOORS = {"decaying_innovation_cdo": 5e-9, "cart_double_pendulum": 1e-8, "three_state_cascade": 5e-8}
+"""The same for what has a second derivative that jumps: the solver's estimate of its error takes it for smooth; for
+what falls over, multiplying the error of every restart of the solver, one a sample; and for a third root through zero,
+where no derivative exists.
 """
 
 GAIN = 0.55
@@ -56,6 +66,13 @@ INPUTS = {"effort": 2.0e4, "force": 4.0, "load_torque": 0.02}
 STARTS: Mapping[str, Mapping[str, float]] = {
     "dynamic_gain_cdo": {"odometer": 40.0},  # beyond the speed that a balise teaches: the slip bends where they meet
     "locomotive": {"train_speed": 10.0, "wheel_rate": 20.2},
+    "wind_turbine": {  # samples that do not cut steps, a converter that the longest of them resolves
+        "sample_period": 0.1,
+        "converter_time": 0.2,
+        "efficiency": 0.97,
+        **{f"pitch_frequency[{i}]": 11.11 for i in (1, 2, 3)},
+        **{f"pitch_damping[{i}]": 0.6 for i in (1, 2, 3)},
+    },
     "train": {"brake_demand": 0.4, "elongation[1]": 0.002, **Train().rolling(10.0)},
 }
 PAYLOADS = {"balise": {"balise_position": 3.4}, "telegram": {"telegram_speed": 12.0, "telegram_weight": 0.3}}

@@ -174,12 +174,19 @@ class GaussianFilter(GatedObserver):
         Args:
             t: [s]. u: inputs of the filter. p: its parameters.
         """
-        inputs = stacked(tuple(getattr(u, s.name) for s in self.model.inputs))
+        return Known(t, stacked(tuple(getattr(u, s.name) for s in self.model.inputs)), self.known_parameters(p))
+
+    def known_parameters(self, p: Any) -> Array:
+        """Parameters of the model, shape (k,).
+
+        Args:
+            p: parameters of the filter.
+        """
         values: list[Array] = []
         for s in self.model.parameters:
             value = getattr(p, s.name)
             values.extend([value] if s.size is None else [value[i] for i in range(s.size)])
-        return Known(t, inputs, stacked(tuple(values)))
+        return stacked(tuple(values))
 
     def belief(self, x: Array) -> Belief:
         """What the filter believes.

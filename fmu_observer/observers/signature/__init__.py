@@ -1,4 +1,4 @@
-"""Observers and detectors that read the graphical signature of a window of samples."""
+"""Observers that read the state, or what has changed, off the graphical signature of a window of samples."""
 
 from plant_models.registry import lazy_names
 

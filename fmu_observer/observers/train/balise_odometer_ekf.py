@@ -129,8 +129,13 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
     }
 
     def __init__(self) -> None:
+        self.states = self.own_states()
+        super().__init__()
+
+    def own_states(self) -> tuple[Signal, ...]:
+        """States of the observer itself, estimates first."""
         start = tuple(FIRST_DEVIATIONS[i] ** 2 if i == j else 0.0 for i, j in PAIRS)
-        self.states = (
+        return (
             POSITION,
             SPEED,
             state("estimated_disturbance", "m/s2", 0.0, "Unknown acceleration d"),
@@ -142,7 +147,6 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
             memory("log_likelihood", "1", 0.0, "Logarithm of the likelihood of all innovations so far"),
             memory("reading_refused", "1", 0.0, "1 where the last reading was not used"),
         )
-        super().__init__()
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """The parameters lie within their bounds."""
@@ -159,14 +163,12 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
     def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """Covariance over the time since the last event, then correction by the reading or the balise."""
         moved = transition(t - x[LAST_TIME], x[V], p)
-        before = predicted_covariance(_covariance(x), moved.F, moved.QN)
+        before = predicted_covariance(covariance_of(x), moved.F, moved.QN)
         estimate = x[:ORDER]
         if event == BALISE.name:
             error, row, deviation = u.balise_position - x[P], BALISE_ROW, p.balise_deviation
         else:
-            rate = _free_acceleration(x, u, p) - self.friction(t, x, u, p)[0]
-            now = u.odometer + p.reading_age * np.where(x[V] > 0.0, rate, 0.0)
-            error, row, deviation = now - x[V] - x[CREEP], ODOMETER_ROW, p.odometer_deviation
+            error, row, deviation = self.reading(t, x, u, p) - x[V] - x[CREEP], ODOMETER_ROW, p.odometer_deviation
         innovation = vector(error)
         after = correct(estimate, before, innovation, row, np.reshape(deviation**2, (1, 1)))
         nis = normalised_square(innovation, after.innovation_covariance)
@@ -185,10 +187,19 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
             x[FAULT] if event == BALISE.name else refused,
         )
 
+    def reading(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """The reading of the odometer, brought from its age to now [m/s].
+
+        Args:
+            t: [s]. x: state. u: inputs. p: parameters.
+        """
+        rate = _free_acceleration(x, u, p) - self.friction(t, x, u, p)[0]
+        return u.odometer + p.reading_age * np.where(x[V] > 0.0, rate, 0.0)
+
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """The estimates, their deviations now, and how the last measurement fits."""
         moved = transition(t - x[LAST_TIME], x[V], p)
-        now = predicted_covariance(_covariance(x), moved.F, moved.QN)
+        now = predicted_covariance(covariance_of(x), moved.F, moved.QN)
         return {
             "position": x[P],
             "speed": x[V],
@@ -276,8 +287,12 @@ def _free_acceleration(x: Array, u: Any, p: Any) -> Array:
     return (np.maximum(u.effort, 0.0) - rolling_drag(x[V], p)) / p.mass + x[D]
 
 
-def _covariance(x: Array) -> Array:
-    """Covariance as remembered, shape (4, 4)."""
+def covariance_of(x: Array) -> Array:
+    """Covariance as remembered, shape (4, 4).
+
+    Args:
+        x: state of the observer.
+    """
     place = {pair: COVARIANCE + k for k, pair in enumerate(PAIRS)}
     return np.vstack([np.hstack([x[place[min(i, j), max(i, j)]] for j in range(ORDER)]) for i in range(ORDER)])
 

@@ -41,6 +41,18 @@ def test_it_searches_writes_and_goes_on(file: Path, capsys: pytest.CaptureFixtur
     assert (folder / "evaluations.jsonl").read_text() == before
 
 
+def test_two_workers_find_what_one_does(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Runs in two processes, to the last bit, whichever ends first."""
+    words = ["tune", str(file), "--parameters", "train.mass=60e3:120e3", "train.effort=1e4:9e4", "--json"]
+    words += ["--cost=-expectation:fast", "--iterations", "2", "--option", "population=4"]
+    found = []
+    for workers in ("1", "2"):
+        assert main([*words, "--workers", workers, "--out", str(file.parent / workers)]) == 0
+        found.append(json.loads(capsys.readouterr().out))
+    assert found[1] == found[0]
+    assert len(set(found[0]["searches"][0]["costs"])) > 1
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

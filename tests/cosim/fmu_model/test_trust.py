@@ -11,8 +11,9 @@ from test_fmus.build import linear_fmu
 
 import fmu_observer
 import fmus
+from cosim.fmu_model.co_simulation import CoSimulationModel
 from cosim.fmu_model.opening import Interface, open_model
-from cosim.fmu_model.sealed import FmuModelError
+from cosim.fmu_model.sealed import FmuModelError, SealedModel
 from cosim.fmu_model.trust import check_states
 from plant_models import PLANTS
 
@@ -39,6 +40,31 @@ def test_a_transition_is_a_step_of_the_run() -> None:
     whole = model.read()[0]
     middle, _ = model.transition(0.0, 0.1, x, u)
     np.testing.assert_array_equal(model.transition(0.1, 0.1, middle, u)[0], whole)
+    model.close()
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_prepared_points_are_those_of_the_ordinary_calls(version: int) -> None:
+    model = open_model(fmus.cached_fmu(PLANTS["locomotive"](), fmi_version=version))
+    assert isinstance(model, CoSimulationModel)
+    points, u = np.array([[5.0, 6.0], [12.0, 13.0], [21.0, 22.0]]), np.array([4e4])
+    driven = np.array([[4e4, -4e4]])
+    wanted = [SealedModel.states_after(model, 0.0, 0.1, points, given) for given in (u, driven)]
+    looks = SealedModel.outputs_at(model, 0.0, points, u, [2, 0])
+    for done in (model._quick_step, lambda _t, _h: False):  # a step that is discarded goes the ordinary way
+        model._quick_step = done
+        for given, states in zip((u, driven), wanted, strict=True):
+            np.testing.assert_array_equal(model.states_after(0.0, 0.1, points, given), states)
+    np.testing.assert_array_equal(model.outputs_at(0.0, points, u, [2, 0]), looks)
+    assert wanted[0][1, 0] != wanted[0][1, 1] != wanted[1][1, 1]
+    model.close()
+
+
+def test_a_step_that_fails_is_told_in_words() -> None:
+    model = open_model(fmus.cached_fmu(PLANTS["locomotive"](), fmi_version=3))
+    points = np.array([[0.0], [np.nan], [1.0]])
+    with pytest.raises(FmuModelError, match=r"locomotive.*doStep was discarded.* at t = 3 s; .*not a finite number"):
+        model.states_after(3.0, 0.1, points, np.array([0.0]))
     model.close()
 
 

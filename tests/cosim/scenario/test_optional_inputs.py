@@ -20,7 +20,9 @@ def test_a_shipped_scenario_is_warned_of_forgotten_inputs_only(name: str) -> Non
     scenario = Scenario.load(name)
     shown = scenario.structure()
     assert not _told(shown)
-    read = [link for link in shown.links if link.target[1] in ("odometer", "measured_speed", "speed")]
+    read = [
+        link for link in shown.links if link.target[1] in ("odometer", "measured_speed", "speed", "generator_speed")
+    ]
     assert read
     scenario._data["connections"] = [str(link) for link in shown.links if link not in read]
     told = _told(scenario.structure())

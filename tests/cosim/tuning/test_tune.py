@@ -18,6 +18,8 @@ from cosim.scenario.outcome import Outcome
 from cosim.tuning.costs import LikelihoodCost, make_cost
 from cosim.tuning.evaluation import EARLIER, JOURNAL, Evaluator
 from cosim.tuning.parameters import tunable
+from cosim.tuning.replays import Replays
+from cosim.tuning.slopes import LikelihoodSlopes, NoSlopesError
 from cosim.tuning.study import at_bounds
 from cosim.tuning.tune import tune
 from cosim.tuning.tuning_files import convergence_figure
@@ -41,9 +43,11 @@ def drive(stop: float = 0.01) -> Scenario:
     return scenario
 
 
-def drive_with_poor_guess() -> Scenario:
+def drive_with_poor_guess(stop: float = 0.01) -> Scenario:
     """With covariances that trust the measurements too much."""
-    return drive().set("filter.process_variance", [1.0, 1.0, 1.0, 0.5]).set("filter.measurement_variance", [1.0, 1.0])
+    return (
+        drive(stop).set("filter.process_variance", [1.0, 1.0, 1.0, 0.5]).set("filter.measurement_variance", [1.0, 1.0])
+    )
 
 
 def tuned(scenario: Scenario | None = None, **changes: Any) -> Tuning:
@@ -158,6 +162,50 @@ def test_an_interrupted_search_keeps_what_it_found_and_goes_on(tmp_path: Path, f
     overlay.write_text('include = ["drive.toml", "overlay.toml"]\n')
     assert mean_square(Scenario.load(overlay).run()) == pytest.approx(whole.after[0], rel=1e-12)
     assert (tmp_path / "convergence.png").stat().st_size > 1000
+
+
+SOME = {
+    name: bounds for name, bounds in VARIANCES.items() if name in ("process_variance[1]", "measurement_variance[2]")
+}
+
+
+def test_a_descent_has_exact_gradients_where_the_filter_is_ours() -> None:
+    """One evaluation an iteration; the same descent by differences of 1e-4 of the range ends within 1e-3 of it."""
+    asked: dict[str, Any] = {"parameters": SOME, "method": "gradient", "options": {}, "seeds": [0], "iterations": 3}
+    exact = tuned(drive_with_poor_guess(0.004), cost="likelihood", **asked)
+    assert exact.how.endswith("exact gradients of the likelihood, by the equations of the filter")
+    assert exact.searches[0].evaluations == [1, 2, 3, 4]
+    told = tuned(drive_with_poor_guess(0.004), cost=Twin("filter"), **asked)
+    assert told.how.endswith("gradients by central differences: the cost is not the likelihood")
+    assert told.searches[0].evaluations[0] == 5
+    np.testing.assert_allclose(exact.searches[0].costs, told.searches[0].costs, rtol=1e-3)
+    assert exact.searches[0].costs[-1] < exact.searches[0].costs[0]
+
+
+def test_slopes_are_those_of_differences() -> None:
+    """In search coordinates, the logarithm; central differences of 1e-4 leave 1e-8 of a smooth function."""
+    outcome = drive_with_poor_guess().run()
+    asked = tunable(drive_with_poor_guess(), "filter", SOME)
+    replays = Replays(outcome, "filter")
+    slopes = LikelihoodSlopes([replays], asked, LikelihoodCost("filter"))
+    at = np.log([0.3, 0.2])
+
+    def cost(point: np.ndarray) -> float:
+        (found,) = replays.outcomes([asked.settings(asked.space.named(point))])
+        assert isinstance(found, Outcome)
+        return LikelihoodCost("filter").of(found)
+
+    moves = 1e-4 * np.eye(2)
+    told = [(cost(at + move) - cost(at - move)) / 2e-4 for move in moves]
+    np.testing.assert_allclose(slopes.of(asked.space, asked.space.named(at)), told, rtol=1e-6)
+    alone = asked.space.without({asked.space.names[0]: 0.3})
+    np.testing.assert_allclose(slopes.of(alone, asked.space.named(at)), told[1:], rtol=1e-6)
+    with pytest.raises(NoSlopesError, match="candidates are not run as members of a batch"):
+        LikelihoodSlopes([], asked, LikelihoodCost("filter"))
+
+
+class Twin(LikelihoodCost):
+    """The same cost of another kind."""
 
 
 def test_an_observer_with_balises_runs_beside_recordings() -> None:

@@ -1,0 +1,171 @@
+"""Speeds of a wind turbine's rotor and generator against the torsion between them, and the torque of the generator
+against its reference. Pure functions on a named memory, for the system that carries it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from fmu_observer.diagnosis.actuator_residual import centred, first_order_residual, rate_residual
+from fmu_observer.diagnosis.finite_window_observer import finite_window_observer, sampled
+from fmu_observer.diagnosis.redundancy import disagreement
+from fmu_observer.diagnosis.residual_filters import residual_filter
+from fmu_observer.diagnosis.windowed_residual import windowed_square
+from plant_models.benchmarks.wind_turbine.drive_train import DriveTrain
+from plant_models.hybrid import memory, parameter
+from plant_models.hybrid.system import Array
+
+WINDOW = 5  # samples of the observer of the torsion
+
+
+def torsion_gains(drive: DriveTrain, sample_period: float, samples: int = WINDOW) -> np.ndarray:
+    """How the torsion at the last sample follows from a window: Omar 2012, (7.7.1)-(7.7.3), with exact sampling.
+
+    Args:
+        drive: with numbers. sample_period: [s]. samples: of the window, at least 2.
+
+    Returns:
+        Gains of rotor speeds [s], generator speeds [s], rotor torques [rad/(N.m)] and generator torques [rad/(N.m)],
+        oldest first, shape (4, samples).
+
+    Raises:
+        ValueError: the window does not show the torsion.
+    """
+    A = np.array(drive.matrix())
+    B = np.array([[1.0 / drive.rotor_inertia, 0.0], [0.0, -1.0 / drive.generator_inertia], [0.0, 0.0]])
+    observer = finite_window_observer(*sampled(A, B, sample_period), np.eye(2, 3), samples)
+    if observer.rank < 3:
+        raise ValueError(f"{samples} samples of both speeds do not show the torsion; expected at least 2.")
+    return np.vstack([observer.gain_y[2].reshape(samples, 2).T, observer.gain_u[2].reshape(samples, 2).T])
+
+
+_GAINS = torsion_gains(DriveTrain(), 0.01)
+
+DRIVE_PARAMETERS = (
+    *(
+        parameter(f"{name}_gain", unit, tuple(map(float, row)), f"Torsion per {text} in the window", size=WINDOW)
+        for name, unit, text, row in zip(
+            ("rotor_speed", "generator_speed", "rotor_torque", "generator_torque"),
+            ("s", "s", "rad/(N.m)", "rad/(N.m)"),
+            ("rotor speed", "generator speed", "torque on the rotor", "torque of the generator"),
+            _GAINS,
+            strict=True,
+        )
+    ),
+    parameter("gear_ratio", "1", 95.0, "Ratio of the gear Ng", min=1e-3),
+    parameter("speed_filter_time", "s", 0.01, "Filter of the residuals of the speed sensors", min=1e-4),
+    parameter("torque_filter_time", "s", 0.02, "Filter of the residual of the generator torque", min=1e-4),
+    parameter("converter_time", "s", 0.02, "Time constant of a healthy converter", min=1e-6),
+)
+
+_HISTORIES = ("rotor_first", "rotor_second", "generator_first", "generator_second", "rotor_torques", "torques")
+DRIVE_MEMORY = (
+    *(
+        memory(name, unit, 0.0, f"{text}, samples before", size=WINDOW - 1)
+        for name, unit, text in zip(
+            _HISTORIES,
+            ("rad/s", "rad/s", "rad/s", "rad/s", "N.m", "N.m"),
+            (
+                "Rotor speed of sensor 1",
+                "Rotor speed of sensor 2",
+                "Generator speed of sensor 1",
+                "Generator speed of sensor 2",
+                "Torque on the rotor",
+                "Measured torque of the generator",
+            ),
+            strict=True,
+        )
+    ),
+    memory("speed_filter", "rad/s", 0.0, "Filters of the speed sensors", size=8),
+    memory("speed_squares", "rad2/s2", 0.0, "Square of the sample before, of each speed sensor", size=4),
+    memory("torque_filter", "N.m", 0.0, "Filter of the generator torque", size=2),
+    memory("torque_squares", "N2.m2", 0.0, "Squares of the two samples before", size=2),
+    memory("held_speed_difference", "rad/s", 0.0, "Difference of the sensors of rotor and of generator", size=2),
+    memory("held_speed_residual", "rad2/s2", 0.0, "Residual of rotor sensors 1, 2, generator sensors 1, 2", size=4),
+    memory("held_torque_residual", "N2.m2", 0.0, "Residual of the generator torque"),
+    memory("held_estimated_torsion", "rad", 0.0, "Torsion from the last samples, mean of the sensors"),
+)
+
+
+def sample_speeds(
+    m: Any, rotor: Array, generator: Array, rotor_torque: Array, torque: Array, p: Any, starts: Array
+) -> dict[str, Any]:
+    """Residuals of the four speed sensors after a sample: Omar 2012, (7.7.4)-(7.7.6).
+
+    Each sensor stands beside the mean of the two of the other speed; a fault of one speed leaves the other healthy, as
+    at most one fault is assumed.
+
+    Args:
+        m: named memory with `DRIVE_MEMORY`. rotor: speeds of the two sensors [rad/s], shape (2,).
+        generator: the same [rad/s], shape (2,). rotor_torque: estimated torque of the wind on the rotor [N.m].
+        torque: measured torque of the generator [N.m]. p: parameters with `DRIVE_PARAMETERS` and `sample_period`.
+        starts: 1 at the first sample, else 0.
+
+    Returns:
+        New values of the memory by name.
+    """
+    now = (rotor[0], rotor[1], generator[0], generator[1], rotor_torque, torque)
+    histories = {
+        name: [np.where(starts > 0.0, value, getattr(m, name)[i]) for i in range(WINDOW - 1)] + [value]
+        for name, value in zip(_HISTORIES, now, strict=True)
+    }
+    gains = (p.rotor_speed_gain, p.rotor_speed_gain, p.generator_speed_gain, p.generator_speed_gain)
+    gains += (p.rotor_torque_gain, p.generator_torque_gain)
+    r1, r2, g1, g2, driving, braking = (
+        _weighted(gain, histories[name]) for name, gain in zip(_HISTORIES, gains, strict=True)
+    )
+    torsions = _beside(r1, r2, g1, g2, 1.0)
+    rates = _beside(rotor[0], rotor[1], generator[0], generator[1], -1.0 / p.gear_ratio)
+    coefficients = residual_filter(p.speed_filter_time, p.sample_period)
+    filters, squares, residuals = [], [], []
+    for i, (torsion, rate) in enumerate(zip(torsions, rates, strict=True)):
+        before = (m.speed_filter[2 * i], m.speed_filter[2 * i + 1])
+        out = rate_residual(coefficients, before, torsion + driving + braking, rate, starts)
+        window = windowed_square(m.speed_squares[i : i + 1], out.value)
+        filters.extend(out.memory)
+        squares.append(window.memory[0])
+        residuals.append(window.value)
+    return {
+        **{name: values[1:] for name, values in histories.items()},
+        "speed_filter": filters,
+        "speed_squares": squares,
+        "held_speed_difference": [disagreement(rotor[0], rotor[1]), disagreement(generator[0], generator[1])],
+        "held_speed_residual": residuals,
+        "held_estimated_torsion": 0.5 * (torsions[0] + torsions[1]) + driving + braking,
+    }
+
+
+def sample_torque(m: Any, torque: Array, reference: Array, p: Any, starts: Array) -> dict[str, Any]:
+    """Residual of the generator torque over three samples: Omar 2012, 7.8.1.
+
+    Args:
+        m: named memory with `DRIVE_MEMORY`, as it was before the sample. torque: measured [N.m].
+        reference: that was held since the last sample [N.m].
+        p: parameters with `DRIVE_PARAMETERS`, `centring` and `sample_period`. starts: 1 at the first sample, else 0.
+
+    Returns:
+        New values of the memory by name.
+    """
+    coefficients = residual_filter(p.torque_filter_time, p.sample_period)
+    before = (m.torque_filter[0], m.torque_filter[1])
+    previous = np.where(starts > 0.0, torque, m.torques[WINDOW - 2])
+    late = centred(torque, previous, p.centring)
+    out = first_order_residual(coefficients, before, late, reference, p.converter_time, starts)
+    window = windowed_square(m.torque_squares, out.value)
+    return {"torque_filter": out.memory, "torque_squares": window.memory, "held_torque_residual": window.value}
+
+
+def _weighted(gain: Array, values: Sequence[Array]) -> Array:
+    total = gain[0] * values[0]
+    for i in range(1, WINDOW):
+        total = total + gain[i] * values[i]
+    return total
+
+
+def _beside(r1: Array, r2: Array, g1: Array, g2: Array, factor: Array) -> tuple[Array, Array, Array, Array]:
+    """Each of four sensors with the mean of the two of the other speed, which counts `factor` times."""
+    rotor, generator = 0.5 * (r1 + r2), 0.5 * factor * (g1 + g2)
+    return r1 + generator, r2 + generator, rotor + factor * g1, rotor + factor * g2

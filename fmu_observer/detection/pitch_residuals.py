@@ -1,0 +1,146 @@
+"""Pitch of a wind turbine's blades against its reference: residuals of six sensors, sharp for faults of a sensor, slow
+for faults of an actuator. Pure functions on a named memory, for the system that carries it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from fmu_observer.diagnosis.actuator_residual import centred, second_order_residual
+from fmu_observer.diagnosis.redundancy import disagreement
+from fmu_observer.diagnosis.residual_filters import residual_filter
+from fmu_observer.diagnosis.windowed_residual import windowed_square
+from plant_models.hybrid import memory, parameter, vector
+from plant_models.hybrid.system import Array
+
+BLADES, SENSORS = 3, 6
+BLOCKS = 10  # of the long window
+
+PITCH_PARAMETERS = (
+    parameter("pitch_frequency", "rad/s", 11.11, "Natural frequency of a healthy pitch actuator", min=1e-3),
+    parameter("pitch_damping", "1", 0.6, "Damping ratio of a healthy pitch actuator", min=0.0),
+    parameter("sensor_filter_time", "s", 0.06, "Filter of the residuals of pitch sensors", min=1e-4),
+    parameter("brief_filter_time", "s", 0.5, "Filter of the residual of one sample, for pitch actuators", min=1e-4),
+    parameter("long_filter_time", "s", 0.6, "Filter of the residual over the long window", min=1e-4),
+    parameter(
+        "centring",
+        "1",
+        1.0,
+        "1: actuators' readings half a sample late, as held references are to Tustin's rule; 0: as printed",
+        min=0.0,
+        max=1.0,
+    ),
+    parameter("mean_residual", "deg/s2", 0.0, "Mean of the residual without a fault, Xbar"),
+)
+
+PITCH_MEMORY = (
+    memory("previous_pitch", "deg", 0.0, "Readings of the sample before", size=SENSORS),
+    memory("sensor_filter", "deg/s2", 0.0, "Filters of the pitch sensors", size=2 * SENSORS),
+    memory("sensor_squares", "deg2/s4", 0.0, "Squares of the two samples before, of each pitch sensor", size=12),
+    memory("brief_filter", "deg/s2", 0.0, "Filters of the residual of one sample", size=2 * SENSORS),
+    memory("long_filter", "deg/s2", 0.0, "Filters of the residual over the long window", size=2 * SENSORS),
+    memory("long_partial", "deg2/s4", 0.0, "Sum of the block that grows, of each blade", size=BLADES),
+    memory("long_blocks", "deg2/s4", 0.0, "Sums of the blocks of the long window", size=BLOCKS * BLADES),
+    memory("held_pitch_difference", "deg", 0.0, "Difference of the two sensors of each blade", size=BLADES),
+    memory("held_pitch_single", "deg2/s4", 0.0, "Residual of each pitch sensor, one sample", size=SENSORS),
+    memory("held_pitch_triple", "deg2/s4", 0.0, "Residual of each pitch sensor, three samples", size=SENSORS),
+    memory("held_pitch_brief", "deg2/s4", 0.0, "Residual of each blade's actuator, one sample", size=BLADES),
+    memory("held_pitch_long", "deg2/s4", 0.0, "Residual of each blade's actuator, long window", size=BLADES),
+)
+
+
+def sample_pitch(m: Any, readings: Array, reference: Array, p: Any, starts: Array) -> dict[str, Any]:
+    """Residuals of the pitch after a sample: Omar 2012, (7.6.2), (7.6.9), (7.6.10), (7.6.13), (7.6.14).
+
+    An actuator is judged by the smaller one of its two sensors' residuals at each sample: a faulty sensor leaves the
+    other.
+
+    Args:
+        m: named memory with `PITCH_MEMORY`. readings: of blades 1, 1, 2, 2, 3, 3 [deg], shape (6,).
+        reference: pitch asked of all blades [deg]. p: parameters with `PITCH_PARAMETERS` and `sample_period`.
+        starts: 1 at the first sample, else 0.
+
+    Returns:
+        New values of the memory by name.
+    """
+    sharp = residual_filter(p.sensor_filter_time, p.sample_period)
+    brief = residual_filter(p.brief_filter_time, p.sample_period)
+    slow = residual_filter(p.long_filter_time, p.sample_period)
+    filters: dict[str, list[Array]] = {"sensor_filter": [], "brief_filter": [], "long_filter": []}
+    squares, single, triple, quick, slow_squares = [], [], [], [], []
+    for i in range(SENSORS):
+        found = []
+        previous = np.where(starts > 0.0, readings[i], m.previous_pitch[i])
+        for name, coefficients in (("sensor_filter", sharp), ("brief_filter", brief), ("long_filter", slow)):
+            before = getattr(m, name)
+            late = readings[i] if name == "sensor_filter" else centred(readings[i], previous, p.centring)
+            model = (late, reference, p.pitch_frequency, p.pitch_damping, starts)
+            out = second_order_residual(coefficients, (before[2 * i], before[2 * i + 1]), *model)
+            filters[name].extend(out.memory)
+            found.append(out.value)
+        window = windowed_square(m.sensor_squares[2 * i : 2 * i + 2], found[0])
+        squares.extend([window.memory[0], window.memory[1]])
+        single.append(found[0] * found[0])
+        triple.append(window.value)
+        quick.append((found[1] - p.mean_residual) * (found[1] - p.mean_residual))
+        slow_squares.append((found[2] - p.mean_residual) * (found[2] - p.mean_residual))
+    return {
+        **filters,
+        "previous_pitch": readings,
+        "sensor_squares": squares,
+        "long_partial": [m.long_partial[i] + _smaller(slow_squares, i) for i in range(BLADES)],
+        "held_pitch_difference": [disagreement(readings[2 * i], readings[2 * i + 1]) for i in range(BLADES)],
+        "held_pitch_single": single,
+        "held_pitch_triple": triple,
+        "held_pitch_brief": [_smaller(quick, i) for i in range(BLADES)],
+    }
+
+
+def end_block(m: Any) -> dict[str, Any]:
+    """The long window moves on by a block; its sum is that of (7.6.10) at this instant.
+
+    Args:
+        m: named memory with `PITCH_MEMORY`.
+
+    Returns:
+        New values of the memory by name.
+    """
+    blocks, sums = [], []
+    for i in range(BLADES):
+        kept = [m.long_blocks[i * BLOCKS + j] for j in range(1, BLOCKS)] + [m.long_partial[i]]
+        blocks.extend(kept)
+        sums.append(sum(kept[1:], kept[0]))
+    return {
+        "long_blocks": blocks,
+        "long_partial": [0.0 * m.long_partial[i] for i in range(BLADES)],
+        "held_pitch_long": sums,
+    }
+
+
+def trusted(first: Array, second: Array, limit: Array, first_residual: Array, second_residual: Array) -> Array:
+    """Mean of two sensors; where they disagree, the one with the smaller residual.
+
+    Args:
+        first: reading m1. second: reading m2. limit: largest difference without a fault.
+        first_residual: of the model with m1. second_residual: of the model with m2.
+    """
+    better = np.where(first_residual <= second_residual, first, second)
+    return np.where(disagreement(first, second) > limit, better, 0.5 * (first + second))
+
+
+def trusted_pitches(readings: Array, limit: Array, residuals: Array) -> Array:
+    """Pitch of each blade, shape (3,).
+
+    Args:
+        readings: of the six sensors [deg], shape (6,). limit: largest difference of two without a fault [deg].
+        residuals: of the six sensors, shape (6,).
+    """
+    pairs = ((2 * i, 2 * i + 1) for i in range(BLADES))
+    return vector(*(trusted(readings[i], readings[j], limit, residuals[i], residuals[j]) for i, j in pairs))
+
+
+def _smaller(values: Sequence[Array], blade: int) -> Array:
+    return np.minimum(values[2 * blade], values[2 * blade + 1])

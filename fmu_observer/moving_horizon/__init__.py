@@ -1,0 +1,1 @@
+"""Moving-horizon estimation over time-stamped rows: pure formulas, no observer."""

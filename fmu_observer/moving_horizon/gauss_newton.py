@@ -1,0 +1,286 @@
+"""One pass of Gauss-Newton over a window, by a sweep forwards and one backwards: fixed cost, linear in the rows. Pure
+functions that trace.
+
+About the states of the pass before, the window is a linear least-squares problem with the structure of a chain. It is
+solved exactly: forwards by the Kalman filter from the arrival cost on, backwards by the adjoint of Bryson and Frazier,
+``lambda = F' ((I - K H)' lambda - H' inv(S) e)``, ``x = m - P lambda`` (Bierman: Factorization methods for discrete
+sequential estimation, chapter X). No covariance is inverted, so that states without noise and known ones are legal.
+
+Bounds are kept by a primal-dual active set (Hintermueller, Ito, Kunisch, SIAM J. Optim. 13 (2002) 865): a bound that is
+active is a measurement without noise, whose multiplier the adjoint knows; from pass to pass it is let go where the
+multiplier has the wrong sign, and taken up where a state has crossed it. What a pass returns is clipped, so that it
+keeps the bounds after any number of passes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from fmu_observer.filtering.kalman import Form, correct, predicted_covariance, symmetric
+from fmu_observer.moving_horizon.arrival_cost import ArrivalCost
+from fmu_observer.moving_horizon.robust_loss import Loss, weight
+from fmu_observer.moving_horizon.window import RowLayout, WindowRow
+from plant_models.hybrid.scan import Arrays, scan
+from plant_models.hybrid.system import Array, vector
+
+
+class Moved(NamedTuple):
+    """A transition into a row.
+
+    Attributes:
+        state: shape (n,). F: Jacobian by the state before, shape (n, n). noise: covariance it adds, shape (n, n).
+    """
+
+    state: Array
+    F: Array
+    noise: Array
+
+
+class Seen(NamedTuple):
+    """What a row measures.
+
+    Attributes:
+        measured: as expected, shape (q,). H: Jacobian by the state, shape (q, n). noise: covariance, shape (q, q).
+    """
+
+    measured: Array
+    H: Array
+    noise: Array
+
+
+class Limits(NamedTuple):
+    """Bounds of the states in `WindowProblem.bounded`, in their order.
+
+    Attributes:
+        lower, upper: shape (b,).
+    """
+
+    lower: Array
+    upper: Array
+
+
+@dataclass(frozen=True, eq=False)
+class WindowProblem:
+    """The least-squares problem of a window.
+
+    Args:
+        order: n, number of states. layout: of the rows.
+        moved: transition into a row, of the state before it, the row and what all rows share.
+        seen: what a row measures, of the state in it, the row and what all rows share.
+        bounded: which states have bounds. limits: the bounds, of what all rows share.
+        losses: of each measurement. loss_scale: of what all rows share, deviations at which the losses doubt.
+        form: of the covariance.
+    """
+
+    order: int
+    layout: RowLayout
+    moved: Callable[[Array, WindowRow, Array], Moved]
+    seen: Callable[[Array, WindowRow, Array], Seen]
+    bounded: tuple[int, ...]
+    limits: Callable[[Array], Limits]
+    losses: tuple[Loss, ...]
+    loss_scale: Callable[[Array], Array]
+    form: Form = "joseph"
+
+    def clipped(self, x: Array, shared: Array) -> Array:
+        """A state within its bounds, shape (n,).
+
+        Args:
+            x: shape (n,). shared: what all rows share.
+        """
+        lower, upper = self.limits(shared)
+        values = [x[i] for i in range(self.order)]
+        for k, i in enumerate(self.bounded):
+            values[i] = np.minimum(np.maximum(values[i], lower[k]), upper[k])
+        return vector(*values)
+
+
+class Solution(NamedTuple):
+    """What some passes make of a window.
+
+    Attributes:
+        estimates: of each row, shape (n,) each. covariance: of the last one, row by row, shape (n * n,).
+        residual: root of the mean square of the weighted residuals, in their deviations [1].
+        step: largest change of an estimate in the last pass, in its standard deviations [1].
+        moved: passes after which an estimate had changed by more than `SETTLED` of its deviation.
+        bounds: bounds that are active in the last row.
+    """
+
+    estimates: list[Array]
+    covariance: Array
+    residual: Array
+    step: Array
+    moved: Array
+    bounds: Array
+
+
+SETTLED = 1e-3  # of a standard deviation: a pass that changes less has nothing left to do
+
+
+def solve(
+    problem: WindowProblem,
+    arrival: ArrivalCost,
+    rows: Sequence[Array],
+    points: Sequence[Array],
+    shared: Array,
+    passes: int,
+) -> Solution:
+    """A number of Gauss-Newton passes over a window.
+
+    Args:
+        problem: what moves and what is measured. arrival: what is known before the first row.
+        rows: oldest first, flat. points: states about which the first pass linearises, one a row, shape (n,) each; of
+            the last row the prediction.
+        shared: what all rows share, shape (s,). passes: one or more.
+    """
+    n, b = problem.order, len(problem.bounded)
+    active = [_at_bounds(problem, point, shared) for point in points]
+    fresh = [np.zeros(1)] * (len(rows) - 1) + [np.ones(1)]
+    count = np.zeros(1)
+    for _ in range(passes):
+        table = list(zip(rows, points, active, fresh, strict=True))
+        _, swept = scan(_forwards(problem), tuple(arrival), table, (shared,))
+        behind = (np.zeros(n), np.zeros(3))
+        (_, sums), found = scan(
+            _backwards(problem),
+            behind,
+            [(*a, *s) for a, s in zip(table, swept, strict=True)],
+            (shared,),
+            backwards=True,
+        )
+        points, active = [row[0] for row in found], [row[1] for row in found]
+        fresh = [np.zeros(1)] * len(rows)
+        count = count + np.where(sums[1:2] > SETTLED, 1.0, 0.0)
+    bounds = np.reshape(np.sum(np.abs(active[-1])), (1,)) if b else np.zeros(1)
+    residual = np.sqrt(sums[0:1] / np.maximum(sums[2:3], 1.0))
+    return Solution(points, swept[-1][1], residual, sums[1:2], count, bounds)
+
+
+def passed(problem: WindowProblem, arrival: ArrivalCost, row: Array, point: Array, shared: Array) -> ArrivalCost:
+    """The arrival cost after a row has left the window.
+
+    Args:
+        problem: what moves and what is measured. arrival: before the row. row: the oldest, flat.
+        point: its state, shape (n,). shared: what all rows share, shape (s,).
+    """
+    table = [(row, point, np.zeros(max(len(problem.bounded), 1)), np.zeros(1))]
+    after, _ = scan(_forwards(problem), tuple(arrival), table, (shared,))
+    return ArrivalCost(*after)
+
+
+def _forwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tuple[Arrays, Arrays]]:
+    """The Kalman filter over one row: prediction, measurements, active bounds."""
+    n, q = problem.order, problem.layout.measurements
+
+    def body(carry: Arrays, given: Arrays, known: Arrays) -> tuple[Arrays, Arrays]:
+        (before, mean, flat), (row_flat, point, active, fresh), (shared,) = carry, given, known
+        row = problem.layout.unpacked(row_flat)
+        P = np.reshape(flat, (n, n))
+        moved = problem.moved(before, row, shared)
+        goes = row.moves > 0.5
+        F = np.where(goes, moved.F, np.eye(n))
+        mean = np.where(goes, moved.state + moved.F @ (mean - before), mean)
+        P = np.where(goes, predicted_covariance(P, moved.F, moved.noise), P)
+        seen = problem.seen(point, row, shared)
+        scale = vector(*_scales(problem, row, seen, P, fresh[0], shared))
+        error = scale * (row.measured - seen.measured - seen.H @ (mean - point))
+        H = np.reshape(scale, (q, 1)) * seen.H
+        noise = seen.noise * np.outer(row.used, row.used) + np.diag(1.0 - row.used)
+        after = correct(mean, P, error, H, noise, None, problem.form)
+        forces = np.reshape(np.linalg.solve(after.innovation_covariance, np.reshape(error, (q, 1))), (q,))
+        mean, P, gains, pulls = _held(problem, after.estimate, after.covariance, active, shared)
+        handed = (point, mean, np.reshape(P, (n * n,)))
+        kept = (*(np.reshape(m, (m.shape[0] * m.shape[1],)) for m in (F, H, after.gain, noise)), forces, gains, pulls)
+        return handed, (mean, handed[2], *kept)
+
+    return body
+
+
+def _backwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tuple[Arrays, Arrays]]:
+    """The adjoint over one row: its state, its bounds, and what it says of the rows before."""
+    n, q = problem.order, problem.layout.measurements
+
+    def body(carry: Arrays, given: Arrays, known: Arrays) -> tuple[Arrays, Arrays]:
+        (adjoint, sums), (shared,) = carry, known
+        row_flat, point, active, _, mean, flat, F, H, K, noise, forces, gains, pulls = given
+        row = problem.layout.unpacked(row_flat)
+        P = np.reshape(flat, (n, n))
+        x = mean - P @ adjoint
+        taken, behind = [0.0 * x[0]] * max(len(problem.bounded), 1), [adjoint[i] for i in range(n)]
+        lower, upper = problem.limits(shared)
+        for k, i in reversed(list(enumerate(problem.bounded))):
+            gain = gains[k * n : (k + 1) * n]
+            force = pulls[k] + gain @ vector(*behind)
+            behind[i] = behind[i] - np.where(np.abs(active[k]) > 0.5, force, 0.0)
+            above, below = x[i] > upper[k], x[i] < lower[k]
+            crossed = np.where(above, 1.0, np.where(below, -1.0, 0.0))
+            holds = force * active[k] < 0.0  # it pushes back, into the bounds
+            taken[k] = np.where(np.abs(active[k]) > 0.5, np.where(holds, active[k], 0.0), crossed)
+        adjoint = vector(*behind)
+        force = forces + np.reshape(K, (n, q)).T @ adjoint
+        adjoint = np.reshape(F, (n, n)).T @ (adjoint - np.reshape(H, (q, n)).T @ force)
+        x = problem.clipped(x, shared)
+        square = force @ np.reshape(noise, (q, q)) @ force
+        spread = vector(*(P[i, i] for i in range(n)))
+        off = np.where(spread > 0.0, np.abs(x - point) / np.sqrt(np.where(spread > 0.0, spread, 1.0)), 0.0)
+        exists = np.max(np.hstack([row.used, np.reshape(row.moves, (1,))]))
+        sums = vector(sums[0] + square, np.maximum(sums[1], exists * np.max(off)), sums[2] + np.sum(row.used))
+        return (adjoint, sums), (x, vector(*taken))
+
+    return body
+
+
+def _scales(problem: WindowProblem, row: WindowRow, seen: Seen, P: Array, fresh: Array, shared: Array) -> list[Array]:
+    """Roots of the weights of the measurements; zero for one that is not used."""
+    scales: list[Array] = []
+    for j, loss in enumerate(problem.losses):
+        if loss == "squares":
+            scales.append(row.used[j])
+            continue
+        own = seen.noise[j, j]
+        variance = own + np.where(fresh > 0.5, seen.H[j] @ P @ seen.H[j], 0.0)  # nothing has smoothed it yet
+        residual = row.measured[j] - seen.measured[j]
+        share = weight(loss, residual * residual / variance, problem.loss_scale(shared))
+        scales.append(row.used[j] * np.sqrt(share))
+    return scales
+
+
+def _held(
+    problem: WindowProblem, mean: Array, P: Array, active: Array, shared: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Mean and covariance with the active bounds as measurements without noise, their gains and forces."""
+    n = problem.order
+    if not problem.bounded:
+        return mean, P, np.zeros(1), np.zeros(1)
+    lower, upper = problem.limits(shared)
+    gains: list[Array] = []
+    pulls: list[Array] = []
+    for k, i in enumerate(problem.bounded):
+        free = np.where(np.abs(active[k]) > 0.5, P[i, i], 0.0)
+        holds = free > 0.0
+        divisor = np.where(holds, free, 1.0)
+        gain = np.where(holds, P[:, i] / divisor, 0.0 * P[:, i])
+        error = np.where(active[k] > 0.0, upper[k], lower[k]) - mean[i]
+        mean = np.where(holds, mean + gain * error, mean)
+        known = np.eye(n)[i]
+        stays = np.where(holds, 1.0 - known, 1.0 + 0.0 * known)  # a known state has no rounding left either
+        P = symmetric(P - np.outer(gain, P[i])) * np.outer(stays, stays)
+        gains.extend(gain[j] for j in range(n))
+        pulls.append(np.where(holds, error / divisor, 0.0))
+    return mean, P, vector(*gains), vector(*pulls)
+
+
+def _at_bounds(problem: WindowProblem, point: Array, shared: Array) -> Array:
+    """1 where a state stands at its upper bound, -1 at its lower one, else 0, shape (b,), at least (1,)."""
+    if not problem.bounded:
+        return np.zeros(1)
+    lower, upper = problem.limits(shared)
+    signs = []
+    for k, i in enumerate(problem.bounded):
+        x, high, low = point[i : i + 1], upper[k : k + 1], lower[k : k + 1]
+        signs.append(np.where(x >= high, 1.0, 0.0) - np.where(x <= low, 1.0, 0.0))
+    return np.hstack(signs)

@@ -1,0 +1,128 @@
+"""The real-time iteration: a row arrives, the oldest leaves into the arrival cost, a fixed number of passes follows.
+
+And what an observer remembers and tells of it, as signals. It knows no observer.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fmu_observer.moving_horizon.arrival_cost import arrival_cost_from
+from fmu_observer.moving_horizon.gauss_newton import WindowProblem, passed, solve
+from fmu_observer.moving_horizon.window import rows_of
+from plant_models.hybrid import Signal, memory, output_signal
+from plant_models.hybrid.option import require_whole
+from plant_models.hybrid.scan import enclosed
+from plant_models.hybrid.system import Array, vector
+
+MOST_ROWS, MOST_PASSES = 1000, 20
+
+TOLD = {
+    "residual_norm": "Root of the mean square of the window's residuals, in their deviations",
+    "last_step": "Largest change of an estimate in the last pass, in its standard deviations",
+    "passes_used": "Passes that changed an estimate by more than 0.001 of its deviation",
+    "rows_in_window": "Rows of the window with a measurement",
+    "bounds_active": "Bounds at which the estimate is held",
+}
+"""What is told of a window, outputs by name."""
+
+
+class Iterated(NamedTuple):
+    """What a row makes of a window.
+
+    Attributes:
+        estimate: at the row, shape (n,). covariance: of it, row by row, shape (n * n,).
+        remembered: new values of `window_memory` in their order, one after the other.
+    """
+
+    estimate: Array
+    covariance: Array
+    remembered: Array
+
+
+def require_window(who: str, window: int, passes: int) -> None:
+    """Refuse a window or a number of passes that is none.
+
+    Args:
+        who: name of the observer, for the message. window: rows, 1 to 1000. passes: 1 to 20.
+
+    Raises:
+        ValueError: one is no whole number, or not within these.
+    """
+    require_whole(who, 1, MOST_ROWS, window=window)
+    require_whole(who, 1, MOST_PASSES, passes=passes)
+
+
+def window_memory(start: Array, covariance: Array, row_width: int, window: int) -> tuple[Signal, ...]:
+    """What an observer remembers of its window.
+
+    Args:
+        start: of the estimates, shape (n,). covariance: of it, shape (n, n). row_width: numbers in a row.
+        window: rows.
+    """
+    first = (*start, *start, *np.ravel(covariance))
+    rows = "Rows, oldest first: moves, period, time, inputs, measured, used; SI units"
+    values = tuple(map(float, np.tile(start, window)))
+    return (
+        memory("arrival_cost", "1", tuple(map(float, first)), "Before the window: point, mean, P", size=len(first)),
+        memory("window", "1", 0.0, rows, size=window * row_width),
+        memory("window_estimates", "1", values, "Estimates of the rows, oldest first, SI units", size=len(values)),
+        memory("last_pass", "1", 0.0, "What is told of the passes and the window", size=len(TOLD)),
+    )
+
+
+def told_outputs() -> tuple[Signal, ...]:
+    """The outputs `TOLD`."""
+    return tuple(output_signal(name, "1", text, variability="discrete") for name, text in TOLD.items())
+
+
+def told(last_pass: Array) -> dict[str, Array]:
+    """Values of the outputs `TOLD`.
+
+    Args:
+        last_pass: the memory of that name, shape (5,).
+    """
+    return {name: last_pass[i] for i, name in enumerate(TOLD)}
+
+
+def iterate(
+    problem: WindowProblem,
+    passes: int,
+    arrival: Array,
+    window: Array,
+    points: Array,
+    row: Array,
+    point: Array,
+    shared: Any,
+) -> Iterated:
+    """A row arrives.
+
+    Args:
+        problem: what moves and what is measured. passes: over the window.
+        arrival, window, points: as remembered (`arrival_cost`, `window`, `window_estimates`), flat.
+        row: the new one, flat. point: prediction of its state, shape (n,). shared: what all rows share, shape (s,).
+    """
+    n, width = problem.order, problem.layout.width
+
+    def iterated(*arrays: Array) -> tuple[Array, ...]:
+        old, table, states, new, predicted, known = arrays
+        rows, estimates = rows_of(table, width), rows_of(states, n)
+        before = passed(problem, arrival_cost_from(old, n), rows[0], estimates[0], known)
+        rows = [*rows[1:], new]
+        found = solve(problem, before, rows, [*estimates[1:], predicted], known, passes)
+        last = (found.residual, found.step, found.moved, problem.layout.count(rows), found.bounds)
+        return found.estimates[-1], found.covariance, np.hstack([*before, *rows, *found.estimates, *last])
+
+    estimate, covariance, remembered = enclosed(iterated, arrival, window, points, row, point, shared)
+    return Iterated(estimate, covariance, remembered)
+
+
+def joined(*parts: Array) -> Array:
+    """Vectors one after the other, shape (k,).
+
+    Args:
+        parts: shape (n,) each.
+    """
+    return vector(*(part[i] for part in parts for i in range(part.shape[0])))

@@ -1,0 +1,126 @@
+"""The quadratic programme of one Gauss-Newton step over a window, handed to PIQP as it comes with CasADi.
+
+Unknowns are the changes of the states and the noises of all rows. It knows matrices and no model.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from fmu_observer.moving_horizon.window_stages import BufferedCall
+
+OPTIONS = {
+    "print_time": False,
+    "error_on_fail": False,
+    "piqp": {"eps_abs": 1e-9, "eps_rel": 1e-10, "max_iter": 100},
+}
+
+
+class Step(NamedTuple):
+    """Where the quadratic programme leads.
+
+    Attributes:
+        change: of the states, shape (N, n). noises: of the transitions, in standard deviations, shape (N, n).
+        prices: multipliers of the transitions, shape (N, n). status: of the solver.
+    """
+
+    change: np.ndarray
+    noises: np.ndarray
+    prices: np.ndarray
+    status: str
+
+    @property
+    def solved(self) -> bool:
+        """Whether the solver says that it is solved."""
+        return self.status == "SOLVER_RET_SUCCESS"
+
+
+class WindowProgram:
+    """Quadratic programmes of one size: ``min sum (dx' A dx + w' w) / 2 + b' dx`` with ``dx = F dx_before + G w + c``.
+
+    Args:
+        count: N, rows of the window. order: n, states.
+    """
+
+    def __init__(self, count: int, order: int) -> None:
+        self.count, self.order = count, order
+        size, within = count * order, np.arange(order)
+        rows = np.repeat(np.arange(count) * order, order * order) + np.tile(within, size)
+        self.cost = _sparsity([np.full(size, order), np.ones(size)], [rows, size + np.arange(size)])
+        columns = np.full((count, order), order + 1)
+        columns[-1] = 1
+        place = np.full((count, order, order + 1), -1)
+        first = np.arange(count)[:, None] * order
+        place[:, :, 0] = first + within
+        place[:-1, :, 1:] = (first[1:] + within)[:, None, :]
+        self._kept = (place >= 0).ravel()
+        self.transitions = _sparsity(
+            [columns.ravel(), np.full(size, order)],
+            [place.ravel()[self._kept], np.repeat(first + within, order, axis=0).ravel()],
+            size,
+        )
+        self._solver = ca.conic("window", "piqp", {"h": self.cost, "a": self.transitions}, OPTIONS)
+        self._call = BufferedCall(self._solver)
+        self._rest = [np.zeros(self._solver.nnz_in(i)) for i in range(10, self._solver.n_in())]
+
+    def solve(
+        self,
+        A: np.ndarray,
+        b: np.ndarray,
+        F: np.ndarray,
+        G: np.ndarray,
+        c: np.ndarray,
+        lower: np.ndarray,
+        upper: np.ndarray,
+    ) -> Step:
+        """Solve one.
+
+        Args:
+            A: cost of the changes, shape (N, n, n), symmetric. b: likewise, shape (N, n).
+            F: transitions into each row, that of the first is not read, shape (N, n, n). G: of the noises, shape
+                (N, n, n). c: what is missing, shape (N, n).
+            lower, upper: bounds of the changes, infinite for none, shape (N, n).
+        """
+        N, n = self.count, self.order
+        columns = np.empty((N, n, n + 1))
+        columns[:, :, 0] = -1.0
+        columns[:-1, :, 1:] = F[1:].transpose(0, 2, 1)
+        coupling = np.concatenate([columns.ravel()[self._kept], G.transpose(0, 2, 1).ravel()])
+        free, zero, nothing = np.full(N * n, np.inf), np.zeros(N * n), np.zeros(2 * N * n)
+        change, _, prices, _ = self._call(
+            np.concatenate([A.ravel(), zero + 1.0]),
+            np.concatenate([b.ravel(), zero]),
+            coupling,
+            -c.ravel(),
+            -c.ravel(),
+            np.concatenate([lower.ravel(), -free]),
+            np.concatenate([upper.ravel(), free]),
+            nothing,
+            nothing,
+            zero,
+            *self._rest,
+        )
+        changes, noises = change.copy().reshape(2, N, n)
+        status = str(self._solver.stats(self._call.memory)["unified_return_status"])
+        return Step(changes, noises, prices.copy().reshape(N, n), status)
+
+
+@lru_cache(maxsize=64)
+def window_program(count: int, order: int) -> WindowProgram:
+    """The programme of a size, made once.
+
+    Args:
+        count: N, rows. order: n, states.
+    """
+    return WindowProgram(count, order)
+
+
+def _sparsity(counts: list[np.ndarray], rows: list[np.ndarray], height: int | None = None) -> Any:
+    """Compressed columns: how many entries each has, and their rows; square unless a height is given."""
+    ends = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(int)
+    width = len(ends) - 1
+    return ca.Sparsity(height or width, width, ends.tolist(), np.concatenate(rows).astype(int).tolist())

@@ -1,0 +1,257 @@
+"""Moving-horizon observer of any model: least squares over a window of time-stamped rows, by a real-time iteration."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from itertools import pairwise
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fmu_observer.filtering.kalman import through
+from fmu_observer.models.filter_model import Known
+from fmu_observer.models.model import stacked
+from fmu_observer.models.system_model import Source
+from fmu_observer.moving_horizon.gauss_newton import Limits, Moved, Seen, WindowProblem
+from fmu_observer.moving_horizon.real_time_iteration import (
+    MOST_PASSES,
+    MOST_ROWS,
+    TOLD,
+    iterate,
+    joined,
+    require_window,
+    told,
+    told_outputs,
+    window_memory,
+)
+from fmu_observer.moving_horizon.robust_loss import LOSSES, SCALES, Loss
+from fmu_observer.moving_horizon.window import RowLayout, WindowRow
+from fmu_observer.observers.discrete.extended_kalman_filter import ExtendedKalmanFilter
+from fmu_observer.observers.discrete.gaussian_filter import Form
+from fmu_observer.observers.innovation_gate import OFF
+from fmu_observer.observers.model_observer import as_matrix
+from plant_models.hybrid import parameter, vector
+from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid.signal import width
+from plant_models.hybrid.system import Array
+
+WINDOW, PASSES = 6, 2  # rows and passes unless told otherwise: small, so that it is built in a second [ours]
+REMEMBERED = ("arrival_cost", "window", "window_estimates")
+UNBOUNDED = 1e30  # a bound that is none; FMI knows no infinite start values
+Bounds = Mapping[str, Sequence[float | None]]
+
+
+class MovingHorizonObserver(ExtendedKalmanFilter):
+    """Moving-horizon estimation: Omar 2012, sections 1.4.8 and 4.2, (1.4.78)-(1.4.81), (4.2.2)-(4.2.4).
+
+    Minimised at every row, over the states of the last `window` rows: the arrival cost of what has left the window,
+    ``w' inv(Q) w`` of the process noise between rows, and the loss of the residuals ``y - h(x)`` in their deviations.
+    `passes` Gauss-Newton passes of fixed cost begin at the solution before, moved on by a row. The arrival cost is
+    exact for linear systems, so that the estimate of one without bounds and with the loss ``squares`` is that of the
+    Kalman filter at every window; a window of one row is the extended Kalman filter.
+
+    Rows are the instants at which measurements arrive (option `arrival` of `GaussianFilter`), at any distance. One that
+    is missing is a row that did not happen; one that is late is replayed, so that it stands in the window at its stamp.
+    A prediction by the event `sampling` alone is a row too.
+
+    An unknown parameter is a state without noise, an unknown input one that noise alone drives. The estimate keeps its
+    bounds at every instant, whatever is measured. Innovations, NIS and likelihood are those of the step from the
+    estimate before, as of the extended filter. Where a robust loss judges telegrams, the gate of balises is off unless
+    it is set.
+
+    Args:
+        model: name of an observer model or of a plant, or one itself.
+        window: rows in the window, 1 to 1000. passes: Gauss-Newton passes at a row, 1 to 20.
+        bounds: lowest and highest value by name of a state; None where there is none, ``{"x2": [0.0, None]}``. They are
+            starts of the parameters `lower_bounds` and `upper_bounds`.
+        loss: ``squares``, ``huber`` or ``geman_mcclure``, for all measurements or for each in a list.
+        options: those of `GaussianFilter`.
+
+    Raises:
+        ValueError: an option is not legal, or the model does not suit; the message says which.
+    """
+
+    name = "moving_horizon_observer"
+    description = "Moving-horizon observer: least squares over the last rows, with bounds and robust losses"
+    source = "Omar 2012, sections 1.4.8 and 4.2; real-time iteration and arrival cost are ours"
+    forms: ClassVar[tuple[Form, ...]] = ("joseph", "short")
+    iterate = staticmethod(iterate)
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+        **ExtendedKalmanFilter.option_choices,
+        "form": ("joseph", "short"),
+        "window": range(1, MOST_ROWS + 1),
+        "passes": range(1, MOST_PASSES + 1),
+        "bounds": (),
+        "loss": LOSSES,
+    }
+
+    def __init__(
+        self,
+        model: Source = "pendulum",
+        *,
+        window: int = WINDOW,
+        passes: int = PASSES,
+        bounds: Bounds | None = None,
+        loss: Loss | Sequence[Loss] = "squares",
+        **options: Any,
+    ) -> None:
+        require_window(self.name, window, passes)
+        self.window, self.passes, self.bounds, self._loss = window, passes, dict(bounds or {}), loss
+        given = {"bounds": {name: list(pair) for name, pair in self.bounds.items()}} if self.bounds else {}
+        listed = loss if isinstance(loss, str) else list(loss)
+        super().__init__(model, window=window, passes=passes, loss=listed, **given, **options)
+
+    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """The window with a row more, and the estimates that it gives, shape (own_count,)."""
+        n, places = self.model.order, self._places
+        filtered = super().update(event, t, x, u, p)
+        arrival, window, points = (
+            x[places[name] : places[following]] for name, following in pairwise((*REMEMBERED, "last_pass"))
+        )
+        start = joined(x[:n], x[: n + n * n])
+        row, shared = self._row(event, t, x, u, p), _flat(self, p)
+        found = self.iterate(
+            self.problem,
+            self.passes,
+            np.where(x[places["primed"]] > 0.5, arrival, start),
+            window,
+            points,
+            vector(*self.problem.layout.packed(row)),
+            self._predicted_point(x[:n], row, shared),
+            shared,
+        )
+        return joined(found.estimate, found.covariance, filtered[n + n * n :], found.remembered)
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """Estimates within their bounds, what is known of the last innovation, and what the window looks like."""
+        shared, n = _flat(self, p), self.model.order
+        inside = self.problem.clipped(x[:n], shared)
+        values = super().output(t, x, u, p) | {s.name: inside[i] for i, s in enumerate(self.model.states)}
+        first = self._places["last_pass"]
+        return values | told(x[first : first + len(TOLD)])
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """Those of the filter; no lowest value above the highest; the scale of the loss within its bounds."""
+        needed = super().requirements(p)
+        scale = [s for s in self.parameters if s.name == "loss_scale"]
+        needed |= within_bounds(scale, p)
+        for k, name in enumerate(self.bounds):
+            text = f"lower_bounds[{k + 1}] must be below upper_bounds[{k + 1}], the bounds of {name}"
+            needed[text] = np.where(p.lower_bounds[k] < p.upper_bounds[k], 1.0, 0.0)
+        return needed
+
+    @cached_property
+    def problem(self) -> WindowProblem:
+        """The least-squares problem of the window."""
+        names = [s.name for s in self.model.states]
+        return WindowProblem(
+            order=self.model.order,
+            layout=RowLayout(len(self.model.inputs), len(self.model.measurements)),
+            moved=self._moved,
+            seen=self._seen,
+            bounded=tuple(names.index(name) for name in self.bounds),
+            limits=self._limits,
+            losses=self._losses,
+            loss_scale=lambda shared: self.unpack_parameters(shared).loss_scale,
+            form="short" if self.form == "short" else "joseph",
+        )
+
+    # -- internals --------------------------------------------------------------------------------------------------
+
+    def _row(self, event: str, t: Array, x: Array, u: Any, p: Any) -> WindowRow:
+        """The row that an event brings."""
+        places, arrived = self._places, self.arrivals.rows(event)
+        primed = np.where(x[places["primed"]] > 0.5, 1.0, 0.0)
+        period = primed * (t - x[places["last_time"]]) if self.arrivals.timed else p.sample_period + 0.0 * primed
+        known, q = self.known(t, u, p), len(self.model.measurements)
+        y = self.arrivals.measured(event, u) if arrived else np.zeros(0)
+        place = {row: i for i, row in enumerate(arrived)}
+        measured = vector(*(y[place[j]] if j in place else 0.0 * primed for j in range(q)))
+        used = vector(*(float(j in place) + 0.0 * primed for j in range(q)))
+        return WindowRow(primed, period, t + 0.0 * primed, known.u, measured, used)
+
+    def _predicted_point(self, x: Array, row: WindowRow, shared: Array) -> Array:
+        """Where the first pass linearises the newest row: the estimate before, moved on, within the bounds."""
+        known = self._known_of(row, self.unpack_parameters(shared))
+        moved = self.model.moved(x, self.model.no_noise(), known, row.period)
+        return self.problem.clipped(np.where(row.moves > 0.5, moved, x), shared)
+
+    def _known_of(self, row: WindowRow, p: Any) -> Known:
+        return Known(row.time - row.period, row.inputs, self.known_parameters(p))
+
+    def _moved(self, x: Array, row: WindowRow, shared: Array) -> Moved:
+        p = self.unpack_parameters(shared)
+        known, model, r = self._known_of(row, p), self.model, self.model.noise_count
+        if self.arrivals.timed:
+            noise = self._noise_of_density(x, known, row.period, p)
+        else:
+            noise = as_matrix(p.process_covariance, r, r)
+        F, W = model.transition_jacobians(x, known, row.period)
+        return Moved(model.moved(x, model.no_noise(), known, row.period), F, through(noise, W))
+
+    def _seen(self, x: Array, row: WindowRow, shared: Array) -> Seen:
+        p, model, s = self.unpack_parameters(shared), self.model, self.model.reading_noise_count
+        known = Known(row.time, row.inputs, self.known_parameters(p))
+        H, V = model.measurement_jacobians(x, known)
+        noise = through(as_matrix(p.measurement_covariance, s, s), V)
+        return Seen(model.measured(x, model.no_reading_noise(), known), H, noise)
+
+    def _declare(self) -> None:
+        """Signals of the filter, then the window's."""
+        model, bounds = self.model, self.bounds
+        names, q = [s.name for s in model.states], len(model.measurements)
+        losses = self._losses = _losses(self.name, self._loss, q)
+        for name, pair in bounds.items():
+            if name not in names or isinstance(pair, str) or len(pair) != 2:
+                raise ValueError(
+                    f"{self.name}: bounds of {name!r} are {pair!r}; expected [lowest, highest] of one of the states "
+                    f"{', '.join(names)}."
+                )
+        if any(loss != "squares" for loss in losses):
+            self.gate_start = OFF
+        lower = tuple(-UNBOUNDED if low is None else float(low) for low, _ in bounds.values())
+        upper = tuple(UNBOUNDED if high is None else float(high) for _, high in bounds.values())
+        listed = ", ".join(bounds)
+        self.own_parameters = () if all(loss == "squares" for loss in losses) else (_loss_scale(losses),)
+        if bounds:
+            self.own_parameters += (
+                parameter("lower_bounds", "1", lower, f"Lowest values, SI units: {listed}", size=len(bounds)),
+                parameter("upper_bounds", "1", upper, f"Highest values, SI units: {listed}", size=len(bounds)),
+            )
+        super()._declare()
+        row_width = RowLayout(len(model.inputs), q).width
+        self.states += window_memory(model.start, np.eye(model.order), row_width, self.window)
+        self._places = {s.name: width(self.states[:i]) for i, s in enumerate(self.states)}
+        self.outputs += told_outputs()
+
+    def _limits(self, shared: Array) -> Limits:
+        if not self.bounds:
+            return Limits(np.zeros(0), np.zeros(0))
+        p = self.unpack_parameters(shared)
+        return Limits(p.lower_bounds, p.upper_bounds)
+
+
+def _losses(who: str, loss: Loss | Sequence[Loss], count: int) -> tuple[Loss, ...]:
+    losses = (loss,) * count if isinstance(loss, str) else tuple(loss)
+    wrong = [given for given in losses if given not in LOSSES]
+    if wrong or len(losses) != count:
+        raise ValueError(
+            f"{who}: loss = {loss!r}; expected one of {', '.join(LOSSES)}, or a list of them with one for each of the "
+            f"{count} measurements."
+        )
+    return losses
+
+
+def _loss_scale(losses: Sequence[Loss]) -> Any:
+    robust = next(loss for loss in losses if loss != "squares")
+    return parameter("loss_scale", "1", SCALES[robust], "Deviations at which the loss begins to doubt", min=1e-3)
+
+
+def _flat(system: MovingHorizonObserver, p: Any) -> Array:
+    """All parameters in their order, shape (k,)."""
+    values: list[Array] = []
+    for s in system.parameter_signals:
+        value = getattr(p, s.name)
+        values.extend([value] if s.size is None else [value[i] for i in range(s.size)])
+    return stacked(tuple(values))

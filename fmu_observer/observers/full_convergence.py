@@ -1,0 +1,194 @@
+"""Moving-horizon observers whose windows are solved to convergence: the same windows, arrival costs and outputs.
+
+They are no members of the registry, since nothing of them becomes C: a scenario names them by
+``fmu_observer.observers.full_convergence:FullBaliseMovingHorizon``, and `fmus build --hosted` makes FMUs of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from math import inf
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fmu_observer.moving_horizon.arrival_cost import arrival_cost_from
+from fmu_observer.moving_horizon.full_solver import Effort, FullSolver
+from fmu_observer.moving_horizon.gauss_newton import WindowProblem, passed
+from fmu_observer.moving_horizon.real_time_iteration import Iterated
+from fmu_observer.observers.discrete.moving_horizon_observer import MovingHorizonObserver
+from fmu_observer.observers.train.balise_moving_horizon import BaliseMovingHorizon
+from plant_models.hybrid import Signal, memory, output_signal, width
+from plant_models.hybrid.option import require_whole
+from plant_models.hybrid.system import Array
+
+TOLERANCE, MAX_ITERATIONS = 1e-4, 30  # of a standard deviation: nobody sees it, and one step less is done [ours]
+ENDED = (
+    output_signal("converged", "1", "1 where the last window was solved to the tolerance", variability="discrete"),
+    output_signal("deadline_missed", "1", "1 where the deadline came first", variability="discrete"),
+    output_signal("feasible", "1", "1 where the answer keeps bounds and transitions", variability="discrete"),
+)
+LAST_SEARCH = memory("last_search", "1", 0.0, "How the last search ended", size=len(ENDED))
+EFFORT_OPTIONS: Mapping[str, Sequence[Any]] = {"tolerance": (), "max_iterations": range(1, 1001), "deadline": ()}
+
+
+class FullMovingHorizonObserver(MovingHorizonObserver):
+    """`MovingHorizonObserver` with every window solved until nothing moves any more, and with a deadline.
+
+    The output `passes_used` counts the steps. Where they end before the tolerance, by `max_iterations` or `deadline`,
+    the last feasible answer stands and `converged` is 0. With a deadline what comes out depends on the machine: a
+    repeated run may differ.
+
+    Args:
+        model, options: those of `MovingHorizonObserver`; its `passes` have no meaning here.
+        tolerance: largest change in the last step, in standard deviations. max_iterations: steps at a row.
+        deadline: time at a row after which the last feasible answer is given [s]; None for none.
+
+    Raises:
+        ValueError: an option is not legal; the message says which.
+    """
+
+    name = "full_moving_horizon_observer"
+    description = "Moving-horizon observer whose windows are solved to convergence"
+    source = "Omar 2012, sections 1.4.8 and 4.2; solver and arrival cost are ours"
+    traceable = False
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {**MovingHorizonObserver.option_choices, **EFFORT_OPTIONS}
+
+    def __init__(
+        self,
+        model: Any = "pendulum",
+        *,
+        tolerance: float = TOLERANCE,
+        max_iterations: int = MAX_ITERATIONS,
+        deadline: float | None = None,
+        **options: Any,
+    ) -> None:
+        self.effort = checked_effort(self.name, tolerance, max_iterations, deadline)
+        super().__init__(model, **options)
+        self.options |= told_effort(self.effort)
+
+    def iterate(self, problem: WindowProblem, passes: int, *arrays: Array) -> Iterated:  # type: ignore[override]
+        """See `iterated_fully`."""
+        return iterated_fully(problem, self.effort, *arrays)
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """What the observer tells, and how the last search ended."""
+        return super().output(t, x, u, p) | _ended(self.states, x)
+
+    def _declare(self) -> None:
+        super()._declare()
+        self.states += (LAST_SEARCH,)
+        self.outputs += ENDED
+
+
+class FullBaliseMovingHorizon(BaliseMovingHorizon):
+    """`BaliseMovingHorizon` with every window solved until nothing moves any more, and with a deadline.
+
+    See `FullMovingHorizonObserver` for what `converged`, `deadline_missed` and `feasible` say.
+
+    Args:
+        window, loss: those of `BaliseMovingHorizon`. tolerance, max_iterations, deadline: those of
+            `FullMovingHorizonObserver`.
+
+    Raises:
+        ValueError: an option is not legal; the message says which.
+    """
+
+    name = "full_balise_moving_horizon"
+    description = "Moving-horizon observer of odometer and balises whose windows are solved to convergence"
+    source = "Omar 2012, (1.4.78), (4.2.2)-(4.2.4); solver and the train case are ours"
+    traceable = False
+    outputs = (*BaliseMovingHorizon.outputs, *ENDED)
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {**BaliseMovingHorizon.option_choices, **EFFORT_OPTIONS}
+
+    def __init__(
+        self,
+        *,
+        tolerance: float = TOLERANCE,
+        max_iterations: int = MAX_ITERATIONS,
+        deadline: float | None = None,
+        **options: Any,
+    ) -> None:
+        self.effort = checked_effort(self.name, tolerance, max_iterations, deadline)
+        super().__init__(**options)
+        self.options |= told_effort(self.effort)
+
+    def own_states(self) -> tuple[Any, ...]:
+        """States of the observer, then how the last search ended."""
+        return (*super().own_states(), LAST_SEARCH)
+
+    def iterate(self, problem: WindowProblem, passes: int, *arrays: Array) -> Iterated:  # type: ignore[override]
+        """See `iterated_fully`."""
+        return iterated_fully(problem, self.effort, *arrays)
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """What the observer tells, and how the last search ended."""
+        return super().output(t, x, u, p) | _ended(self.states, x)
+
+
+def iterated_fully(
+    problem: WindowProblem,
+    effort: Effort,
+    arrival: Array,
+    window: Array,
+    points: Array,
+    row: Array,
+    point: Array,
+    shared: Array,
+) -> Iterated:
+    """A row arrives, as in `real_time_iteration.iterate`; how the search ended stands behind what is remembered.
+
+    Args:
+        problem: what moves and what is measured. effort: what the solution may cost.
+        arrival, window, points: as remembered, flat. row: the new one, flat. point: prediction of its state, shape
+            (n,). shared: what all rows share, shape (s,).
+    """
+    n, layout = problem.order, problem.layout
+    rows, states = np.reshape(window, (-1, layout.width)), np.reshape(points, (-1, n))
+    before = passed(problem, arrival_cost_from(arrival, n), rows[0], states[0], shared)
+    rows, guesses = np.vstack([rows[1:], row]), np.vstack([states[1:], point])
+    found = _solver(problem).solve(before, rows, guesses, shared, effort)
+    last = [found.residual, found.step, float(found.iterations), *layout.count(list(rows)), float(found.active)]
+    ended = [float(said) for said in (found.converged, found.timed_out, found.feasible)]
+    remembered = np.hstack([*before, rows.ravel(), found.states.ravel(), last, ended])
+    return Iterated(found.estimate, found.covariance.ravel(), remembered)
+
+
+def checked_effort(who: str, tolerance: float, max_iterations: int, deadline: float | None) -> Effort:
+    """The effort that options name.
+
+    Args:
+        who: name of the observer, for the message. tolerance: in standard deviations. max_iterations: steps at a row.
+        deadline: [s], None for none.
+
+    Raises:
+        ValueError: one of them is not legal.
+    """
+    require_whole(who, 1, 1000, max_iterations=max_iterations)
+    if not tolerance > 0.0:
+        raise ValueError(f"{who}: tolerance must be above 0 standard deviations, got {tolerance!r}.")
+    if deadline is not None and not deadline >= 0.0:
+        raise ValueError(f"{who}: deadline must be at least 0 s, got {deadline!r}.")
+    return Effort(float(tolerance), int(max_iterations), inf if deadline is None else float(deadline))
+
+
+def told_effort(effort: Effort) -> dict[str, Any]:
+    """The options that give an effort.
+
+    Args:
+        effort: what a solution may cost.
+    """
+    given: dict[str, Any] = {"tolerance": effort.tolerance, "max_iterations": effort.max_iterations}
+    return given if effort.deadline == inf else given | {"deadline": effort.deadline}
+
+
+def _ended(states: tuple[Signal, ...], x: Array) -> dict[str, Array]:
+    first = width(states[: states.index(LAST_SEARCH)])
+    return {s.name: x[first + i] for i, s in enumerate(ENDED)}
+
+
+@lru_cache(maxsize=8)
+def _solver(problem: WindowProblem) -> FullSolver:
+    """The solver of a problem, compiled once."""
+    return FullSolver(problem)

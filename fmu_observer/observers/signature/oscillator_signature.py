@@ -1,0 +1,115 @@
+"""Full inversion of signatures of one point: the braked oscillator."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fmu_observer.observers.parameter_values import Value
+from fmu_observer.observers.signature.signature_observer import Inverted, SignatureObserver
+from fmu_observer.signatures.inversion import soft_inverse
+from fmu_observer.signatures.pencil import NextScaling
+from plant_models.benchmarks.braked_oscillator import BrakedOscillator, Variant
+from plant_models.hybrid import parameter
+from plant_models.hybrid.option import require_whole
+from plant_models.hybrid.system import Array
+
+ORDER, POINTS = 2, 1  # printed N; N_O = 3
+SET = (1.0, 3.0)  # printed: |x1|, |x2| at most
+EPS = {"norm": 10.0, "literal": 0.1}
+SHARPNESS = 200.0
+
+
+class OscillatorSignature(SignatureObserver):
+    """Full signature observer of `braked_oscillator`: Omar 2012, section 4.6.1, (4.6.1)-(4.6.8).
+
+    The signature of three samples is one point. The table holds the points of a grid of states; for each grid value of
+    x1 they make a curve over x2, and the estimate of x1 is the mean of the grid values weighted by
+    ``exp(-mu distance)`` (4.6.5), likewise for x2. Axes are scaled to [0, 1].
+
+    With N = 2 the second coordinate is the weight of the second vertex (see `polygon`): exact arithmetic leaves no
+    ordinate, and the thesis read rounding errors of 1e-17. eps and mu are not printed; here eps =
+    0.1 with ``literal`` scaling and 10 with ``norm``, mu = 200 [ours], none is validated. Polygonal lines replace
+    splines.
+
+    The table belongs to the parameters it was built with: set what `tabulated` returns together with others.
+
+    Args:
+        nodes: grid values an axis, printed 7 and 13. next_scaling: ``literal`` (default) tells both states, ``norm`` x1
+            alone. variant: of the plant.
+
+    Raises:
+        ValueError: an option is no whole number or out of bounds, or unknown.
+    """
+
+    name = "oscillator_signature"
+    description = "Signature observer of the braked oscillator"
+    source = "Omar 2012, (4.6.1)-(4.6.8)"
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "nodes": range(4, 22),
+        "next_scaling": ("literal", "norm"),
+        "variant": ("mixed", "speed", "root"),
+    }
+
+    def __init__(self, nodes: int = 7, next_scaling: NextScaling = "literal", variant: Variant = "mixed") -> None:
+        require_whole(self.name, 4, 21, nodes=nodes)
+        if next_scaling not in EPS:
+            raise ValueError(f"{self.name}: next_scaling is {next_scaling!r}; it is 'norm' or 'literal'.")
+        self.nodes = [np.linspace(-size, size, nodes) for size in SET]
+        eps = EPS[next_scaling]
+        self.declare(
+            BrakedOscillator(variant),
+            ORDER + POINTS,
+            next_scaling,
+            gain=0.1,
+            eps=eps,
+            own_parameters=(
+                parameter("sharpness", "1", SHARPNESS, "Sharpness mu of the weights", min=1e-3),
+                parameter(
+                    "table", "1", (0.0,) * (2 * nodes**2), "Points of the grid, both coordinates", size=2 * nodes**2
+                ),
+            ),
+        )
+        super().__init__(nodes=nodes, next_scaling=next_scaling, variant=variant)
+        self._fill_table()
+
+    def tabulated(
+        self, parameters: Mapping[str, Value] | None = None, preset: str | None = None
+    ) -> dict[str, np.ndarray]:
+        """The table for other parameters, to be set together with them.
+
+        Args:
+            parameters: values by name; those of the plant, sampling period and regularisation matter. preset: to start
+                from.
+
+        Raises:
+            ValueError: a parameter is unknown, not finite or of another size.
+        """
+        p = self.model_values(parameters, preset)
+        grid = np.stack(np.meshgrid(*self.nodes, indexing="ij"))
+        window = np.stack([self.plant.measured(x)[0] for x in self.moved(grid, ORDER + POINTS - 1, p)])
+        points = self.points(window, ORDER, p.regularisation)
+        return {"table": np.stack([points[0][0], points[1][0]]).ravel()}
+
+    def inverted(self, past: Sequence[Array], x: Array, p: Any) -> Inverted:
+        """Both states by (4.6.5)."""
+        count = len(self.nodes[0])
+        xi, eta = (np.reshape(p.table[i * count**2 : (i + 1) * count**2], (count, count)) for i in range(2))
+        point = self.points(past[0], ORDER, p.regularisation)
+        scaled, places = [], []
+        for values, read in zip((xi, eta), point, strict=True):
+            low = np.min(values)
+            size = np.max(values) - low
+            scaled.append((values - low) / size)
+            places.append((read[0] - low) / size)
+        place = np.stack(places)
+        state = np.stack(
+            [
+                soft_inverse(self.nodes[0], scaled, place, p.sharpness),
+                soft_inverse(self.nodes[1], [values.T for values in scaled], place, p.sharpness),
+            ]
+        )
+        beyond = np.maximum(np.max(-place), np.max(place - 1.0)) * (count - 1)
+        return Inverted(state, np.maximum(beyond, 0.0))

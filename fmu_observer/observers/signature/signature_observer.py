@@ -1,0 +1,285 @@
+"""Base of observers that invert the signature of a window of samples and blend it with the model's prediction."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections import namedtuple
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fmu_observer.observers.parameter_values import Value, parameter_values
+from fmu_observer.signatures.blending import blended
+from fmu_observer.signatures.pencil import NextScaling, pencil_point
+from plant_models.benchmarks.noisy_plant import NoisyPlant
+from plant_models.hybrid import (
+    HybridSystem,
+    OutputWarning,
+    PeriodicEvent,
+    Signal,
+    input_signal,
+    memory,
+    output_signal,
+    parameter,
+    scalar_names,
+    vector,
+)
+from plant_models.hybrid.integration import rk4_step
+from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid.scan import enclosed, scan
+from plant_models.hybrid.system import Array
+
+OUTSIDE_CELLS = 0.5
+"""Cells beyond its table from which a window counts as outside: less comes of rounding and of mild noise."""
+
+MOSTLY = OutputWarning(
+    "found more than half of its windows beyond its table: the state is not in the set the table was built for, its "
+    "parameters are not those of the table, or the noise is too large. Widen the set, build the table anew "
+    "(`tabulated`), or lower the gain",
+    shows=("outside_count", "window_count"),
+    at_end=True,
+)
+NO_MODEL = ("sample_period", "process_noise", "measurement_noise")
+
+
+class Inverted(NamedTuple):
+    """What the signature of a window tells.
+
+    Attributes:
+        state: at the oldest sample of the window, shape (n,). outside: how far beyond the table, in cells [1].
+        own: values of the subclass' own memory, one each.
+    """
+
+    state: Array
+    outside: Array
+    own: tuple[Array, ...] = ()
+
+
+class SignatureObserver(HybridSystem):
+    """Base of observers of a `NoisyPlant` by the signature of its last samples: Omar 2012, sections 4.2 to 4.6.
+
+    At each sample: 1. the window moves on; 2. its signature is inverted, which gives the state at its oldest sample
+    (4.3.4); 3. the model brings this state to now (4.2.4); 4. it is blended with what the model made of the last
+    estimate, by the gain q (4.6.8). Until the window is full the model runs alone. The window holds the sample at hand;
+    that of the thesis ends one sample before it.
+
+    The contract: a subclass calls `declare` before ``super().__init__`` and writes `inverted`; where model parameters
+    are estimated it overrides `model_parameters`.
+    """
+
+    internal_step = 0.1  # nothing flows between samples
+    plant: NoisyPlant
+    window: int
+    scaling: NextScaling
+
+    def declare(
+        self,
+        plant: NoisyPlant,
+        window: int,
+        scaling: NextScaling,
+        gain: float,
+        eps: float,
+        own_parameters: Sequence[Signal] = (),
+        own_memory: Sequence[Signal] = (),
+        own_outputs: Sequence[Signal] = (),
+        known: Sequence[str] = (),
+    ) -> None:
+        """Set signals and event.
+
+        Args:
+            plant: whose equations are the model. window: samples, N_O. scaling: of the next sample, see `pencil_point`.
+            gain: default q. eps: default regularisation, in the unit of the samples.
+            own_parameters, own_memory, own_outputs: of the subclass; memory and outputs correspond one to one.
+            known: names of parameters of the plant that are not parameters of the observer.
+        """
+        self.plant, self.window, self.scaling = plant, window, scaling
+        names = [s.name for s in plant.parameters if s.name not in NO_MODEL]
+        self._model = namedtuple("Model", [*names, "sample_period"])
+        named = plant.plain_outputs[: len(plant.moving)]
+        measured = plant.outputs[len(plant.plain_outputs) :]
+        self.state_names = tuple(s.name for s in named)
+        self.measured_names = tuple(s.name for s in measured)
+        pairs = list(zip(plant.moving, named, strict=True))
+        self.states = (
+            *(memory(f"estimated_{s.name}", s.unit, m.start, f"Estimate: {s.description}") for m, s in pairs),
+            *(memory(f"looked_up_{s.name}", s.unit, m.start, f"Of the signature: {s.description}") for m, s in pairs),
+            *(memory(f"past_{s.name}", s.unit, 0.0, f"{s.description}, oldest first", size=window) for s in measured),
+            memory("samples_held", "1", 0.0, "Samples in the window"),
+            memory("windows_inverted", "1", 0.0, "Full windows so far"),
+            memory("windows_outside", "1", 0.0, "Full windows beyond the table so far"),
+            *own_memory,
+        )
+        self.inputs = tuple(input_signal(s.name, s.unit, 0.0, s.description) for s in measured)
+        self.outputs = (
+            *(output_signal(s.name, s.unit, f"Estimate: {s.description}", variability="discrete") for s in named),
+            *(
+                output_signal(
+                    f"{s.name}_look_up", s.unit, f"Of the signature alone: {s.description}", variability="discrete"
+                )
+                for s in named
+            ),
+            output_signal(
+                "window_full", "1", "1 once the window is full, and estimates are corrected", variability="discrete"
+            ),
+            output_signal("window_count", "1", "Full windows so far", variability="discrete"),
+            output_signal("outside_count", "1", "Full windows beyond the table so far", variability="discrete"),
+            output_signal(
+                "mostly_outside",
+                "1",
+                "1 where most windows were beyond the table",
+                variability="discrete",
+                warning=MOSTLY,
+            ),
+            *own_outputs,
+        )
+        self._own_outputs = tuple(s.name for s in own_outputs)
+        period = next(s for s in plant.parameters if s.name == "sample_period")
+        self.parameters = (
+            *(s for s in plant.parameters if s.name not in (*NO_MODEL, *known)),
+            parameter("sample_period", "s", period.start, "Time tau between two samples", min=1e-6),
+            parameter("gain", "1", gain, "Gain q of the signature's estimate; 0 for the model alone", min=0.0),
+            parameter("regularisation", "1", eps, "eps of the pencil map, in the unit of the samples", min=1e-9),
+            *own_parameters,
+        )
+        self.events = (PeriodicEvent("sampling", "sample_period", description="A sample is read"),)
+        self._places = {
+            s.name: i for s, i in zip(self.states, np.cumsum([0, *(s.width for s in self.states)]), strict=False)
+        }
+
+    # -- what a subclass writes -------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def inverted(self, past: Sequence[Array], x: Array, p: Any) -> Inverted:
+        """State at the oldest sample of the window.
+
+        Args:
+            past: samples of each measurement, the oldest first, shape (N_O,) each. x: memory before. p: parameters.
+        """
+
+    def model_parameters(self, own: Sequence[Array], p: Any) -> Any:
+        """Parameters of the plant's equations.
+
+        Args:
+            own: values of the subclass' own memory. p: parameters of the observer.
+        """
+        return p
+
+    def adopted(self, now: Array, u: Any) -> Array:
+        """The state of the signature, brought to now, with what is measured at once put in; shape (n,).
+
+        Args:
+            now: shape (n,). u: inputs.
+        """
+        return now
+
+    # -- what it may use --------------------------------------------------------------------------------------------
+
+    def moved(self, start: Array, steps: int, model: Any) -> list[Array]:
+        """States of the model over some periods, the start first, ``steps + 1`` of them.
+
+        Args:
+            start: shape (n,) or (n, ...). steps: periods. model: parameters of the equations and `sample_period`.
+        """
+        states = [start]
+        for _ in range(steps):
+            states.append(
+                rk4_step(lambda t, x: self.plant.flow(t, x, None, model), 0.0, model.sample_period, states[-1])
+            )
+        return states
+
+    def brought(self, start: Array, steps: int, model: Any) -> Array:
+        """The last of these states alone, shape (n,); a loop in the generated C.
+
+        Args:
+            start: shape (n,). steps: periods. model: see `moved`.
+        """
+
+        def row(carry: Any, _row: Any, shared: Any) -> Any:
+            return (
+                self.moved(carry[0], 1, self._model(*(shared[0][i] for i in range(len(self._model._fields)))))[-1],
+            ), ()
+
+        def loop(state: Array, values: Array) -> tuple[Array, ...]:
+            carry, _ = scan(row, (state,), [(np.zeros(1),)] * steps, (values,))
+            return (carry[0],)
+
+        values = vector(*(getattr(model, name) for name in self._model._fields))
+        return enclosed(loop, start, values)[0]
+
+    def points(self, samples: Array, order: int, eps: Array) -> tuple[Array, Array]:
+        """Abscissas and ordinates of a signature, shape (M, ...) each.
+
+        Args:
+            samples: the oldest first, shape (M + N, ...). order: N. eps: regularisation.
+        """
+        count = len(samples) - order
+        found = [pencil_point(samples[i : i + order], samples[i + order], eps, self.scaling) for i in range(count)]
+        return np.stack([point[0] for point in found]), np.stack([point[1] for point in found])
+
+    def model_values(self, parameters: Mapping[str, Value] | None = None, preset: str | None = None) -> Any:
+        """Named tuple of all parameters, some replaced.
+
+        Args:
+            parameters: values by name. preset: to start from; None for the default one.
+
+        Raises:
+            ValueError: a parameter is unknown, not finite or of another size, or the preset is unknown.
+        """
+        return self.unpack_parameters(parameter_values(self, parameters, preset, "to build the table"))
+
+    # -- what follows -----------------------------------------------------------------------------------------------
+
+    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Move the window on, invert its signature, blend; shape of the state."""
+        n, width = len(self.state_names), self.window
+        held, windows, outsides, own = self._counts(x)
+        past = []
+        for i, name in enumerate(self.measured_names):
+            first = 2 * n + i * width
+            past.append(np.hstack([x[first + 1 : first + width], np.stack([getattr(u, name) + 0.0 * held])]))
+        count = np.minimum(held + 1.0, float(width))
+        full = np.where(count > width - 0.5, 1.0, 0.0)
+        ahead = np.where(held > 0.5, self.moved(x[:n], 1, self.model_parameters(own, p))[-1], x[:n])
+        told = self.inverted(past, x, p)
+        now = self.adopted(self.brought(told.state, width - 1, self.model_parameters(told.own, p)), u)
+        estimate = blended(ahead, now, p.gain, full)
+        shown = np.where(full > 0.5, now, ahead)
+        beyond = full * np.where(told.outside > OUTSIDE_CELLS, 1.0, 0.0)
+        kept = [np.where(full > 0.5, new, old) for new, old in zip(told.own, own, strict=True)]
+        return vector(
+            *(estimate[i] for i in range(n)),
+            *(shown[i] for i in range(n)),
+            *(samples[i] for samples in past for i in range(width)),
+            count,
+            windows + full,
+            outsides + beyond,
+            *kept,
+        )
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """Estimates, what the signature alone gives, and how often it lay beyond the table."""
+        n = len(self.state_names)
+        held, windows, outsides, own = self._counts(x)
+        values = {name: x[i] for i, name in enumerate(self.state_names)}
+        values |= {f"{name}_look_up": x[n + i] for i, name in enumerate(self.state_names)}
+        values |= {"window_full": np.where(held > self.window - 0.5, 1.0, 0.0), "window_count": windows}
+        values |= {"outside_count": outsides, "mostly_outside": np.where(outsides > 0.5 * windows, 1.0, 0.0)}
+        return values | dict(zip(self._own_outputs, own, strict=True))
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """Parameters are finite and within their bounds."""
+        return super().requirements(p) | within_bounds([s for s in self.parameters if s.name != "table"], p)
+
+    # -- internals --------------------------------------------------------------------------------------------------
+
+    def _fill_table(self) -> None:
+        """Start values of `table`, for the parameters at theirs; the end of the constructor."""
+        start = tuple(map(float, self.tabulated()["table"]))
+        self.parameters = tuple(replace(s, start=start) if s.name == "table" else s for s in self.parameters)
+        self.__dict__.pop("parameter_signals", None)
+
+    def _counts(self, x: Array) -> tuple[Array, Array, Array, list[Array]]:
+        first = self._places["samples_held"]
+        return x[first], x[first + 1], x[first + 2], [x[i] for i in range(first + 3, len(scalar_names(self.states)))]

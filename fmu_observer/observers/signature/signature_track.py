@@ -1,0 +1,155 @@
+"""Signatures of a sampled signal while it comes: the properties of Omar 2012, section 2.5, and which parameter they say
+has changed. Uses the pencil map and the properties.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from fmu_observer.observers.signature.printed_recursion import PRINTED_MEMORY, Printed, next_printed
+from fmu_observer.observers.signature.tip_recursion import CYCLES, TIP_MEMORY, Tips, next_tips
+from fmu_observer.signatures.pencil import NextScaling, pencil_point
+from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, vector
+from plant_models.hybrid.option import require_whole
+from plant_models.hybrid.system import Array
+
+Reading = Literal["repaired", "as_published"]
+
+
+class SignatureTrack(HybridSystem):
+    """Two signatures of a signal, S1 of order `long_order` and S2 of order `short_order`, three properties of them, and
+    a verdict: Omar 2012, section 2.5.
+
+    r1 is the length of S1 from its left end to the middle between its right-hand branches, r2 the abscissa of the right
+    tip of S2, r3 the gap between those branches. For `van_der_pol` they tell the three parameters apart:
+
+    - r3 is off: p3 has changed, whatever p1 and p2 do;
+    - r2 is off, and r1 not by much: p2;
+    - r1 is off, and r2 not: p1; r1 is off by more than `strong_change`, and r2 too: both. A small change of p1 beside
+      one of p2 cannot be told.
+
+    The signal has to oscillate: properties are taken over the last two ways from tip to tip, and held until the next
+    tip. `ready` is 0 until four tips are found, and where none has come for `patience`.
+
+    Args:
+        long_order: N of S1. short_order: N of S2, at most that of S1. next_scaling: ``norm``, which the independence of
+            the properties needs, or ``literal``. reading: ``repaired`` takes local maxima; ``as_published`` the printed
+            formulas, which find points far left of the branches and hop between tips of S2.
+
+    Raises:
+        ValueError: an order below 2, orders that are not in order, or an unknown scaling or reading.
+
+    Presets: `van_der_pol` (default): properties of the nominal `van_der_pol` at 100 Hz as measured, thresholds ours.
+    """
+
+    name = "signature_track"
+    description = "Signature properties of an oscillating signal, and which parameter has changed"
+    source = "Omar 2012, (2.3.1)-(2.3.6), section 2.5; detection of the tips ours"
+    internal_step = 1e-2
+    inputs = (input_signal("signal", "1", 0.0, "The signal"),)
+    outputs = (
+        output_signal("length", "1", "r1, length of S1 to the middle of its branches", variability="discrete"),
+        output_signal("short_tip", "1", "r2, abscissa of the right tip of S2", variability="discrete"),
+        output_signal("gap", "1", "r3, gap between the right-hand branches of S1", variability="discrete"),
+        output_signal("abscissa", "1", "Abscissa of the newest point of S1", variability="discrete"),
+        output_signal("ready", "1", "1 while the properties count, else 0", variability="discrete"),
+        output_signal("p1_changed", "1", "1 while the first parameter is judged to have changed"),
+        output_signal("p2_changed", "1", "1 while the second parameter is judged to have changed"),
+        output_signal("p3_changed", "1", "1 while the third parameter is judged to have changed"),
+    )
+    parameters = (
+        parameter("sample_period", "s", 0.01, "Time between two samples, tau", min=1e-6),
+        parameter("eps", "1", 1e-3, "Regularisation in the unit of the signal", min=1e-12),
+        parameter("patience", "s", 3.0, "Time without a tip after which the properties no longer count", min=0.0),
+        parameter("nominal_length", "1", 0.3345, "r1 without a change"),
+        parameter("nominal_short_tip", "1", 0.052, "r2 without a change"),
+        parameter("nominal_gap", "1", 0.0021, "r3 without a change"),
+        parameter("length_change", "1", 0.01, "Change of r1 that counts", min=0.0),
+        parameter("strong_change", "1", 0.02, "Change of r1 that counts although r2 has changed", min=0.0),
+        parameter("short_tip_change", "1", 0.002, "Change of r2 that counts", min=0.0),
+        parameter("gap_change", "1", 0.006, "Change of r3 that counts", min=0.0),
+    )
+    events = (PeriodicEvent("sampling", "sample_period", description="The signal is read"),)
+    presets: Mapping[str, Mapping[str, Any]] = {"van_der_pol": {}}
+    default_preset = "van_der_pol"
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "next_scaling": ("norm", "literal"),
+        "reading": ("repaired", "as_published"),
+    }
+
+    def __init__(
+        self,
+        long_order: int = 100,
+        short_order: int = 50,
+        next_scaling: NextScaling = "norm",
+        reading: Reading = "repaired",
+    ) -> None:
+        require_whole(self.name, 2, long_order=long_order, short_order=short_order)
+        if short_order > long_order:
+            raise ValueError(f"{self.name}: short_order {short_order} is above long_order {long_order}; exchange them.")
+        for key, value in (("next_scaling", next_scaling), ("reading", reading)):
+            if value not in self.option_choices[key]:
+                raise ValueError(f"{self.name}: {key} is {value!r}; use one of {', '.join(self.option_choices[key])}.")
+        self.orders, self.next_scaling, self.reading = (long_order, short_order), next_scaling, reading
+        self.states = (
+            memory("samples", "1", 0.0, "The last samples, the oldest first", size=long_order),
+            memory("taken", "1", 0.0, "Samples taken, counted as far as is needed"),
+            *TIP_MEMORY,
+            *(PRINTED_MEMORY if reading == "as_published" else ()),
+        )
+        super().__init__(
+            long_order=long_order,
+            short_order=short_order,
+            next_scaling=next_scaling,
+            reading=reading,
+        )
+
+    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """A sample gives one point to each signature."""
+        count, short = self.orders
+        past, taken = x[:count], x[count]
+        long_point = pencil_point(past, u.signal, p.eps, self.next_scaling)
+        short_point = pencil_point(past[count - short :], u.signal, p.eps, self.next_scaling)
+        full = taken > count - 0.5
+        tips, patience = self._tips(x), p.patience / p.sample_period
+        if self.reading == "repaired":
+            rest = [*next_tips(tips, long_point[0], short_point[0], patience)]
+        else:
+            begin = count + 1 + len(TIP_MEMORY)
+            printed = Printed(*(x[begin + i] for i in range(len(PRINTED_MEMORY))))
+            points = ((long_point[0], long_point[1]), (short_point[0], short_point[1]))
+            found = next_printed(tips, printed, *points, patience)
+            rest = [*found[0], *found[1]]
+        kept = (np.where(full, new, x[count + 1 + i]) for i, new in enumerate(rest))
+        return vector(*(past[i] for i in range(1, count)), u.signal, np.minimum(taken + 1.0, 1.0 * count), *kept)
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """Properties and verdict."""
+        m = self._tips(x)
+        ready = np.where(m.tips > CYCLES - 0.5, 1.0, 0.0)
+        return {
+            "length": m.length,
+            "short_tip": m.short_tip,
+            "gap": m.gap,
+            "abscissa": m.before,
+            "ready": ready,
+            **self._verdict(m, ready, p),
+        }
+
+    def _verdict(self, m: Tips, ready: Array, p: Any) -> dict[str, Array]:
+        change = np.abs(m.length - p.nominal_length)
+        second = np.abs(m.short_tip - p.nominal_short_tip) > p.short_tip_change
+        first = np.where(second, change - p.strong_change, change - p.length_change) > 0.0
+        third = np.abs(m.gap - p.nominal_gap) > p.gap_change
+        return {
+            "p1_changed": ready * np.where(first, 1.0, 0.0),
+            "p2_changed": ready * np.where(second, 1.0, 0.0),
+            "p3_changed": ready * np.where(third, 1.0, 0.0),
+        }
+
+    def _tips(self, x: Array) -> Tips:
+        begin = self.orders[0] + 1
+        return Tips(*(x[begin + i] for i in range(len(TIP_MEMORY))))

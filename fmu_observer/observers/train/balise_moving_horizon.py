@@ -1,0 +1,186 @@
+"""Train observer: moving-horizon estimation over the last readings of the odometer and the last balises."""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from itertools import pairwise
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fmu_observer.moving_horizon.gauss_newton import Limits, Moved, Seen, WindowProblem
+from fmu_observer.moving_horizon.real_time_iteration import (
+    MOST_PASSES,
+    MOST_ROWS,
+    TOLD,
+    iterate,
+    joined,
+    require_window,
+    told,
+    told_outputs,
+    window_memory,
+)
+from fmu_observer.moving_horizon.robust_loss import LOSSES, SCALES, Loss
+from fmu_observer.moving_horizon.window import RowLayout, WindowRow
+from fmu_observer.observers.innovation_gate import OFF
+from fmu_observer.observers.train.balise_odometer_ekf import (
+    BALISE_ROW,
+    FIRST_DEVIATIONS,
+    LAST_TIME,
+    ODOMETER_ROW,
+    ORDER,
+    OWN_PARAMETERS,
+    PAIRS,
+    BaliseOdometerEkf,
+    D,
+    V,
+    covariance_of,
+    transition,
+)
+from fmu_observer.observers.train.train_observer import BALISE
+from plant_models.hybrid import parameter, vector
+from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid.signal import width
+from plant_models.hybrid.system import Array
+
+WINDOW, PASSES = 10, 2  # rows and passes unless told otherwise: small, so that it is built in a second [ours]
+LAYOUT = RowLayout(inputs=ORDER + 2, measurements=1)
+OFFSETS, SPEED, IS_BALISE = slice(0, ORDER), ORDER, ORDER + 1  # inputs of a row
+WINDOW_PARAMETERS = (
+    parameter("speed_limit", "m/s", 100.0, "Highest speed; the lowest is zero", min=0.1),
+    parameter("disturbance_limit", "m/s2", 1.0, "Largest unknown acceleration, either way", min=1e-6),
+    parameter("loss_scale", "1", SCALES["geman_mcclure"], "Deviations at which the loss begins to doubt", min=1e-3),
+)
+Shared = namedtuple(
+    "Shared",
+    "mass davis_b davis_c creep_time creep_share acceleration_density disturbance_density odometer_deviation "
+    "balise_deviation speed_limit disturbance_limit loss_scale",
+)
+
+
+class BaliseMovingHorizon(BaliseOdometerEkf):
+    """Moving-horizon estimation of a train from its odometer and balises: Omar 2012, (1.4.78); the train case is ours.
+
+    States, transition and noises are those of `BaliseOdometerEkf`. The last `window` rows, readings and balises at
+    their stamps, are kept; at every row `passes` Gauss-Newton passes minimise the arrival cost, the process noise
+    between rows and the loss of the residuals, see `fmu_observer.moving_horizon`. Between rows the estimate flows with
+    the effort as it is; a row keeps what the flow made of the estimate before, so that the window knows every change
+    of the effort.
+
+    Speed is never below zero nor above `speed_limit`, the unknown acceleration within `disturbance_limit`. The loss
+    ``geman_mcclure`` doubts a false balise, and readings of a wheel that slides, by what the other rows of the window
+    say before and after, and takes its doubt back where later rows agree with it: no gate has to decide at once. So the
+    gate of balises is off unless it is set. `odometer_fault`, NIS and likelihood are those of the filter's step.
+
+    With the loss ``squares``, no bound active and every reading within its gate it is `BaliseOdometerEkf` at every
+    window.
+
+    Args:
+        window: rows in the window, 1 to 1000. passes: Gauss-Newton passes at a row, 1 to 20.
+        loss: ``geman_mcclure``, ``huber`` or ``squares``.
+
+    Raises:
+        ValueError: an option is not legal; the message says which.
+    """
+
+    name = "balise_moving_horizon"
+    description = "Moving-horizon observer of odometer and balises, with disturbance and creep"
+    source = "Omar 2012, (1.4.78), (4.2.2)-(4.2.4); real-time iteration and the train case are ours"
+    parameters = (*OWN_PARAMETERS, *WINDOW_PARAMETERS)
+    outputs = (*BaliseOdometerEkf.outputs, *told_outputs())
+    iterate = staticmethod(iterate)
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "window": range(1, MOST_ROWS + 1),
+        "passes": range(1, MOST_PASSES + 1),
+        "loss": LOSSES,
+    }
+
+    def __init__(self, window: int = WINDOW, passes: int = PASSES, loss: Loss = "geman_mcclure") -> None:
+        require_window(self.name, window, passes)
+        if loss not in LOSSES:
+            raise ValueError(f"{self.name}: loss = {loss!r}; expected one of {', '.join(LOSSES)}.")
+        self.window, self.passes, self.loss = window, passes, loss
+        self.gate_start = OFF
+        super().__init__()
+        self.options = {"window": window, "passes": passes, "loss": loss}
+
+    def own_states(self) -> tuple[Any, ...]:
+        """States of the filter, then what is remembered of the window."""
+        covariance = np.diag(np.square(FIRST_DEVIATIONS))
+        filtered = super().own_states()
+        remembered = window_memory(np.zeros(ORDER), covariance, LAYOUT.width, self.window)
+        places = {s.name: width((*filtered, *remembered)[: len(filtered) + i]) for i, s in enumerate(remembered)}
+        self._places = (*places.values(), width((*filtered, *remembered)))
+        return (*filtered, *remembered)
+
+    @cached_property
+    def problem(self) -> WindowProblem:
+        """The least-squares problem of the window."""
+        return WindowProblem(
+            order=ORDER,
+            layout=LAYOUT,
+            moved=_moved,
+            seen=_seen,
+            bounded=(V, D),
+            limits=_limits,
+            losses=(self.loss,),
+            loss_scale=lambda shared: Shared(*shared).loss_scale,
+        )
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """The parameters lie within their bounds."""
+        return super().requirements(p) | within_bounds(WINDOW_PARAMETERS, p)
+
+    def update(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """The window with a row more, and the estimates that it gives, shape (own_count,)."""
+        filtered = super().update(event, t, x, u, p)
+        arrival, window, points, last = (x[first:end] for first, end in pairwise(self._places))
+        begun = last[list(TOLD).index("rows_in_window")] > 0.5
+        shared = vector(*(getattr(p, name) for name in Shared._fields))
+        start = joined(x[:ORDER], x[:ORDER], np.reshape(covariance_of(x), (ORDER * ORDER,)))
+        known = self.problem.clipped(x[:ORDER], shared)
+        before = np.where(begun, points[-ORDER:], x[:ORDER])
+        row = self._row(event, t, x, u, p, before)
+        packed = vector(*LAYOUT.packed(row))
+        found = self.iterate(
+            self.problem, self.passes, np.where(begun, arrival, start), window, points, packed, known, shared
+        )
+        covariance = np.reshape(found.covariance, (ORDER, ORDER))
+        upper = vector(*(covariance[i, j] for i, j in PAIRS))
+        return joined(found.estimate, upper, filtered[LAST_TIME : self._places[0]], found.remembered)
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """The estimates now within their bounds, their deviations, how the last measurement fits, and the window."""
+        shared = vector(*(getattr(p, name) for name in Shared._fields))
+        inside = self.problem.clipped(x[:ORDER], shared)
+        values = super().output(t, x, u, p) | {"speed": inside[V], "disturbance": inside[D]}
+        return values | told(x[self._places[3] : self._places[4]])
+
+    # -- internals --------------------------------------------------------------------------------------------------
+
+    def _row(self, event: str, t: Array, x: Array, u: Any, p: Any, before: Array) -> WindowRow:
+        """The row that an event brings: what the flow added to the linear transition, and the measurement."""
+        period, is_balise = t - x[LAST_TIME], float(event == BALISE.name)
+        offset = x[:ORDER] - transition(period, x[V], p).F @ before
+        measured = u.balise_position if event == BALISE.name else self.reading(t, x, u, p)
+        inputs = vector(*(offset[i] for i in range(ORDER)), x[V], is_balise + 0.0 * x[V])
+        return WindowRow(1.0 + 0.0 * x[V], period, t + 0.0 * x[V], inputs, vector(measured), vector(1.0 + 0.0 * x[V]))
+
+
+def _moved(x: Array, row: WindowRow, shared: Array) -> Moved:
+    F, noise = transition(row.period, row.inputs[SPEED], Shared(*shared))
+    return Moved(F @ x + row.inputs[OFFSETS], F, noise)
+
+
+def _seen(x: Array, row: WindowRow, shared: Array) -> Seen:
+    p, balise = Shared(*shared), row.inputs[IS_BALISE]
+    H = balise * BALISE_ROW + (1.0 - balise) * ODOMETER_ROW
+    deviation = np.where(balise > 0.5, p.balise_deviation, p.odometer_deviation)
+    return Seen(H @ x, H, np.reshape(deviation * deviation, (1, 1)))
+
+
+def _limits(shared: Array) -> Limits:
+    p = Shared(*shared)
+    return Limits(vector(0.0 * p.mass, -p.disturbance_limit), vector(p.speed_limit, p.disturbance_limit))
