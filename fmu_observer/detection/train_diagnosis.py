@@ -176,9 +176,10 @@ class TrainDiagnosis(HybridSystem):
         held["pressure"] = np.abs(read.pressure - m["modelled_pressure"]) / p.threshold_pressure
         held |= dict(zip(MOTION.residuals[:SPEED_PAIRS], speeds, strict=True))
         held |= self._shares(m, read, u, p)
+        raised = m.each("raised")
         alarms_after(m, t, [held[name] * there for name, there in zip(RESIDUALS, can.residuals, strict=True)], p)
         wheel = wheels(m, u, self._brake_force(largest([m["modelled_pressure"], read.pressure]), p), p)
-        codes_after(m, t, can, contradicted_wheels(m, read, wheel, p), stuck_sensors(m, read, wheel, p), p)
+        codes_after(m, t, can, contradicted_wheels(m, read, wheel, p), stuck_sensors(m, read, wheel, p), raised, p)
 
     def _shares(self, m: Memory, read: Readings, u: Any, p: Any) -> dict[str, Array]:
         """Shares of force after a coarse step, and their residuals over their thresholds."""
@@ -238,7 +239,8 @@ class TrainDiagnosis(HybridSystem):
         distance = u.balise_position - m["mark"]
         ways = [way - mark for way, mark in zip(m.each("way"), m.each("way_mark"), strict=True)]
         known = np.where(m["telegrams"] > 0.5, 1.0, 0.0)
-        ratios, balise = way_ratios([distance - way for way in ways], read.fitted, distance, p)
+        sound = [there * (1.0 - bad) for there, bad in zip(read.fitted, m.each("faulty"), strict=True)]
+        ratios, balise = way_ratios([distance - way for way in ways], sound, distance, p)
         held = dict(zip(RESIDUALS, m.each("ratio"), strict=True))
         held |= {f"way_{name}": known * r for name, r in zip(("1", "2", "radar"), ratios, strict=True)}
         held["balise"] = known * balise
@@ -252,6 +254,7 @@ class TrainDiagnosis(HybridSystem):
             ratio=[held[name] for name in RESIDUALS],
             telegrams=m["telegrams"] + 1.0,
             refused=refused,
+            faulty=[0.0, 0.0, 0.0],
             telegram_verdict=np.where(used > 0.0, float(USED), float(IGNORED)),
             mark=np.where(used > 0.0, u.balise_position, m["mark"]),
             way_mark=marks,

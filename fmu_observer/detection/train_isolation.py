@@ -38,6 +38,7 @@ MOTION = IsolationTable(
         "balise": (),
         "adhesion": ("odometers", "way_1", "way_2", "balise", "gps_position"),
     },
+    together=("odometer_1_gps", "odometer_2_gps", "radar_gps"),
 )
 """What is measured of the motion: five kinds of sensors, and rails on which both wheels slip."""
 

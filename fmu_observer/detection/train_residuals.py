@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fmu_observer.diagnosis.isolation_table import largest
 from fmu_observer.diagnosis.windowed_residual import windowed_square
 from plant_models.hybrid.system import Array, vector
 
@@ -15,6 +16,7 @@ ABSENT = -1e9
 """Start value of the inputs of sensors that a train need not have: a sensor that reads this is not fitted."""
 _BELOW = -1e8
 HUGE = 1e9
+ALIKE = 0.5  # errors of ways that differ by less than this factor have one cause
 
 
 class Readings(NamedTuple):
@@ -132,19 +134,19 @@ def voted_speed(read: Readings, raised: list[Array]) -> Array:
 def way_ratios(errors: list[Array], fitted: list[Array], distance: Array, p: Any) -> tuple[list[Array], Array]:
     """Residuals of the ways from the last balise to this one over their thresholds.
 
-    Where the ways of all sources are off, the balise is; else the sources that are off.
+    Where the ways of all sources are off by much the same, the balise is; else the sources that are off.
 
     Args:
-        errors: distance of the balises less the way of each source [m]. fitted: 1 for those that are there.
-        distance: between the balises [m]. p: parameters.
+        errors: distance of the balises less the way of each source [m]. fitted: 1 for those that are there and have
+            shown no fault on the way. distance: between the balises [m]. p: parameters.
 
     Returns:
         Ratios of the ways, and that of the balise.
     """
     limit = p.balise_floor + p.balise_share * np.abs(distance)
-    ratios = [np.abs(error) / limit for error in errors]
-    least = HUGE
+    ratios = [f * np.abs(error) / limit for error, f in zip(errors, fitted, strict=True)]
+    most, least = largest(ratios), HUGE
     for ratio, there_is in zip(ratios, fitted, strict=True):
         least = np.minimum(least, np.where(there_is > 0.0, ratio, HUGE))
-    least = np.where(least >= HUGE, 0.0, least)
-    return [f * np.where(least > 1.0, 0.0, r) for r, f in zip(ratios, fitted, strict=True)], least
+    alike = np.where(least < HUGE, np.where(least > ALIKE * most, 1.0, 0.0), 0.0)
+    return [(1.0 - alike) * ratio for ratio in ratios], alike * most

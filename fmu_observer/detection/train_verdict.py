@@ -162,14 +162,17 @@ def stuck_sensors(m: Memory, read: Readings, wheel: Wheels, p: Any) -> list[Arra
     return stuck
 
 
-def codes_after(m: Memory, t: Array, can: Availability, wrong: list[Array], stuck: list[Array], p: Any) -> None:
+def codes_after(
+    m: Memory, t: Array, can: Availability, wrong: list[Array], stuck: list[Array], before: list[Array], p: Any
+) -> None:
     """Fault codes, instant of the detection, confidence.
 
     Until `isolation_delay` after the first alarm of a group a fault is suspected only: residuals are not equally quick.
+    Nor are they to clear: an isolated fault is kept while alarms only go.
 
     Args:
         m: memory, changed in place. t: time [s]. can: what there can be. wrong: odometers that no wheel explains.
-        stuck: sensors that stand still. p: parameters.
+        stuck: sensors that stand still. before: alarms of the sample before. p: parameters.
     """
     raised, ratios = m.each("raised"), m.each("ratio")
     codes: list[Array] = []
@@ -182,9 +185,13 @@ def codes_after(m: Memory, t: Array, can: Availability, wrong: list[Array], stuc
         start = np.where(any_alarm > 0.0, np.where(since < 0.0, t, since), -1.0)
         said = group.judge(raised[own], can.residuals[own], possible)
         sure = np.where(t - start >= p.isolation_delay - 1e-9, 1.0, 0.0)
-        for fault, isolated, suspected in zip(group.faults, said.isolated, said.suspected, strict=True):
-            told = isolated * sure
-            codes.append(told * _isolated_code(fault, wrong) + SUSPECTED * (suspected + isolated * (1.0 - sure)))
+        known = m.each("code")[first : first + len(group.faults)]
+        fresh = largest([now * (1.0 - old) for now, old in zip(raised[own], before[own], strict=True)])
+        kept = any_alarm * (1.0 - fresh) * np.where(largest(known) >= WHEEL, 1.0, 0.0)
+        for fault, isolated, suspected, code in zip(group.faults, said.isolated, said.suspected, known, strict=True):
+            told = np.where(kept > 0.0, np.where(code >= WHEEL, 1.0, 0.0), isolated * sure)
+            maybe = (1.0 - kept) * (suspected + isolated * (1.0 - sure))
+            codes.append(told * _isolated_code(fault, wrong) + SUSPECTED * maybe)
             trusts.append((isolated + suspected) * _margin(group, fault, ratios[own], can.residuals[own]))
             counted.append(isolated + suspected)
         begun.append(start)
@@ -197,6 +204,10 @@ def codes_after(m: Memory, t: Array, can: Availability, wrong: list[Array], stuc
     for old, now in zip(m.each("group_since"), begun, strict=True):
         newest = np.where(now >= 0.0, np.where(old < 0.0, now, newest), newest)
     trust = sum(trusts, 0.0) / np.maximum(sum(counted, 0.0), 1.0)
+    slips = codes[FAULTS.index("adhesion")]
+    bad = [np.maximum(codes[0], slips), np.maximum(codes[1], slips), codes[2]]
+    faulty = [np.maximum(old, np.where(now > 0.0, 1.0, 0.0)) for old, now in zip(m.each("faulty"), bad, strict=True)]
+    m.put(faulty=faulty)
     m.put(code=codes, group_since=begun, several=largest(unexplained), trust=trust, detected_at=newest)
 
 

@@ -37,6 +37,7 @@ class IsolationTable:
 
     Args:
         residuals: names. must: by fault, the residuals that it moves. may: by fault, those that it moves at times.
+        together: residuals of which several that are quiet count as one: those of a sensor less fine than the others.
 
     Raises:
         ValueError: a fault names a residual that is not in the table, or `may` names another fault.
@@ -45,6 +46,7 @@ class IsolationTable:
     residuals: tuple[str, ...]
     must: Mapping[str, tuple[str, ...]]
     may: Mapping[str, tuple[str, ...]]
+    together: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for fault, moved in [*self.must.items(), *self.may.items()]:
@@ -75,7 +77,9 @@ class IsolationTable:
                 cover = cover if name in moved else cover * (1.0 - alarm)
             covers.append(cover)
             every = zip(self.residuals, counted, available, strict=True)
-            missing.append(sum((seen - alarm for name, alarm, seen in every if name in self.must[fault]), 0.0))
+            quiet = {name: seen - alarm for name, alarm, seen in every if name in self.must[fault]}
+            coarse = [quiet.pop(name) for name in self.together if name in quiet]
+            missing.append(sum(quiet.values(), 0.0) + (largest(coarse) if coarse else 0.0))
         none = len(self.residuals) + 1.0
         best = none
         for cover, quiet in zip(covers, missing, strict=True):
