@@ -1,7 +1,7 @@
 """Thresholds, false alarms and detections of the train's diagnosis, and what can be told apart with which sensors.
 
 ``python docs/studies/train_diagnosis.py`` prints the tables of docs/train_diagnosis.md, with ``--write`` it writes them
-(three minutes). Thresholds come from fault-free journeys, a stated rate of false alarms each; false alarms and faults
+(two minutes). Thresholds come from fault-free journeys, a stated rate of false alarms each; false alarms and faults
 are then counted on other journeys, rails, loads and seeds.
 """
 
@@ -25,7 +25,7 @@ from fmu_observer.diagnosis.thresholds import alarm_rate, checked, count_alarms,
 
 PAGE = Path(__file__).resolve().parents[1] / "train_diagnosis.md"
 PER_HOUR = 0.05  # alarms that each threshold may raise [1/h]
-SEEDS, FAULTY = 240, 40
+SEEDS, FAULTY = 120, 20
 SETTLED = 50  # samples left out at the start
 WHEEL = 2.0  # smallest code of an isolated fault
 IN_SAMPLE = "in sample"

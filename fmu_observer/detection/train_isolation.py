@@ -23,22 +23,29 @@ MOTION = IsolationTable(
         "balise",
     ),
     must={
-        "odometer_1": ("odometers", "odometer_1_radar", "odometer_1_gps"),
-        "odometer_2": ("odometers", "odometer_2_radar", "odometer_2_gps"),
-        "radar": ("odometer_1_radar", "odometer_2_radar", "radar_gps"),
+        "odometer_1": ("odometers", "odometer_1_radar", "odometer_1_gps", "way_1"),
+        "odometer_2": ("odometers", "odometer_2_radar", "odometer_2_gps", "way_2"),
+        "radar": ("odometer_1_radar", "odometer_2_radar", "radar_gps", "way_radar"),
         "gps": ("gps_position",),
         "balise": ("balise",),
-        "adhesion": ("odometer_1_radar", "odometer_2_radar", "odometer_1_gps", "odometer_2_gps"),
+        "adhesion": (
+            "odometer_1_radar",
+            "odometer_2_radar",
+            "odometer_1_gps",
+            "odometer_2_gps",
+            "way_1",
+            "way_2",
+        ),
     },
     may={
-        "odometer_1": ("way_1", "balise", "gps_position"),
-        "odometer_2": ("way_2", "balise", "gps_position"),
-        "radar": ("way_radar", "balise", "gps_position"),
+        "odometer_1": ("balise", "gps_position"),
+        "odometer_2": ("balise", "gps_position"),
+        "radar": ("balise", "gps_position"),
         "gps": ("odometer_1_gps", "odometer_2_gps", "radar_gps"),
         "balise": (),
-        "adhesion": ("odometers", "way_1", "way_2", "balise", "gps_position"),
+        "adhesion": ("odometers", "balise", "gps_position"),
     },
-    together=("odometer_1_gps", "odometer_2_gps", "radar_gps"),
+    together=(("odometer_1_gps", "odometer_2_gps", "radar_gps"), ("way_1", "way_2", "way_radar")),
 )
 """What is measured of the motion: five kinds of sensors, and rails on which both wheels slip."""
 
@@ -93,7 +100,10 @@ def available_residuals(fitted: tuple[str, ...]) -> tuple[str, ...]:
     if unknown or "odometer_1" not in fitted:
         said = f"unknown sensors {', '.join(unknown)}" if unknown else "odometer_1 is missing"
         raise ValueError(f"Sensors of a train: {said}; known are {', '.join(SENSORS)}, and odometer_1 is needed.")
-    return tuple(name for name in RESIDUALS if set(_NEEDS[name]) <= set(fitted))
+    alone = not {"odometer_2", "radar"} & set(fitted)  # then a way that is off is as well a balise that is
+    return tuple(
+        name for name in RESIDUALS if set(_NEEDS[name]) <= set(fitted) and not (alone and name.startswith("way"))
+    )
 
 
 def isolability(fitted: tuple[str, ...]) -> dict[str, tuple[str, ...] | None]:
@@ -114,4 +124,9 @@ def isolability(fitted: tuple[str, ...]) -> dict[str, tuple[str, ...] | None]:
         for fault in faults:
             others = tuple(f for f in table.not_isolable(fault, there) if f in faults)
             found[fault] = others if fault in detected else None
+    if found["odometer_1"] is None:  # its speed is believed, and the shares of force are found from it
+        for fault in ("cylinder", "friction", "traction"):
+            found[fault] = (*(found[fault] or ()), "odometer_1")
+    if "balise" in fitted and "radar" not in fitted:  # both wheels off alike, from one balise to the next
+        found["balise"] = tuple(dict.fromkeys((*(found["balise"] or ()), "adhesion")))
     return found

@@ -70,7 +70,7 @@ def availability(read: Readings, gps_full: Array, telegrams: Array) -> Availabil
         second * gps,
         radar * gps,
         gps * some,
-        first * two,
+        first * two * largest([second, radar]),
         second * two,
         radar * two,
         source * two,

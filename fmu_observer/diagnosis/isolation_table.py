@@ -37,7 +37,8 @@ class IsolationTable:
 
     Args:
         residuals: names. must: by fault, the residuals that it moves. may: by fault, those that it moves at times.
-        together: residuals of which several that are quiet count as one: those of a sensor less fine than the others.
+        together: groups of residuals of which several that are quiet count as one: those of a sensor less fine than
+            the others, or of one that comes later.
 
     Raises:
         ValueError: a fault names a residual that is not in the table, or `may` names another fault.
@@ -46,7 +47,7 @@ class IsolationTable:
     residuals: tuple[str, ...]
     must: Mapping[str, tuple[str, ...]]
     may: Mapping[str, tuple[str, ...]]
-    together: tuple[str, ...] = ()
+    together: tuple[tuple[str, ...], ...] = ()
 
     def __post_init__(self) -> None:
         for fault, moved in [*self.must.items(), *self.may.items()]:
@@ -78,8 +79,8 @@ class IsolationTable:
             covers.append(cover)
             every = zip(self.residuals, counted, available, strict=True)
             quiet = {name: seen - alarm for name, alarm, seen in every if name in self.must[fault]}
-            coarse = [quiet.pop(name) for name in self.together if name in quiet]
-            missing.append(sum(quiet.values(), 0.0) + (largest(coarse) if coarse else 0.0))
+            groups = [[quiet.pop(name) for name in group if name in quiet] for group in self.together]
+            missing.append(sum(quiet.values(), 0.0) + sum((largest(group) for group in groups if group), 0.0))
         none = len(self.residuals) + 1.0
         best = none
         for cover, quiet in zip(covers, missing, strict=True):
