@@ -8,8 +8,11 @@ import numpy as np
 
 from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.results.result import Result
+from plant_models.hybrid.units import UnitError, conversion, parse_unit
 
 Quantity = Literal["speed", "position"]
+
+UNITS = {"speed": "m/s", "position": "m"}
 
 
 def recorded(result: Result, name: str | None) -> np.ndarray | None:
@@ -22,14 +25,28 @@ def recorded(result: Result, name: str | None) -> np.ndarray | None:
 
 
 def estimate(result: Result, observer: str, signal: str) -> np.ndarray | None:
-    """What an observer said of a quantity, shape (rows,), or None where it was not recorded.
+    """What an observer said of a quantity, shape (rows,), or None where it was not recorded or is of another kind: the
+    ``speed`` of a motor in rad/s is no speed of a train.
 
     Args:
         result: the run.
         observer: name of its component.
         signal: the quantity, as the outputs of observers are called.
     """
-    return recorded(result, f"{observer}.{signal}")
+    name = f"{observer}.{signal}"
+    return None if _of_another_kind(result, name, UNITS.get(signal)) else recorded(result, name)
+
+
+def _of_another_kind(result: Result, name: str, wanted: str | None) -> bool:
+    """Whether a recorded signal has a unit, and none that is convertible to the wanted one."""
+    unit = next((s.unit for s in result.signals if s.name == name), "1")
+    if wanted is None or unit == "1":
+        return False
+    try:
+        conversion(parse_unit(unit), parse_unit(wanted))
+    except UnitError:
+        return True
+    return False
 
 
 def estimation_error(result: Result, spec: ReportSpec, observer: str, quantity: Quantity) -> np.ndarray | None:

@@ -145,8 +145,9 @@ class ExtendedFilter(FmuFilter):
     def predict(self, belief: Belief, t: float, h: float, u: Array) -> Belief:
         """The belief a step later; arguments as for `FmuFilter`."""
         x, steps = belief.x, self._steps(belief)
-        if self._directional is not None:
-            moved, F = self._directional.transition_with_slope(t, h, x, u)
+        sloped = None if self._directional is None else self._directional.transition_with_slope(t, h, x, u)
+        if sloped is not None:
+            moved, F = sloped
             P = kalman.predicted_covariance(belief.P, F, h * self.noises.intensity) + self._from_inputs(t, h, x, u)
             return replace(belief, x=moved, P=P, count=belief.count + 1)
         points, apart = _about(x, steps)

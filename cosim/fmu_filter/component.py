@@ -5,7 +5,8 @@ It is plain Python to the master: what `cosim.components.python_model` demands o
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +19,10 @@ from cosim.fmu_filter.belief import ExtendedFilter, FmuFilter, Noises, Unscented
 from cosim.fmu_filter.journal import SAME, Journal
 from cosim.fmu_filter.many import EnsembleFilter, ParticleFilter
 from cosim.fmu_filter.settings import FilterTable
+from cosim.fmu_model.exchange import ExchangeModel
 from cosim.fmu_model.opening import open_model, start_value
 from cosim.fmu_model.sealed import FmuModelError, SealedModel
-from cosim.fmu_model.trust import check_states, usual_step
+from cosim.fmu_model.trust import check_saving, check_states, usual_step
 from fmus.check.probe import probe
 from plant_models.hybrid.signal import Signal, input_signal, output_signal
 from plant_models.hybrid.units import UnitError, parse_unit
@@ -34,7 +36,8 @@ class FmuFilterModel:
     """A filter over an FMU: ``step`` predicts and takes samples, ``balise`` takes telegrams, late ones too.
 
     Inputs are those of the FMU, and ``measured_NAME`` for each output that is measured. Outputs are the estimated
-    states, the FMU's outputs at the estimate, ``NAME_std`` for each state, ``nis`` and ``nis_degrees``.
+    states, the FMU's outputs at the estimate, ``NAME_std`` for each state, ``nis`` and ``nis_degrees``. In names such
+    as ``body.v[2]`` all but letters, digits and ``_`` becomes ``_``.
 
     Args:
         path: the ``.fmu`` file. table: which filter. parameters: start values of the FMU by name.
@@ -70,11 +73,16 @@ class FmuFilterModel:
         self._P = np.zeros((len(self._estimated), len(self._estimated)))
         if table.kind != "particle":
             self._P = np.diag(_by_name(model, "state", model.states, table.start_deviation) ** 2)
-        self.inputs = [_signal(model, name, "input", name) for name in model.inputs]
-        self.inputs += [_signal(model, name, "input", MEASURED + name) for name in table.measurements]
+        self._words = legal_names([*model.inputs, *model.states, *model.outputs])
+        self.inputs = [_signal(model, name, "input", self._words[name]) for name in model.inputs]
+        self.inputs += [_signal(model, name, "input", MEASURED + self._words[name]) for name in table.measurements]
         self.outputs = self._output_signals()
-        self._measured_inputs = [MEASURED + name for name in table.measurements]
-        self._deviations = [f"{name}_std" for name in self._estimated]
+        self._driven = [self._words[name] for name in model.inputs]
+        self._told = [self._words[name] for name in model.outputs]
+        self._measured_inputs = [MEASURED + self._words[name] for name in table.measurements]
+        self._means = [self._words[name] for name in self._estimated]
+        self._deviations = [f"{name}_std" for name in self._means]
+        self._unchecked = not checked and table.kind != "particle"
         self._journal: Journal | None = None
         self._next = 0
         self._u = model.start_inputs.copy()
@@ -92,9 +100,11 @@ class FmuFilterModel:
         Returns:
             The outputs.
         """
-        table, model = self._made_of[1], self._model
+        table = self._made_of[1]
+        if self._unchecked:
+            self._check_step(dt)
         journal = self._begun(t)
-        self._u = np.array([inputs[name] for name in model.inputs], dtype=float)
+        self._u = np.array([inputs[name] for name in self._driven], dtype=float)
         journal.predict(dt, self._u)
         now = t + dt
         period = table.sample_period
@@ -156,11 +166,18 @@ class FmuFilterModel:
             self._next = 1
         return self._journal
 
+    def _check_step(self, dt: float) -> None:
+        """At the first step: its length [s] is no multiple of the one at which the states were looked at before."""
+        self._unchecked = False
+        usual = usual_step(self._model)
+        if abs(dt / usual - max(1, round(dt / usual))) > SAME:
+            check_states(self._model, dt)
+
     def _values(self, t: float) -> dict[str, float]:
         assert self._journal is not None
-        belief, model = self._journal.belief, self._model
-        found = dict(zip(model.outputs, self._engine.outputs(belief, t, self._u).tolist(), strict=True))
-        found.update(zip(self._estimated, belief.x.tolist(), strict=True))
+        belief = self._journal.belief
+        found = dict(zip(self._told, self._engine.outputs(belief, t, self._u).tolist(), strict=True))
+        found.update(zip(self._means, belief.x.tolist(), strict=True))
         deviations = np.sqrt(np.maximum(belief.P.diagonal(), 0.0))
         found.update(zip(self._deviations, deviations.tolist(), strict=True))
         found["nis"], found["nis_degrees"] = belief.nis, float(belief.degrees)
@@ -169,8 +186,8 @@ class FmuFilterModel:
     def _output_signals(self) -> list[Signal]:
         model = self._model
         names = list(dict.fromkeys([*model.states, *model.outputs]))
-        found = [_signal(model, name, "output", name) for name in names]
-        found += [_signal(model, name, "output", f"{name}_std") for name in self._estimated]
+        found = [_signal(model, name, "output", self._words[name]) for name in names]
+        found += [_signal(model, name, "output", f"{self._words[name]}_std") for name in self._estimated]
         return [
             *found,
             output_signal("nis", "1", "NIS of the last sample"),
@@ -181,17 +198,34 @@ class FmuFilterModel:
         """First outputs, before the first step: the start."""
         if name.startswith("_"):
             raise AttributeError(name)
-        first = dict(zip(self._model.states, self._start.tolist(), strict=True))
-        deviations = np.sqrt(np.diagonal(self._P)).tolist()
-        first |= {f"{state}_std": value for state, value in zip(self._estimated, deviations, strict=True)}
+        states = [self._words[state] for state in self._model.states]
+        first = dict(zip(states, self._start.tolist(), strict=True))
+        first |= zip(self._deviations, np.sqrt(np.diagonal(self._P)).tolist(), strict=True)
         if name in first:
             return float(first[name])
-        if name in self._model.outputs:
+        if name in self._told:
             _, y = self._model.values_at(0.0, self._start, self._model.start_inputs)
-            return float(y[self._model.outputs.index(name)])
+            return float(y[self._told.index(name)])
         if name in ("nis", "nis_degrees"):
             return 0.0
         raise AttributeError(name)
+
+
+def legal_names(names: Sequence[str]) -> dict[str, str]:
+    """Names of an FMU as those of signals: what is no letter, digit or ``_`` becomes ``_``, ``body.v[2]`` ``body_v_2``.
+
+    Args:
+        names: of variables, perhaps some twice.
+    """
+    found: dict[str, str] = {}
+    for name in dict.fromkeys(names):
+        word = re.sub(r"\W+", "_", name).strip("_") or "variable"
+        word = f"_{word}" if word[0].isdigit() else word
+        number, base = 2, word
+        while word in found.values():
+            word, number = f"{base}_{number}", number + 1
+        found[name] = word
+    return found
 
 
 def _engine(table: FilterTable, model: SealedModel, noises: Noises) -> FmuFilter:
@@ -209,10 +243,8 @@ def _opened(path: str | Path, table: FilterTable, parameters: Mapping[str, float
     """The FMU with its states, or without where they are only saved."""
     if table.kind != "particle":
         return open_model(path, table.interface, states=table.states, outputs=table.outputs, parameters=parameters)
-    if table.interface == "model-exchange":
-        raise FmuModelError(f"{path}: a particle filter saves states between steps, which is co-simulation's.")
     starts = {name: start_value(path, name) for name in table.start_deviation if name not in parameters}
-    return open_model(path, "co-simulation", states=(), outputs=table.outputs, parameters={**parameters, **starts})
+    return open_model(path, table.interface, states=(), outputs=table.outputs, parameters={**parameters, **starts})
 
 
 def _demand(table: FilterTable, model: SealedModel, parameters: Mapping[str, float]) -> None:
@@ -221,12 +253,18 @@ def _demand(table: FilterTable, model: SealedModel, parameters: Mapping[str, flo
     if table.kind != "particle":
         check_states(model, h)
         return
-    seen = probe(lambda: load_fmu(model.path, "probed"), parameters, 0.0, h)
-    if seen.restores == "no":
+    if isinstance(model, ExchangeModel):
+        check_saving(model, h)
+    elif (seen := probe(lambda: load_fmu(model.path, "probed"), parameters, 0.0, h)).restores == "no":
         found = "; ".join(seen.remarks) or "it does not declare canGetAndSetFMUState"
         raise FmuModelError(
             f"{model.path}: its states cannot be saved and restored honestly ({found}), so no particle filter can "
             "select among them. Use 'ekf', 'ukf' or 'ensemble' where its states have start values."
+        )
+    if not any((*table.start_deviation.values(), *table.input_noise.values())):
+        raise FmuModelError(
+            f"{model.path}: nothing moves the particles apart: give 'start_deviation' (start values, parameters too) "
+            "or 'input_noise'."
         )
 
 

@@ -40,7 +40,8 @@ class EnsembleFilter(FmuFilter):
     def predict(self, belief: Belief, t: float, h: float, u: Array) -> Belief:
         """The belief a step later; arguments as for `FmuFilter`."""
         members, count = _points(belief), belief.count + 1
-        driven = u[:, None] + ensemble.drawn(self.noises.inputs, self._draws(2 * count, len(u)))
+        draws = self._draws(2 * count, len(u))
+        driven = u[:, None] + (ensemble.drawn(self.noises.inputs, draws) if len(u) else draws)
         moved = self.model.states_after(t, h, members, driven)
         added = ensemble.drawn(h * self.noises.intensity, self._draws(2 * count + 1, len(belief.x)))
         return self._summed(replace(belief, points=moved + added, count=count))
@@ -122,7 +123,7 @@ class ParticleFilter(FmuFilter):
         """The belief a step later; arguments as for `FmuFilter`."""
         model, count = self.model, belief.count + 1
         draws = np.random.default_rng([self._seed, count]).standard_normal((len(u), self._count))
-        driven = u[:, None] + ensemble.drawn(self.noises.inputs, draws)
+        driven = u[:, None] + (ensemble.drawn(self.noises.inputs, draws) if len(u) else draws)
         states, columns = [], []
         for i, saved in enumerate(belief.states):
             model.told(partial(model.instance.restore, saved.state))

@@ -1,26 +1,25 @@
-"""A model exchange FMU as a model: its states are set, its derivatives integrated here. Touches one instance.
+"""A model exchange FMU as a model: its states are set, its derivatives integrated here, its events handled on the way.
+Touches one instance.
 
-Between two restarts no event happens: what the FMU decided at the restart (a contact that sticks, a zone that is
-degraded) stays so. That is what a linearisation and one step of a filter need.
+A linearisation looks at the equations that hold at its point: what the FMU decided at the restart (a contact that
+sticks, a zone that is degraded) stays so.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
-import scipy
 
-from cosim.fmu_model.sealed import Array, FmuModelError, SealedModel, declared_states
-
-TOLERANCE = 1e-10
-"""Relative and absolute, of the integration: far below what a filter or a difference shows."""
+from cosim.fmu_model.exchange_events import EventRun, integrated
+from cosim.fmu_model.sealed import Array, FmuModelError, SealedModel, Way, declared_states
 
 
 class ExchangeModel(SealedModel):
     """A model exchange FMU; arguments as for `SealedModel`. Its states are those that it declares, in its own order."""
 
-    way = "exchange"
+    way: Way = "exchange"
 
     @property
     def directional(self) -> bool:
@@ -76,23 +75,17 @@ class ExchangeModel(SealedModel):
             )
 
     def advance(self, t: float, h: float) -> None:
-        """Integrate from where the instance stands by LSODA, for stiff equations too, inputs held.
+        """Integrate from where the instance stands by LSODA, for stiff equations too, inputs held, events handled.
 
         Args:
             t: instant [s]. h: how far [s].
 
         Raises:
-            FmuModelError: the FMU refuses.
+            FmuModelError: the FMU refuses, asks for the end, or has more events than can be.
         """
-        x, u = self.told(self.instance.states), self._inputs.copy()
+        self._run.advance(t, h, self.told(self.instance.states), self._inputs.copy())
 
-        def rates(instant: float, at: Array) -> Array:
-            self.move(instant, at, u)
-            return self.derivatives()
-
-        self.move(t + h, self._integrated(rates, t, h, x), u)
-
-    def transition_with_slope(self, t: float, h: float, x: Array, u: Array) -> tuple[Array, Array]:
+    def transition_with_slope(self, t: float, h: float, x: Array, u: Array) -> tuple[Array, Array] | None:
         """States after a step, and their Jacobian by the states before it: the variational equation ``dF = A F`` with A
         from directional derivatives, integrated along.
 
@@ -100,18 +93,23 @@ class ExchangeModel(SealedModel):
             t: begin of the step [s]. h: its length [s]. x: states, shape (n,). u: inputs, held, shape (m,).
 
         Returns:
-            States at its end, shape (n,), and the Jacobian, shape (n, n).
+            States at its end, shape (n,), and the Jacobian, shape (n, n); None where an event lies in the step, over
+            which this equation does not hold.
         """
         n, rows = len(x), self.derivative_names
         self.restart(t, x, u)
+        before = self._run.signs()
 
         def rates(instant: float, at: Array) -> Array:
             self.move(instant, at[:n], u)
             A = self.slopes(rows)
             return np.concatenate([self.derivatives(), (A @ at[n:].reshape(n, n)).ravel()])
 
-        end = self._integrated(rates, t, h, np.concatenate([x, np.eye(n).ravel()]))
+        whole = integrated(self.path, rates, t, t + h, np.concatenate([x, np.eye(n).ravel()]))
+        end = np.asarray(whole.y[:, -1])
         self.move(t + h, end[:n], u)
+        if self.instance.next_event <= t + h or (self._run.signs() != before).any():
+            return None
         return end[:n], end[n:].reshape(n, n)
 
     def slopes(self, unknowns: Sequence[str]) -> Array:
@@ -123,14 +121,6 @@ class ExchangeModel(SealedModel):
         ask = self.instance.directional_derivative
         columns = self.told(lambda: [ask(unknowns, [name], [1.0]) for name in self.states])
         return np.array(columns).T.reshape(len(unknowns), len(self.states))
-
-    def _integrated(self, rates: Callable[[float, Array], Array], t: float, h: float, start: Array) -> Array:
-        solution = scipy.integrate.solve_ivp(
-            rates, (t, t + h), start, method="LSODA", rtol=TOLERANCE, atol=TOLERANCE, t_eval=[t + h]
-        )
-        if not solution.success:
-            raise FmuModelError(f"{self.path}: its derivatives cannot be integrated from {t:g} s: {solution.message}")
-        return np.asarray(solution.y[:, -1])
 
     def _own_states(self, given: Sequence[str] | None) -> Sequence[str]:
         own = declared_states(self.instance)
@@ -151,10 +141,14 @@ class ExchangeModel(SealedModel):
         super()._restart(t, x, u)
         if self._set_afterwards:
             instance = self.instance
+            instance.set_states(x)  # which FMI allows in Continuous-Time Mode only
             instance.guard("enterEventMode", instance.slave.enterEventMode)
-            instance.set_states(x)
             instance.settle()
             instance.guard("enterContinuousTimeMode", instance.slave.enterContinuousTimeMode)
 
     def _enter(self, t: float) -> None:
         self.instance.initialize(t)
+
+    @cached_property
+    def _run(self) -> EventRun:
+        return EventRun(self)

@@ -15,6 +15,7 @@ from cosim.fmu_model.exchange import ExchangeModel
 from cosim.fmu_model.linearisation import Linearisation, Method
 from cosim.fmu_model.opening import Interface, open_model
 from cosim.fmu_model.sealed import FmuModelError, SealedModel
+from cosim.fmu_model.trust import check_states
 from fmus.check.derivatives import RELATIVE_STEP, compare
 from fmus.check.findings import Verdict
 
@@ -90,6 +91,7 @@ def linearise_model(model: SealedModel, t: float, x: Array, u: Array, step: floa
         function, length = _continuous(model, t), 0.0
     else:
         function, length = _sampled(model, t, step), step
+        remarks += _doubts(model, step)
     rates, y = function(x, u)
     if not (np.isfinite(rates).all() and np.isfinite(y).all()):
         raise FmuModelError(f"{model.path}: at this point it gives values that are no finite numbers. Choose another.")
@@ -167,6 +169,18 @@ def _sampled(model: SealedModel, t: float, step: float) -> Function:
         return model.read()[0], y
 
     return function
+
+
+def _doubts(model: SealedModel, step: float) -> list[str]:
+    """What stands against the states of a co-simulation, and where they are set, if that is unusual."""
+    told = []
+    if model.way == "step mode":
+        told.append("Its states have no start values; they are set in Step Mode, after a restart, which it takes.")
+    try:
+        check_states(model, step)
+    except FmuModelError as error:
+        told.append(f"Do not rely on A and B before this is settled: {str(error).removeprefix(f'{model.path}: ')}")
+    return told
 
 
 def _differences(model: SealedModel, function: Function, x: Array, u: Array) -> Array:

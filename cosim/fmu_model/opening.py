@@ -59,7 +59,8 @@ def open_model(
     if chosen is None:
         chosen = offered[0] if offered else CO_SIMULATION
     if chosen not in offered:
-        raise FmuModelError(f"{path}: it has no {interface or 'co-simulation'}; it offers: {', '.join(offered)}.")
+        instead = ", ".join(offered) or "scheduled execution only, in which no time passes by itself"
+        raise FmuModelError(f"{path}: it has no {interface or 'co-simulation'}; it offers: {instead}.")
     try:
         archive.demand_this_platform(chosen)
     except NotAnFmuError as error:

@@ -23,7 +23,7 @@ from fmus.check.instance import SlaveError
 from fmus.fmi.instance import Instance
 
 Array = NDArray[np.float64]
-Way = Literal["restart", "exchange"]
+Way = Literal["restart", "step mode", "exchange"]
 REALS = ("Real", "Float64", "Float32")
 FAR = 1e6
 """End of the experiment that is announced, after the instant of a restart [s]."""
@@ -69,13 +69,13 @@ class SealedModel(ABC):
         self.inputs = tuple(self._chosen(inputs, real_names(instance, "input"), "input"))
         self.parameters = dict(parameters or {})
         self._chosen(list(self.parameters), [], "parameter")
-        self._demand_settable()
         self.told(instance.instantiate)
         self._states_read, self._outputs_read = np.zeros(len(self.states)), np.zeros(len(self.outputs))
         self._read_states = instance.reader(list(self.states), self._states_read)
         self._read_outputs = instance.reader(list(self.outputs), self._outputs_read)
         self._write_inputs, self._inputs = instance.writer(list(self.inputs))
         self.start, self.start_inputs = self.told(self._begun)
+        self._demand_settable()
         self.parameters = {name: value for name, value in self.parameters.items() if name not in self.states}
         starts = self.states if all(map(self._has_start, self.states)) else ()
         self._settings = [name for name in self.parameters if name not in self.inputs]
@@ -280,17 +280,9 @@ class SealedModel(ABC):
             variable.initial in ("exact", "approx") and variable.variability != "constant"
         )
 
+    @abstractmethod
     def _demand_settable(self) -> None:
-        """Refuse states that no start value moves."""
-        for name in self.states:
-            if not self._has_start(name):
-                variable = self.instance.variables.element(name).variable
-                raise FmuModelError(
-                    f"{self.path}: the state {name!r} has no start value that can be set (causality "
-                    f"{variable.causality}, initial {variable.initial or 'not declared'}), so no filter can move it. "
-                    "Name states whose start is exact, use the model exchange of the FMU where it has one, or a "
-                    "particle filter over saved states, which selects and moves nothing."
-                )
+        """Refuse states that nothing moves; the instance stands at its start."""
 
     def told(self, call: Callable[[], Any]) -> Any:
         """What a call of the FMU gives; its failure in words with the file.
@@ -307,7 +299,7 @@ class SealedModel(ABC):
             raise self._in_words(error) from error
 
     def _in_words(self, error: SlaveError) -> FmuModelError:
-        return FmuModelError(f"{self.path}: {error}.")
+        return FmuModelError(f"{self.path}: {str(error).rstrip('.')}.")
 
 
 def real_names(instance: Instance, causality: str) -> list[str]:

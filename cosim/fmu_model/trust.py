@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
+from math import ceil
 
 import numpy as np
 
@@ -13,6 +15,8 @@ SOLVER = 1e-3
 """What a restarted solver may make of a step, as a share of the change over it; a part of the state that was forgotten
 makes more of it.
 """
+MOST_RESTARTS = 100
+"""Restarts in a row by which steps of an FMU's own are looked for."""
 ROUNDING = 1e-9
 """The same as a share of the values."""
 
@@ -60,6 +64,7 @@ def check_states(model: SealedModel, h: float, t: float = 0.0) -> StateTrust:
             which finding it was and what to do.
     """
     u = model.start_inputs + 1.0
+    _demand_own_steps_fit(model, t, u, h)
     model.restart(t, model.start, u)
     rows = [model.read()]
     for k in range(2 * STEPS):
@@ -80,6 +85,68 @@ def check_states(model: SealedModel, h: float, t: float = 0.0) -> StateTrust:
             "given. No filter can move it; a particle filter over saved states only selects."
         )
     return StateTrust(model.way, exact, worst, idle)
+
+
+def check_saving(model: SealedModel, h: float, t: float = 0.0) -> None:
+    """Measure whether a saved state is all of the state: steps are made, taken back and made again.
+
+    Args:
+        model: the FMU. h: length of the steps [s]. t: start of the run [s].
+
+    Raises:
+        FmuModelError: it saves no states, or what follows a restored one is something else.
+    """
+    names = (*model.states, *model.outputs)
+    model.restart(t, model.start, model.start_inputs + 1.0)
+    model.advance(t, h)
+    if not model.instance.can_save:
+        raise FmuModelError(
+            f"{model.path}: it does not declare that its state can be saved and restored, so no particle filter can "
+            "select among states. Use 'ekf', 'ukf' or 'ensemble' where its states can be set."
+        )
+    saved = model.told(model.instance.save)
+    runs = []
+    for again in (False, True):
+        if again:
+            model.told(partial(model.instance.restore, saved))
+        model.set_inputs(model.start_inputs + 1.0)
+        for k in range(1, 1 + STEPS):
+            model.advance(t + k * h, h)
+        runs.append(np.concatenate(model.read()))
+    model.told(partial(model.instance.release, saved))
+    apart = np.flatnonzero(~((runs[0] == runs[1]) | (np.isnan(runs[0]) & np.isnan(runs[1]))))
+    if len(apart):
+        i = int(apart[0])
+        raise FmuModelError(
+            f"{model.path}: restored and stepped again, {names[i]} is {float(runs[1][i])!r}, and {float(runs[0][i])!r} "
+            "before: its states cannot be saved and restored honestly, so no particle filter can select among them."
+        )
+
+
+def _demand_own_steps_fit(model: SealedModel, t: float, u: Array, h: float) -> None:
+    """Refuse an FMU whose own steps are longer than those asked for: started anew at each of them it never makes one.
+
+    Looked at over two steps of its default experiment, where those are longer.
+    """
+    x = model.start
+    count = min(ceil(2.0 * usual_step(model) / h - ROUNDING), MOST_RESTARTS)
+    if count <= STEPS:
+        return
+    model.restart(t, x, u)
+    for k in range(count):
+        model.advance(t + k * h, h)
+    run, redone = model.read()[0], x
+    for k in range(count):
+        redone = model.transition(t + k * h, h, redone, u)[0]
+    apart = np.abs(redone - run) - SOLVER * np.abs(run - x) - ROUNDING * np.maximum(np.abs(run), 1.0)
+    if (apart > 0.0).any():
+        i = int(np.argmax(apart))
+        raise FmuModelError(
+            f"{model.path}: started again at each of {count} steps of {h:g} s, {model.states[i]} is "
+            f"{float(redone[i])!r} at the end, and {float(run[i])!r} in the run: the FMU has steps of its own that do "
+            f"not fit into these. Use steps of {usual_step(model):g} s, those of its default experiment, or its model "
+            "exchange."
+        )
 
 
 def _demand_read_back(model: SealedModel, t: float, x: Array, u: Array) -> None:

@@ -14,8 +14,9 @@ keeps the bounds after any number of passes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +25,7 @@ from fmu_observer.filtering.kalman import Form, correct, predicted_covariance, s
 from fmu_observer.moving_horizon.arrival_cost import ArrivalCost
 from fmu_observer.moving_horizon.robust_loss import Loss, weight
 from fmu_observer.moving_horizon.window import RowLayout, WindowRow
-from plant_models.hybrid.scan import Arrays, scan
+from plant_models.hybrid.scan import Arrays, scan_table
 from plant_models.hybrid.system import Array, vector
 
 
@@ -103,14 +104,14 @@ class Solution(NamedTuple):
     """What some passes make of a window.
 
     Attributes:
-        estimates: of each row, shape (n,) each. covariance: of the last one, row by row, shape (n * n,).
+        estimates: of each row, shape (N, n). covariance: of the last one, row by row, shape (n * n,).
         residual: root of the mean square of the weighted residuals, in their deviations [1].
         step: largest change of an estimate in the last pass, in its standard deviations [1].
         moved: passes after which an estimate had changed by more than `SETTLED` of its deviation.
         bounds: bounds that are active in the last row.
     """
 
-    estimates: list[Array]
+    estimates: Array
     covariance: Array
     residual: Array
     step: Array
@@ -118,60 +119,53 @@ class Solution(NamedTuple):
     bounds: Array
 
 
+KEPT = 8  # problems whose sweeps are known as functions, so that they are traced once
 SETTLED = 1e-3  # of a standard deviation: a pass that changes less has nothing left to do
 
 
 def solve(
-    problem: WindowProblem,
-    arrival: ArrivalCost,
-    rows: Sequence[Array],
-    points: Sequence[Array],
-    shared: Array,
-    passes: int,
+    problem: WindowProblem, arrival: ArrivalCost, rows: Array, points: Array, shared: Array, passes: int
 ) -> Solution:
     """A number of Gauss-Newton passes over a window.
 
     Args:
         problem: what moves and what is measured. arrival: what is known before the first row.
-        rows: oldest first, flat. points: states about which the first pass linearises, one a row, shape (n,) each; of
-            the last row the prediction.
+        rows: oldest first, shape (N, width). points: states about which the first pass linearises, shape (N, n); of the
+            last row the prediction.
         shared: what all rows share, shape (s,). passes: one or more.
     """
-    n, b = problem.order, len(problem.bounded)
-    active = [_at_bounds(problem, point, shared) for point in points]
-    fresh = [np.zeros(1)] * (len(rows) - 1) + [np.ones(1)]
-    count = np.zeros(1)
+    n, count = problem.order, rows.shape[0]
+    active, used = _at_bounds(problem, points, shared), np.zeros(1)
+    fresh = np.zeros((count, 1))
+    fresh[-1] = 1.0
     for _ in range(passes):
-        table = list(zip(rows, points, active, fresh, strict=True))
-        _, swept = scan(_forwards(problem), tuple(arrival), table, (shared,))
+        table = (rows, points, active, fresh)
+        _, swept = scan_table(_forwards(problem), tuple(arrival), table, (shared,))
         behind = (np.zeros(n), np.zeros(3))
-        (_, sums), found = scan(
-            _backwards(problem),
-            behind,
-            [(*a, *s) for a, s in zip(table, swept, strict=True)],
-            (shared,),
-            backwards=True,
+        (_, sums), (points, active) = scan_table(
+            _backwards(problem), behind, (*table, *swept), (shared,), backwards=True
         )
-        points, active = [row[0] for row in found], [row[1] for row in found]
-        fresh = [np.zeros(1)] * len(rows)
-        count = count + np.where(sums[1:2] > SETTLED, 1.0, 0.0)
-    bounds = np.reshape(np.sum(np.abs(active[-1])), (1,)) if b else np.zeros(1)
+        fresh = np.zeros((count, 1))
+        used = used + np.where(sums[1:2] > SETTLED, 1.0, 0.0)
+    held = np.reshape(np.sum(np.abs(active[-1])), (1,))
     residual = np.sqrt(sums[0:1] / np.maximum(sums[2:3], 1.0))
-    return Solution(points, swept[-1][1], residual, sums[1:2], count, bounds)
+    return Solution(points, swept[1][-1], residual, sums[1:2], used, held)
 
 
 def passed(problem: WindowProblem, arrival: ArrivalCost, row: Array, point: Array, shared: Array) -> ArrivalCost:
     """The arrival cost after a row has left the window.
 
     Args:
-        problem: what moves and what is measured. arrival: before the row. row: the oldest, flat.
+        problem: what moves and what is measured. arrival: before the row. row: the oldest, shape (width,).
         point: its state, shape (n,). shared: what all rows share, shape (s,).
     """
-    table = [(row, point, np.zeros(max(len(problem.bounded), 1)), np.zeros(1))]
-    after, _ = scan(_forwards(problem), tuple(arrival), table, (shared,))
+    of_row, at = np.reshape(row, (1, problem.layout.width)), np.reshape(point, (1, problem.order))
+    table = (of_row, at, np.zeros((1, max(len(problem.bounded), 1))), np.zeros((1, 1)))
+    after, _ = scan_table(_forwards(problem), tuple(arrival), table, (shared,))
     return ArrivalCost(*after)
 
 
+@lru_cache(maxsize=KEPT)
 def _forwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tuple[Arrays, Arrays]]:
     """The Kalman filter over one row: prediction, measurements, active bounds."""
     n, q = problem.order, problem.layout.measurements
@@ -200,6 +194,7 @@ def _forwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tupl
     return body
 
 
+@lru_cache(maxsize=KEPT)
 def _backwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tuple[Arrays, Arrays]]:
     """The adjoint over one row: its state, its bounds, and what it says of the rows before."""
     n, q = problem.order, problem.layout.measurements
@@ -274,13 +269,13 @@ def _held(
     return mean, P, vector(*gains), vector(*pulls)
 
 
-def _at_bounds(problem: WindowProblem, point: Array, shared: Array) -> Array:
-    """1 where a state stands at its upper bound, -1 at its lower one, else 0, shape (b,), at least (1,)."""
+def _at_bounds(problem: WindowProblem, points: Array, shared: Array) -> Array:
+    """1 where a state stands at its upper bound, -1 at its lower one, else 0, shape (N, b), at least (N, 1)."""
     if not problem.bounded:
-        return np.zeros(1)
+        return np.zeros((points.shape[0], 1))
     lower, upper = problem.limits(shared)
-    signs = []
+    columns = []
     for k, i in enumerate(problem.bounded):
-        x, high, low = point[i : i + 1], upper[k : k + 1], lower[k : k + 1]
-        signs.append(np.where(x >= high, 1.0, 0.0) - np.where(x <= low, 1.0, 0.0))
-    return np.hstack(signs)
+        x = points[:, i : i + 1]
+        columns.append(np.where(x >= upper[k], 1.0, 0.0) - np.where(x <= lower[k], 1.0, 0.0))
+    return np.hstack(columns)

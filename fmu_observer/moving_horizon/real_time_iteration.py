@@ -5,13 +5,14 @@ And what an observer remembers and tells of it, as signals. It knows no observer
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from fmu_observer.moving_horizon.arrival_cost import arrival_cost_from
-from fmu_observer.moving_horizon.gauss_newton import WindowProblem, passed, solve
-from fmu_observer.moving_horizon.window import rows_of
+from fmu_observer.moving_horizon.gauss_newton import KEPT, WindowProblem, passed, solve
 from plant_models.hybrid import Signal, memory, output_signal
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.scan import enclosed
@@ -104,19 +105,28 @@ def iterate(
         arrival, window, points: as remembered (`arrival_cost`, `window`, `window_estimates`), flat.
         row: the new one, flat. point: prediction of its state, shape (n,). shared: what all rows share, shape (s,).
     """
+    arrays = (arrival, window, points, row, point, shared)
+    estimate, covariance, remembered = enclosed(_iteration(problem, passes), *arrays)
+    return Iterated(estimate, covariance, remembered)
+
+
+@lru_cache(maxsize=KEPT)
+def _iteration(problem: WindowProblem, passes: int) -> Callable[..., tuple[Array, ...]]:
+    """What `iterate` does, as a function of arrays alone."""
     n, width = problem.order, problem.layout.width
 
     def iterated(*arrays: Array) -> tuple[Array, ...]:
         old, table, states, new, predicted, known = arrays
-        rows, estimates = rows_of(table, width), rows_of(states, n)
-        before = passed(problem, arrival_cost_from(old, n), rows[0], estimates[0], known)
-        rows = [*rows[1:], new]
-        found = solve(problem, before, rows, [*estimates[1:], predicted], known, passes)
+        count = states.shape[0] // n
+        before = passed(problem, arrival_cost_from(old, n), table[:width], states[:n], known)
+        rows = np.reshape(np.hstack([table[width:], new]), (count, width))
+        estimates = np.reshape(np.hstack([states[n:], predicted]), (count, n))
+        found = solve(problem, before, rows, estimates, known, passes)
         last = (found.residual, found.step, found.moved, problem.layout.count(rows), found.bounds)
-        return found.estimates[-1], found.covariance, np.hstack([*before, *rows, *found.estimates, *last])
+        kept = (np.reshape(rows, (count * width,)), np.reshape(found.estimates, (count * n,)))
+        return found.estimates[-1], found.covariance, np.hstack([*before, *kept, *last])
 
-    estimate, covariance, remembered = enclosed(iterated, arrival, window, points, row, point, shared)
-    return Iterated(estimate, covariance, remembered)
+    return iterated
 
 
 def joined(*parts: Array) -> Array:

@@ -6,7 +6,6 @@ not used in their row, or have no row. It knows no model.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -67,20 +66,11 @@ class RowLayout:
         vectors = (row.inputs, row.measured, row.used)
         return [row.moves, row.period, row.time, *(v[i] for v in vectors for i in range(v.shape[0]))]
 
-    def count(self, rows: Sequence[Array]) -> Array:
+    def count(self, rows: Array) -> Array:
         """How many rows have a measurement, shape (1,).
 
         Args:
-            rows: flat, shape (width,) each.
+            rows: shape (N, width).
         """
-        q = self.measurements
-        return sum((np.where(np.sum(row[-q:]) > 0.5, np.ones(1), np.zeros(1)) for row in rows), np.zeros(1))
-
-
-def rows_of(window: Array, width: int) -> list[Array]:
-    """The rows of a flat window, oldest first, shape (width,) each.
-
-    Args:
-        window: shape (N * width,). width: numbers in a row.
-    """
-    return [window[i : i + width] for i in range(0, window.shape[0], width)]
+        used = rows[:, self.width - self.measurements :] @ np.ones(self.measurements)
+        return np.reshape(np.sum(np.where(used > 0.5, 1.0, 0.0)), (1,))

@@ -13,13 +13,15 @@ from fmpy.model_description import ModelDescription
 from fmus.check.instance import FmuInstance
 from fmus.fmi.fmi2 import FMI2Instance
 from fmus.fmi.fmi3 import FMI3Instance
-from fmus.fmi.standard import MODEL_EXCHANGE, fmi_version
+from fmus.fmi.standard import MODEL_EXCHANGE, NEVER, fmi_version
 
 
 class FmuModel(FmuInstance):
     """A model exchange instance, from `instantiate` over `initialize` to continuous-time mode."""
 
     interface = MODEL_EXCHANGE
+    next_event = NEVER
+    """The next instant at which the FMU wants Event Mode [s]."""
 
     @property
     def state_count(self) -> int:
@@ -72,9 +74,19 @@ class FmuModel(FmuInstance):
     def update_discrete_states(self) -> bool:
         """End a super-dense instant; True where the FMU needs another one."""
         update = self.slave.newDiscreteStates if self.fmi_version == 2 else self.slave.updateDiscreteStates
-        again, end, *_ = self.guard("updating discrete states", update)
+        again, end, _, _, defined, instant = self.guard("updating discrete states", update)
         self.terminated |= bool(end)
+        self.next_event = float(instant) if defined else NEVER
         return bool(again)
+
+    def _forget(self) -> None:
+        self.next_event = NEVER
+
+    def _remember(self) -> tuple[Any, ...]:
+        return self.terminated, self.next_event
+
+    def _recall(self, remembered: tuple[Any, ...]) -> None:
+        self.terminated, self.next_event = remembered
 
     def _filled(self, what: str, call: Callable[[Any, int], Any], count: int) -> np.ndarray:
         values = np.zeros(count)

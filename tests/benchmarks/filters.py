@@ -1,28 +1,35 @@
-"""Benchmark: native Kalman filters of a synchronous motor (4 states, 2 measurements) beside those of filterpy.
+"""Benchmark: native Kalman filters of a synchronous motor (4 states, 2 measurements) beside those of filterpy, filters
+of 20 members of it, and the filter of odometer and balises.
 
-``python tests/benchmarks/filters.py [SAMPLES]``. All take one Runge-Kutta step a period, on the same equations.
-Nothing is asserted. Times are CPU seconds of this process.
+``python tests/benchmarks/filters.py [SAMPLES]``. Those of the motor take one Runge-Kutta step a period, on the same
+equations; filterpy has no particle filter, so that one stands beside its ensemble, and of the train it computes the
+matrices only. Nothing is asserted. Times are CPU seconds of this process.
 """
 
 from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import filterpy.kalman
 import numpy as np
 
+from fmu_observer.observers.discrete.ensemble_kalman_filter import EnsembleKalmanFilter
 from fmu_observer.observers.discrete.extended_kalman_filter import ExtendedKalmanFilter
-from fmu_observer.observers.discrete.gaussian_filter import GaussianFilter
+from fmu_observer.observers.discrete.particle_filter import ParticleFilter
 from fmu_observer.observers.discrete.unscented_kalman_filter import UnscentedKalmanFilter
+from fmu_observer.observers.train.balise_odometer_ekf import ODOMETER_ROW, BaliseOdometerEkf, transition
 from fmus import Batch
 from plant_models import PLANTS
+from plant_models.hybrid import HybridSystem
 
 MEMBERS = 200
+DRAWN = 20  # members of an ensemble, or particles
 MOTOR: dict[str, Any] = {"model": "synchronous_motor", "outputs": ["current_d", "current_q"], "substeps": 1}
 T = PLANTS["synchronous_motor"]().internal_step
+DRIVEN = {"sample_period": T, "voltage_d": 1.0}
 R, L, FLUX, J, FRICTION, POLES = 3.4, 0.0121, 0.013, 5.9e-6, 1e-4, 2.0
 H = np.eye(2, 4)
 
@@ -38,15 +45,27 @@ def main(arguments: list[str]) -> None:
                 f"  {kind.name}, {form}: {1e6 * own:.3f} us a sample, {theirs[other] / own:.0f} times faster",
                 flush=True,
             )
+    theirs["ensemble"] = by_filterpy(ensemble(), max(10, samples // 10))
+    print(f"ensemble filter of filterpy, {DRAWN} members: {1e6 * theirs['ensemble']:.1f} us a sample", flush=True)
+    for drawn in (EnsembleKalmanFilter, ParticleFilter):
+        own = native(drawn(members=DRAWN, **MOTOR), max(10, samples // 10))
+        print(f"  {drawn.name}: {1e6 * own:.3f} us a sample, {theirs['ensemble'] / own:.0f} times faster", flush=True)
+    theirs["train"] = by_filterpy(train(), samples)
+    print(f"the matrices of {BaliseOdometerEkf.name} by filterpy: {1e6 * theirs['train']:.1f} us a reading", flush=True)
+    own = native(BaliseOdometerEkf(), samples, {"effort": 2e4, "odometer": 20.0}, period=0.1)
+    print(
+        f"  {BaliseOdometerEkf.name}, flow and gates too: {1e6 * own:.3f} us, {theirs['train'] / own:.0f} times faster",
+        flush=True,
+    )
 
 
-def native(system: GaussianFilter, samples: int) -> float:
+def native(system: HybridSystem, samples: int, values: Mapping[str, float] = DRIVEN, period: float = T) -> float:
     """CPU seconds of a sample in the C of the FMU, with its integration loop and events."""
     batch = Batch(system, MEMBERS)
-    batch.set("sample_period", T)
-    batch.set("voltage_d", 1.0)
+    for name, value in values.items():
+        batch.set(name, value)
     batch.start()
-    spent = seconds(lambda: batch.run([samples * T]))
+    spent = seconds(lambda: batch.run([samples * period]))
     assert not batch.failures
     return spent / (samples * MEMBERS)
 
@@ -112,6 +131,32 @@ def unscented() -> Callable[[np.ndarray], None]:
     def step(reading: np.ndarray) -> None:
         theirs.predict()
         theirs.update(reading)
+
+    return step
+
+
+def ensemble() -> Callable[[np.ndarray], None]:
+    theirs = filterpy.kalman.EnsembleKalmanFilter(np.zeros(4), np.eye(4), 2, T, DRAWN, lambda x: x[:2], moved)
+    theirs.Q, theirs.R = 1e-3 * np.eye(4), 0.1 * np.eye(2)
+
+    def step(reading: np.ndarray) -> None:
+        theirs.predict()
+        theirs.update(reading)
+
+    return step
+
+
+def train() -> Callable[[np.ndarray], None]:
+    theirs, p = (
+        filterpy.kalman.KalmanFilter(4, 1),
+        BaliseOdometerEkf().unpack_parameters(BaliseOdometerEkf().start_parameters()),
+    )
+    theirs.H, theirs.R = ODOMETER_ROW, np.array([[p.odometer_deviation**2]])
+    theirs.F, theirs.Q = transition(0.1, 20.0, p)
+
+    def step(reading: np.ndarray) -> None:
+        theirs.predict()
+        theirs.update(reading[:1])
 
     return step
 

@@ -8,10 +8,11 @@ import filterpy.kalman
 import numpy as np
 import pytest
 
+from fmu_observer.observers.discrete.extended_kalman_filter import ExtendedKalmanFilter
 from fmu_observer.observers.traction import MotorEkf, MotorEkfStator
 from fmu_observer.observers.traction.motor_filter import MotorFilter
 from fmu_observer.observers.traction.motor_filter_presets import ROWS
-from plant_models.hybrid import Runtime
+from plant_models.hybrid import Runtime, scalar_names
 from plant_models.hybrid.exact_jacobian import exact_jacobian
 from plant_models.railway.traction import to_stator
 
@@ -67,6 +68,33 @@ def test_it_is_the_filter_of_filterpy(observer: MotorFilter) -> None:
         np.testing.assert_allclose(ours[k, :n], theirs.x, rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(ours[k, n : n + n * n].reshape(n, n), theirs.P, rtol=1e-8, atol=1e-12)
         assert ours[k, nis] == pytest.approx(innovation @ np.linalg.solve(theirs.S, innovation), rel=1e-6)
+
+
+def test_the_generic_filter_of_the_euler_motor_is_the_same() -> None:
+    """Its model remembers held currents and whether it has been sampled: known exactly, they take no part."""
+    observer, generic = MotorEkf(), ExtendedKalmanFilter("synchronous_motor_euler", outputs=["current_d", "current_q"])
+    p, inputs = parameters(observer), drawn_inputs(observer)
+    whole = np.zeros(7)
+    whole[:4] = p.process_variance
+    runtime = Runtime(generic)
+    told = scalar_names(generic.parameter_signals)
+    runtime.p[[told.index(f"process_covariance[{i}]") for i in range(1, 50)]] = np.diag(whole).ravel()
+    runtime.p[[told.index(f"measurement_covariance[{i}]") for i in range(1, 5)]] = np.diag(
+        p.measurement_variance
+    ).ravel()
+    held = scalar_names(generic.states)
+    runtime.x[held.index("estimated_sampled")] = 1.0
+    runtime.x[[held.index(f"estimate_covariance[{i}]") for i in range(1, 50)]] = np.diag([1.0] * 4 + [0.0] * 3).ravel()
+    runtime.u[:] = inputs[0]
+    runtime.start(0.0)
+    ours = run(observer, inputs)
+    for k in range(1, COUNT + 1):
+        runtime.u[:] = inputs[k]
+        runtime.advance(k * T)
+        np.testing.assert_allclose(runtime.x[:4], ours[k, :4], rtol=1e-9, atol=1e-9)
+    P = np.reshape(runtime.x[held.index("estimate_covariance[1]") :][:49], (7, 7))
+    np.testing.assert_allclose(P[:4, :4], ours[-1, 4:20].reshape(4, 4), rtol=1e-9, atol=1e-12)
+    assert runtime.x[held.index("last_nis")] == pytest.approx(ours[-1, 22], rel=1e-9)
 
 
 @pytest.mark.parametrize(

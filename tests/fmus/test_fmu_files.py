@@ -165,6 +165,16 @@ def test_missing_compiler_says_what_to_install(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.compiler
+def test_flags_of_the_environment_come_last_and_another_build_is_another_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CFLAGS", "")
+    plain = find_compiler()
+    monkeypatch.setenv("CFLAGS", "-O1 -DNAME='a b'")
+    compiler = find_compiler()
+    assert compiler.flags == (*plain.flags, "-O1", "-DNAME=a b")
+    assert compiler.identity() != plain.identity()
+
+
 def test_what_cannot_be_traced_is_refused(tracker: HybridSystem, tmp_path: Path) -> None:
     opaque = type("Opaque", (type(tracker),), {"traceable": False})()
     with pytest.raises(GenerationError, match="cannot be traced"):

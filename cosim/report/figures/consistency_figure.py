@@ -58,11 +58,14 @@ def _figure(result: Result, spec: ReportSpec, ax: Axes, kinds: Sequence[Kind]) -
     ax.axhline(1.0, color=MARK, linewidth=0.8)
     names = [f"{e.observer} {e.name}" for e in entries]
     for name, entry in zip(names, entries, strict=True):
-        share = np.clip(entry.squares / entry.degrees, SMALLEST, LARGEST)
-        mean = np.convolve(share, np.full(count, 1.0 / count), mode="valid")
+        mean = np.convolve(entry.squares / entry.degrees, np.full(count, 1.0 / count), mode="valid")
+        degrees = float(entry.degrees.mean())
+        band = chi_square_band(degrees, float(count))
+        inside = np.mean((mean * degrees >= band.low) & (mean * degrees <= band.high))
         text = label(spec, entry.observer) + ("" if entry.kind != "error" else f", {entry.quantity}")
-        text = f"{text}: {100.0 * entry.found.inside:.3g} % inside"
-        curve(ax, entry.time[count - 1 :], mean, None, label=text, **observer_line(names, name))
+        text = f"{text}: {100.0 * inside:.3g} % inside"
+        drawn = np.clip(mean, SMALLEST, LARGEST)
+        curve(ax, entry.time[count - 1 :], drawn, None, label=text, **observer_line(names, name))
     ax.set_yscale("log")
     ax.set_ylabel(f"{kinds[0]} / degrees of freedom [1]")
     mark_evaluation(ax, result, spec)

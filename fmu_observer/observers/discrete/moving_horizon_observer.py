@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
 
+from fmu_observer.condition import Condition
 from fmu_observer.filtering.kalman import through
 from fmu_observer.models.filter_model import Known
 from fmu_observer.models.model import stacked
@@ -27,6 +29,7 @@ from fmu_observer.moving_horizon.real_time_iteration import (
 )
 from fmu_observer.moving_horizon.robust_loss import LOSSES, SCALES, Loss
 from fmu_observer.moving_horizon.window import RowLayout, WindowRow
+from fmu_observer.moving_horizon.window_observability import window_observability
 from fmu_observer.observers.discrete.extended_kalman_filter import ExtendedKalmanFilter
 from fmu_observer.observers.discrete.gaussian_filter import Form
 from fmu_observer.observers.innovation_gate import OFF
@@ -140,6 +143,22 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
             text = f"lower_bounds[{k + 1}] must be below upper_bounds[{k + 1}], the bounds of {name}"
             needed[text] = np.where(p.lower_bounds[k] < p.upper_bounds[k], 1.0, 0.0)
         return needed
+
+    def condition_of(self, p: Any) -> Condition:
+        """That of the filter behind the arrival cost, and which states the rows of a window tell on their own.
+
+        Args:
+            p: all parameters.
+        """
+        steady, model = super().condition_of(p), self.model
+        inputs = stacked(tuple(float(s.start_values[0]) for s in model.inputs))
+        known = Known(0.0, inputs, np.asarray(self.known_parameters(p), dtype=float))
+        told_by = window_observability(model, known, float(p.sample_period), self.window)
+        return replace(
+            steady,
+            values={**steady.values, "window_rank": told_by.rank},
+            statement=f"{steady.statement}; of a window of {self.window} full rows {told_by.explain()}",
+        )
 
     @cached_property
     def problem(self) -> WindowProblem:

@@ -6,6 +6,7 @@ from abc import abstractmethod
 from collections import namedtuple
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -95,8 +96,6 @@ class SignatureObserver(HybridSystem):
             known: names of parameters of the plant that are not parameters of the observer.
         """
         self.plant, self.window, self.scaling = plant, window, scaling
-        names = [s.name for s in plant.parameters if s.name not in NO_MODEL]
-        self._model = namedtuple("Model", [*names, "sample_period"])
         named = plant.plain_outputs[: len(plant.moving)]
         measured = plant.outputs[len(plant.plain_outputs) :]
         self.state_names = tuple(s.name for s in named)
@@ -273,6 +272,12 @@ class SignatureObserver(HybridSystem):
         return super().requirements(p) | within_bounds([s for s in self.parameters if s.name != "table"], p)
 
     # -- internals --------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _model(self) -> Any:
+        """Type of the parameters of the equations, and of the period."""
+        names = [s.name for s in self.plant.parameters if s.name not in NO_MODEL]
+        return namedtuple("Model", [*names, "sample_period"])
 
     def _fill_table(self) -> None:
         """Start values of `table`, for the parameters at theirs; the end of the constructor."""

@@ -12,7 +12,8 @@ from test_fmus.build import linear_fmu
 import cosim
 import fmus
 from cosim.errors import ScenarioError
-from cosim.fmu_filter.component import FmuFilterModel
+from cosim.fmu_filter import component
+from cosim.fmu_filter.component import FmuFilterModel, legal_names
 from cosim.fmu_filter.settings import FilterTable
 from cosim.fmu_model.sealed import FmuModelError
 from fmu_observer.filtering import kalman, unscented
@@ -258,6 +259,43 @@ def test_particles_need_honest_states(tmp_path: Path) -> None:
     table = FilterTable.model_validate({"kind": "particle", "measurements": {"y1": 0.1}})
     with pytest.raises(FmuModelError, match=r"cannot be saved and restored honestly \(it does not declare"):
         FmuFilterModel(path, table)
+
+
+def test_particles_need_something_that_moves_them_apart(tmp_path: Path) -> None:
+    path = linear_fmu(tmp_path, "mass", [[0, 1], [0, 0]], [[0], [1]], [[1, 0]], [[0]], inputs=["force"])
+    table = FilterTable.model_validate({"kind": "particle", "measurements": {"y1": 0.1}})
+    with pytest.raises(FmuModelError, match="nothing moves the particles apart"):
+        FmuFilterModel(path, table)
+
+
+def test_particles_of_model_exchange_find_what_those_of_co_simulation_do() -> None:
+    """The same draws, two integrators: the same weights to the error of the steps."""
+    path, found = fmus.cached_fmu(PLANTS["pendulum"](), fmi_version=3), []
+    for interface in ("co-simulation", "model-exchange"):
+        table = {"kind": "particle", "interface": interface, "measurements": {"angle": 0.05}, "members": 20}
+        table |= {"start_deviation": {"pendulum_angle": 0.2}}
+        filter_ = FmuFilterModel(path, FilterTable.model_validate(table), {"pendulum_angle": 0.3})
+        inputs = {signal.name: 0.0 for signal in filter_.inputs}
+        for k in range(3):
+            out = filter_.step(k * 0.05, inputs | {"measured_angle": 0.4}, 0.05)
+        found.append([out["angle"], out["angle_std"]])
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-4)
+
+
+def test_a_step_at_which_states_were_not_looked_at_is(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The default experiment has steps of 10 ms: multiples of it need no second look."""
+    looked: list[float] = []
+    monkeypatch.setattr(component, "check_states", lambda _model, h: looked.append(h))
+    inputs = {"effort": 5e4, "measured_wheel_speed": 12.0}
+    for dt, expected in ((0.02, [0.01]), (0.004, [0.01, 0.004]), (0.015, [0.01, 0.015])):
+        looked.clear()
+        made(path, "ekf").step(0.0, inputs, dt)
+        assert looked == expected
+
+
+def test_names_of_an_fmu_become_names_of_signals() -> None:
+    names = ["u[1]", "body.v", "der(x)", "body_v", "2nd", "body.v"]
+    assert list(legal_names(names).values()) == ["u_1", "body_v", "der_x", "body_v_2", "_2nd"]
 
 
 def test_particles_over_an_fmu_without_states_to_write(tmp_path: Path) -> None:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import lying_fmus
 import numpy as np
@@ -11,10 +15,12 @@ from test_fmus.build import linear_fmu
 
 import fmu_observer
 import fmus
+from cosim.fmu_model import exchange_events
 from cosim.fmu_model.co_simulation import CoSimulationModel
+from cosim.fmu_model.linearise import _doubts, linearise_model
 from cosim.fmu_model.opening import Interface, open_model
 from cosim.fmu_model.sealed import FmuModelError, SealedModel
-from cosim.fmu_model.trust import check_states
+from cosim.fmu_model.trust import check_saving, check_states
 from plant_models import PLANTS
 
 
@@ -43,16 +49,23 @@ def test_a_transition_is_a_step_of_the_run() -> None:
     model.close()
 
 
+def begun(real: Callable[[float, float], None], event: Any, met: bool, t: float, h: float) -> None:
+    """Begins a point of which the FMU says that it met an event."""
+    real(t, h)
+    event.value = met
+
+
 @pytest.mark.parametrize("version", [2, 3])
-def test_prepared_points_are_those_of_the_ordinary_calls(version: int) -> None:
+def test_prepared_points_are_those_of_the_ordinary_calls(version: int, monkeypatch: pytest.MonkeyPatch) -> None:
     model = open_model(fmus.cached_fmu(PLANTS["locomotive"](), fmi_version=version))
     assert isinstance(model, CoSimulationModel)
+    assert model._quick is not None
     points, u = np.array([[5.0, 6.0], [12.0, 13.0], [21.0, 22.0]]), np.array([4e4])
     driven = np.array([[4e4, -4e4]])
     wanted = [SealedModel.states_after(model, 0.0, 0.1, points, given) for given in (u, driven)]
     looks = SealedModel.outputs_at(model, 0.0, points, u, [2, 0])
-    for done in (model._quick_step, lambda _t, _h: False):  # a step that is discarded goes the ordinary way
-        model._quick_step = done
+    for met in (False, True):  # a step that meets an event goes the ordinary way
+        monkeypatch.setattr(model._quick, "_begin", partial(begun, model._quick._begin, model._quick._flags[0], met))
         for given, states in zip((u, driven), wanted, strict=True):
             np.testing.assert_array_equal(model.states_after(0.0, 0.1, points, given), states)
     np.testing.assert_array_equal(model.outputs_at(0.0, points, u, [2, 0]), looks)
@@ -92,6 +105,97 @@ def test_states_without_start_values_are_refused(tmp_path: Path) -> None:
         open_model(path)
     with pytest.raises(FmuModelError, match=r"'x\[1\]' has no start value"):
         open_model(path, states=["x[1]"])
+
+
+WITHOUT_STARTS = lying_fmus.description(model=lying_fmus.STATES).replace(' initial="exact"', ' initial="calculated"')
+"""Of the small C FMU: its states have no start values, and it takes values at any time."""
+
+
+def test_states_without_starts_are_set_in_step_mode_where_they_are_taken(tmp_path: Path) -> None:
+    late = open_model(lying_fmus.build(tmp_path / "late", xml=WITHOUT_STARTS), "co-simulation")
+    ordinary = open_model(lying_fmus.build(tmp_path / "exact"))
+    assert check_states(late, 0.01).way == late.way == "step mode"
+    assert ordinary.way == "restart"
+    x, u = np.array([3.0, -2.0]), ordinary.start_inputs + 0.7
+    for one, other in zip(late.transition(0.5, 0.01, x, u), ordinary.transition(0.5, 0.01, x, u), strict=True):
+        np.testing.assert_array_equal(one, other)
+    found = linearise_model(late, 0.0, late.start, late.start_inputs, 0.01)
+    assert "set in Step Mode" in found.remarks[0]
+    late.close()
+    ordinary.close()
+
+
+class OwnSteps:
+    """Decays in steps of its own of 0.1 s that begin at the restart, whatever steps are asked for."""
+
+    path, way, states, outputs = "own.fmu", "restart", ("x",), ()
+    instance = SimpleNamespace(description=SimpleNamespace(defaultExperiment=SimpleNamespace(stepSize="0.1")))
+    start, start_inputs = np.ones(1), np.zeros(0)
+
+    def restart(self, t: float, x: np.ndarray, _u: np.ndarray) -> None:
+        self.begin, self.done, self.x = t, 0, x.copy()
+
+    def advance(self, t: float, h: float) -> None:
+        while self.begin + 0.1 * (self.done + 1) < t + h + 1e-9:
+            self.x, self.done = 0.9 * self.x, self.done + 1
+
+    def read(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.x.copy(), np.zeros(0)
+
+    def nominal(self, _name: str) -> float:
+        return 1.0
+
+    def values_at(self, t: float, x: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self.transition(t, 0.0, x, u)
+
+    def transition(self, t: float, h: float, x: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        self.restart(t, x, u)
+        self.advance(t, h)
+        return self.read()
+
+
+def test_steps_of_its_own_that_do_not_fit_are_told() -> None:
+    model = cast(SealedModel, OwnSteps())
+    assert check_states(model, 0.1).exact
+    assert check_states(model, 0.2).exact
+    for step, count in ((0.01, 20), (0.05, 4)):
+        said = rf"at each of {count} steps of {step:g} s.*steps of its own.*steps of 0.1 s"
+        with pytest.raises(FmuModelError, match=said):
+            check_states(model, step)
+    assert _doubts(model, 0.1) == []
+    assert _doubts(model, 0.01)[0].startswith("Do not rely on A and B before this is settled: started again at each")
+
+
+def test_events_of_model_exchange_are_handled() -> None:
+    """A locomotive at rest breaks away where the effort passes its resistance; co-simulation does the same."""
+    path = fmus.cached_fmu(PLANTS["locomotive"](), fmi_version=3)
+    model, same = open_model(path, "model-exchange"), open_model(path, "co-simulation")
+    x = np.zeros(3)
+    for t, effort in ((0.0, 0.0), (0.1, 3e4), (0.2, -3e4)):
+        one, other = (m.transition(t, 0.1, x, np.array([effort]))[0] for m in (model, same))
+        np.testing.assert_allclose(one, other, rtol=1e-3, atol=3e-4)  # 0.5 ms late at 0.33 m/s2, 0.58 rad/s2
+        x = other
+    model.close()
+    same.close()
+
+
+def test_a_state_that_chatters_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(exchange_events, "MOST_EVENTS", 1)
+    model = open_model(fmus.cached_fmu(PLANTS["locomotive"](), fmi_version=3), "model-exchange")
+    x = np.array([0.0, 0.02, 0.02 / 0.575])  # stops within the step
+    with pytest.raises(FmuModelError, match=r"1 events between t = 2 s and 2\.\d+ s, the last .* event indicator \d"):
+        model.transition(2.0, 0.5, x, np.array([-3e4]))
+    model.close()
+
+
+def test_saved_states_of_model_exchange_are_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = lying_fmus.build(tmp_path, xml=lying_fmus.description(model=lying_fmus.STATES))
+    model = open_model(path, "model-exchange", states=())
+    check_saving(model, 0.01)
+    monkeypatch.setattr(model.instance, "restore", lambda _state: None)
+    with pytest.raises(FmuModelError, match=r"restored and stepped again, position is .* restored honestly"):
+        check_saving(model, 0.01)
+    model.close()
 
 
 def test_a_discrete_observer_has_no_states_to_move() -> None:

@@ -9,9 +9,11 @@ import numpy as np
 from cosim.evaluation.consistency import filter_consistency, true_value
 from cosim.evaluation.consistency_table import consistency_text
 from cosim.evaluation.result_warnings import result_warnings
+from cosim.evaluation.roles import estimation_error
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.consistency_figure import NeesPanel, NisPanel, nees_figure, nis_figure
 from cosim.report.page.report import report_page
+from cosim.results.data import SignalInfo
 from cosim.results.result import Result
 from cosim.scenario.outcome import Outcome
 from cosim.studies.measures import error_measures, measure_unit
@@ -58,6 +60,14 @@ def test_one_that_trusts_itself_too_much_is_warned_of_once_with_what_to_do() -> 
     (warning,) = [w for w in result_warnings(run(0.25), SPEC) if "confident" in w]
     assert "underconfident" in warning
     assert "Decrease" in warning
+
+
+def test_errors_without_noise_are_not_judged() -> None:
+    """A plant that moves as the filter expects: NEES is 0 and says nothing of the covariance; NIS still does."""
+    assert [entry.kind for entry in filter_consistency(run(1e-7), SPEC)] == ["NIS"]
+    assert not any("confident" in w for w in result_warnings(run(1e-7, nis=False), SPEC))
+    (warning,) = [w for w in result_warnings(run(1e-3), SPEC) if "confident" in w]
+    assert "adds no noise in this run looks alike" in warning
 
 
 def test_small_innovations_beside_large_errors_are_not_answered_by_smaller_covariances() -> None:
@@ -113,3 +123,29 @@ def test_sweeps_have_measures_that_are_one_for_a_consistent_filter() -> None:
     assert measure_unit("kf.nis") == "1"
     failed = error_measures(Outcome(replace(run(), failure="it broke"), SPEC, ()))
     assert np.isnan(failed["kf.nis"])
+
+
+def test_the_share_in_the_legend_is_that_of_the_curve_that_is_drawn() -> None:
+    def share(told: float) -> float:
+        (curve,) = [c for c in nis_figure(run(told), SPEC).get_lines() if "inside" in str(c.get_label())]
+        return float(str(curve.get_label()).split(": ")[1].split(" %")[0])
+
+    assert 90.0 < share(1.0) < 99.0
+    assert share(2.0) < 5.0  # of single samples 84 % are
+
+
+def test_the_speed_of_a_shaft_is_no_speed_of_a_train() -> None:
+    table = run().table
+    speeds = {unit: replace(SPEC, true_speed="plant.position") for unit in ("rad/s", "m/s", "km/h", "1")}
+    for unit, spec in speeds.items():
+        result = Result(table_with_speed(table), [SignalInfo("kf.speed", unit)])
+        error = estimation_error(result, spec, "kf", "speed")
+        assert (error is None) == (unit == "rad/s"), unit
+
+
+def table_with_speed(table: np.ndarray) -> np.ndarray:
+    """The table with a column more."""
+    wider = np.zeros(len(table), [*table.dtype.descr, ("kf.speed", "f8")])
+    for name in table.dtype.names or ():
+        wider[name] = table[name]
+    return wider

@@ -1,0 +1,360 @@
+"""Moving-horizon estimation against the Kalman filter, dense least squares, and readings that lie."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+import scipy
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fmu_observer import OBSERVERS
+from fmu_observer.models import find_model
+from fmu_observer.models.filter_model import Known, filter_model
+from fmu_observer.moving_horizon import robust_loss
+from fmu_observer.moving_horizon.arrival_cost import arrival_cost_at
+from fmu_observer.moving_horizon.gauss_newton import Limits, Moved, Seen, WindowProblem, solve
+from fmu_observer.moving_horizon.real_time_iteration import iterate
+from fmu_observer.moving_horizon.window import RowLayout, WindowRow
+from fmu_observer.moving_horizon.window_observability import window_observability
+from fmu_observer.observers.discrete.moving_horizon_observer import MovingHorizonObserver
+from fmu_observer.observers.train.balise_moving_horizon import BaliseMovingHorizon
+from plant_models.hybrid import Runtime, scalar_names
+from plant_models.hybrid.scan import enclosed, scan_table
+from plant_models.hybrid.system import vector
+
+N = 3  # position, speed, an unknown input
+LAYOUT = RowLayout(inputs=1, measurements=2)
+R = np.array([[0.3, 0.05], [0.05, 0.1]])
+H = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.2]])
+START, P0 = np.array([0.0, 1.0, 0.0]), np.diag([4.0, 2.0, 1.0])
+
+
+def transition(T: Any) -> tuple[Any, Any]:
+    """Of two integrators behind an unknown input, and its noise; one state has none of its own."""
+    F = np.vstack(
+        [
+            np.hstack([1.0 + 0 * T, T, 0.5 * T * T]),
+            np.hstack([0 * T, 1.0 + 0 * T, T]),
+            np.hstack([0 * T, 0 * T, 1.0 + 0 * T]),
+        ]
+    )
+    return F, np.diag(np.hstack([0.0 * T, 0.2 * T, 0.05 * T]))
+
+
+def problem(bounded: tuple[int, ...] = (), lower: float = -0.5, upper: float = 0.5) -> WindowProblem:
+    def moved(x: Any, row: WindowRow, _shared: Any) -> Moved:
+        F, Q = transition(row.period)
+        return Moved(F @ x + F[:, 1] * row.inputs[0], F, Q)
+
+    def limits(_shared: Any) -> Limits:
+        return Limits(np.full(len(bounded), lower), np.full(len(bounded), upper))
+
+    return WindowProblem(
+        N,
+        LAYOUT,
+        moved,
+        lambda x, _row, _shared: Seen(H @ x, H, R),
+        bounded,
+        limits,
+        ("squares", "squares"),
+        lambda s: s,
+    )
+
+
+@cache
+def compiled(window: int, passes: int = 1, bounded: tuple[int, ...] = ()) -> Callable[..., Any]:
+    """`iterate` as one traced function, as an observer's jump is."""
+    sizes = (2 * N + N * N, window * LAYOUT.width, window * N, LAYOUT.width, N, 1)
+    symbols = [ca.SX.sym(f"a{i}", size) for i, size in enumerate(sizes)]
+    arrays = [ca.ArrayInterface.SX(s, shape=(s.numel(),)) for s in symbols]
+    found = iterate(problem(bounded), passes, *arrays)
+    return ca.Function("iterated", symbols, [ca.SX(value) for value in found])
+
+
+def rows_of(seed: int, count: int) -> list[np.ndarray]:
+    """Rows with gaps from a hundredth of a second to ten, of one measurement, both, or none."""
+    rng = np.random.default_rng(seed)
+    rows, t = [], 0.0
+    for i in range(count):
+        period = 0.0 if i == 0 else 10.0 ** rng.uniform(-2, 1)
+        t += period
+        used = rng.integers(0, 2, 2)
+        rows.append(np.array([float(i > 0), period, t, rng.normal(), *(rng.normal(size=2) * used * 5), *used]))
+    return rows
+
+
+def kalman(rows: list[np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """The Kalman filter in its textbook form."""
+    x, P, found = START, P0, []
+    for row in rows:
+        if row[0]:
+            F, Q = transition(row[1])
+            x, P = F @ x + F[:, 1] * row[3], F @ P @ F.T + Q
+        used = row[6:] > 0.5
+        if used.any():
+            C, S = H[used], R[np.ix_(used, used)]
+            K = P @ C.T @ np.linalg.inv(C @ P @ C.T + S)
+            x, P = x + K @ (row[4:6][used] - C @ x), (np.eye(N) - K @ C) @ P
+        found.append((x, P))
+    return found
+
+
+def moved_through(window: int, rows: list[np.ndarray], passes: int = 1, bounded: tuple[int, ...] = ()) -> list[Any]:
+    function = compiled(window, passes, bounded)
+    arrival = np.concatenate(arrival_cost_at(START, P0))
+    table, points, x, found = np.zeros(window * LAYOUT.width), np.tile(START, window), START, []
+    for row in rows:
+        point = x
+        if row[0]:
+            F, _ = transition(row[1])
+            point = F @ x + F[:, 1] * row[3]
+        x, P, kept = (np.asarray(v).ravel() for v in function(arrival, table, points, row, point, 0.0))
+        arrival, rest = kept[: len(arrival)], kept[len(arrival) :]
+        table, points, told = rest[: len(table)], rest[len(table) : len(table) + len(points)], rest[-5:]
+        found.append((x, P.reshape(N, N), points.reshape(window, N), told))
+    return found
+
+
+def check_linear(window: int, seed: int) -> None:
+    rows = rows_of(seed, 60)
+    for (x, P, _, _), (expected, covariance) in zip(moved_through(window, rows), kalman(rows), strict=True):
+        scale = np.sqrt(np.diag(covariance)).max() + np.abs(expected).max()
+        assert np.abs(x - expected).max() <= 1e-9 * scale
+        assert np.abs(P - covariance).max() <= 1e-9 * np.abs(covariance).max()
+
+
+@settings(max_examples=4, deadline=None)
+@given(window=st.integers(1, 50), seed=st.integers(0, 2**20))
+def test_a_linear_window_is_the_kalman_filter(window: int, seed: int) -> None:
+    check_linear(window, seed)
+
+
+@pytest.mark.parametrize("window", range(1, 51))
+def test_every_linear_window_is_the_kalman_filter(window: int) -> None:
+    check_linear(window, window)
+
+
+def test_estimates_of_the_window_are_the_smoothed_ones() -> None:
+    """Against dense least squares over all rows; while no row has left, the window is the whole record."""
+    rows = rows_of(3, 12)
+    x = dense(rows, None)
+    assert np.allclose(moved_through(12, rows)[-1][2], x, atol=1e-8 * np.abs(x).max())
+
+
+def dense(rows: list[np.ndarray], bounds: tuple[int, float, float] | None) -> np.ndarray:
+    """All states of a record as one bounded least-squares problem, shape (N, n); what has no noise gets very little."""
+    count = len(rows)
+    blocks, sides = [], []
+
+    def add(at: dict[int, np.ndarray], side: np.ndarray, covariance: np.ndarray) -> None:
+        root = np.linalg.inv(np.linalg.cholesky(covariance))
+        block = np.zeros((len(side), count * N))
+        for i, matrix in at.items():
+            block[:, i * N : (i + 1) * N] = matrix
+        blocks.append(root @ block)
+        sides.append(root @ side)
+
+    add({0: np.eye(N)}, START, P0)
+    for i, row in enumerate(rows):
+        if row[0]:
+            F, Q = transition(row[1])
+            add({i: np.eye(N), i - 1: -F}, F[:, 1] * row[3], Q + 1e-12 * np.eye(N))
+        used = row[6:] > 0.5
+        if used.any():
+            add({i: H[used]}, row[4:6][used], R[np.ix_(used, used)])
+    lower, upper = np.full(count * N, -np.inf), np.full(count * N, np.inf)
+    if bounds is not None:
+        lower[bounds[0] :: N], upper[bounds[0] :: N] = bounds[1:]
+    A, b = np.vstack(blocks), np.concatenate(sides)
+    found = scipy.optimize.lsq_linear(A, b, (lower, upper), method="bvls", tol=1e-14)
+    return np.asarray(found.x).reshape(count, N)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_bounds_give_the_bounded_optimum(seed: int) -> None:
+    """Enough passes find the optimum of all states under bounds, that of another solver; the first seeds have 3 to 9
+    states at a bound."""
+    rows = [row for row in rows_of(seed, 12) if row[1] < 3.0]
+    table = np.array(rows)
+    points = np.tile(START, (len(rows), 1))
+    found = solve(problem((2,)), arrival_cost_at(START, P0), table, points, np.zeros(1), 12)
+    expected = dense(rows, (2, -0.5, 0.5))
+    assert (np.abs(expected[:, 2]) > 0.5 - 1e-9).any()  # a bound is active
+    assert np.allclose(found.estimates, expected, atol=2e-5 * np.abs(expected).max())  # the 1e-12 above
+    assert found.moved[0] < 12.0  # it has settled
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 2**20), size=st.floats(0.1, 1e6))
+def test_bounds_are_never_broken(seed: int, size: float) -> None:
+    rows = rows_of(seed, 30)
+    for row in rows:
+        row[4:6] *= size
+    for _, _, points, _ in moved_through(8, rows, 2, (1, 2)):
+        assert np.abs(points[:, 1:]).max() <= 0.5
+
+
+# -- observers ---------------------------------------------------------------------------------------------------------
+
+
+def test_an_exact_model_without_noise_is_followed() -> None:
+    observer = MovingHorizonObserver("pendulum", window=5)
+    model = filter_model(find_model("pendulum"))
+    runtime, x = Runtime(observer), model.start.copy()
+    names = [s.name for s in observer.input_signals]
+    for k in range(60):
+        u = np.array([np.sin(0.1 * k)] * len(model.inputs))
+        known = Known(0.0, u, np.zeros(0))
+        if k:
+            x = model.moved(x, model.no_noise(), known, model.sample_period)
+        for name, value in zip([s.name for s in model.inputs], u, strict=True):
+            runtime.u[names.index(name)] = value
+        for s, y in zip(model.measurements, model.measured(x, model.no_reading_noise(), known), strict=True):
+            runtime.u[names.index(f"measured_{s.name}")] = y
+        if k:
+            runtime.advance(k * model.sample_period)
+        else:
+            runtime.start(0.0)
+        assert np.abs(runtime.update_outputs()[: model.order] - x).max() <= 1e-8
+
+
+def run_train(observer: Any, wrong: float, seconds: float = 24.0) -> np.ndarray:
+    """Position errors of a train with true effort, a balise every 8 s, the second of which is told wrong [m]."""
+    runtime, rng = Runtime(observer), np.random.default_rng(1)
+    names, parameters = [s.name for s in observer.input_signals], [s.name for s in observer.parameter_signals]
+    runtime.p[parameters.index("gate")] = 0.0
+    runtime.p[parameters.index("odometer_gate")] = 1e6
+    v, position, errors = 15.0, 0.0, []
+    runtime.u[names.index("effort")] = 20e3
+    runtime.u[names.index("odometer")] = v
+    runtime.x[:2] = 3.0, 14.0
+    runtime.start(0.0)
+    for k in range(1, round(seconds / 0.1) + 1):
+        a = (20e3 - 900.0 - 32.4 * v - 1.65287 * v * v) / 90e3
+        position, v = position + 0.1 * v + 0.005 * a, v + 0.1 * a
+        runtime.u[names.index("odometer")] = v + 0.1 * rng.normal()
+        runtime.advance(0.1 * k)
+        if k % 80 == 0:
+            runtime.u[names.index("balise_position")] = position + 0.5 * rng.normal() + (wrong if k == 160 else 0.0)
+            runtime.trigger("balise")
+        errors.append(runtime.update_outputs()[0] - position)
+    return np.array(errors)
+
+
+def test_a_false_balise_pulls_least_squares_by_metres_and_the_robust_loss_not() -> None:
+    pulled = np.abs(run_train(BaliseMovingHorizon(10, loss="squares"), 20.0)[160:230]).max()
+    robust = np.abs(run_train(BaliseMovingHorizon(10), 20.0)[160:230]).max()
+    assert pulled > 8.0  # the loss of squares believes it by three quarters and more
+    assert robust < 1.5  # what it is without the false balise
+
+
+def test_with_squares_and_no_active_bound_it_is_the_filter() -> None:
+    filtered = run_train(OBSERVERS["balise_odometer_ekf"](), 0.0, 12.0)
+    assert np.abs(run_train(BaliseMovingHorizon(7, loss="squares"), 0.0, 12.0) - filtered).max() <= 1e-9
+
+
+def test_contradictory_bounds_are_refused_in_words() -> None:
+    runtime = Runtime(MovingHorizonObserver("linear_pendulum", bounds={"rate": [1.0, -1.0]}))
+    with pytest.raises(ValueError, match=r"lower_bounds\[1\] must be below upper_bounds\[1\], the bounds of rate"):
+        runtime.start(0.0)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"bounds": {"y": [0, 1]}}, "expected .lowest, highest. of one of the states angle, rate"),
+        ({"bounds": {"angle": [0, 1, 2]}}, "expected .lowest, highest."),
+        ({"loss": "tukey"}, "expected one of squares, huber, geman_mcclure"),
+        ({"window": 0}, "window must be 1 to 1000"),
+        ({"passes": 0}, "passes must be 1 to 20"),
+    ],
+)
+def test_illegal_options_are_refused_in_words(options: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        MovingHorizonObserver("linear_pendulum", **options)
+
+
+def test_a_window_that_does_not_tell_a_state_says_which() -> None:
+    short, long = (MovingHorizonObserver("linear_pendulum", window=w).condition() for w in (1, 2))
+    assert short.values["window_rank"] == 1
+    assert "do not tell +1 rate" in short.statement
+    assert long.values["window_rank"] == 2
+    assert "alone tell every state" in long.statement
+
+
+def reaction(**options: Any) -> MovingHorizonObserver:
+    return MovingHorizonObserver("gas_phase_reaction", outputs=["y"], unknown=["rate"], substeps=1, **options)
+
+
+@pytest.mark.parametrize(("period", "condition", "spread"), [(0.01, 8.7e3, 0.16), (0.1, 197.0, 0.0035)])
+def test_the_window_of_a_reaction_is_as_ill_conditioned_as_known(
+    period: float, condition: float, spread: float
+) -> None:
+    """Condition and deviation of the rate at noise of 1e-3, computed independently from the closed form."""
+    model = reaction().model
+    known = Known(0.0, np.zeros(0), np.array([v for s in model.parameters for v in s.start_values]))
+    measured = window_observability(model, known, period, 11).measured
+    assert np.linalg.cond(measured) == pytest.approx(condition, rel=5e-3)
+    assert 1e-3 * np.sqrt(np.linalg.inv(measured.T @ measured)[2, 2]) == pytest.approx(spread, rel=2e-2)
+
+
+def test_an_unknown_rate_is_found_within_its_bounds() -> None:
+    observer = reaction(window=11, passes=3, bounds={"rate": [0.1, 0.35]})
+    runtime = Runtime(observer)
+    parameters = scalar_names(observer.parameter_signals)
+    for name, value in {"process_covariance": 0.0, "measurement_covariance": 1e-8, "sample_period": 0.1}.items():
+        for i, scalar in enumerate(parameters):
+            if scalar.split("[")[0] == name:
+                runtime.p[i] = value
+    runtime.x[:3] = 2.3, 0.7, 0.3  # the total pressure is measured, so it is right
+    rates = []
+    for k in range(60):
+        a = 2.5 / (1.0 + 0.3 * 2.5 * 0.1 * k)
+        runtime.u[0] = a + 0.5 * (3.5 - a)
+        runtime.advance(0.1 * k) if k else runtime.start(0.0)
+        rates.append(runtime.update_outputs()[2])
+    assert abs(rates[-1] - 0.15) < 1e-3
+    assert min(rates) >= 0.1
+    assert max(rates) <= 0.35
+
+
+@pytest.mark.parametrize("names", [["y"], ["rate", "rate"]])
+def test_what_is_unknown_must_be_there(names: list[str]) -> None:
+    with pytest.raises(ValueError, match=r"expected names of its inputs .none. or of its scalar parameters .rate"):
+        MovingHorizonObserver("gas_phase_reaction", outputs=["y"], unknown=names)
+
+
+# -- formulas ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("loss", robust_loss.LOSSES)
+def test_weights_are_the_slopes_of_the_losses(loss: robust_loss.Loss) -> None:
+    squared, h = np.array([0.01, 0.5, 4.0, 100.0]), 1e-5
+    slope = (robust_loss.cost(loss, squared + h, 1.5) - robust_loss.cost(loss, squared - h, 1.5)) / (2 * h)
+    assert np.allclose(2.0 * slope, robust_loss.weight(loss, squared, 1.5), atol=1e-9)
+
+
+@pytest.mark.parametrize("count", [1, 16, 17, 50])
+@pytest.mark.parametrize("backwards", [False, True])
+def test_a_traced_loop_is_the_loop(count: int, backwards: bool) -> None:
+    def body(carry: Any, row: Any, shared: Any) -> Any:
+        c = 0.5 * carry[0] + row[0][0] * shared[0]
+        return (c,), (np.hstack([c, row[0]]), vector(c[0]))
+
+    def looped(start: Any, flat: Any, known: Any) -> Any:
+        last, found = scan_table(body, (start,), (np.reshape(flat, (count, 3)),), (known,), backwards=backwards)
+        return last[0], np.reshape(found[0], (count * 5,)), np.reshape(found[1], (count,))
+
+    rng = np.random.default_rng(0)
+    values = [rng.normal(size=k) for k in (2, 3 * count, 2)]
+    symbols = [ca.SX.sym(f"a{i}", len(v)) for i, v in enumerate(values)]
+    arrays = [ca.ArrayInterface.SX(s, shape=(s.numel(),)) for s in symbols]
+    traced = ca.Function("f", symbols, [ca.SX(v) for v in enclosed(looped, *arrays)])
+    for expected, found in zip(looped(*values), traced(*values), strict=True):
+        assert np.abs(expected - np.asarray(found).ravel()).max() == 0.0
