@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from wind_turbine_loop import ALARM_NAMES, DIAGNOSIS, PEAKS, Outcome, run_members
+from wind_turbine_loop import ALARM_NAMES, DIAGNOSIS, INTERVALS, PEAKS, Outcome, run_members
 
 from fmu_observer.diagnosis.thresholds import alarm_rate, proportion_interval
 
@@ -63,7 +63,7 @@ def fault_row(number: int, outcome: Outcome, members: slice, where: str = "") ->
     Args:
         number: of the fault. outcome: of the batch. members: which of it. where: said after the fault.
     """
-    onset, clear = outcome.onset[members], outcome.gone[members] + 0.01
+    onset, clear = outcome.onset[members], np.maximum(outcome.gone[members] + 0.01, 0.0)
     seen = int(np.count_nonzero(~np.isnan(onset)))
     if number == 10:
         # Of the estimate: within 0.05 of 0.25, and back above 0.9.
@@ -88,12 +88,14 @@ def fault_row(number: int, outcome: Outcome, members: slice, where: str = "") ->
 
 def faults_table() -> str:
     """Detection and clearing of each fault: the ten of the benchmark, two of them in strong wind as well."""
-    numbers = [n for n in PUBLISHED for _ in JUDGES]
-    outcome = run_members(numbers, [*JUDGES] * len(PUBLISHED), STOP)
     count = len(JUDGES)
     head = ["", "fault", "published", "limit", "seen", "onset, median (largest)", "gone, median (largest)", "coverage"]
     rows = [[*head, "other alarms"]]
-    rows += [fault_row(n, outcome, slice(i * count, (i + 1) * count)) for i, n in enumerate(PUBLISHED)]
+    for number in PUBLISHED:
+        print(f"fault {number} of {len(PUBLISHED)}", file=sys.stderr, flush=True)
+        after = 400.0 if number == 10 else 100.0  # [s] for the alarm to clear
+        outcome = run_members([number] * count, [*JUDGES], INTERVALS[number][1] + after)
+        rows.append(fault_row(number, outcome, slice(None)))
     strong = run_members([8] * count + [9] * count, [*JUDGES] * 2, 1000.0, (500.0, 600.0), **STRONG)
     rows += [fault_row(8, strong, slice(0, count), ", 14 m/s"), fault_row(9, strong, slice(count, None), ", 14 m/s")]
     return markdown(rows)
@@ -147,7 +149,7 @@ def markdown(rows: list[list[str]]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-TABLES = {"faults": faults_table, "limits": limits_table, "sizes": sizes_table}
+TABLES = {"sizes": sizes_table, "limits": limits_table, "faults": faults_table}
 
 
 def main() -> None:

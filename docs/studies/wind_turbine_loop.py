@@ -22,6 +22,7 @@ from plant_models.hybrid.system import Array
 
 PARTS = {"wind": Wind(), "turbine": WindTurbine(), "controller": WindTurbineController()}
 DIAGNOSIS = WindTurbineDiagnosis()
+SYSTEMS = {**PARTS, "diagnosis": DIAGNOSIS}
 SETTLED = 20.0  # [s]: residuals count from here on
 PEAKS = (
     ("pitch_difference", 3),
@@ -55,6 +56,19 @@ def _renamed(part: str, system: HybridSystem, variability: str) -> list[Signal]:
     return [replace(s, name=f"{part}_{s.name}") for s in system.states if s.variability == variability]
 
 
+_STATES = (
+    *(s for part, system in SYSTEMS.items() for s in _renamed(part, system, "continuous")),
+    *(s for part, system in SYSTEMS.items() for s in _renamed(part, system, "discrete")),
+    *_LOG,
+)
+_ENDS = np.cumsum([s.width for s in _STATES])
+LAYOUT = {s.name: slice(int(end) - s.width, int(end)) for s, end in zip(_STATES, _ENDS, strict=True)}
+"""Where each state of the loop stands."""
+
+FIXED = {name: system.unpack_parameters(system.start_parameters()) for name, system in PARTS.items()}
+"""Parameters of the parts."""
+
+
 class WindTurbineLoop(HybridSystem):
     """The closed loop with one fault at a time, and what came of it."""
 
@@ -62,6 +76,18 @@ class WindTurbineLoop(HybridSystem):
     description = "Wind turbine, controller, fault and diagnosis"
     source = "Omar 2012, chapter 7"
     internal_step = 5e-3
+    states = _STATES
+    outputs = (output_signal("efficiency", "1", "Estimated efficiency"),)
+    events = (
+        PeriodicEvent(
+            "sampling",
+            "sample_period",
+            noises=(*PARTS["wind"].noises, *PARTS["turbine"].noises),
+            description="Everything is sampled",
+        ),
+        PeriodicEvent("block_end", "block_period", description="The long window moves on"),
+        PeriodicEvent("efficiency_update", "update_period", description="The efficiency is estimated anew"),
+    )
     parameters = (
         parameter("fault", "1", 0.0, "Number of the fault, 0 for none"),
         parameter("onset", "s", 0.0, "Begin of the fault"),
@@ -76,38 +102,14 @@ class WindTurbineLoop(HybridSystem):
         *(s for s in DIAGNOSIS.parameters if s.name != "sample_period"),
     )
 
-    def __init__(self) -> None:
-        self.layout: dict[str, slice] = {}
-        flows, held, at = [], [], 0
-        for part, system in {**PARTS, "diagnosis": DIAGNOSIS}.items():
-            flows += _renamed(part, system, "continuous")
-            held += _renamed(part, system, "discrete")
-        self.states = (*flows, *held, *_LOG)
-        for signal in self.states:
-            self.layout[signal.name] = slice(at, at + signal.width)
-            at += signal.width
-        self.events = (
-            PeriodicEvent(
-                "sampling",
-                "sample_period",
-                noises=(*PARTS["wind"].noises, *PARTS["turbine"].noises),
-                description="Everything is sampled",
-            ),
-            PeriodicEvent("block_end", "block_period", description="The long window moves on"),
-            PeriodicEvent("efficiency_update", "update_period", description="The efficiency is estimated anew"),
-        )
-        self.outputs = (output_signal("efficiency", "1", "Estimated efficiency"),)
-        self._fixed = {name: system.unpack_parameters(system.start_parameters()) for name, system in PARTS.items()}
-        super().__init__()
-
     def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
         """The turbine turns."""
         turbine = PARTS["turbine"]
-        return turbine.flow(t, self._part("turbine", x), self._turbine_inputs(t, x, None, p), self._fixed["turbine"])
+        return turbine.flow(t, self._part("turbine", x), self._turbine_inputs(t, x, None, p), FIXED["turbine"])
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """Estimated efficiency."""
-        return {"efficiency": x[self.layout["diagnosis_held_efficiency_estimate"].start]}
+        return {"efficiency": x[LAYOUT["diagnosis_held_efficiency_estimate"].start]}
 
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """A sampling instant, or one of the diagnosis alone."""
@@ -116,7 +118,7 @@ class WindTurbineLoop(HybridSystem):
             return self._with(x, diagnosis=told)
         wind = PARTS["wind"].jump("gust", t, self._part("wind", x), u, self._wind(p))
         x = self._with(x, wind=wind)
-        fixed = self._fixed["turbine"]
+        fixed = FIXED["turbine"]
         x = self._with(
             x,
             turbine=PARTS["turbine"].jump(
@@ -139,7 +141,7 @@ class WindTurbineLoop(HybridSystem):
         before = self._part("diagnosis", x)
         told = DIAGNOSIS.jump("sampling", t, before, given, p)
         asked = PARTS["controller"].unpack_inputs(vector(readings["generator"][0], readings["power"]))
-        moved = PARTS["controller"].jump("sampling", t, controller, asked, self._fixed["controller"])
+        moved = PARTS["controller"].jump("sampling", t, controller, asked, FIXED["controller"])
         log = self._logged(t, x, before, told, p)
         return self._with(self._with(x, diagnosis=told, controller=moved), log=log)
 
@@ -147,9 +149,9 @@ class WindTurbineLoop(HybridSystem):
 
     def _slots(self, part: str) -> list[slice]:
         if part == "log":
-            return [self.layout[s.name] for s in _LOG]
+            return [LAYOUT[s.name] for s in _LOG]
         system = DIAGNOSIS if part == "diagnosis" else PARTS[part]
-        return [self.layout[f"{part}_{s.name}"] for s in system.states]
+        return [LAYOUT[f"{part}_{s.name}"] for s in system.states]
 
     def _part(self, part: str, x: Array) -> Array:
         return vector(*(x[i] for slot in self._slots(part) for i in range(slot.start, slot.stop)))
@@ -164,7 +166,7 @@ class WindTurbineLoop(HybridSystem):
 
     def _wind(self, p: Any) -> Any:
         names = ("mean_from", "mean_to", "sine_amplitude", "turbulence_std", "sample_period")
-        return self._fixed["wind"]._replace(**{name: getattr(p, name) for name in names})
+        return FIXED["wind"]._replace(**{name: getattr(p, name) for name in names})
 
     def _turbine_inputs(self, t: Array, x: Array, u: Any, p: Any) -> Any:
         blown = PARTS["wind"].output(t, self._part("wind", x), None, self._wind(p))["wind_speed"]
@@ -186,7 +188,7 @@ class WindTurbineLoop(HybridSystem):
 
     def _readings(self, t: Array, x: Array, p: Any) -> dict[str, Any]:
         def held(name: str) -> list[Array]:
-            slot = self.layout[f"turbine_held_{name}"]
+            slot = LAYOUT[f"turbine_held_{name}"]
             return [x[i] for i in range(slot.start, slot.stop)]
 
         acts = self._acts(t, p)
@@ -214,7 +216,7 @@ class WindTurbineLoop(HybridSystem):
 
     def _logged(self, t: Array, x: Array, before: Array, told: Array, p: Any) -> Array:
         was, now = (MEMORY.unpack(state) for state in (before, told))
-        log = {s.name: x[self.layout[s.name].start] if s.size is None else x[self.layout[s.name]] for s in _LOG}
+        log = {s.name: x[LAYOUT[s.name].start] if s.size is None else x[LAYOUT[s.name]] for s in _LOG}
         acts = self._acts(t, p)
         own = 0.0 * t
         mine = [np.where(np.abs(p.own - i) < 0.5, np.where(p.fault > 0.0, 1.0, 0.0), 0.0) for i in range(_ALARMS)]
@@ -248,6 +250,9 @@ def _largest(now: Any, name: str, p: Any) -> Array:
         largest = np.maximum(largest, values[i])
     return largest
 
+
+LOOP = WindTurbineLoop()
+"""One system for all batches of a process: traced once."""
 
 INTERVALS = {
     1: (1000.0, 1200.0),
@@ -291,14 +296,14 @@ def run_members(
         interval: begin and end of the faults [s]; None for those of the benchmark.
         values: parameters, one number for all or shape (members,).
     """
-    batch = fmus.Batch(WindTurbineLoop(), len(faults))
+    batch = fmus.Batch(LOOP, len(faults))
     begins, ends = np.array([interval or INTERVALS.get(f, (0.0, 0.0)) for f in faults]).T
     own = [OWN_ALARM.get(f, 0) for f in faults]
     given = {"fault": faults, "seed": seeds, "onset": begins, "end": ends, "own": own, **values}
     for name, value in given.items():
         batch.set(name, value)
     batch.start()
-    instants = np.arange(0.0, stop + 1e-9, 10.0)
+    instants = np.unique([*np.arange(0.0, stop, 10.0), stop])
     efficiency = batch.run(instants[1:], results=["efficiency"])[:, :, 0]
     if batch.failures:
         raise RuntimeError(f"{batch.failures}")

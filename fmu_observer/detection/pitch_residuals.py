@@ -55,8 +55,8 @@ PITCH_MEMORY = (
 def sample_pitch(m: Any, readings: Array, reference: Array, p: Any, starts: Array) -> dict[str, Any]:
     """Residuals of the pitch after a sample: Omar 2012, (7.6.2), (7.6.9), (7.6.10), (7.6.13), (7.6.14).
 
-    An actuator is judged by the smaller one of its two sensors' residuals at each sample: a faulty sensor leaves the
-    other.
+    An actuator is judged by the smaller one of its two sensors' residuals at each sample, and only where both have one
+    sign: a faulty sensor leaves the other, and noise of one sensor counts for nothing [ours].
 
     Args:
         m: named memory with `PITCH_MEMORY`. readings: of blades 1, 1, 2, 2, 3, 3 [deg], shape (6,).
@@ -68,13 +68,13 @@ def sample_pitch(m: Any, readings: Array, reference: Array, p: Any, starts: Arra
     """
     sharp = residual_filter(p.sensor_filter_time, p.sample_period)
     brief = residual_filter(p.brief_filter_time, p.sample_period)
-    slow = residual_filter(p.long_filter_time, p.sample_period)
+    long = residual_filter(p.long_filter_time, p.sample_period)
     filters: dict[str, list[Array]] = {"sensor_filter": [], "brief_filter": [], "long_filter": []}
-    squares, single, triple, quick, slow_squares = [], [], [], [], []
+    squares, single, triple, quick, slow = [], [], [], [], []
     for i in range(SENSORS):
         found = []
         previous = np.where(starts > 0.0, readings[i], m.previous_pitch[i])
-        for name, coefficients in (("sensor_filter", sharp), ("brief_filter", brief), ("long_filter", slow)):
+        for name, coefficients in (("sensor_filter", sharp), ("brief_filter", brief), ("long_filter", long)):
             before = getattr(m, name)
             late = readings[i] if name == "sensor_filter" else centred(readings[i], previous, p.centring)
             model = (late, reference, p.pitch_frequency, p.pitch_damping, starts)
@@ -85,13 +85,13 @@ def sample_pitch(m: Any, readings: Array, reference: Array, p: Any, starts: Arra
         squares.extend([window.memory[0], window.memory[1]])
         single.append(found[0] * found[0])
         triple.append(window.value)
-        quick.append((found[1] - p.mean_residual) * (found[1] - p.mean_residual))
-        slow_squares.append((found[2] - p.mean_residual) * (found[2] - p.mean_residual))
+        quick.append(found[1] - p.mean_residual)
+        slow.append(found[2] - p.mean_residual)
     return {
         **filters,
         "previous_pitch": readings,
         "sensor_squares": squares,
-        "long_partial": [m.long_partial[i] + _smaller(slow_squares, i) for i in range(BLADES)],
+        "long_partial": [m.long_partial[i] + _smaller(slow, i) for i in range(BLADES)],
         "held_pitch_difference": [disagreement(readings[2 * i], readings[2 * i + 1]) for i in range(BLADES)],
         "held_pitch_single": single,
         "held_pitch_triple": triple,
@@ -142,5 +142,7 @@ def trusted_pitches(readings: Array, limit: Array, residuals: Array) -> Array:
     return vector(*(trusted(readings[i], readings[j], limit, residuals[i], residuals[j]) for i, j in pairs))
 
 
-def _smaller(values: Sequence[Array], blade: int) -> Array:
-    return np.minimum(values[2 * blade], values[2 * blade + 1])
+def _smaller(residuals: Sequence[Array], blade: int) -> Array:
+    """Square of the smaller one of two residuals, zero where their signs differ: noise of one sensor has no say."""
+    first, second = residuals[2 * blade], residuals[2 * blade + 1]
+    return np.where(first * second > 0.0, np.minimum(first * first, second * second), 0.0)

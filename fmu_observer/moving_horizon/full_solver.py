@@ -7,7 +7,7 @@ was chosen.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import inf
 from time import perf_counter
@@ -18,7 +18,7 @@ import numpy as np
 from fmu_observer.moving_horizon import robust_loss
 from fmu_observer.moving_horizon.arrival_cost import ArrivalCost
 from fmu_observer.moving_horizon.gauss_newton import WindowProblem
-from fmu_observer.moving_horizon.window_program import Step, window_program
+from fmu_observer.moving_horizon.window_program import Step, WindowProgram, window_program
 from fmu_observer.moving_horizon.window_stages import Stages, WindowStages
 
 SMALLEST_SHARE = 1.0 / 64.0
@@ -60,7 +60,8 @@ class FullSolution:
         cost: half the sum of the losses. residual: root of the mean square of the weighted residuals, in their
             deviations. step: largest change in the last step, in standard deviations of the last row.
         iterations: steps done. seconds: time that they took. active: bounds that are touched in the last row.
-        converged: whether the step fell below the tolerance. timed_out: whether the deadline came first.
+        converged: whether the step fell below the tolerance, or met no curvature, so that another would be zero.
+        timed_out: whether the deadline came first.
         feasible: whether `states` keep bounds and transitions. reason: why it did not converge; empty where it did.
     """
 
@@ -97,10 +98,11 @@ class FullSolver:
 
     Args:
         problem: what moves, what is measured, bounds, losses.
+        program: gives what solves the quadratic programmes of a window, of its rows and states.
     """
 
-    def __init__(self, problem: WindowProblem) -> None:
-        self.problem = problem
+    def __init__(self, problem: WindowProblem, program: Callable[[int, int], WindowProgram] = window_program) -> None:
+        self.problem, self._program = problem, program
         self._stages = WindowStages(problem)
 
     def solve(
@@ -126,17 +128,24 @@ class FullSolver:
             WindowError: bounds contradict one another, a number is not finite, or no trajectory of the model keeps the
                 bounds; the message says which.
         """
-        return _Search(self.problem, self._stages, arrival, np.asarray(rows), np.asarray(shared)).solve(
-            np.asarray(points, dtype=float), effort
-        )
+        program = self._program(len(rows), self.problem.order)
+        search = _Search(self.problem, self._stages, program, arrival, np.asarray(rows), np.asarray(shared))
+        return search.solve(np.asarray(points, dtype=float), effort)
 
 
 class _Search:
     """One window on its way to its solution."""
 
     def __init__(
-        self, problem: WindowProblem, stages: WindowStages, arrival: ArrivalCost, rows: np.ndarray, shared: np.ndarray
+        self,
+        problem: WindowProblem,
+        stages: WindowStages,
+        program: WindowProgram,
+        arrival: ArrivalCost,
+        rows: np.ndarray,
+        shared: np.ndarray,
     ) -> None:
+        self.program = program
         self.problem, self.stages, self.arrival, self.rows, self.shared = problem, stages, arrival, rows, shared
         for name, value in {"rows": rows, "parameters": shared, **arrival._asdict()}.items():
             if not np.isfinite(value).all():
@@ -165,9 +174,8 @@ class _Search:
         began = perf_counter()
         states = np.clip(start, self.lower, self.upper)
         point = self.at(states, None)
-        before, after = self.spread(point)
+        doubt, after = self.spread(point)  # doubt of the newest row: nothing has smoothed it yet
         self.scale = np.sqrt(np.maximum(after.diagonal(), 1e-300))
-        doubt = before  # of the newest row, which nothing has smoothed yet
         kept, feasible = point, self.keeps(point)
         iterations, size, lasted, reason = 0, inf, 0.0, ""
         while size > effort.tolerance:
@@ -184,12 +192,16 @@ class _Search:
             if not step.solved:
                 reason = f"the quadratic programme ended with {step.status}"
                 break
+            before, weights = point.stages, self.weights(point, doubt if iterations == 0 else None)
             point, share = self.searched(point, step, free=iterations == 0)
+            linear = share == 1.0 and self.unchanged(before, point, weights)  # the programme was the problem itself
             size = float(np.abs(share * step.change / self.scale).max())
             iterations += 1
             lasted = perf_counter() - began - spent
             if self.keeps(point) or not feasible:
                 kept, feasible = point, self.keeps(point)
+            if linear:
+                break
             if share <= SMALLEST_SHARE and size > effort.tolerance:
                 reason = "no part of the last step makes the cost smaller"
                 break
@@ -244,14 +256,13 @@ class _Search:
         b = -np.einsum("kqi,kq->ki", H, residuals)
         stages = point.stages
         given = (A, b, stages.F, stages.G, stages.moved - point.states)
-        program = window_program(len(self.rows), self.problem.order)
         lower, upper = self.lower - point.states, self.upper - point.states
         if self.active(point.states) == 0:
             free = np.full(lower.shape, inf)
-            found = program.solve(*given, -free, free)
+            found = self.program.solve(*given, -free, free)
             if found.solved and ((found.change >= lower) & (found.change <= upper)).all():
                 return found
-        found = program.solve(*given, lower, upper)
+        found = self.program.solve(*given, lower, upper)
         return found._replace(change=np.clip(found.change, lower, upper))
 
     def searched(self, point: _Point, step: Step, *, free: bool) -> tuple[_Point, float]:
@@ -265,6 +276,12 @@ class _Search:
             if free or better or share <= SMALLEST_SHARE:
                 return after, share
             share *= 0.5
+
+    def unchanged(self, before: Stages, point: _Point, weights: np.ndarray) -> bool:
+        """Whether a step met no curvature: Jacobians and weights after it are those before it."""
+        now = point.stages
+        pairs = ((before.F, now.F), (before.G, now.G), (before.H, now.H), (weights, self.weights(point)))
+        return self.keeps(point) and all(np.array_equal(old, new) for old, new in pairs)
 
     def merit(self, point: _Point, prices: np.ndarray) -> float:
         """Cost, and what the transitions that are not kept cost at these prices, shape (n,)."""

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -118,6 +119,7 @@ class Solution(NamedTuple):
     bounds: Array
 
 
+KEPT = 8  # problems whose sweeps are known as functions, so that they are traced once
 SETTLED = 1e-3  # of a standard deviation: a pass that changes less has nothing left to do
 
 
@@ -163,6 +165,7 @@ def passed(problem: WindowProblem, arrival: ArrivalCost, row: Array, point: Arra
     return ArrivalCost(*after)
 
 
+@lru_cache(maxsize=KEPT)
 def _forwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tuple[Arrays, Arrays]]:
     """The Kalman filter over one row: prediction, measurements, active bounds."""
     n, q = problem.order, problem.layout.measurements
@@ -191,6 +194,7 @@ def _forwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tupl
     return body
 
 
+@lru_cache(maxsize=KEPT)
 def _backwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tuple[Arrays, Arrays]]:
     """The adjoint over one row: its state, its bounds, and what it says of the rows before."""
     n, q = problem.order, problem.layout.measurements

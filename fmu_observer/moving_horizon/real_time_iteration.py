@@ -5,12 +5,14 @@ And what an observer remembers and tells of it, as signals. It knows no observer
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from fmu_observer.moving_horizon.arrival_cost import arrival_cost_from
-from fmu_observer.moving_horizon.gauss_newton import WindowProblem, passed, solve
+from fmu_observer.moving_horizon.gauss_newton import KEPT, WindowProblem, passed, solve
 from plant_models.hybrid import Signal, memory, output_signal
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.scan import enclosed
@@ -103,6 +105,14 @@ def iterate(
         arrival, window, points: as remembered (`arrival_cost`, `window`, `window_estimates`), flat.
         row: the new one, flat. point: prediction of its state, shape (n,). shared: what all rows share, shape (s,).
     """
+    arrays = (arrival, window, points, row, point, shared)
+    estimate, covariance, remembered = enclosed(_iteration(problem, passes), *arrays)
+    return Iterated(estimate, covariance, remembered)
+
+
+@lru_cache(maxsize=KEPT)
+def _iteration(problem: WindowProblem, passes: int) -> Callable[..., tuple[Array, ...]]:
+    """What `iterate` does, as a function of arrays alone."""
     n, width = problem.order, problem.layout.width
 
     def iterated(*arrays: Array) -> tuple[Array, ...]:
@@ -116,8 +126,7 @@ def iterate(
         kept = (np.reshape(rows, (count * width,)), np.reshape(found.estimates, (count * n,)))
         return found.estimates[-1], found.covariance, np.hstack([*before, *kept, *last])
 
-    estimate, covariance, remembered = enclosed(iterated, arrival, window, points, row, point, shared)
-    return Iterated(estimate, covariance, remembered)
+    return iterated
 
 
 def joined(*parts: Array) -> Array:

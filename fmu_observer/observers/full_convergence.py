@@ -99,6 +99,7 @@ class FullBaliseMovingHorizon(BaliseMovingHorizon):
     description = "Moving-horizon observer of odometer and balises whose windows are solved to convergence"
     source = "Omar 2012, (1.4.78), (4.2.2)-(4.2.4); solver and the train case are ours"
     traceable = False
+    internal_step = 0.1  # [s]; it flows in Python, and the resistance hardly changes in that time
     outputs = (*BaliseMovingHorizon.outputs, *ENDED)
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {**BaliseMovingHorizon.option_choices, **EFFORT_OPTIONS}
 
@@ -149,7 +150,7 @@ def iterated_fully(
     before = passed(problem, arrival_cost_from(arrival, n), rows[0], states[0], shared)
     rows, guesses = np.vstack([rows[1:], row]), np.vstack([states[1:], point])
     found = _solver(problem).solve(before, rows, guesses, shared, effort)
-    last = [found.residual, found.step, float(found.iterations), *layout.count(list(rows)), float(found.active)]
+    last = [found.residual, found.step, float(found.iterations), *layout.count(rows), float(found.active)]
     ended = [float(said) for said in (found.converged, found.timed_out, found.feasible)]
     remembered = np.hstack([*before, rows.ravel(), found.states.ravel(), last, ended])
     return Iterated(found.estimate, found.covariance.ravel(), remembered)

@@ -6,19 +6,18 @@ The thesis calls the search DiagSign and prints neither the margin nor the numbe
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from fmu_observer.signatures.clouds import Coordinate, Separation, separation
+from fmu_observer.signatures.clouds import Coordinate, Separation, extent, separation
 from fmu_observer.signatures.dynamic_signature import dynamic_signature
 from fmu_observer.signatures.pencil import EPS, NextScaling
 from fmu_observer.signatures.properties import PROPERTIES
 
 UNDECIDED = -1
-Points = Mapping[Hashable, np.ndarray]  # label -> shape (2, experiments)
 
 
 @dataclass(frozen=True)
@@ -28,7 +27,7 @@ class SearchSpace:
     Args:
         orders: N, past samples a point. quantities: keys of `PROPERTIES`. eps: regularisations in the unit of the
             samples. scalings: of the next sample.
-        margin: d_min, least width of the strip between clouds, as a share of the range of all experiments.
+        margin: d_min, least width of the strip between clouds, as a share of their range across it.
         draws: pairs of coordinates that are drawn. seed: of the draws.
     """
 
@@ -83,7 +82,7 @@ class Stage:
 
     Args:
         label: of the class that is told apart. plane: in which. rivals: what holds it apart from each class left.
-        margin: width of the narrowest strip, in units of the ranges.
+        margin: width of the narrowest strip, as a share of the range across it.
     """
 
     label: Hashable
@@ -128,11 +127,12 @@ class SignatureClassifier:
         nearest = np.full(count, np.inf)
         for stage in self.stages:
             points = stage.plane.points(records)
-            beyond = np.min([r.normal @ points - r.threshold for r in stage.rivals.values()], axis=0)
-            nearest = np.where(open_, np.minimum(nearest, np.abs(beyond)), nearest)
-            within = np.abs(beyond) < 0.5 * strip * max(stage.margin, 0.0)
-            index = np.where(open_ & ~within & (beyond > 0.0), self.labels.index(stage.label), index)
-            open_ &= ~within & (beyond <= 0.0)
+            beyond = np.stack([r.normal @ points - r.threshold for r in stage.rivals.values()])
+            half = np.array([[0.5 * strip * max(r.gap, 0.0)] for r in stage.rivals.values()])
+            inside, outside = (beyond > half).all(axis=0), (beyond <= -half).any(axis=0)
+            nearest = np.where(open_, np.minimum(nearest, np.abs(beyond).min(axis=0)), nearest)
+            index = np.where(open_ & inside, self.labels.index(stage.label), index)
+            open_ &= outside
         return Classified(np.where(open_, self.labels.index(self.last), index), nearest)
 
 
@@ -157,47 +157,57 @@ def train_classifier(
         SeparationError: no pair holds a class apart and `overlap` is False; it names the classes and the best margin.
     """
     records, groups = np.asarray(records, dtype=float), _groups(records, labels)
-    values, left, stages = _table(records, space), dict(groups), list[Stage]()
+    values = _table(records, space)
+    drawn = {pair: _strips(pair, values, groups) for pair in _draws(values, space)}
+    left, stages = set(groups), list[Stage]()
     while len(left) > 1:
-        pair, strips = _best_pair(values, left, space)
-        widest = max(_margin(s) for s in strips.values())
-        if widest < space.margin and not overlap:
+        found = {pair: _isolated(strips, left) for pair, strips in drawn.items()}
+        best = max(found, key=lambda pair: max(found[pair].values()))
+        ranked = sorted(found[best], key=lambda label: -found[best][label])
+        if found[best][ranked[0]] < space.margin and not overlap:
             raise SeparationError(
                 f"no pair of {space.draws} draws holds one of the classes {_listed(left)} apart from the others by "
-                f"{space.margin:g} of the range; the best strip is {widest:.3g}. Draw more, offer other orders or "
-                f"properties, ask for a smaller margin, or accept overlap=True."
+                f"{space.margin:g} of the range; the best strip is {found[best][ranked[0]]:.3g}. Draw more, offer "
+                f"other orders or properties, ask for a smaller margin, or accept overlap=True."
             )
-        ranked = sorted(strips, key=lambda label: -_margin(strips[label]))
         for label in ranked[: len(left) - 1]:
-            margin = _margin({rival: s for rival, s in strips[label].items() if rival in left})
+            rivals = {rival: s for rival, s in drawn[best][label].items() if rival in left}
+            margin = min(s.margin for s in rivals.values())
             if label == ranked[0] or margin >= space.margin:
-                rivals = {rival: s for rival, s in strips[label].items() if rival in left}
-                stages.append(Stage(label, _plane(pair, values), rivals, margin))
-                del left[label]
+                stages.append(Stage(label, _plane(best, values), rivals, margin))
+                left.remove(label)
     return SignatureClassifier(tuple(stages), next(iter(left)), tuple(groups))
 
 
-def best_plane(records: np.ndarray, labels: Sequence[Hashable], space: SearchSpace) -> tuple[Plane, float]:
-    """The pair of coordinates that holds all classes apart best, and the narrowest strip between two of them.
+class Drawn(NamedTuple):
+    """A pair of coordinates that was drawn.
+
+    Attributes:
+        plane: of the pair. points: of the experiments in it, shape (2, n). margin: of the narrowest strip between two
+            classes, as a share of the range across it, negative where they overlap.
+    """
+
+    plane: Plane
+    points: np.ndarray
+    margin: float
+
+
+def drawn_planes(records: np.ndarray, labels: Sequence[Hashable], space: SearchSpace) -> list[Drawn]:
+    """All pairs of a search with the experiments in them, for those who choose by something else than the margin.
 
     Args:
         records: of all experiments, samples first, shape (K, n). labels: class of each. space: what is drawn.
-
-    Returns:
-        The plane, and the width of the strip in units of the ranges, negative where clouds overlap.
 
     Raises:
         ValueError: there are fewer than two classes, or not one label a record.
     """
     records = np.asarray(records, dtype=float)
     groups, values = _groups(records, labels), _table(records, space)
-    best, width = None, -np.inf
+    found = list[Drawn]()
     for pair in _draws(values, space):
-        margin = min(_margin(s) for s in _strips(pair, values, groups).values())
-        if margin > width:
-            best, width = pair, margin
-    assert best is not None
-    return _plane(best, values), width
+        margin = min(_isolated(_strips(pair, values, groups), set(groups)).values())
+        found.append(Drawn(_plane(pair, values), np.stack([_scaled(c, values) for c in pair]), margin))
+    return found
 
 
 def _groups(records: np.ndarray, labels: Sequence[Hashable]) -> dict[Hashable, np.ndarray]:
@@ -248,27 +258,22 @@ def _strips(
 ) -> dict[Hashable, dict[Hashable, Separation]]:
     """Of each class what holds it apart from each other."""
     points = np.stack([_scaled(c, values) for c in pair])
+    extents = {label: extent(points[:, members]) for label, members in groups.items()}
     strips: dict[Hashable, dict[Hashable, Separation]] = {label: {} for label in groups}
     labels = list(groups)
     for i, first in enumerate(labels):
         for second in labels[i + 1 :]:
-            found = separation(points[:, groups[first]], points[:, groups[second]])
-            strips[first][second] = found
-            strips[second][first] = Separation(found.margin, -found.normal, -found.threshold)
+            found = separation(extents[first], extents[second])
+            strips[first][second], strips[second][first] = found, found.turned()
     return strips
 
 
-def _best_pair(
-    values: Mapping[Coordinate, np.ndarray], groups: Mapping[Hashable, np.ndarray], space: SearchSpace
-) -> tuple[tuple[Coordinate, Coordinate], dict[Hashable, dict[Hashable, Separation]]]:
-    """The pair drawn in which one class has the widest strip around it."""
-    found = ((pair, _strips(pair, values, groups)) for pair in _draws(values, space))
-    return max(found, key=lambda item: max(_margin(s) for s in item[1].values()))
+def _isolated(strips: Mapping[Hashable, Mapping[Hashable, Separation]], left: set[Hashable]) -> dict[Hashable, float]:
+    """Of each class left the narrowest strip to another one left."""
+    return {
+        label: min(s.margin for rival, s in strips[label].items() if rival in left) for label in strips if label in left
+    }
 
 
-def _margin(strips: Mapping[Hashable, Separation]) -> float:
-    return min(s.margin for s in strips.values())
-
-
-def _listed(labels: Mapping[Hashable, object]) -> str:
-    return ", ".join(map(str, labels)) or "none"
+def _listed(labels: Iterable[Hashable]) -> str:
+    return ", ".join(sorted(map(str, labels))) or "none"

@@ -13,7 +13,10 @@ from fmu_observer.signatures.pencil import EPS, NextScaling
 from fmu_observer.signatures.properties import PROPERTIES
 
 DIRECTIONS = np.arange(180) * np.pi / 180.0
-"""Directions in which two clouds are held apart: one a degree."""
+"""Directions in which two clouds are held apart: one a degree [rad]."""
+THIN = 1e-9
+"""Range below which clouds have no extent in a direction, in units of the coordinates."""
+NORMALS = np.stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)])
 
 
 class Coordinate(NamedTuple):
@@ -50,27 +53,58 @@ class Separation(NamedTuple):
     """How two clouds are held apart by a line.
 
     Attributes:
-        margin: width of the strip between them, negative where they overlap in every direction.
+        margin: width of the strip between them, as a share of the range of both across it; negative where they overlap
+            in every direction.
+        gap: the width itself, in units of the coordinates.
         normal: unit vector from the second to the first, shape (2,). threshold: of ``normal . point`` in the middle of
             the strip.
     """
 
     margin: float
+    gap: float
     normal: np.ndarray
     threshold: float
 
+    def turned(self) -> Separation:
+        """The same with first and second exchanged."""
+        return Separation(self.margin, self.gap, -self.normal, -self.threshold)
 
-def separation(first: np.ndarray, second: np.ndarray) -> Separation:
-    """Widest strip between two clouds among lines of one a degree.
 
-    The width is the distance of the convex hulls, or less by 1 % of the clouds' size at most, since the best line may
-    lie half a degree beside.
+class Extent(NamedTuple):
+    """How far a cloud reaches in each of `DIRECTIONS`.
+
+    Attributes:
+        low: smallest projection, shape (k,). high: largest, shape (k,).
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+
+
+def extent(points: np.ndarray) -> Extent:
+    """How far a cloud reaches; of many clouds that are compared in pairs each is looked through once.
 
     Args:
-        first: shape (2, n). second: shape (2, k).
+        points: shape (2, n).
     """
-    normals = np.stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)])
-    normals = np.concatenate([normals, -normals], axis=1)
-    above, below = (normals.T @ first).min(axis=1), (normals.T @ second).max(axis=1)
-    best = int(np.argmax(above - below))
-    return Separation(float(above[best] - below[best]), normals[:, best], float(0.5 * (above[best] + below[best])))
+    projected = NORMALS.T @ points
+    return Extent(projected.min(axis=1), projected.max(axis=1))
+
+
+def separation(first: Extent, second: Extent) -> Separation:
+    """Strip between two clouds that is widest beside their range across it, among lines of one a degree.
+
+    As a share of that range a strip does not depend on the units of the coordinates, and clouds that lie on one line,
+    since two properties say the same, are not held apart by that line's thinness.
+
+    Args:
+        first: of the one cloud. second: of the other.
+    """
+    gaps = np.stack([first.low - second.high, second.low - first.high])
+    widths = np.maximum(first.high, second.high) - np.minimum(first.low, second.low)
+    shares = np.where(widths > THIN, gaps / np.maximum(widths, THIN), -1.0)
+    side, at = np.unravel_index(int(np.argmax(shares)), shares.shape)
+    margin, gap = float(shares[side, at]), float(gaps[side, at])
+    if side == 0:
+        return Separation(margin, gap, NORMALS[:, at], float(0.5 * (first.low[at] + second.high[at])))
+    return Separation(margin, gap, -NORMALS[:, at], float(-0.5 * (second.low[at] + first.high[at])))

@@ -5,16 +5,18 @@ first. NumPy on recordings.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 import scipy
 
-from fmu_observer.signatures.classification import Plane, SearchSpace, best_plane
+from fmu_observer.signatures.classification import Drawn, Plane, SearchSpace, drawn_planes
 
 PLACES = 400
 """Places at which a curve is compared with a point."""
+CLOSE = 1e-9
+"""Centres nearer than this, in units of the ranges, count as this far apart."""
 
 
 class Located(NamedTuple):
@@ -51,38 +53,52 @@ class ClassCurve:
         Args:
             records: samples first, shape (K, n).
         """
-        return self._nearest(self.plane.points(records))
+        return self.nearest(self.plane.points(records))
 
-    def _nearest(self, points: np.ndarray) -> Located:
+    def nearest(self, points: np.ndarray) -> Located:
+        """Value at the nearest place of the curve.
+
+        Args:
+            points: in the plane, shape (2, n).
+        """
         away = np.hypot(*(points[:, :, None] - self.places[:, None, :]))
         place = np.argmin(away, axis=1)
         return Located(self.place_values[place], away[np.arange(len(place)), place])
 
 
 def train_curve(records: np.ndarray, values: Sequence[float], space: SearchSpace) -> tuple[ClassCurve, float]:
-    """Curve of classes in the plane that holds them apart best.
+    """Curve of classes in the drawn plane in which it gives the experiments of the training back best [ours: the plane
+    with the widest strips may have the classes out of order, and values between them are then lost].
 
     Args:
         records: samples first, shape (K, n). values: of the quantity, one a record; equal ones are a class.
         space: what is drawn.
 
     Returns:
-        The curve, and the narrowest strip between two clouds, negative where they overlap.
+        The curve, and the narrowest strip between two clouds in its plane, as a share of the range across it, negative
+        where they overlap.
 
     Raises:
         ValueError: there are fewer than two classes, or not one value a record.
     """
-    plane, margin = best_plane(records, list(values), space)
-    points, classes = plane.points(records), np.unique(values)
-    clouds = [points[:, np.asarray(values) == value] for value in classes]
+    given = np.asarray(values, dtype=float)
+    curves = [(_curve(drawn, given), drawn) for drawn in drawn_planes(records, list(values), space)]
+    off = [np.sqrt(np.mean((curve.nearest(drawn.points).value - given) ** 2)) for curve, drawn in curves]
+    best, drawn = curves[int(np.argmin(off))]
+    return best, drawn.margin
+
+
+def _curve(drawn: Drawn, values: np.ndarray) -> ClassCurve:
+    """Spline through the centres of the clouds in a plane, parametrised by the way along their broken line."""
+    classes = np.unique(values)
+    clouds = [drawn.points[:, values == value] for value in classes]
     centres = np.stack([0.5 * (cloud.min(axis=1) + cloud.max(axis=1)) for cloud in clouds], axis=1)
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(centres, axis=1)))])
+    steps = np.maximum(np.hypot(*np.diff(centres, axis=1)), CLOSE)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
     fine = np.linspace(0.0, along[-1], PLACES)
-    degree = min(3, len(classes) - 1)
-    smooth = scipy.interpolate.make_interp_spline(along, centres, k=degree, axis=1)
-    curve = ClassCurve(plane, classes, smooth(fine), np.interp(fine, along, classes), 0.0)
-    reach = float(curve.locate(records).distance.max())
-    return ClassCurve(plane, classes, curve.places, curve.place_values, reach), margin
+    smooth = scipy.interpolate.make_interp_spline(along, centres, k=min(3, len(classes) - 1), axis=1)
+    curve = ClassCurve(drawn.plane, classes, smooth(fine), np.interp(fine, along, classes), 0.0)
+    return replace(curve, reach=float(curve.nearest(drawn.points).distance.max()))
 
 
 class Estimated(NamedTuple):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 from plant_models.hybrid.system import Array
 
 CHUNK = 16  # rows in one function: a longer loop is one of chunks, which a compiler takes in its stride
+KEPT = 32  # traced functions, for the other events and functions of the same system
 Arrays = tuple[Array, ...]  # each of shape (k,)
 Body = Callable[[Arrays, Arrays, Arrays], tuple[Arrays, Arrays]]  # (carry, row, shared) -> carry, result
 
@@ -34,12 +36,19 @@ def enclosed(function: Callable[..., Arrays], *arrays: Array) -> Arrays:
     if not _is_symbol("SX", arrays):
         return function(*arrays)
     ca = sys.modules["casadi"]
-    symbols = [ca.MX.sym(f"a{i}", array.shape[0]) for i, array in enumerate(arrays)]
-    results = function(*(ca.ArrayInterface.MX(s, shape=(s.numel(),)) for s in symbols))
-    columns = [ca.densify(ca.MX(result)) for result in results]
-    called = ca.Function("enclosed", symbols, columns, {"never_inline": True})
+    called = _enclosed(function, tuple(array.shape[0] for array in arrays))
     values = called.call([ca.densify(ca.SX(array)) for array in arrays])
     return tuple(ca.ArrayInterface.SX(value, shape=(value.numel(),)) for value in values)
+
+
+@lru_cache(maxsize=KEPT)
+def _enclosed(function: Callable[..., Arrays], sizes: tuple[int, ...]) -> Any:
+    """The function among symbols of whole arrays; the same object for the same function, so that C has it once."""
+    ca = sys.modules["casadi"]
+    symbols = [ca.MX.sym(f"a{i}", size) for i, size in enumerate(sizes)]
+    results = function(*(ca.ArrayInterface.MX(s, shape=(s.numel(),)) for s in symbols))
+    columns = [ca.densify(ca.MX(result)) for result in results]
+    return ca.Function("enclosed", symbols, columns, {"never_inline": True})
 
 
 def scan(
@@ -87,13 +96,8 @@ def scan_table(
 def _called(body: Body, carry: Arrays, rows: Arrays, shared: Arrays, backwards: bool) -> tuple[Arrays, Arrays]:
     """The loop among symbols of whole arrays."""
     ca = sys.modules["casadi"]
-    widths = [[array.shape[-1] for array in group] for group in (carry, rows, shared)]
-    symbols = [[ca.SX.sym(f"a{i}", width) for i, width in enumerate(group)] for group in widths]
-    arrays = [tuple(ca.ArrayInterface.SX(s, shape=(s.numel(),)) for s in group) for group in symbols]
-    handed, result = body(arrays[0], arrays[1], arrays[2])
-    columns = ca.cse([ca.densify(ca.SX(array)) for array in (*handed, *result)])
-    row = ca.Function("row", [s for group in symbols for s in group], columns)
-    loop = _loop(row, rows[0].shape[0], [len(group) for group in widths], backwards)
+    widths = tuple(tuple(array.shape[-1] for array in group) for group in (carry, rows, shared))
+    loop = _loop(body, widths, rows[0].shape[0], backwards)
     tables = [ca.MX(table).T for table in rows]
     values = loop.call([*map(ca.MX, carry), *tables, *map(ca.MX, shared)])
     symbolic: Any = ca.ArrayInterface.MX
@@ -101,14 +105,26 @@ def _called(body: Body, carry: Arrays, rows: Arrays, shared: Arrays, backwards: 
     return last, tuple(symbolic(value.T, shape=value.T.shape) for value in values[len(carry) :])
 
 
-def _loop(row: Any, count: int, groups: Sequence[int], backwards: bool) -> Any:
+@lru_cache(maxsize=KEPT)
+def _row(body: Body, widths: tuple[tuple[int, ...], ...]) -> Any:
+    """The body as one function of single elements, the same object for the same body."""
+    ca = sys.modules["casadi"]
+    symbols = [[ca.SX.sym(f"a{i}", width) for i, width in enumerate(group)] for group in widths]
+    arrays = [tuple(ca.ArrayInterface.SX(s, shape=(s.numel(),)) for s in group) for group in symbols]
+    handed, result = body(arrays[0], arrays[1], arrays[2])
+    columns = ca.cse([ca.densify(ca.SX(array)) for array in (*handed, *result)])
+    return ca.Function("row", [s for group in symbols for s in group], columns)
+
+
+@lru_cache(maxsize=KEPT)
+def _loop(body: Body, widths: tuple[tuple[int, ...], ...], count: int, backwards: bool) -> Any:
     """A function of `count` rows, one a column: of calls of `CHUNK` rows where there are more."""
     ca = sys.modules["casadi"]
-    chunk = CHUNK if count > CHUNK else 1
+    row, chunk = _row(body, widths), CHUNK if count > CHUNK else 1
     whole, rest = divmod(count, chunk)
-    inner = row if chunk == 1 else _loop(row, chunk, groups, backwards)
-    calls = [inner] * whole + ([_loop(row, rest, groups, backwards)] if rest else [])
-    carried, tables = groups[0], slice(groups[0], groups[0] + groups[1])
+    inner = row if chunk == 1 else _loop(body, widths, chunk, backwards)
+    calls = [inner] * whole + ([_loop(body, widths, rest, backwards)] if rest else [])
+    carried, tables = len(widths[0]), slice(len(widths[0]), len(widths[0]) + len(widths[1]))
     sizes = [row.size1_in(i) for i in range(row.n_in())]
     columns = [count if tables.start <= i < tables.stop else 1 for i in range(row.n_in())]
     symbols = [ca.MX.sym(f"a{i}", *shape) for i, shape in enumerate(zip(sizes, columns, strict=True))]

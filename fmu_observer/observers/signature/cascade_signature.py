@@ -20,7 +20,7 @@ from plant_models.hybrid.system import Array
 ORDER, POINTS = 67, 34  # printed N and M; N_O = 101
 SIZE = 3.0  # printed set [-3, 3]^3
 EPS = {"literal": 1.0, "norm": 1e-3}
-SLABS, DIRECTIONS, ANGLES = 15, 12, 37
+SLABS, DIRECTIONS, ANGLES = 15, 12, 19
 OTHER_SIDE = 1e6
 """Added to the distance of a class of the other sign, which (4.6.14) does not look at."""
 LEAST = 1e-6
@@ -80,8 +80,9 @@ class CascadeSignature(SignatureObserver):
         ]
         self.declare(plant, ORDER + POINTS, next_scaling, gain=0.1, eps=EPS[next_scaling], known=known)
         self.parameters = tuple(s for s in self.parameters if s.name != "regularisation")
-        start = plant.start_parameters()
-        self._constants = plant.unpack_parameters(start)
+        values = plant.unpack_parameters(plant.start_parameters())
+        self._constants = (float(values.nonlinearity), float(values.ramp))
+        self._period = float(values.sample_period)
         self.tables = self._built()
         super().__init__(nodes=nodes, next_scaling=next_scaling)
 
@@ -91,13 +92,13 @@ class CascadeSignature(SignatureObserver):
         Args:
             states: shape (3, ...).
         """
-        model = self.model_parameters((), self._constants)
+        model = self._model(*self._constants, self._period)
         window = np.stack([self.plant.measured(x)[0] for x in self.moved(states, self.window - 1, model)])
         return np.stack(self.points(window, ORDER, EPS[self.scaling]))
 
     def model_parameters(self, own: Sequence[Array], p: Any) -> Any:
         """The printed constants."""
-        return self._model(self._constants.nonlinearity, self._constants.ramp, p.sample_period)
+        return self._model(*self._constants, p.sample_period)
 
     def inverted(self, past: Sequence[Array], x: Array, p: Any) -> Inverted:
         """x2 by envelopes, then x1 by median lines, then x3 by chords."""

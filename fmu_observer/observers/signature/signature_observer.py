@@ -6,6 +6,7 @@ from abc import abstractmethod
 from collections import namedtuple
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -95,8 +96,6 @@ class SignatureObserver(HybridSystem):
             known: names of parameters of the plant that are not parameters of the observer.
         """
         self.plant, self.window, self.scaling = plant, window, scaling
-        names = [s.name for s in plant.parameters if s.name not in NO_MODEL]
-        self._model = namedtuple("Model", [*names, "sample_period"])
         named = plant.plain_outputs[: len(plant.moving)]
         measured = plant.outputs[len(plant.plain_outputs) :]
         self.state_names = tuple(s.name for s in named)
@@ -274,9 +273,15 @@ class SignatureObserver(HybridSystem):
 
     # -- internals --------------------------------------------------------------------------------------------------
 
-    def _fill_table(self) -> None:
-        """Start values of `table`, for the parameters at theirs; the end of the constructor."""
-        start = tuple(map(float, self.tabulated()["table"]))
+    @cached_property
+    def _model(self) -> Any:
+        """Type of the parameters of the equations, and of the period."""
+        names = [s.name for s in self.plant.parameters if s.name not in NO_MODEL]
+        return namedtuple("Model", [*names, "sample_period"])
+
+    def _fill_table(self, table: np.ndarray) -> None:
+        """Make a table, which needs a system that is made, the start value of `table`."""
+        start = tuple(map(float, table))
         self.parameters = tuple(replace(s, start=start) if s.name == "table" else s for s in self.parameters)
         self.__dict__.pop("parameter_signals", None)
 

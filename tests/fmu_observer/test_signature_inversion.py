@@ -1,0 +1,239 @@
+"""Inversion of signatures by tables: closed forms, brute force, and what the thesis prints."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fmu_observer.observers.signature import (
+    CascadeSignature,
+    CultureSignature,
+    OscillatorSignature,
+    ReactionSignature,
+)
+from fmu_observer.observers.signature.signature_observer import SignatureObserver
+from fmu_observer.signatures import inversion
+from fmu_observer.signatures.blending import blended
+from fmu_observer.signatures.class_distance import class_distance, envelope_numbers, line_slopes
+from fmu_observer.signatures.dynamic_signature import dynamic_signature
+from fmu_observer.signatures.envelope import best_envelope
+from fmu_observer.signatures.envelope_distance import line_distance
+from plant_models.hybrid import scalar_names
+from plant_models.hybrid.system import HybridSystem
+
+ROUNDING = 1e-12
+RNG = np.random.default_rng(4)
+
+
+@pytest.mark.parametrize(("gain", "weight"), [(0.01, 0.0099), (0.1, 0.0909), (0.2, 0.1667), (0.3, 0.2308)])
+def test_the_weights_of_the_blend_are_those_of_the_specification(gain: float, weight: float) -> None:
+    assert abs(blended(np.zeros(1), np.ones(1), gain)[0] - weight) < 5e-5  # printed in four digits
+    assert blended(np.array([2.0]), np.ones(1), gain, 0.0)[0] == 2.0
+
+
+@given(st.floats(-3.0, 5.0), st.booleans())
+@settings(max_examples=30, deadline=None)
+def test_a_monotone_table_is_inverted_as_by_numpy(target: float, falling: bool) -> None:
+    nodes, values = np.linspace(1.0, 2.0, 5), np.array([-1.0, 0.0, 0.5, 2.0, 3.0])
+    found = inversion.monotone_inverse(nodes, -values if falling else values, -target if falling else target)
+    assert abs(found.values - np.interp(target, values, nodes)) < ROUNDING
+    assert (found.outside > 0.0) == (not -1.0 <= target <= 3.0)
+
+
+def test_a_network_is_inverted_in_each_cell_and_says_what_lies_beyond() -> None:
+    first, second = np.linspace(0.0, 2.0, 3), np.linspace(-1.0, 1.0, 4)
+    a, b = np.meshgrid(first, second, indexing="ij")
+
+    def mapped(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.stack([x + 0.1 * x * y, 2.0 * y - 0.2 * x])  # bilinear: exact within each cell
+
+    network = list(mapped(a, b))
+    for place in RNG.uniform((0.0, -1.0), (2.0, 1.0), (30, 2)):
+        found = inversion.network_inverse(first, second, network, mapped(*place))
+        np.testing.assert_allclose(found.values, place, atol=1e-5)  # two Newton steps
+        assert found.outside < 1e-4
+    far = inversion.network_inverse(first, second, network, mapped(np.array(3.0), np.array(0.0)))
+    assert far.outside > 0.9
+    assert far.values[0] == 2.0
+
+
+def test_the_soft_look_up_is_the_printed_mean_with_the_distance_along_curves() -> None:
+    curves, labels, point = RNG.normal(size=(2, 4, 6)), np.array([-1.0, 0.0, 0.5, 2.0]), np.array([0.2, -0.1])
+    shares = np.linspace(0.0, 1.0, 4001)  # brute force over the points of each line
+    dense = curves[:, :, :-1, None] + shares * (curves[:, :, 1:] - curves[:, :, :-1])[..., None]
+    distance = np.hypot(*(dense - point[:, None, None, None])).min(axis=(1, 2))
+    weights = np.exp(-30.0 * distance)
+    expected = (weights * labels).sum() / weights.sum()
+    assert abs(inversion.soft_inverse(labels, list(curves), point, 30.0) - expected) < 1e-4  # of the brute force
+    far = inversion.soft_inverse(labels, list(curves), np.array([50.0, 50.0]), 200.0)  # exp(-1e4) vanishes
+    assert np.isfinite(far)
+
+
+def test_the_two_nearest_are_weighted_by_the_distance_of_the_other() -> None:
+    labels = np.arange(5.0)
+    for distances in RNG.uniform(0.1, 1.0, (20, 5)):
+        j, k = np.argsort(distances)[:2]
+        expected = (distances[k] * labels[j] + distances[j] * labels[k]) / (distances[j] + distances[k])
+        assert abs(inversion.nearest_two(list(distances), labels) - expected) < ROUNDING
+
+
+def test_corrections_make_a_coarse_table_exact() -> None:
+    nodes = np.linspace(1.0, 3.0, 3)
+
+    def look_up(r: np.ndarray) -> inversion.Found:
+        found = inversion.monotone_inverse(nodes, nodes**2, r[0])
+        return inversion.Found(np.stack([found.values]), found.outside)
+
+    errors = [
+        abs(inversion.corrected_inverse(look_up, lambda z: z**2, np.array([2.9]), times).values[0] - np.sqrt(2.9))
+        for times in (0, 2, 6)
+    ]
+    assert errors[0] > 0.05
+    assert errors[1] < 0.1 * errors[0]
+    assert errors[2] < 1e-3 * errors[0]
+
+
+def test_a_search_finds_the_candidate_and_says_where_none_brackets() -> None:
+    candidates = np.linspace(0.0, 1.0, 6)
+    directions = np.array([[1.0], [-2.0]])
+    for true in (0.2, 0.37, 0.8):
+        found = inversion.best_candidate(candidates, directions * (candidates - true))
+        assert abs(found.values - true) < ROUNDING
+        assert found.outside == 0.0
+    for true, end in ((-0.3, 0.0), (1.2, 1.0)):
+        found = inversion.best_candidate(candidates, directions * (candidates - true))
+        assert (found.values, found.outside) == (end, 1.0)
+
+
+def test_a_table_that_turns_is_refused_with_quantity_and_range() -> None:
+    with pytest.raises(ValueError, match=r"does not tell x2 between 1 and 2 at b = 3.*Narrow the range"):
+        inversion.require_monotone("x2", np.arange(4.0), np.array([0.0, 1.0, 0.5, 4.0]), "at b = 3")
+    inversion.require_monotone("x2", np.arange(4.0), np.array([0.0, 1.0, 3.5, 4.0]))
+
+
+def test_the_traced_distance_to_an_envelope_is_that_of_its_rectangles() -> None:
+    made = best_envelope(RNG.normal(size=(2, 200)) * [[1.0], [0.3]], 10)
+    slopes, numbers = line_slopes(7), envelope_numbers(made)
+    angles = np.arctan2(slopes[:, 1], slopes[:, 0]) - made.angle
+    for point in (*RNG.normal(size=(6, 2)), np.array([40.0, 40.0])):
+        ours = np.array([class_distance(point, numbers, slope) for slope in slopes])
+        theirs = np.asarray(line_distance(point, made, angles))
+        np.testing.assert_allclose(ours, np.minimum(theirs, 1e9), rtol=1e-9)
+
+
+# -- what the thesis prints, and the specification gives ------------------------------------------------------------
+
+
+def parameters(system: HybridSystem, **values: float) -> object:
+    return system.unpack_parameters(system.start_parameters())._replace(**values)
+
+
+@pytest.fixture(scope="module")
+def reaction() -> ReactionSignature:
+    return ReactionSignature(11, 6)
+
+
+def test_the_first_property_of_the_reaction_and_the_search_for_its_rate(reaction: ReactionSignature) -> None:
+    for x1, expected in ((0.75, -0.42e-3), (1.5, -1.67e-3), (2.25, -3.75e-3)):
+        root = reaction.properties(np.array([x1, 1.5]), 0.15, 0.01, 1e-2)[0][0]
+        assert abs(-0.15 * root**2 - expected) < 0.02 * abs(expected)  # eps there is not known; it enters in 1 %
+    p = parameters(reaction)
+    for state in ((2.5, 0.5), (1.5, 1.0), (1.0, 2.0)):
+        window = reaction.properties(np.array(state), 0.15, 0.01, 1e-2)[1]
+        found, residuals = reaction.search(window, p)
+        costs = (residuals**2).sum(axis=0)
+        assert reaction.rates[np.argmin(costs)] == pytest.approx(0.15)
+        assert costs.min() < 1e-6
+        np.testing.assert_allclose(found.values[:, np.argmin(costs)], state, atol=1e-4)  # six corrections
+
+
+def test_a_rate_beyond_the_candidates_is_told(reaction: ReactionSignature) -> None:
+    p = parameters(reaction)
+    x = reaction.start_state()
+    for rate, outside in ((0.2, False), (0.5, True)):
+        window = reaction.properties(np.array([1.5, 1.0]), rate, 0.01, 1e-2)[1]
+        assert (reaction.inverted([window], x, p).outside >= 1.0) == outside
+
+
+def test_the_median_of_the_cascade_has_the_sign_of_the_second_state() -> None:
+    observer = CascadeSignature()
+    grid = np.stack(np.meshgrid(observer.nodes, observer.nodes, observer.nodes, indexing="ij"))
+    model = observer.model_parameters((), parameters(observer))
+    windows = np.stack([x[0] for x in observer.moved(grid, 100, model)])
+    for scaling, eps, expected in (("norm", 1e-3, 294), ("literal", 1.0, 294), ("literal", 1e-3, 286)):
+        median = np.median(dynamic_signature(windows, 67, eps, scaling)[0], axis=0)  # type: ignore[arg-type]
+        assert ((np.sign(median) == np.sign(grid[1])) & (grid[1] != 0)).sum() == expected
+    told = observer.inverted([windows[:, 5, 1, 4]], observer.start_state(), parameters(observer)).state
+    assert np.abs(told[:2] - grid[:2, 5, 1, 4]).max() < 0.5  # half of a cell, at a node of the table
+
+
+def test_the_culture_is_told_by_literal_scaling_only() -> None:
+    sines = []
+    for scaling in ("literal", "norm"):
+        observer = CultureSignature(3, scaling)  # type: ignore[arg-type]
+        p = parameters(observer)
+        states = np.array([[0.5] * 4, [1.86, 1.06, 1.46, 1.46], [0.15, 0.15, 0.19, 0.11]])
+        light = np.stack([observer.plant.measured_under(x, p)[1] for x in observer.moved(states, 7, p)])
+        found = observer.properties(light, 1e-3)
+        a, b = found[:, 0] - found[:, 1], found[:, 2] - found[:, 3]
+        sines.append(abs(a[0] * b[1] - a[1] * b[0]) / np.linalg.norm(a) / np.linalg.norm(b))
+    assert sines == pytest.approx([0.52, 0.058], rel=0.25)  # the finite steps there are not known
+
+
+def test_glycerol_and_enzyme_come_back_from_a_clean_window() -> None:
+    observer = CultureSignature()
+    p = parameters(observer)
+    state = np.array([0.5, 1.6, 0.13])
+    measured = [observer.plant.measured_under(x, p) for x in observer.moved(state, 7, p)]
+    past = [np.array([m[i] for m in measured]) for i in range(2)]
+    told = observer.inverted(past, observer.start_state(), p)
+    np.testing.assert_allclose(told.state, state, rtol=0.06)  # a 3 x 3 network is bent between its nodes
+    assert told.outside == 0.0
+
+
+def test_a_table_follows_its_parameters_and_tells_a_node_from_its_window() -> None:
+    observer = OscillatorSignature(7)
+    grid = observer.tabulated({"braking": 0.3})["table"]
+    assert np.abs(grid - observer.tabulated()["table"]).max() > 1e-6
+    p = parameters(observer, braking=0.3)._replace(table=grid, sharpness=1e4)  # type: ignore[attr-defined]
+    node = np.array([observer.nodes[0][4], observer.nodes[1][5]])
+    window = np.stack([observer.plant.measured(x)[0] for x in observer.moved(node, 2, p)])
+    np.testing.assert_allclose(observer.inverted([window], observer.start_state(), p).state, node, atol=1e-6)
+
+
+def test_until_the_window_is_full_the_model_runs_alone() -> None:
+    observer = OscillatorSignature()
+    states = {}
+    for gain in (0.0, 5.0):
+        p = parameters(observer, gain=gain)
+        x, states[gain] = observer.start_state(), []
+        for sample in (1.0, 1.01, 1.02, 1.03):
+            u = observer.unpack_inputs(np.array([sample]))
+            x = observer.jump("sampling", 0.0, x, u, p)
+            states[gain].append(x[:2].copy())
+            full = observer.output(0.0, x, u, p)["window_full"]
+        assert full == 1.0
+    same = [bool((a == b).all()) for a, b in zip(*states.values(), strict=True)]
+    assert same == [True, True, False, False]
+
+
+def test_most_windows_beyond_the_table_are_warned_of() -> None:
+    observer = OscillatorSignature()
+    warning = next(s for s in observer.outputs if s.name == "mostly_outside").warning
+    assert warning is not None
+    assert "tabulated" in warning.text
+    x, p = observer.start_state(), parameters(observer)
+    for k in range(6):
+        u = observer.unpack_inputs(np.array([100.0 * (-1.0) ** k]))
+        x = observer.jump("sampling", 0.0, x, u, p)
+    told = observer.output(0.0, x, observer.unpack_inputs(np.zeros(1)), p)
+    assert (told["window_count"], told["mostly_outside"]) == (4.0, 1.0)
+
+
+@pytest.mark.parametrize("cls", [CascadeSignature, CultureSignature, OscillatorSignature, ReactionSignature])
+def test_options_beyond_their_range_are_refused(cls: type[SignatureObserver]) -> None:
+    with pytest.raises(ValueError, match="nodes must be"):
+        cls(nodes=99)  # type: ignore[call-arg]
+    assert "measured" in scalar_names(cls().inputs)[0]
