@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -153,6 +153,8 @@ def calibrate(
             f"out, or record signals, or a run, that it acts on. Inputs that the recording drives: {driven}."
         )
     units = {name: runs.unit(name) for name in names}
+    told = {name: runs.unit(name) or unit if unit == "1" else unit for name, unit in recorded.units.items()}
+    recorded = replace(recorded, units=told)  # a table without units has those of the model
     return Calibration(
         names, units, dict(runs.start), found, recorded, level, tuple(_remarks(found, names, recorded, low, high))
     )

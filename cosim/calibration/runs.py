@@ -44,10 +44,10 @@ class Runs(Protocol):
         """
 
     def unit(self, name: str) -> str:
-        """Unit of a value that is fitted, empty where it is not known.
+        """Unit of a signal or of a value that is fitted, empty where it is not known.
 
         Args:
-            name: of the value.
+            name: of it.
         """
 
     def close(self) -> None:
@@ -164,6 +164,7 @@ class ScenarioRuns:
             self.start[name] = float(value)
         outcome = self._outcome(self.start)
         self.outputs = tuple(signal.name for signal in outcome.signals)
+        self._units = {signal.name: signal.unit for signal in outcome.signals}
 
     def run(self, values: Mapping[str, float], recorded: RecordedSignals) -> Array:
         """Simulate with parameters; arguments and result as for `Runs`."""
@@ -182,12 +183,12 @@ class ScenarioRuns:
         return result
 
     def unit(self, name: str) -> str:
-        """Nothing is said of the unit of a scenario's value.
+        """Unit of a signal; nothing is said of that of a scenario's value.
 
         Args:
-            name: of the value.
+            name: of the signal or value.
         """
-        return ""
+        return self._units.get(name, "")
 
     def close(self) -> None:
         """Nothing to free."""

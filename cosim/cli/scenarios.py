@@ -7,12 +7,14 @@ import tomllib
 from typing import Any
 
 from cosim.errors import ScenarioError
+from cosim.scenario.override import CASE
 from cosim.simulation.scenario import Scenario
 from fmus.cli.progress import ProgressBar
 
 DEFAULT = "freight_profile_d"
 OVERRIDES = (
-    "override component.parameter, master.KEY, balises.KEY, report.KEY, a top-level key, or case; may be repeated"
+    "override component.parameter, master.KEY, balises.KEY, report.KEY, a top-level key, or case; may be repeated; the "
+    "others win over case"
 )
 
 
@@ -40,8 +42,9 @@ def load_scenario(options: argparse.Namespace) -> Scenario:
         ScenarioError: there is none, or an override is not ``NAME=VALUE``.
     """
     scenario = Scenario.load(options.scenario, strict=getattr(options, "strict", False))
-    for setting in options.settings:
-        scenario.set(*parse_setting(setting))
+    given = [parse_setting(setting) for setting in options.settings]
+    for name, value in sorted(given, key=lambda entry: entry[0] != CASE):  # what is said by name wins over a case
+        scenario.set(name, value)
     return scenario
 
 

@@ -13,6 +13,7 @@ from cosim.cli.scenarios import add_scenario, load_scenario, parse_setting
 from cosim.errors import ScenarioError, nearest
 from cosim.results.folder import check_writable
 from cosim.scenario.override import CASE
+from cosim.simulation.scenario import Scenario
 from cosim.studies.sampling import MOST, Range, uniform
 from fmus.cli.progress import ProgressBar
 
@@ -65,7 +66,7 @@ def execute(options: argparse.Namespace) -> int:
     if options.zip and options.samples is not None:
         raise ScenarioError("--zip and --samples exclude each other.")
     mode: Any = "latin" if options.samples is not None else "zip" if options.zip else "grid"
-    values = ({CASE: list(scenario.cases)} if options.cases else {}) | _values(options.vary)
+    values = (_cases(scenario, options.settings, options.zip) if options.cases else {}) | _values(options.vary)
     if not values:
         raise ScenarioError("Nothing is varied: give --vary NAME=VALUES, or --cases for a scenario with cases.")
     if options.cases and not scenario.cases:
@@ -97,6 +98,14 @@ def execute(options: argparse.Namespace) -> int:
         print(result.text() if options.by is None else studies.groups_text(result, options.by))
         print(f"\n{len(result) - len(result.failed)} of {len(result)} runs done: {directory}")
     return SOME_FAILED if result.failed else DONE
+
+
+def _cases(scenario: Scenario, settings: list[str], zipped: bool) -> dict[str, list[Any]]:
+    """All cases, and what ``--set`` says of values that a case sets too: that wins, as it does for one run."""
+    told = {name for values in scenario.cases.values() for name in values}
+    given = dict(parse_setting(text) for text in settings)
+    times = len(scenario.cases) if zipped else 1
+    return {CASE: list(scenario.cases)} | {name: [value] * times for name, value in given.items() if name in told}
 
 
 def _values(given: list[str]) -> dict[str, Any]:

@@ -24,8 +24,11 @@ NOT_MEASUREMENTS = ("_std", "_covariance", "_likelihood")
 ADVICE = {
     "overconfident": "it trusts itself more than its errors allow. Increase the covariance of the process noise, or "
     "that of the measurements where the sensor is worse than told; a wrong model or a bias looks alike",
-    "underconfident": "its errors are smaller than it tells. Decrease the covariances of process or measurements",
+    "underconfident": "its errors are smaller than it tells. Decrease the covariances of process or measurements; a "
+    "plant or a sensor that adds no noise in this run looks alike",
 }
+NOTHING_WRONG = 1e-6
+"""Mean square of errors, in units of what is told, below which a run holds no noise to judge a covariance by."""
 COLOURED = (
     "Innovations look small because the error lasts (a wheel that creeps, a bias): give it a state, or increase the "
     "covariance of the process noise"
@@ -192,6 +195,8 @@ def _judged(
     if np.count_nonzero(known) < FEWEST_INSTANTS:
         return
     time, squares, degrees = time[known], squares[known], degrees[known]
+    if kind != "NIS" and squares.mean() < NOTHING_WRONG * degrees.mean():
+        return  # the plant moves without noise as the filter expects it to
     found = judge(squares, degrees, white=kind == "NIS")
     yield FilterConsistency(observer, kind, quantity, time, squares, degrees, found)
 

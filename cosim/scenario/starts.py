@@ -32,9 +32,8 @@ def start_values(component: Component, parameters: Mapping[str, Any]) -> dict[st
     enumeration, or the bytes of a binary in hexadecimal.
 
     Raises:
-        CouplingError: a name is unknown (the nearest are suggested), or a value is not of the variable's type or lies
-        outside
-            what the component declares.
+        CouplingError: a name is unknown (the nearest are suggested), a list is shorter than its vector, or a value is
+            not of the variable's type or lies outside what the component declares.
     """
     starts: dict[str, StartValue] = {}
     for name, value in parameters.items():
@@ -49,6 +48,11 @@ def _spread(component: Component, name: str, value: Any) -> Iterator[tuple[str, 
     if f"{name}[1]" not in vector:
         yield name, value
     elif isinstance(value, list):
+        if len(value) < len(vector):  # a longer one ends with a name that is unknown
+            raise CouplingError(
+                f"{component.name}.{name}: expected {len(vector)} values, one for each element, or one number for all "
+                f"(got {len(value)})."
+            )
         yield from ((f"{name}[{i}]", entry) for i, entry in enumerate(value, 1))
     else:
         yield from ((n, value) for n in vector)

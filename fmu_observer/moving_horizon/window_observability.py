@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+
+from fmu_observer.models.filter_model import FilterModel, Known
 
 TOLERANCE = 1e-9  # of the largest singular value of the measured rows: below it, a direction is not told
 PART = 1e-6  # of the largest entry of a direction: below it, a state has no part in it
@@ -15,10 +16,11 @@ class WindowObservability(NamedTuple):
     """What a window tells of the state in its first row.
 
     Attributes:
-        rank: independent directions that are told. unseen: orthonormal basis of those that are not, shape
-            (n, n - rank). states: names of the states.
+        measured: what the rows measure of it, shape (N * q, n). rank: independent directions that are told.
+        unseen: orthonormal basis of those that are not, shape (n, n - rank). states: names of the states.
     """
 
+    measured: np.ndarray
     rank: int
     unseen: np.ndarray
     states: tuple[str, ...]
@@ -36,20 +38,25 @@ class WindowObservability(NamedTuple):
         return " ".join(f"{value:+.3g} {name}" for name, value in named if abs(value) > PART)
 
 
-def window_observability(F: np.ndarray, H: np.ndarray, rows: int, states: Sequence[str]) -> WindowObservability:
-    """What a number of rows tell of the state in the first of them, without noise.
+def window_observability(model: FilterModel, known: Known, period: float, rows: int) -> WindowObservability:
+    """What a number of full rows tell of the state in the first of them, along the model's own way without noise.
 
     Args:
-        F: transition from row to row, shape (n, n). H: what a row measures, shape (q, n). rows: N.
-        states: names, n of them.
+        model: the model, from its start. known: time, inputs held, and parameters. period: from row to row [s].
+        rows: N.
 
     Returns:
-        Rank, and the directions that no combination of the rows shows.
+        Measured rows, rank, and the directions that no combination of the rows shows.
     """
-    seen, measured = [], H
-    for _ in range(rows):
-        seen.append(measured)
-        measured = measured @ F
-    _, values, directions = np.linalg.svd(np.vstack(seen))
-    rank = int(np.sum(values > TOLERANCE * values[0])) if values.size and values[0] > 0.0 else 0
-    return WindowObservability(rank, directions[rank:].T, tuple(states))
+    x, passage, seen = model.start, np.eye(model.order), []
+    for i in range(rows):
+        now = known._replace(t=known.t + i * period)
+        H, _ = model.measurement_jacobians(x, now)
+        F, _ = model.transition_jacobians(x, now, period)
+        seen.append(np.asarray(H) @ passage)
+        passage = np.asarray(F) @ passage
+        x = np.asarray(model.moved(x, model.no_noise(), now, period), dtype=float)
+    measured = np.vstack(seen)
+    _, values, directions = np.linalg.svd(measured)
+    rank = int(np.sum(values > TOLERANCE * values[0])) if values[0] > 0.0 else 0
+    return WindowObservability(measured, rank, directions[rank:].T, tuple(s.name for s in model.states))

@@ -21,9 +21,10 @@ from fmu_observer.moving_horizon.arrival_cost import arrival_cost_at
 from fmu_observer.moving_horizon.gauss_newton import Limits, Moved, Seen, WindowProblem, solve
 from fmu_observer.moving_horizon.real_time_iteration import iterate
 from fmu_observer.moving_horizon.window import RowLayout, WindowRow
+from fmu_observer.moving_horizon.window_observability import window_observability
 from fmu_observer.observers.discrete.moving_horizon_observer import MovingHorizonObserver
 from fmu_observer.observers.train.balise_moving_horizon import BaliseMovingHorizon
-from plant_models.hybrid import Runtime
+from plant_models.hybrid import Runtime, scalar_names
 from plant_models.hybrid.scan import enclosed, scan_table
 from plant_models.hybrid.system import vector
 
@@ -285,6 +286,48 @@ def test_a_window_that_does_not_tell_a_state_says_which() -> None:
     assert "do not tell +1 rate" in short.statement
     assert long.values["window_rank"] == 2
     assert "alone tell every state" in long.statement
+
+
+def reaction(**options: Any) -> MovingHorizonObserver:
+    return MovingHorizonObserver("gas_phase_reaction", outputs=["y"], unknown=["rate"], substeps=1, **options)
+
+
+@pytest.mark.parametrize(("period", "condition", "spread"), [(0.01, 8.7e3, 0.16), (0.1, 197.0, 0.0035)])
+def test_the_window_of_a_reaction_is_as_ill_conditioned_as_known(
+    period: float, condition: float, spread: float
+) -> None:
+    """Condition and deviation of the rate at noise of 1e-3, computed independently from the closed form."""
+    model = reaction().model
+    known = Known(0.0, np.zeros(0), np.array([v for s in model.parameters for v in s.start_values]))
+    measured = window_observability(model, known, period, 11).measured
+    assert np.linalg.cond(measured) == pytest.approx(condition, rel=5e-3)
+    assert 1e-3 * np.sqrt(np.linalg.inv(measured.T @ measured)[2, 2]) == pytest.approx(spread, rel=2e-2)
+
+
+def test_an_unknown_rate_is_found_within_its_bounds() -> None:
+    observer = reaction(window=11, passes=3, bounds={"rate": [0.1, 0.35]})
+    runtime = Runtime(observer)
+    parameters = scalar_names(observer.parameter_signals)
+    for name, value in {"process_covariance": 0.0, "measurement_covariance": 1e-8, "sample_period": 0.1}.items():
+        for i, scalar in enumerate(parameters):
+            if scalar.split("[")[0] == name:
+                runtime.p[i] = value
+    runtime.x[:3] = 2.3, 0.7, 0.3  # the total pressure is measured, so it is right
+    rates = []
+    for k in range(60):
+        a = 2.5 / (1.0 + 0.3 * 2.5 * 0.1 * k)
+        runtime.u[0] = a + 0.5 * (3.5 - a)
+        runtime.advance(0.1 * k) if k else runtime.start(0.0)
+        rates.append(runtime.update_outputs()[2])
+    assert abs(rates[-1] - 0.15) < 1e-3
+    assert min(rates) >= 0.1
+    assert max(rates) <= 0.35
+
+
+@pytest.mark.parametrize("names", [["y"], ["rate", "rate"]])
+def test_what_is_unknown_must_be_there(names: list[str]) -> None:
+    with pytest.raises(ValueError, match=r"expected names of its inputs .none. or of its scalar parameters .rate"):
+        MovingHorizonObserver("gas_phase_reaction", outputs=["y"], unknown=names)
 
 
 # -- formulas ----------------------------------------------------------------------------------------------------------

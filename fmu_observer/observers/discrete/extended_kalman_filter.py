@@ -12,7 +12,8 @@ from fmu_observer.models.filter_model import Known
 from fmu_observer.models.registry import MODELS
 from fmu_observer.models.system_model import Source
 from fmu_observer.observability import require_detectable_model
-from fmu_observer.observers.discrete.gaussian_filter import Belief, GaussianFilter
+from fmu_observer.observers.discrete.belief import Belief
+from fmu_observer.observers.discrete.gaussian_filter import GaussianFilter
 from plant_models.hybrid.system import Array
 
 

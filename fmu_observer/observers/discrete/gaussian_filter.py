@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -17,7 +17,9 @@ from fmu_observer.models.filter_model import Known
 from fmu_observer.models.model import stacked
 from fmu_observer.models.process_noise import noise_over
 from fmu_observer.models.system_model import SUBSTEPS, Source, find_filter_model
+from fmu_observer.models.unknown_values import with_unknown
 from fmu_observer.observers.discrete.arrivals import PERIODIC, Arrivals
+from fmu_observer.observers.discrete.belief import Belief, chosen
 from fmu_observer.observers.discrete.covariance_requirements import positive
 from fmu_observer.observers.discrete.filter_condition import steady_condition
 from fmu_observer.observers.discrete.filter_signals import SignalsOf
@@ -34,19 +36,6 @@ Form = Literal["joseph", "short", "square_root"]
 DENSITY = 1e-2  # of the default process noise in every state or noise input [x2/s] [ours]
 VARIANCE = 1e-4  # of the default measurement noise [y2] [ours]
 SIGMAS = 3.0  # standard deviations of the position that the gate of balise telegrams grants [ours]
-
-
-class Belief(NamedTuple):
-    """What a filter believes.
-
-    Attributes:
-        estimate: shape (n,). spread: its covariance, or the lower factor of it, shape (n, n). drawn: what a prediction
-            hands on to the correction after it, or None.
-    """
-
-    estimate: Array
-    spread: Array
-    drawn: Any = None
 
 
 class GaussianFilter(GatedObserver):
@@ -70,6 +59,7 @@ class GaussianFilter(GatedObserver):
     Args:
         model: name of an observer model or of a plant, ``file.py:Class``, or a model or system itself.
         outputs, inputs, process_noises, measurement_noises, substeps: of a plant, see `models.system_model`.
+        unknown: names of its parameters or inputs that are estimated too, see `models.unknown_values`.
         arrival: see above. form: of the covariance equations, one of `forms`.
         covariances: whether the whole covariance of the estimate is an output, `covariance`, row by row.
         options: of the subclass.
@@ -88,6 +78,7 @@ class GaussianFilter(GatedObserver):
         "process_noises": (),
         "measurement_noises": (),
         "substeps": (),
+        "unknown": (),
         "arrival": (),
         "form": ("joseph", "short", "square_root"),
         "covariances": (False, True),
@@ -102,6 +93,7 @@ class GaussianFilter(GatedObserver):
         process_noises: Sequence[str] = (),
         measurement_noises: Sequence[str] = (),
         substeps: int = SUBSTEPS,
+        unknown: Sequence[str] = (),
         arrival: str | Sequence[str] = PERIODIC,
         form: Form | None = None,
         covariances: bool = False,
@@ -114,6 +106,8 @@ class GaussianFilter(GatedObserver):
             "measurement_noises": measurement_noises,
         }
         self.model = find_filter_model(model, **named, substeps=substeps)
+        if unknown:
+            self.model = with_unknown(self.model, unknown)
         self.form: Form = self.forms[0] if form is None else form
         if self.form not in self.forms:
             raise ValueError(f"{self.name}: unknown form {form!r}; choose one of: {', '.join(self.forms)}.")
@@ -125,6 +119,7 @@ class GaussianFilter(GatedObserver):
             model=model if isinstance(model, str) else self.model.name,
             **given,
             **({} if substeps == SUBSTEPS else {"substeps": substeps}),
+            **({"unknown": list(unknown)} if unknown else {}),
             arrival=arrival if isinstance(arrival, str) else list(arrival),
             form=self.form,
             covariances=covariances,
@@ -221,7 +216,7 @@ class GaussianFilter(GatedObserver):
             known, r = self.known(t - p.sample_period, u, p), self.model.noise_count
             noise = as_matrix(p.process_covariance, r, r)
             ahead = self.predicted(before, known, p.sample_period, noise, p)
-            belief = _chosen(primed, ahead, self.unmoved(before, p))
+            belief = chosen(primed, ahead, self.unmoved(before, p))
         kept = {name: x[first] for name, first in places.items()}
         q = len(self.model.measurements)
         first, second = places["last_innovation"], places["last_innovation_covariance"]
@@ -369,21 +364,6 @@ class GaussianFilter(GatedObserver):
 
 def _matrix(name: str, values: np.ndarray, text: str) -> Signal:
     return parameter(name, "1", tuple(map(float, values.ravel())), text, size=values.size)
-
-
-def _chosen(primed: Array, one: Belief, other: Belief) -> Belief:
-    """The one belief where a filter has begun, else the other."""
-
-    def fields(a: Any, b: Any) -> Any:
-        if a is None:
-            return None
-        return (
-            type(a)(*(fields(*pair) for pair in zip(a, b, strict=True)))
-            if isinstance(a, tuple)
-            else np.where(primed, a, b)
-        )
-
-    return Belief(*(fields(*pair) for pair in zip(one, other, strict=True)))
 
 
 def _replaced(e: Array, S: Array, rows: Sequence[int], error: Array, found: Array) -> tuple[Array, Array]:

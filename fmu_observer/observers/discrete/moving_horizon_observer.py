@@ -153,9 +153,7 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         steady, model = super().condition_of(p), self.model
         inputs = stacked(tuple(float(s.start_values[0]) for s in model.inputs))
         known = Known(0.0, inputs, np.asarray(self.known_parameters(p), dtype=float))
-        F, _ = model.transition_jacobians(model.start, known, float(p.sample_period))
-        H, _ = model.measurement_jacobians(model.start, known)
-        told_by = window_observability(np.asarray(F), np.asarray(H), self.window, [s.name for s in model.states])
+        told_by = window_observability(model, known, float(p.sample_period), self.window)
         return replace(
             steady,
             values={**steady.values, "window_rank": told_by.rank},

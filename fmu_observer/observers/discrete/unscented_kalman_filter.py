@@ -13,7 +13,8 @@ from fmu_observer.filtering.square_root import factor
 from fmu_observer.filtering.unscented import Scattered, Weights
 from fmu_observer.models.filter_model import Known
 from fmu_observer.models.system_model import Source
-from fmu_observer.observers.discrete.gaussian_filter import Belief, Form, GaussianFilter
+from fmu_observer.observers.discrete.belief import Belief
+from fmu_observer.observers.discrete.gaussian_filter import Form, GaussianFilter
 from plant_models.hybrid import parameter
 from plant_models.hybrid.system import Array
 

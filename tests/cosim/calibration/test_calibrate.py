@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -124,7 +125,9 @@ GUESSES = [f"{name}={value}" for name, value in GUESS.items()]
 def test_command(path: Path, table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     files = ["--toml", str(tmp_path / "p.toml"), "--plot", str(tmp_path / "fit.png")]
     assert main(words(path, table, "--parameters", *GUESSES, *files)) == 0
-    assert "95 % interval" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "95 % interval" in said
+    assert re.search(r"^speed +\S+ +m/s ", said, re.MULTILINE), said  # the table says no unit, the FMU does
     values = tomllib.loads((tmp_path / "p.toml").read_text())["parameters"]
     assert values["mass"] == pytest.approx(80e3, rel=0.01)
     assert (tmp_path / "fit.png").stat().st_size > 10_000

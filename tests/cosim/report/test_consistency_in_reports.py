@@ -62,6 +62,14 @@ def test_one_that_trusts_itself_too_much_is_warned_of_once_with_what_to_do() -> 
     assert "Decrease" in warning
 
 
+def test_errors_without_noise_are_not_judged() -> None:
+    """A plant that moves as the filter expects: NEES is 0 and says nothing of the covariance; NIS still does."""
+    assert [entry.kind for entry in filter_consistency(run(1e-7), SPEC)] == ["NIS"]
+    assert not any("confident" in w for w in result_warnings(run(1e-7, nis=False), SPEC))
+    (warning,) = [w for w in result_warnings(run(1e-3), SPEC) if "confident" in w]
+    assert "adds no noise in this run looks alike" in warning
+
+
 def test_small_innovations_beside_large_errors_are_not_answered_by_smaller_covariances() -> None:
     lasting = run(4.0)
     lasting.table["kf.nis"] /= 16.0

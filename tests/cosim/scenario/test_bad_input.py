@@ -37,6 +37,10 @@ SETTINGS: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "bad option": ({"observer.options.premise": "dead"}, "'dead'.*'frozen'"),
     "unknown parameter": ({"locomotive.mas": 1.0}, "locomotive: no variable 'mas'.*'mass'"),
+    "list shorter than its vector": (
+        {"driver.profile_speed": [1.0, 2.0]},
+        r"driver.profile_speed: expected 8 values, one for each element, or one number for all \(got 2\)",
+    ),
     "unknown model": ({"report.observers": ["x y"]}, "report.observers"),
     "unknown key": ({"balises.spaceing": 3.0}, "balises.spaceing: unknown key.*'spacing'"),
     "unknown top-level key": ({"stepp": 3.0}, "stepp: unknown key.*'step'"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from math import nan
 from pathlib import Path
@@ -150,6 +151,19 @@ def test_a_sweep_goes_on_where_one_ended(swept: SweepResult, tmp_path: Path) -> 
     assert len(again) == 6
     with pytest.raises(ScenarioError, match="resumed from its folder"):
         sweep.run(resume=True)
+
+
+def test_what_a_command_sets_wins_over_a_case(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Wherever it stands, for one run and for all cases."""
+    path, out = str(family().save(tmp_path / "family.toml")), tmp_path / "out"
+    assert main(["run", path, "--set", "stop=0.1", "--set", "case=heavy, long", "--out", str(out), "--quiet"]) == 0
+    assert "0.1 s simulated" in capsys.readouterr().out
+    words = ["sweep", path, "--cases", "--set", "stop=0.1", "--set", "train.effort=1e4", "--quiet", "--out", str(out)]
+    for more in ([], ["--zip"]):
+        assert main([*words, *more, "--table-only"]) == 0
+        with (out / "index.csv").open() as file:
+            assert [row["stop"] for row in csv.DictReader(file)] == ["0.1", "0.1"]
+    capsys.readouterr()
 
 
 def test_the_command_runs_all_cases_and_groups_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
