@@ -7,7 +7,7 @@ was chosen.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import inf
 from time import perf_counter
@@ -18,7 +18,7 @@ import numpy as np
 from fmu_observer.moving_horizon import robust_loss
 from fmu_observer.moving_horizon.arrival_cost import ArrivalCost
 from fmu_observer.moving_horizon.gauss_newton import WindowProblem
-from fmu_observer.moving_horizon.window_program import Step, window_program
+from fmu_observer.moving_horizon.window_program import Step, WindowProgram, window_program
 from fmu_observer.moving_horizon.window_stages import Stages, WindowStages
 
 SMALLEST_SHARE = 1.0 / 64.0
@@ -97,10 +97,11 @@ class FullSolver:
 
     Args:
         problem: what moves, what is measured, bounds, losses.
+        program: gives what solves the quadratic programmes of a window, of its rows and states.
     """
 
-    def __init__(self, problem: WindowProblem) -> None:
-        self.problem = problem
+    def __init__(self, problem: WindowProblem, program: Callable[[int, int], WindowProgram] = window_program) -> None:
+        self.problem, self._program = problem, program
         self._stages = WindowStages(problem)
 
     def solve(
@@ -126,17 +127,24 @@ class FullSolver:
             WindowError: bounds contradict one another, a number is not finite, or no trajectory of the model keeps the
                 bounds; the message says which.
         """
-        return _Search(self.problem, self._stages, arrival, np.asarray(rows), np.asarray(shared)).solve(
-            np.asarray(points, dtype=float), effort
-        )
+        program = self._program(len(rows), self.problem.order)
+        search = _Search(self.problem, self._stages, program, arrival, np.asarray(rows), np.asarray(shared))
+        return search.solve(np.asarray(points, dtype=float), effort)
 
 
 class _Search:
     """One window on its way to its solution."""
 
     def __init__(
-        self, problem: WindowProblem, stages: WindowStages, arrival: ArrivalCost, rows: np.ndarray, shared: np.ndarray
+        self,
+        problem: WindowProblem,
+        stages: WindowStages,
+        program: WindowProgram,
+        arrival: ArrivalCost,
+        rows: np.ndarray,
+        shared: np.ndarray,
     ) -> None:
+        self.program = program
         self.problem, self.stages, self.arrival, self.rows, self.shared = problem, stages, arrival, rows, shared
         for name, value in {"rows": rows, "parameters": shared, **arrival._asdict()}.items():
             if not np.isfinite(value).all():
@@ -244,14 +252,13 @@ class _Search:
         b = -np.einsum("kqi,kq->ki", H, residuals)
         stages = point.stages
         given = (A, b, stages.F, stages.G, stages.moved - point.states)
-        program = window_program(len(self.rows), self.problem.order)
         lower, upper = self.lower - point.states, self.upper - point.states
         if self.active(point.states) == 0:
             free = np.full(lower.shape, inf)
-            found = program.solve(*given, -free, free)
+            found = self.program.solve(*given, -free, free)
             if found.solved and ((found.change >= lower) & (found.change <= upper)).all():
                 return found
-        found = program.solve(*given, lower, upper)
+        found = self.program.solve(*given, lower, upper)
         return found._replace(change=np.clip(found.change, lower, upper))
 
     def searched(self, point: _Point, step: Step, *, free: bool) -> tuple[_Point, float]:

@@ -5,7 +5,9 @@ Unknowns are the changes of the states and the noises of all rows. It knows matr
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -13,11 +15,7 @@ import numpy as np
 
 from fmu_observer.moving_horizon.window_stages import BufferedCall
 
-OPTIONS = {
-    "print_time": False,
-    "error_on_fail": False,
-    "piqp": {"eps_abs": 1e-9, "eps_rel": 1e-10, "max_iter": 100},
-}
+SOLVER, OPTIONS = "piqp", {"eps_abs": 1e-9, "eps_rel": 1e-10, "max_iter": 100}
 
 
 class Step(NamedTuple):
@@ -44,9 +42,12 @@ class WindowProgram:
 
     Args:
         count: N, rows of the window. order: n, states.
+        solver: name of a solver of quadratic programmes that CasADi knows. options: of it.
     """
 
-    def __init__(self, count: int, order: int) -> None:
+    def __init__(
+        self, count: int, order: int, solver: str = SOLVER, options: Mapping[str, Any] = MappingProxyType(OPTIONS)
+    ) -> None:
         self.count, self.order = count, order
         size, within = count * order, np.arange(order)
         rows = np.repeat(np.arange(count) * order, order * order) + np.tile(within, size)
@@ -63,7 +64,8 @@ class WindowProgram:
             [place.ravel()[self._kept], np.repeat(first + within, order, axis=0).ravel()],
             size,
         )
-        self._solver = ca.conic("window", "piqp", {"h": self.cost, "a": self.transitions}, OPTIONS)
+        told = {"print_time": False, "error_on_fail": False, solver: dict(options)}
+        self._solver = ca.conic("window", solver, {"h": self.cost, "a": self.transitions}, told)
         self._call = BufferedCall(self._solver)
         self._rest = [np.zeros(self._solver.nnz_in(i)) for i in range(10, self._solver.n_in())]
 
@@ -90,23 +92,34 @@ class WindowProgram:
         columns[:, :, 0] = -1.0
         columns[:-1, :, 1:] = F[1:].transpose(0, 2, 1)
         coupling = np.concatenate([columns.ravel()[self._kept], G.transpose(0, 2, 1).ravel()])
-        free, zero, nothing = np.full(N * n, np.inf), np.zeros(N * n), np.zeros(2 * N * n)
-        change, _, prices, _ = self._call(
+        free, zero = np.full(N * n, np.inf), np.zeros(N * n)
+        found, prices, status = self.handed(
             np.concatenate([A.ravel(), zero + 1.0]),
             np.concatenate([b.ravel(), zero]),
             coupling,
             -c.ravel(),
-            -c.ravel(),
             np.concatenate([lower.ravel(), -free]),
             np.concatenate([upper.ravel(), free]),
-            nothing,
-            nothing,
-            zero,
-            *self._rest,
         )
-        changes, noises = change.copy().reshape(2, N, n)
+        changes, noises = found.reshape(2, N, n)
+        return Step(changes, noises, prices.reshape(N, n), status)
+
+    def handed(
+        self, h: np.ndarray, g: np.ndarray, a: np.ndarray, right: np.ndarray, lower: np.ndarray, upper: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, str]:
+        """``min z' H z / 2 + g' z`` with ``A z = right`` and bounds, by the solver.
+
+        Args:
+            h: nonzeros of H as in `cost`. g: shape (2 N n,). a: nonzeros of A as in `transitions`.
+            right: shape (N n,). lower, upper: shape (2 N n,).
+
+        Returns:
+            z, the multipliers of the equations, and the solver's status.
+        """
+        nothing, none = np.zeros(len(g)), np.zeros(len(right))
+        told = self._call(h, g, a, right, right, lower, upper, nothing, nothing, none, *self._rest)
         status = str(self._solver.stats(self._call.memory)["unified_return_status"])
-        return Step(changes, noises, prices.copy().reshape(N, n), status)
+        return told[0].copy(), told[2].copy(), status
 
 
 @lru_cache(maxsize=64)

@@ -99,6 +99,7 @@ class FullBaliseMovingHorizon(BaliseMovingHorizon):
     description = "Moving-horizon observer of odometer and balises whose windows are solved to convergence"
     source = "Omar 2012, (1.4.78), (4.2.2)-(4.2.4); solver and the train case are ours"
     traceable = False
+    internal_step = 0.1  # [s]; it flows in Python, and the resistance hardly changes in that time
     outputs = (*BaliseMovingHorizon.outputs, *ENDED)
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {**BaliseMovingHorizon.option_choices, **EFFORT_OPTIONS}
 

@@ -27,6 +27,7 @@ from plant_models.hybrid.system import Array
 ORDER, POINTS = 2, 9  # printed N; N_O = 11
 LARGEST = 3.0  # printed set [0, 3]^2
 RATES = (0.10, 0.35)  # printed range of b [1/s]
+EPS, WIDE_PERIOD = 1e-2, 0.1
 
 
 class ReactionSignature(SignatureObserver):
@@ -41,8 +42,10 @@ class ReactionSignature(SignatureObserver):
     J_r then has its minimum up to 0.16 1/s away from b. Each look-up is corrected `corrections` times by the model;
     with six the minimum stands at b. 3. ``literal`` scaling: with ``norm`` r1 depends on x2 as much as on x1.
 
-    With samples each 0.01 s the problem is so ill-conditioned that noise of 1e-3 on y moves x1 by 1.3; samples each
-    0.1 s (preset `wide_samples` of the plant) are needed with noise.
+    With samples each 0.01 s (preset `as_published`) the problem is so ill-conditioned that noise of 1e-3 on y moves x1
+    by 1.3 even by least squares; with 0.1 s (preset `wide_samples`, its table included) by 0.02. The properties are
+    smallest values of nine points, which noise moves one way: with noise the rate ends at the border of its range. Use
+    a moving-horizon observer there.
 
     Args:
         candidates: of the rate, evenly over [0.10, 0.35] 1/s; the printed search has steps of 0.025, which is 11.
@@ -55,6 +58,7 @@ class ReactionSignature(SignatureObserver):
     name = "reaction_signature"
     description = "Signature observer of the gas-phase reaction, its rate unknown"
     source = "Omar 2012, (4.8.1)-(4.8.6)"
+    default_preset = "as_published"
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
         "candidates": range(3, 12),
         "corrections": range(7),
@@ -73,13 +77,13 @@ class ReactionSignature(SignatureObserver):
         self.nodes = np.linspace(0.0, LARGEST, nodes)
         middle = float(np.mean(RATES))
         self.plant, self.scaling = GasPhaseReaction(), next_scaling
-        table = self._built(1e-2, 1e-2)
+        table = self._built(1e-2, EPS)
         self.declare(
             self.plant,
             ORDER + POINTS,
             next_scaling,
             gain=0.2,
-            eps=1e-2,
+            eps=EPS,
             own_parameters=(
                 parameter("table", "1", tuple(table), "sqrt(-r1 / b) over x1, then r2 over x1 and x2", size=len(table)),
             ),
@@ -93,6 +97,8 @@ class ReactionSignature(SignatureObserver):
             ),
             known=("rate",),
         )
+        wide = {"sample_period": WIDE_PERIOD, "table": tuple(self._built(WIDE_PERIOD, EPS))}
+        self.presets = {"as_published": {}, "wide_samples": wide}
         super().__init__(candidates=candidates, corrections=corrections, nodes=nodes, next_scaling=next_scaling)
 
     def properties(self, state: Array, rate: Array, period: Array, eps: Array) -> tuple[Array, Array]:
