@@ -30,7 +30,7 @@ from fmu_observer.observers.train.balise_moving_horizon import LAYOUT, BaliseMov
 PAGE = Path(__file__).parents[1] / "moving_horizon.md"
 READINGS, BALISES, WINDOWS = 200, 20, 12
 ORDER = 4
-DISTURBANCE_LIMIT = 0.02  # [m/s2]: tight, so that it is active in part of the window
+DISTURBANCE_LIMIT = 0.003  # [m/s2]: tight, so that it is active in part of the window
 EFFORT = Effort(1e-4)
 HEADING = (
     "solver of the quadratic programmes", "CPU time a window, median [ms]", "largest [ms]", "Gauss-Newton steps",

@@ -60,7 +60,8 @@ class FullSolution:
         cost: half the sum of the losses. residual: root of the mean square of the weighted residuals, in their
             deviations. step: largest change in the last step, in standard deviations of the last row.
         iterations: steps done. seconds: time that they took. active: bounds that are touched in the last row.
-        converged: whether the step fell below the tolerance. timed_out: whether the deadline came first.
+        converged: whether the step fell below the tolerance, or met no curvature, so that another would be zero.
+        timed_out: whether the deadline came first.
         feasible: whether `states` keep bounds and transitions. reason: why it did not converge; empty where it did.
     """
 
@@ -173,9 +174,8 @@ class _Search:
         began = perf_counter()
         states = np.clip(start, self.lower, self.upper)
         point = self.at(states, None)
-        before, after = self.spread(point)
+        doubt, after = self.spread(point)  # doubt of the newest row: nothing has smoothed it yet
         self.scale = np.sqrt(np.maximum(after.diagonal(), 1e-300))
-        doubt = before  # of the newest row, which nothing has smoothed yet
         kept, feasible = point, self.keeps(point)
         iterations, size, lasted, reason = 0, inf, 0.0, ""
         while size > effort.tolerance:
@@ -192,12 +192,16 @@ class _Search:
             if not step.solved:
                 reason = f"the quadratic programme ended with {step.status}"
                 break
+            before, weights = point.stages, self.weights(point, doubt if iterations == 0 else None)
             point, share = self.searched(point, step, free=iterations == 0)
+            linear = share == 1.0 and self.unchanged(before, point, weights)  # the programme was the problem itself
             size = float(np.abs(share * step.change / self.scale).max())
             iterations += 1
             lasted = perf_counter() - began - spent
             if self.keeps(point) or not feasible:
                 kept, feasible = point, self.keeps(point)
+            if linear:
+                break
             if share <= SMALLEST_SHARE and size > effort.tolerance:
                 reason = "no part of the last step makes the cost smaller"
                 break
@@ -272,6 +276,12 @@ class _Search:
             if free or better or share <= SMALLEST_SHARE:
                 return after, share
             share *= 0.5
+
+    def unchanged(self, before: Stages, point: _Point, weights: np.ndarray) -> bool:
+        """Whether a step met no curvature: Jacobians and weights after it are those before it."""
+        now = point.stages
+        pairs = ((before.F, now.F), (before.G, now.G), (before.H, now.H), (weights, self.weights(point)))
+        return self.keeps(point) and all(np.array_equal(old, new) for old, new in pairs)
 
     def merit(self, point: _Point, prices: np.ndarray) -> float:
         """Cost, and what the transitions that are not kept cost at these prices, shape (n,)."""

@@ -150,7 +150,7 @@ def iterated_fully(
     before = passed(problem, arrival_cost_from(arrival, n), rows[0], states[0], shared)
     rows, guesses = np.vstack([rows[1:], row]), np.vstack([states[1:], point])
     found = _solver(problem).solve(before, rows, guesses, shared, effort)
-    last = [found.residual, found.step, float(found.iterations), *layout.count(list(rows)), float(found.active)]
+    last = [found.residual, found.step, float(found.iterations), *layout.count(rows), float(found.active)]
     ended = [float(said) for said in (found.converged, found.timed_out, found.feasible)]
     remembered = np.hstack([*before, rows.ravel(), found.states.ravel(), last, ended])
     return Iterated(found.estimate, found.covariance.ravel(), remembered)

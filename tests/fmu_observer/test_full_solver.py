@@ -167,8 +167,8 @@ def test_a_false_balise_does_not_pull_where_squares_are_pulled_by_metres():
 def test_many_passes_of_the_real_time_iteration_come_to_the_same():
     rows, problem = _rows(8, seed=8, step=0.1), _problem(_swinging, (1,), ([-0.5], [0.5]))
     found = _solve(problem, rows)
-    points = [START] * len(rows)
-    passes = gauss_newton.solve(problem, arrival_cost_at(START, SPREAD), list(rows), points, np.array([1.5]), 30)
+    points = np.tile(START, (len(rows), 1))
+    passes = gauss_newton.solve(problem, arrival_cost_at(START, SPREAD), rows, points, np.array([1.5]), 30)
     assert found.converged
     assert found.active + (np.abs(found.states[:, 1]) >= 0.5 - 1e-9).sum() > 0, "a bound is active"
     assert np.array(passes.estimates) == pytest.approx(found.states, abs=SOLVED)
