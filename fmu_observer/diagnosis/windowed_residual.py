@@ -64,9 +64,9 @@ def judge(before: Alarm, t: Array, exceeds: Array, raise_after: Array = 1.0, cle
     Source:
         Omar 2012, 7.5.1 (iii) asks for a persistence and prints none.
     """
-    speaks_against = np.where(exceeds > 0.0, 1.0 - before.raised, before.raised)
+    speaks_against: Array = np.where(exceeds > 0.0, 1.0 - before.raised, before.raised)
     contrary = speaks_against * (before.contrary + 1.0)
     needed = np.where(before.raised > 0.0, clear_after, raise_after)
-    changes = np.where(contrary >= needed - 0.5, speaks_against, 0.0)
+    changes: Array = np.where(contrary >= needed - 0.5, speaks_against, 0.0)
     raised = np.where(changes > 0.0, 1.0 - before.raised, before.raised)
     return Alarm(raised, (1.0 - changes) * contrary, np.where(changes > 0.0, t, before.since))
