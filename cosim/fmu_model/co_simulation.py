@@ -7,7 +7,7 @@ from itertools import repeat
 
 import numpy as np
 
-from cosim.fmu_model.quick_points import Point, QuickPoints
+from cosim.fmu_model.quick_points import Batch, Point, QuickPoints
 from cosim.fmu_model.quick_restarts import quicken_restarts
 from cosim.fmu_model.sealed import FAR, Array, FmuModelError, SealedModel, Way
 from fmus.check.instance import SlaveError
@@ -18,11 +18,10 @@ class CoSimulationModel(SealedModel):
     """A co-simulation FMU; arguments as for `SealedModel`."""
 
     way: Way = "restart"
-    _quick = False
-    """Whether the order of the calls is fixed, so that those of a point are prepared as one."""
-    _quick_restart: Point
-    _quick_step: Point
-    _quick_look: Point
+    _quick: QuickPoints | None = None
+    """Restarts as one call each, where the order of the calls is fixed."""
+    _steps: Batch
+    _looks: Batch
 
     def advance(self, t: float, h: float) -> None:
         """Go on by one communication step, inputs held.
@@ -39,35 +38,24 @@ class CoSimulationModel(SealedModel):
             raise self._in_words(error) from error
 
     def states_after(self, t: float, h: float, points: Array, u: Array) -> Array:  # noqa: D102 - see SealedModel
-        if not self._quick:
+        if self._quick is None or self._quick.hangs_in:
             return super().states_after(t, h, points, u)
         found = np.empty((points.shape[1], len(self.states)))
-        quick, states, read = self._quick_step, self._state_values, self._states_read
-        self._input_values[:] = u if u.ndim == 1 else 0.0
-        driven = repeat(None) if u.ndim == 1 else u.T
+        if u.ndim == 1:
+            self._input_values[:] = u
         try:
-            for row, x, now in zip(found, points.T, driven, strict=False):
-                states[:] = x
-                if now is not None:
-                    self._input_values[:] = now
-                if not quick(t, h):
-                    self._slowly(t, h, x)
-                row[:] = read
+            self._steps(t, h, points, repeat(None) if u.ndim == 1 else u.T, found, self._slowly)
         except SlaveError as error:
             raise self._in_words(error) from error
         return found.T
 
     def outputs_at(self, t: float, points: Array, u: Array, chosen: Sequence[int]) -> Array:  # noqa: D102 - see SealedModel
-        if not self._quick:
+        if self._quick is None or self._quick.hangs_in:
             return super().outputs_at(t, points, u, chosen)
         found = np.empty((points.shape[1], len(self.outputs)))
-        look, states, read = self._quick_look, self._state_values, self._outputs_read
         self._input_values[:] = u
         try:
-            for row, x in zip(found, points.T, strict=True):
-                states[:] = x
-                look(t, 0.0)
-                row[:] = read
+            self._looks(t, 0.0, points, repeat(None), found, self._slowly)
         except SlaveError as error:
             raise self._in_words(error) from error
         return found.take(chosen, axis=1).T
@@ -75,18 +63,18 @@ class CoSimulationModel(SealedModel):
     def _slowly(self, t: float, h: float, x: Array) -> None:
         """A step in the ordinary way from a state, shape (n,), with the inputs that were written last."""
         super()._restart(t, x, self._input_values.copy())
-        self.advance(t, h)
+        self.instance.advance(t, t + h)
         self._read_states()
 
     def _restart(self, t: float, x: Array, u: Array) -> None:
-        if not self._quick:
-            super()._restart(t, x, u)
-            if self.way == "step mode":
-                self._late_states[:] = x
-                self._write_late()
+        if self._quick is not None:
+            self._state_values[:], self._input_values[:] = x, u
+            self._quick.restart(t)
             return
-        self._state_values[:], self._input_values[:] = x, u
-        self._quick_restart(t, 0.0)
+        super()._restart(t, x, u)
+        if self.way == "step mode":
+            self._late_states[:] = x
+            self._write_late()
 
     def _enter(self, t: float) -> None:
         self.instance.enter_initialization(t, t + FAR)
@@ -117,10 +105,11 @@ class CoSimulationModel(SealedModel):
         if not is_native(instance.slave):
             return
         quicken_restarts(instance.slave, instance.fmi_version)
-        self._quick = not instance.has_event_mode and self.way == "restart"
-        if not self._quick:  # initialisation ends in calls that depend on what the FMU answers
-            return
-        quick = QuickPoints(instance, FAR, self._written, self._write_values)
-        self._quick_restart = quick.point((), None, step=False)
-        self._quick_step = quick.point(self.states, self._read_states, step=True)
-        self._quick_look = quick.point(self.outputs, self._read_outputs, step=False)
+        if instance.has_event_mode or self.way != "restart":
+            return  # initialisation ends in calls that depend on what the FMU answers, or is followed by others
+        self._quick = quick = QuickPoints(instance, FAR, self._written, self._write_values)
+        states, inputs = self._state_values, self._input_values
+        self._steps = quick.batch(Point(states, inputs, self._states_read), self.states, self._read_states, step=True)
+        self._looks = quick.batch(
+            Point(states, inputs, self._outputs_read), self.outputs, self._read_outputs, step=False
+        )

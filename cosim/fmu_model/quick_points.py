@@ -5,14 +5,31 @@ one call that is prepared once. A filter makes it many times a sample. Touches o
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from fmpy.fmi1 import FMICallException
+from numpy.typing import NDArray
 
 from fmus.fmi.instance import shown
-from fmus.fmi.native_calls import joined_calls, prepared_call
+from fmus.fmi.native_calls import WARNING, JoinedCalls, prepared_call
 from fmus.fmi.standard import DISCARD
 
-Point = Callable[[float, float], bool]  # (instant [s], length of the step [s]) -> whether it was done as asked
+Array = NDArray[np.float64]
+Slowly = Callable[[float, float, Array], None]  # (instant [s], length of the step [s], states)
+Batch = Callable[[float, float, Array, Iterable[Array | None], Array, Slowly], None]
+"""Of instant [s], length of the step [s], states of shape (n, N), inputs of each point or None where they stay, what
+was read, shape (N, k), and who does a point in the ordinary way.
+"""
+
+
+class Point(NamedTuple):
+    """Buffers of a point: states and inputs, written; what is read there."""
+
+    states: Array
+    inputs: Array
+    read: Array
 
 
 class QuickPoints:
@@ -55,42 +72,82 @@ class QuickPoints:
             f"{prefix}Set": f"writing {shown(written)}",
         }
         self._get = f"{prefix}Get"
+        self._restart = JoinedCalls(slave, [self._reset, *self._write, *self._initialise])
 
-    def point(self, names: Sequence[str], read: Callable[[], None] | None, *, step: bool) -> Point:
-        """Reset, values, initialisation, a step where one is asked for, and what is read, in one call.
+    @property
+    def hangs_in(self) -> bool:
+        """Whether somebody logs the calls or answers in place of the library: then go the ordinary way."""
+        return self._restart.hangs_in
+
+    def restart(self, t: float) -> None:
+        """Reset, values and initialisation.
 
         Args:
-            names: what is read. read: reads it at the end; None for nothing. step: whether a step is made.
+            t: instant [s].
+        """
+        self._begin(t, 0.0)
+        try:
+            self._restart()
+        except self._instance.mistakes:
+            raise
+        except Exception as error:
+            raise self._explained(error, "", t) from error
+        self._instance.note_initialised()
+
+    def batch(self, point: Point, names: Sequence[str], read: Callable[[], None], *, step: bool) -> Batch:
+        """Restarts at many points, a step from each where one is asked for, and what is read there.
+
+        Args:
+            point: buffers of states and inputs, which are written, and of what is read.
+            names: what is read. read: reads it. step: whether a step is made.
 
         Returns:
-            The call. It says False where the step was discarded, ended early or met an event: then do it in the
-            ordinary way, which knows what to make of that. It raises what the instance makes of a failure.
+            The call. A point whose step is discarded, ends early or meets an event is given to who knows what to make
+            of it. It raises what the instance makes of a failure.
         """
-        instance, start, stop, length, far = self._instance, self._start, self._stop, self._length, self._far
-        flags, words = self._flags, self._words | {self._get: f"reading {shown(names)}"}
         calls = [self._reset, *self._write, *self._initialise, *([self._step] if step else [])]
-        run = joined_calls(instance.slave, [*calls, read] if read is not None and names else calls)
+        steps = JoinedCalls(self._instance.slave, [*calls, read] if names else calls).steps
+        instance, (event, terminate, early), shownames = self._instance, self._flags, shown(names)
 
-        def point(t: float, h: float) -> bool:
-            start.value, stop.value, length.value, self._reached.value = t, t + far, h, t + h
-            for raised in flags:  # a slave may leave out what it has nothing to say of
-                raised.value = False
-            instance.note_reset(t)
+        def run(
+            t: float, h: float, points: Array, driven: Iterable[Array | None], found: Array, slowly: Slowly
+        ) -> None:
+            self._begin(t, h)
             try:
-                run()
+                for row, x, u in zip(found, points.T, driven, strict=False):
+                    point.states[:] = x
+                    if u is not None:
+                        point.inputs[:] = u
+                    whole = True
+                    for raw, typed, name in steps:
+                        status = raw(*typed)
+                        if status > WARNING:
+                            if status != DISCARD or not name.endswith("DoStep"):
+                                raise FMICallException(name, status)
+                            whole = False
+                            break
+                    if not whole or (step and (event.value or terminate.value or early.value)):
+                        slowly(t, h, x)
+                        self._begin(t, h)
+                    row[:] = point.read
             except instance.mistakes:
                 raise
             except Exception as error:
-                name = str(getattr(error, "function", ""))
-                if name.endswith("DoStep") and getattr(error, "status", None) == DISCARD:
-                    return False
-                what = next((words[key] for key in words if name.startswith(key)), name or "a restart")
-                raise instance.explained(what, error, t if what == "doStep" else None) from error
+                raise self._explained(error, shownames, t) from error
             instance.note_initialised()
-            if not step:
-                return True
             instance.time = t + h
-            event, terminate, early = flags
-            return not (event.value or terminate.value or early.value)
 
-        return point
+        return run
+
+    def _begin(self, t: float, h: float) -> None:
+        self._start.value, self._stop.value, self._length.value, self._reached.value = t, t + self._far, h, t + h
+        for raised in self._flags:  # a slave may leave out what it has nothing to say of
+            raised.value = False
+        self._instance.note_reset(t)
+
+    def _explained(self, error: Exception, names: str, t: float) -> Exception:
+        name = str(getattr(error, "function", ""))
+        words = self._words | {self._get: f"reading {names}"}
+        what = next((words[key] for key in words if name.startswith(key)), name or "a restart")
+        found: Exception = self._instance.explained(what, error, t if what == "doStep" else None)
+        return found

@@ -6,6 +6,7 @@ They serve the linear and the extended filter alike: what the matrices are Jacob
 
 from __future__ import annotations
 
+from functools import cache
 from math import factorial, log, pi
 from typing import Literal, NamedTuple
 
@@ -28,6 +29,11 @@ class Corrected(NamedTuple):
     covariance: Array
     gain: Array
     innovation_covariance: Array
+
+
+@cache
+def _identity(n: int) -> Array:
+    return np.eye(n)
 
 
 def symmetric(matrix: Array) -> Array:
@@ -134,7 +140,7 @@ def correct(
     K = solved(S, spread).T
     if form == "short":
         return Corrected(x + K @ innovation, symmetric(P - K @ spread), K, S)
-    rest = np.eye(P.shape[0]) - K @ H
+    rest = _identity(P.shape[0]) - K @ H
     return Corrected(x + K @ innovation, symmetric(rest @ P @ rest.T + K @ noise @ K.T), K, S)
 
 

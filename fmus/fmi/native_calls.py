@@ -65,38 +65,46 @@ def prepared_call(slave: Any, name: str, *arguments: Any) -> Callable[[], None]:
     return call
 
 
-def joined_calls(slave: Any, calls: Sequence[Callable[[], None]]) -> Callable[[], None]:
+class JoinedCalls:
     """Several calls as one: who hangs himself into a call is looked for once, not at every call.
+
+    It raises what the first of them raises that fails.
 
     Args:
         slave: fmpy's slave, instantiated.
         calls: in their order; those from `prepared_call` of this slave go to the library without anything between.
-
-    Returns:
-        The call; it raises what the first of them raises that fails.
     """
-    steps, found = list[tuple[Callable[..., int], tuple[Any, ...], str]](), list[Native]()
-    for call in calls:
-        native: Native | None = getattr(call, "native", None)
-        if native is None or native.slave is not slave:
-            steps.append((_done(call), (), ""))
-        else:
-            found.append(native)
-            steps.append((native.raw, native.typed, native.name))
-    answer, names = slave._functions.__getitem__, [native.name for native in found]
-    expected = [native.function for native in found]
 
-    def join() -> None:
-        if slave.fmiCallLogger is not None or [*map(answer, names)] != expected:
-            for call in calls:
+    def __init__(self, slave: Any, calls: Sequence[Callable[[], None]]) -> None:
+        self._slave, self._calls = slave, list(calls)
+        self.steps = list[tuple[Callable[..., int], tuple[Any, ...], str]]()
+        """Function, arguments and name of each: to be called one after the other where nobody `hangs_in`."""
+        found = list[Native]()
+        for call in calls:
+            native: Native | None = getattr(call, "native", None)
+            if native is None or native.slave is not slave:
+                self.steps.append((_done(call), (), ""))
+            else:
+                found.append(native)
+                self.steps.append((native.raw, native.typed, native.name))
+        self._names, self._expected = [n.name for n in found], [n.function for n in found]
+
+    @property
+    def hangs_in(self) -> bool:
+        """Whether somebody logs calls, or answers in place of the library."""
+        answering = [*map(self._slave._functions.__getitem__, self._names)]
+        return self._slave.fmiCallLogger is not None or answering != self._expected
+
+    def __call__(self) -> None:
+        """Make the calls."""
+        if self.hangs_in:
+            for call in self._calls:
                 call()
             return
-        for raw, typed, name in steps:
+        for raw, typed, name in self.steps:
             status = raw(*typed)
             if status > WARNING:
                 raise FMICallException(name, status)
-
-    return join
 
 
 def _done(call: Callable[[], None]) -> Callable[[], int]:

@@ -19,7 +19,7 @@ from fmpy.fmi3 import FMU3Slave
 from lying_fmus import build
 
 from fmus import build_fmu, recipe
-from fmus.fmi.native_calls import joined_calls, prepared_call
+from fmus.fmi.native_calls import JoinedCalls, prepared_call
 
 pytestmark = pytest.mark.compiler
 FORCE, POSITION, SPEED = 1, 2, 3
@@ -146,13 +146,13 @@ def test_who_answers_in_place_of_the_library_is_asked(slave: Any) -> None:
     assert values[0] == 1.0
 
 
-def test_joined_calls_do_what_each_does(slave: Any) -> None:
+def test_JoinedCalls_do_what_each_does(slave: Any) -> None:
     values, force, seen = np.zeros(2), np.array([3.0]), list[float]()
     start, length = ctypes.c_double(), ctypes.c_double(0.1)
     push = prepared_call(slave, "fmi2SetReal", slave.component, references(FORCE), 1, pointer(force))
     step = prepared_call(slave, "fmi2DoStep", slave.component, start, length, ctypes.c_int(0))
     read = prepared_call(slave, "fmi2GetReal", slave.component, references(POSITION, SPEED), 2, pointer(values))
-    both = joined_calls(slave, [push, step, lambda: seen.append(start.value), read])
+    both = JoinedCalls(slave, [push, step, lambda: seen.append(start.value), read])
     before = slave.getFMUstate()
     both()
     slave.setFMUstate(before)
@@ -166,10 +166,10 @@ def test_joined_calls_do_what_each_does(slave: Any) -> None:
     slave.freeFMUstate(before)
 
 
-def test_joined_calls_respect_who_hangs_himself_in(slave: Any) -> None:
+def test_JoinedCalls_respect_who_hangs_himself_in(slave: Any) -> None:
     values, lines, real = np.zeros(1), list[str](), slave._functions["fmi2GetReal"]
     read = prepared_call(slave, "fmi2GetReal", slave.component, references(SPEED), 1, pointer(values))
-    both = joined_calls(slave, [read, read])
+    both = JoinedCalls(slave, [read, read])
 
     def other(*_arguments: Any) -> int:
         values[0] += 21.0

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
-from typing import cast
+from typing import Any, cast
 
 import lying_fmus
 import numpy as np
@@ -47,16 +49,23 @@ def test_a_transition_is_a_step_of_the_run() -> None:
     model.close()
 
 
+def begun(real: Callable[[float, float], None], event: Any, met: bool, t: float, h: float) -> None:
+    """Begins a point of which the FMU says that it met an event."""
+    real(t, h)
+    event.value = met
+
+
 @pytest.mark.parametrize("version", [2, 3])
-def test_prepared_points_are_those_of_the_ordinary_calls(version: int) -> None:
+def test_prepared_points_are_those_of_the_ordinary_calls(version: int, monkeypatch: pytest.MonkeyPatch) -> None:
     model = open_model(fmus.cached_fmu(PLANTS["locomotive"](), fmi_version=version))
     assert isinstance(model, CoSimulationModel)
+    assert model._quick is not None
     points, u = np.array([[5.0, 6.0], [12.0, 13.0], [21.0, 22.0]]), np.array([4e4])
     driven = np.array([[4e4, -4e4]])
     wanted = [SealedModel.states_after(model, 0.0, 0.1, points, given) for given in (u, driven)]
     looks = SealedModel.outputs_at(model, 0.0, points, u, [2, 0])
-    for done in (model._quick_step, lambda _t, _h: False):  # a step that is discarded goes the ordinary way
-        model._quick_step = done
+    for met in (False, True):  # a step that meets an event goes the ordinary way
+        monkeypatch.setattr(model._quick, "_begin", partial(begun, model._quick._begin, model._quick._flags[0], met))
         for given, states in zip((u, driven), wanted, strict=True):
             np.testing.assert_array_equal(model.states_after(0.0, 0.1, points, given), states)
     np.testing.assert_array_equal(model.outputs_at(0.0, points, u, [2, 0]), looks)

@@ -1,0 +1,81 @@
+"""Figure of residuals over their thresholds: when each raised its alarm, beside the true faults. For every detector
+whose outputs `ratio_*` are such.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from cosim.drawing.style import MARK, OBSERVER_LINES, PALE_RED, axes_or_new, styled
+from cosim.evaluation.fault_detection import intervals
+from cosim.evaluation.roles import recorded
+from cosim.evaluation.spec import ReportSpec
+from cosim.report.figures.drawing import legend_above, thin, time_axis
+from cosim.report.figures.panel import Panel
+from cosim.results.result import Result
+
+RATIO = "ratio_"
+"""Begin of the name of an output that is a residual divided by its threshold [1]."""
+FLOOR = 0.1  # smallest ratio that is drawn
+
+
+def ratio_signals(result: Result, spec: ReportSpec) -> dict[str, np.ndarray]:
+    """Residuals over their thresholds by signal name, each shape (rows,).
+
+    Args:
+        result: the run. spec: the observers.
+    """
+    starts = tuple(f"{observer}.{RATIO}" for observer in spec.observers)
+    return {name: result[name] for name in result.table.dtype.names or () if starts and name.startswith(starts)}
+
+
+@styled
+def residual_figure(result: Result, spec: ReportSpec, ax: Axes | None = None) -> Axes:
+    """Each residual over its threshold on a logarithmic axis: above 1 it raises an alarm. Those that never did are
+    grey; true faults are shaded.
+
+    Args:
+        result: the run. spec: roles. ax: axes to draw on; None for a figure of its own.
+
+    Returns:
+        The axes.
+    """
+    ax = axes_or_new(ax)
+    true = recorded(result, spec.true_fault)
+    for start, end in intervals(result.time, true) if true is not None else []:
+        ax.axvspan(start, end, color=PALE_RED, zorder=0.5)
+    several, coloured = len(spec.observers) > 1, 0
+    for name, ratio in ratio_signals(result, spec).items():
+        time, values = thin(result.time, np.maximum(np.nan_to_num(ratio, posinf=1e6), FLOOR))
+        if np.max(values) <= 1.0:
+            ax.plot(time, values, color=MARK, linewidth=0.5, alpha=0.5)
+            continue
+        observer, _, signal = name.partition(f".{RATIO}")
+        text = signal.replace("_", " ")
+        ax.plot(time, values, label=f"{observer}: {text}" if several else text, **OBSERVER_LINES[coloured % 6])
+        coloured += 1
+    ax.axhline(1.0, color=MARK, linewidth=1.2, label="threshold")
+    ax.set_yscale("log")
+    ax.set_ylim(bottom=FLOOR)
+    ax.set_ylabel("Residual / threshold [1]")
+    time_axis(ax, result)
+    legend_above(ax)
+    return ax
+
+
+class ResidualsPanel(Panel):
+    """Residuals and thresholds."""
+
+    name = "residuals"
+    title = "Residuals over their thresholds"
+    caption = "Above the line a residual raises an alarm; grey: never did. Shaded: a fault acts."
+    place = 3.45
+
+    @staticmethod
+    def draw(result: Result, spec: ReportSpec, ax: Axes | None) -> Axes:  # noqa: D102 - see Panel
+        return residual_figure(result, spec, ax)
+
+    @staticmethod
+    def available(result: Result, spec: ReportSpec) -> bool:  # noqa: D102 - see Panel
+        return bool(ratio_signals(result, spec))

@@ -1,0 +1,303 @@
+"""Thresholds, false alarms and detections of the train's diagnosis, and what can be told apart with which sensors.
+
+``python docs/studies/train_diagnosis.py`` prints the tables of docs/train_diagnosis.md, with ``--write`` it writes them
+(two minutes). Thresholds come from fault-free journeys, a stated rate of false alarms each; false alarms and faults
+are then counted on other journeys, rails, loads and seeds.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from train_diagnosis_runs import INSIDE, OUTSIDE, PERIOD, Journey, balise_places, diagnosed, recorded, sensed
+
+from fmu_observer.detection.train_diagnosis import TrainDiagnosis
+from fmu_observer.detection.train_isolation import FAULTS
+from fmu_observer.diagnosis.thresholds import alarm_rate, checked, count_alarms, proportion_interval, rate_threshold
+
+PAGE = Path(__file__).resolve().parents[1] / "train_diagnosis.md"
+PER_HOUR = 0.05  # alarms that each threshold may raise [1/h]
+SEEDS, FAULTY = 120, 20
+SETTLED = 50  # samples left out at the start
+WHEEL = 2.0  # smallest code of an isolated fault
+IN_SAMPLE = "in sample"
+SHARED = {
+    "threshold_wheels": ("odometers",),
+    "threshold_radar": ("odometer_1_radar", "odometer_2_radar"),
+    "threshold_gps": ("odometer_1_gps", "odometer_2_gps", "radar_gps"),
+    "threshold_position": ("gps_position",),
+    "balise_floor": ("way_1", "way_2", "way_radar"),
+    "threshold_pressure": ("pressure",),
+    "threshold_traction": ("traction",),
+    "threshold_brake": ("brake_measured", "brake_demanded"),
+}
+PERSISTENT = ("threshold_wheels", "threshold_radar", "threshold_gps", "threshold_position", "threshold_pressure")
+Runs = list[dict[str, np.ndarray]]
+
+
+def fault_free(runs: Runs, seeds: int, seed: int) -> list[dict[str, np.ndarray]]:
+    """Outputs of the diagnosis on fault-free journeys, one for each."""
+    return [diagnosed(run, sensed(run, seeds, seed + i)) for i, run in enumerate(runs)]
+
+
+def lasting(values: np.ndarray, samples: int) -> np.ndarray:
+    """Smallest of so many values in a row: what an alarm with that persistence compares, shape (members, k)."""
+    out = values.copy()
+    for back in range(1, samples):
+        out[:, back:] = np.minimum(out[:, back:], values[:, :-back])
+    return out
+
+
+def residual_recordings(outs: list[dict[str, np.ndarray]], name: str) -> list[np.ndarray]:
+    """The residual that a threshold is for, over the threshold in use, each shape (samples,)."""
+    samples = 3 if name in PERSISTENT else 1
+    return [row for out in outs for r in SHARED[name] for row in lasting(out[f"ratio_{r}"][:, SETTLED:], samples)]
+
+
+Outputs = dict[str, list[dict[str, np.ndarray]]]
+
+
+def threshold_table(free: Outputs) -> str:
+    """What the sweep asks for, what is in use, and the false alarms of each set of journeys at what is in use."""
+    p = TrainDiagnosis().unpack_parameters(TrainDiagnosis().start_parameters())
+    titles = " | ".join(f"{title}: false alarms an hour" for title in free)
+    lines = [
+        f"| threshold | in use | asked for at {PER_HOUR:g} an hour | {titles} |",
+        "|---|---|---|" + "---|" * len(free),
+    ]
+    for name, shared in SHARED.items():
+        used = float(getattr(p, name))
+        kept = {title: residual_recordings(outs, name) for title, outs in free.items()}
+        asked = used * rate_threshold(kept[IN_SAMPLE], PERIOD, PER_HOUR * len(shared))
+        rates = " | ".join(_rate(rows, len(shared)) for rows in kept.values())
+        lines.append(f"| `{name}` | {used:.4g} | {asked:.3g} | {rates} |")
+    return "\n".join(lines)
+
+
+def _rate(rows: list[np.ndarray], shared: int) -> str:
+    found = checked(rows, 1.0, PERIOD * 1.0)
+    found = alarm_rate(found.alarms, found.hours / shared)
+    return f"{found.rate:.2g} ({found.low:.2g} to {found.high:.2g})"
+
+
+def alarm_table(free: Outputs) -> str:
+    """False alarms of the whole: anything suspected, anything isolated."""
+    lines = ["| journeys | hours | suspected or isolated, an hour | isolated, an hour |", "|---|---|---|---|"]
+    for title, outs in free.items():
+        hours = sum(out["radar_fault"][:, SETTLED:].size for out in outs) * PERIOD / 3600.0
+        row = []
+        for least in (1.0, 2.0):
+            alarms = 0
+            for out in outs:
+                worst = np.max([out[f"{fault}_fault"] for fault in FAULTS], axis=0)[:, SETTLED:]
+                alarms += sum(count_alarms(member >= least) for member in worst)
+            found = alarm_rate(alarms, hours)
+            row.append(f"{alarms}: {found.rate:.2g} ({found.low:.2g} to {found.high:.2g})")
+        lines.append(f"| {title} | {hours:.0f} | {row[0]} | {row[1]} |")
+    return "\n".join(lines)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A fault of a size.
+
+    Attributes:
+        title: of the row. fault: that is to be told. during: ``any``, ``brake`` or ``pull``: when it begins.
+        lasts: [s]; infinite for the rest of the run. change: of a reading and its mean before, to the faulty one.
+        signal: input of the diagnosis that it changes; empty for the balise. offset: of the balise [m].
+    """
+
+    title: str
+    fault: str
+    signal: str
+    change: Callable[[np.ndarray], np.ndarray] | None = None
+    during: str = "any"
+    lasts: float = np.inf
+    frozen: bool = False
+    ramp: float = 0.0
+    offset: float = 0.0
+
+
+def _gain(factor: float) -> Callable[[np.ndarray], np.ndarray]:
+    return lambda y: factor * y
+
+
+def _plus(offset: float) -> Callable[[np.ndarray], np.ndarray]:
+    return lambda y: y + offset
+
+
+CASES = (
+    *(Case(f"odometer 1 reads {g:g} of it", "odometer_1", "odometer_1", _gain(g)) for g in (0.98, 0.95, 0.9, 0.8, 1.1)),
+    Case("odometer 1 frozen", "odometer_1", "odometer_1", frozen=True),
+    Case("odometer 2 reads 0.9 of it", "odometer_2", "odometer_2", _gain(0.9)),
+    *(
+        Case(f"jam of wheel 1, {d:g}, 3 s", "odometer_1", "odometer_1", _gain(1 - d), "brake", 3.0)
+        for d in (0.1, 0.3, 1.0)
+    ),
+    Case("skid of wheel 1, 0.3, 3 s", "odometer_1", "odometer_1", _gain(1.3), "pull", 3.0),
+    *(Case(f"radar reads {g:g} of it", "radar", "radar", _gain(g)) for g in (0.98, 0.95, 0.9)),
+    Case("radar frozen", "radar", "radar", frozen=True),
+    *(Case(f"satellites jump by {d:g} m", "gps", "gps_position", _plus(d)) for d in (3.0, 6.0, 20.0)),
+    Case("satellites drift by 0.3 m/s", "gps", "gps_position", _plus(0.0), ramp=0.3),
+    Case("satellites frozen", "gps", "gps_position", frozen=True),
+    *(Case(f"balise off by {d:g} m", "balise", "", offset=d) for d in (3.0, 6.0, 12.0)),
+    *(
+        Case(f"pressure reads {g:g} of it", "pressure_sensor", "cylinder_pressure", _gain(g), "brake")
+        for g in (0.9, 0.8, 0.5)
+    ),
+    Case("pressure reads zero", "pressure_sensor", "cylinder_pressure", _gain(0.0), "brake"),
+)
+ACTUATORS: tuple[tuple[str, str, Journey], ...] = tuple(
+    (f"{title} {share:g} of it", fault, make(share))
+    for title, fault, make in (
+        ("traction gives", "traction", lambda s: Journey(50.0, 1000.0, 0.4, traction=s)),
+        ("brake shoes give", "friction", lambda s: Journey(50.0, 1000.0, 0.4, 0.5, plant=(("brake_ratio", s),))),
+        ("cylinders fill to", "cylinder", lambda s: Journey(50.0, 1000.0, 0.4, 0.5, brake=s)),
+    )
+    for share in (0.9, 0.8, 0.6)
+)
+
+
+def injected(
+    case: Case, run: Mapping[str, np.ndarray], read: Mapping[str, np.ndarray], seed: int
+) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
+    """Readings with a fault from a random instant on, these instants [s], and errors of balises [m]."""
+    rng = np.random.default_rng(seed)
+    t, members = run["time"], len(read["odometer_1"])
+    moving = (run["speed"] > 3.0) & (t > 15.0)
+    force = {"any": np.ones(len(t), bool), "brake": run["demand"] > 0.2, "pull": run["effort"] > 30e3}[case.during]
+    allowed = np.flatnonzero(moving & force & (t < t[moving][-1] - (5.0 if case.during != "any" else 20.0)))
+    starts = rng.choice(allowed, members)
+    places = balise_places(run)
+    error = np.zeros((members, len(places)))
+    if not case.signal:
+        which = rng.integers(1, max(len(places) - 1, 2), members)
+        error[np.arange(members), which] = case.offset
+        return dict(read), np.interp(places[which], run["position"], t), error
+    faulty = read[case.signal].copy()
+    for member, start in enumerate(starts):
+        end = min(start + round(case.lasts / PERIOD), len(t)) if np.isfinite(case.lasts) else len(t)
+        part = faulty[member, start:end]
+        if case.frozen:
+            faulty[member, start:end] = faulty[member, start - 1]
+        elif case.change is not None:
+            faulty[member, start:end] = case.change(part) + case.ramp * PERIOD * np.arange(1, len(part) + 1)
+    return {**read, case.signal: faulty}, t[starts], error
+
+
+@dataclass(frozen=True)
+class Score:
+    """What became of the faults of one kind: numbers of faults, detected, isolated rightly and wrongly, delays [s]."""
+
+    faults: int
+    detected: int
+    right: int
+    wrong: int
+    delays: np.ndarray
+    last_codes: np.ndarray
+
+
+def scored(out: Mapping[str, np.ndarray], fault: str, t: np.ndarray, onsets: np.ndarray) -> Score:
+    """Which faults were told, and how soon: the first alarm behind the onset, and the first fault that is isolated."""
+    codes = np.stack([out[f"{name}_fault"] for name in FAULTS])
+    own = FAULTS.index(fault)
+    detected = right = wrong = 0
+    delays, last = [], []
+    for member, onset in enumerate(onsets):
+        after = t >= onset - 1e-9
+        own_code = np.where(after, codes[own, member], 0.0)
+        if own_code.max() > 0.0:
+            detected += 1
+            delays.append(float(t[np.flatnonzero(own_code > 0.0)[0]] - onset))
+        isolated = np.where(after, codes[:, member], 0.0) >= WHEEL
+        if isolated.any():
+            first = int(np.flatnonzero(isolated.any(axis=0))[0])
+            right += bool(isolated[own, first])
+            wrong += not isolated[own, first]
+            told = own_code[own_code >= WHEEL]
+            last.append(float(told[-1]) if told.size else 0.0)
+    return Score(len(onsets), detected, right, wrong, np.array(delays), np.array(last))
+
+
+def score_row(title: str, s: Score, note: str = "") -> str:
+    """A line of the table."""
+    low, high = proportion_interval(s.detected, s.faults)
+    delays = f"{np.median(s.delays):.1f} | {np.quantile(s.delays, 0.95):.1f}" if s.delays.size else "- | -"
+    share = f"{100 * s.detected / s.faults:.0f} ({100 * low:.0f} to {100 * high:.0f})"
+    told = f"{100 * s.right / s.faults:.0f} | {100 * s.wrong / s.faults:.0f}"
+    return f"| {title} | {s.faults} | {share} | {delays} | {told} | {note} |"
+
+
+def fault_table(runs: Runs, members: int) -> str:
+    """Detection, delay and isolation by fault and size, on journeys that made no threshold."""
+    lines = [
+        "| fault | cases | detected [%], 95 % | delay, median [s] | 95 % of them within [s] | isolated rightly [%] | "
+        "wrongly [%] | told as wheel / wrong / stuck [%] |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    reads = [sensed(run, members, 900 + i) for i, run in enumerate(runs)]
+    by_case: list[list[Score]] = [[] for _ in CASES]
+    for i, (run, read) in enumerate(zip(runs, reads, strict=True)):
+        drawn = [injected(case, run, read, 1000 * number + i) for number, case in enumerate(CASES)]
+        together = {name: np.concatenate([faulty[name] for faulty, _, _ in drawn]) for name in read}
+        error = np.concatenate([error for _, _, error in drawn])
+        out = diagnosed(run, together, balise_error=error, results=[f"{fault}_fault" for fault in FAULTS])
+        for number, (case, (_, onsets, _)) in enumerate(zip(CASES, drawn, strict=True)):
+            own = {name: values[number * members : (number + 1) * members] for name, values in out.items()}
+            by_case[number].append(scored(own, case.fault, run["time"], onsets))
+    for case, scores in zip(CASES, by_case, strict=True):
+        total = joined(scores)
+        of = max(total.last_codes.size, 1)
+        kinds = " / ".join(f"{100 * np.sum(total.last_codes == code) / of:.0f}" for code in (2.0, 3.0, 4.0))
+        lines.append(score_row(case.title, total, kinds))
+    for title, fault, journey in ACTUATORS:
+        run = recorded(journey)
+        acts = run["effort"] > 30e3 if fault == "traction" else run["demand"] > 0.2
+        onset = run["time"][np.flatnonzero(acts & (run["speed"] > 1.0))[0]]
+        out = diagnosed(run, sensed(run, members, 990))
+        lines.append(score_row(title, scored(out, fault, run["time"], np.full(members, onset)), "-"))
+    return "\n".join(lines)
+
+
+def joined(scores: list[Score]) -> Score:
+    """The scores of several journeys as one."""
+    numbers = (sum(getattr(s, name) for s in scores) for name in ("faults", "detected", "right", "wrong"))
+    arrays = (np.concatenate([getattr(s, name) for s in scores]) for name in ("delays", "last_codes"))
+    return Score(*numbers, *arrays)
+
+
+def tables(seeds: int = SEEDS, members: int = FAULTY) -> dict[str, str]:
+    """All tables by name."""
+    inside, outside = ([recorded(j) for j in journeys] for journeys in (INSIDE, OUTSIDE))
+    dry, wet = ([run for run, j in zip(outside, OUTSIDE, strict=True) if (j.rail > 0.0) == on] for on in (False, True))
+    sets = {IN_SAMPLE: (inside, 100), "out of sample, dry": (dry, 500), "out of sample, wet": (wet, 700)}
+    free = {title: fault_free(runs, seeds, seed) for title, (runs, seed) in sets.items()}
+    return {
+        "thresholds": threshold_table(free),
+        "alarms": alarm_table(free),
+        "faults": fault_table(dry, members),
+    }
+
+
+def main() -> None:
+    """Print the tables, or write them into the page."""
+    found = tables()
+    text = PAGE.read_text(encoding="utf-8") if "--write" in sys.argv else ""
+    for name, table in found.items():
+        print(table, end="\n\n")
+        part = re.compile(rf"(<!-- study: {name} -->\n).*?(<!-- end -->)", re.DOTALL)
+        text = part.sub(lambda m, table=table: f"{m[1]}\n{table}\n\n{m[2]}", text)
+    if "--write" in sys.argv:
+        PAGE.write_text(text, encoding="utf-8", newline="\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,261 @@
+"""The diagnosis of a train: which of its sensors, wheels, traction and brake is at fault, since when, and how surely.
+
+Declares the hybrid system; residuals, verdicts and shares of force stand in the files beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fmu_observer.detection.train_diagnosis_signals import EVENTS, INPUTS, OUTPUTS, PARAMETERS
+from fmu_observer.detection.train_efficiency import MotionWindow, Share, brake_share, traction_share
+from fmu_observer.detection.train_isolation import BRAKE, FAULTS, MOTION, RESIDUALS, isolability
+from fmu_observer.detection.train_memory import CONTINUOUS, Memory, remembered
+from fmu_observer.detection.train_residuals import (
+    Readings,
+    SpeedWindows,
+    readings,
+    speed_ratios,
+    voted_speed,
+    way_ratios,
+)
+from fmu_observer.detection.train_verdict import (
+    alarms_after,
+    availability,
+    codes_after,
+    contradicted_wheels,
+    stuck_sensors,
+    wheels,
+)
+from fmu_observer.diagnosis.isolation_table import largest
+from plant_models.hybrid import HybridSystem, vector
+from plant_models.hybrid.event import IGNORED, USED
+from plant_models.hybrid.option import require_whole
+from plant_models.hybrid.requirements import within_bounds
+from plant_models.hybrid.system import Array
+from plant_models.railway.vehicle.pneumatic_brake import filling, limited
+
+SPEED_PAIRS = 6  # residuals of speed stand first in `MOTION`
+
+
+class TrainDiagnosis(HybridSystem):
+    """Faults of two odometers, radar, satellite positions, balises, brake pressure, brake and traction.
+
+    Every `sample_period` the sensors are compared: pairs of sources of speed over a window, satellite position with
+    dead reckoning, pressure with what the demand makes of a cylinder. At a balise its distance from the last one is
+    compared with the way of each source. Over a window of some seconds the train as one point is inverted for the share
+    of traction and of brake force that arrives. Each residual is divided by its threshold and raises an alarm above 1;
+    `MOTION`, `BRAKE` and `TRACTION` say which fault moves which, and the fault that explains the alarms and asks for
+    least is told. One fault at a time in each of the three groups; the second odometer must be on another axle.
+
+    An odometer that is off while an effort acts that can make its wheel slip or jam is put down to the wheel; where it
+    is off for `contrary_time` without such an effort, or to the other side, to the sensor. A wheel that is locked and a
+    sensor that reads zero are not told apart before the brake is released.
+
+    Sensors that are not connected are not fitted: less can be told apart then (`isolability`), and `isolation_limited`
+    says so. While speeds disagree, and a window after, no share of force is found.
+
+    Args:
+        speed_window: samples N of a pair of speeds. gps_window: samples L of a difference of satellite positions.
+        force_window: coarse steps M of the window of forces.
+
+    Raises:
+        ValueError: a window is not a whole number in its range.
+
+    Presets: `swept` (default; thresholds from fault-free runs, see docs/train_diagnosis.md).
+
+    Source: Omar 2012, chapter 7 (redundancy, windowed residuals, grid inversion), for a train; table and thresholds
+    ours.
+    """
+
+    name = "train_diagnosis"
+    description = "Faults of a train's odometers, radar, satellites, balises, brake and traction: isolated and timed"
+    source = "Omar 2012, 7.5.1, (7.6.9)-(7.6.13), (7.7.6)-(7.7.8), for a train; table of isolation ours"
+    internal_step = 1e-2  # the flow is exact for held inputs, but for the cylinder's lag
+    inputs = INPUTS
+    outputs = OUTPUTS
+    parameters = PARAMETERS
+    events = EVENTS
+    presets: Mapping[str, Mapping[str, Any]] = {"swept": {}}
+    default_preset = "swept"
+    option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
+        "speed_window": range(2, 51),
+        "gps_window": range(2, 101),
+        "force_window": range(3, 61),
+    }
+
+    def __init__(self, *, speed_window: int = 10, gps_window: int = 20, force_window: int = 8) -> None:
+        require_whole(self.name, 2, 50, speed_window=speed_window)
+        require_whole(self.name, 2, 100, gps_window=gps_window)
+        require_whole(self.name, 3, 60, force_window=force_window)
+        self.states = (*CONTINUOUS, *remembered(speed_window, gps_window, force_window))
+        super().__init__(speed_window=speed_window, gps_window=gps_window, force_window=force_window)
+
+    @staticmethod
+    def isolability(fitted: tuple[str, ...]) -> dict[str, tuple[str, ...] | None]:
+        """What can be told with these sensors, see `fmu_observer.detection.train_isolation.isolability`.
+
+        Args:
+            fitted: names of sensors.
+        """
+        return isolability(fitted)
+
+    def requirements(self, p: Any) -> dict[str, Array]:
+        """Thresholds and times are within their bounds; a threshold of zero would be an alarm for ever."""
+        return super().requirements(p) | within_bounds(self.parameters, p)
+
+    def flow(self, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """Derivatives of dead reckoning, of the ways, and of the modelled pressure, shape (5,) or (5, members)."""
+        m, read = Memory(self.states, x), readings(u)
+        pipe = p.pipe_pressure_released - limited(u.brake_demand) * p.pipe_depression_full
+        return vector(m["voted_speed"], *read.speeds, filling(m["modelled_pressure"], pipe, p))
+
+    def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
+        """A sample is judged, or a balise compared; shape (n,) or (n, members)."""
+        m, read = Memory(self.states, x), readings(u)
+        if event == "balise":
+            self._at_balise(m, read, u, p)
+        else:
+            self._at_sample(m, read, t, u, p)
+        return m.joined()
+
+    def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
+        """The declared outputs."""
+        m, read = Memory(self.states, x), readings(u)
+        codes = dict(zip(FAULTS, m.each("code"), strict=True))
+        sources = sum(read.fitted) + read.has_gps
+        told = {f"{fault}_fault": code for fault, code in codes.items()}
+        shares, known = m.each("share"), largest(m.each("share_found"))
+        return {
+            **told,
+            "odometer_fault": np.where(codes["odometer_1"] > 0.0, 1.0, 0.0),
+            "fault_count": sum(np.where(code > 0.0, 1.0, 0.0) for code in codes.values()),
+            "several_faults": m["several"],
+            "detection_time": m["detected_at"],
+            "confidence": m["trust"],
+            "speed": m["voted_speed"],
+            "position": m["estimated_position"],
+            "traction_efficiency": shares[0],
+            "brake_performance": shares[1],
+            "brake_by_demand": shares[2],
+            "isolation_limited": np.where(sources < 2.5, 1.0, 1.0 - read.has_pressure),
+            "shares_unknown": 1.0 - known,
+            **{f"ratio_{name}": ratio for name, ratio in zip(RESIDUALS, m.each("ratio"), strict=True)},
+        }
+
+    # -- a sample -----------------------------------------------------------------------------------------------------
+
+    def _at_sample(self, m: Memory, read: Readings, t: Array, u: Any, p: Any) -> None:
+        raised = m.each("raised")
+        m.put(voted_speed=voted_speed(read, raised[:SPEED_PAIRS]), samples=m["samples"] + 1.0)
+        count = np.where(read.has_gps > 0.0, m["gps_samples"] + 1.0, 0.0)
+        can = availability(read, np.where(count > m["lead_first"].shape[0] + 0.5, 1.0, 0.0), m["telegrams"])
+        before = SpeedWindows(
+            m["squares_odometers"],
+            m["squares_first_radar"],
+            m["squares_second_radar"],
+            (m["lead_first"], m["lead_second"], m["lead_radar"]),
+        )
+        speeds, after = speed_ratios(before, read, m.each("way"), m["voted_speed"], p)
+        m.put(
+            gps_samples=count,
+            squares_odometers=after.odometers,
+            squares_first_radar=after.first_radar,
+            squares_second_radar=after.second_radar,
+            lead_first=after.leads[0],
+            lead_second=after.leads[1],
+            lead_radar=after.leads[2],
+        )
+        since_mark = m["estimated_position"] - m["mark"]
+        held = dict(zip(RESIDUALS, m.each("ratio"), strict=True))
+        off = np.abs(read.gps - m["estimated_position"])
+        held["gps_position"] = off / (p.threshold_position + p.balise_share * np.abs(since_mark))
+        held["pressure"] = np.abs(read.pressure - m["modelled_pressure"]) / p.threshold_pressure
+        held |= dict(zip(MOTION.residuals[:SPEED_PAIRS], speeds, strict=True))
+        held |= self._shares(m, read, u, p)
+        raised = m.each("raised")
+        alarms_after(m, t, [held[name] * there for name, there in zip(RESIDUALS, can.residuals, strict=True)], p)
+        wheel = wheels(m, u, self._brake_force(largest([m["modelled_pressure"], read.pressure]), p), p)
+        codes_after(m, t, can, contradicted_wheels(m, read, wheel, p), stuck_sensors(m, read, wheel, p), raised, p)
+
+    def _shares(self, m: Memory, read: Readings, u: Any, p: Any) -> dict[str, Array]:
+        """Shares of force after a coarse step, and their residuals over their thresholds."""
+        mass = p.mass + p.rotating_mass
+        now = [
+            m["voted_speed"],
+            np.maximum(u.effort, 0.0) / mass,
+            self._brake_force(read.pressure, p) / mass,
+            self._brake_force(m["modelled_pressure"], p) / mass,
+            (np.minimum(u.effort, 0.0) - u.gradient_force) / mass,
+        ]
+        sums = [total + value for total, value in zip(m.each("coarse_sum"), now, strict=True)]
+        count = m["coarse_samples"] + 1.0
+        full = np.where(count * p.sample_period >= p.coarse_step - 1e-9, 1.0, 0.0)
+        loud = largest(m.each("raised")[:SPEED_PAIRS])
+        quiet = np.where(loud > 0.0, 0.0, m["quiet_steps"] + full)
+        names = ("mean_speed", "mean_drive", "mean_measured", "mean_demanded", "mean_other")
+        rings = []
+        for name, total in zip(names, sums, strict=True):
+            ring = m.each(name)
+            rings.append(
+                [np.where(full > 0.0, new, old) for old, new in zip(ring, [*ring[1:], total / count], strict=True)]
+            )
+        usable = full * np.where(quiet > len(rings[0]) - 0.5, 1.0, 0.0)
+        window, before = MotionWindow(*rings), m.each("share")
+        step = count * p.sample_period
+        found = [
+            traction_share(window, before[0], step, mass, p),
+            brake_share(window.measured, window, before[1], step, mass, p),
+            brake_share(window.demanded, window, before[2], step, mass, p),
+        ]
+        found[1] = Share(found[1].value, found[1].found * read.has_pressure)
+        told = [usable * one.found for one in found]
+        shares = [np.where(on > 0.0, one.value, old) for on, one, old in zip(told, found, before, strict=True)]
+        m.put(
+            coarse_sum=[(1.0 - full) * total for total in sums],
+            coarse_samples=(1.0 - full) * count,
+            quiet_steps=quiet,
+            share=shares,
+            share_found=[np.maximum(old, on) for old, on in zip(m.each("share_found"), told, strict=True)],
+            **dict(zip(names, rings, strict=True)),
+        )
+        pulls, measured, demanded = (np.abs(1.0 - share) for share in shares)
+        brakes = (measured / p.threshold_brake, demanded / p.threshold_brake)
+        return {"traction": pulls / p.threshold_traction} | dict(zip(BRAKE.residuals[1:], brakes, strict=True))
+
+    @staticmethod
+    def _brake_force(pressure: Array, p: Any) -> Array:
+        """Brake force of the whole train [N] at a pressure in the cylinders [Pa]."""
+        usable = p.cylinder_pressure_full - p.cylinder_pressure_idle
+        return p.full_brake_force * np.maximum(pressure - p.cylinder_pressure_idle, 0.0) / usable
+
+    # -- a balise -----------------------------------------------------------------------------------------------------
+
+    @staticmethod
+    def _at_balise(m: Memory, read: Readings, u: Any, p: Any) -> None:
+        distance = u.balise_position - m["mark"]
+        ways = [way - mark for way, mark in zip(m.each("way"), m.each("way_mark"), strict=True)]
+        known = np.where(m["telegrams"] > 0.5, 1.0, 0.0)
+        sound = [there * (1.0 - bad) for there, bad in zip(read.fitted, m.each("faulty"), strict=True)]
+        ratios, balise = way_ratios([distance - way for way in ways], sound, distance, p)
+        held = dict(zip(RESIDUALS, m.each("ratio"), strict=True))
+        held |= {f"way_{name}": known * r for name, r in zip(("1", "2", "radar"), ratios, strict=True)}
+        held["balise"] = known * balise
+        # One that no way agrees with is not used; two in a row mean that the place of the train was wrong.
+        refused = np.where(held["balise"] > 1.0, 1.0 - m["refused"], 0.0)
+        used = 1.0 - refused
+        position = np.where(used > 0.0, u.balise_position, m["estimated_position"])
+        marks = [np.where(used > 0.0, way, mark) for way, mark in zip(m.each("way"), m.each("way_mark"), strict=True)]
+        m.put(
+            estimated_position=position,
+            ratio=[held[name] for name in RESIDUALS],
+            telegrams=m["telegrams"] + 1.0,
+            refused=refused,
+            faulty=[0.0, 0.0, 0.0],
+            telegram_verdict=np.where(used > 0.0, float(USED), float(IGNORED)),
+            mark=np.where(used > 0.0, u.balise_position, m["mark"]),
+            way_mark=marks,
+        )

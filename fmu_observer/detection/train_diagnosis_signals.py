@@ -1,0 +1,142 @@
+"""Inputs, outputs, parameters and events of the diagnosis of a train. Data only."""
+
+from __future__ import annotations
+
+from fmu_observer.detection.train_isolation import FAULTS, RESIDUALS
+from fmu_observer.detection.train_residuals import ABSENT
+from plant_models.hybrid import (
+    OutputWarning,
+    PeriodicEvent,
+    Signal,
+    TriggeredEvent,
+    input_signal,
+    output_signal,
+    parameter,
+)
+from plant_models.railway.vehicle.pneumatic_brake import BRAKE_PARAMETERS
+
+_FIT = "-1e9: not fitted"
+
+INPUTS = (
+    input_signal("odometer_1", "m/s", 0.0, "First odometer"),
+    input_signal("odometer_2", "m/s", ABSENT, f"Second odometer, on another axle; {_FIT}", optional=True),
+    input_signal("radar", "m/s", ABSENT, f"Doppler radar; {_FIT}", optional=True),
+    input_signal(
+        "gps_position", "m", ABSENT, f"Satellite position along the track, new at each sample; {_FIT}", optional=True
+    ),
+    input_signal("cylinder_pressure", "Pa", ABSENT, f"Measured pressure in a brake cylinder; {_FIT}", optional=True),
+    input_signal("effort", "N", 0.0, "Effort asked for: traction > 0, electric brake < 0"),
+    input_signal("brake_demand", "1", 0.0, "Demand to the air brake, 0..1"),
+    input_signal("gradient_force", "N", 0.0, "Downhill pull as a resistance by the map, uphill > 0", optional=True),
+)
+
+_TITLES = {
+    "odometer_1": "First odometer",
+    "odometer_2": "Second odometer",
+    "radar": "Radar",
+    "gps": "Satellite positions",
+    "balise": "Last balise",
+    "adhesion": "Rail: both wheels",
+    "pressure_sensor": "Pressure sensor",
+    "cylinder": "Filling of the brake cylinders",
+    "friction": "Friction of the brake",
+    "traction": "Traction",
+}
+_CODES = "0 none, 1 suspected, 2 wheel, 3 wrong, 4 stuck, 5 loss"
+
+OUTPUTS = (
+    *(output_signal(f"{fault}_fault", "1", f"{_TITLES[fault]}: {_CODES}", variability="discrete") for fault in FAULTS),
+    output_signal("odometer_fault", "1", "1 while the first odometer is suspected or at fault", variability="discrete"),
+    output_signal("fault_count", "1", "How many faults are suspected or isolated", variability="discrete"),
+    output_signal("several_faults", "1", "1 while no single fault explains the alarms", variability="discrete"),
+    output_signal("detection_time", "s", "Instant of the last detection; -1 none", variability="discrete"),
+    output_signal(
+        "confidence", "1", "1 less threshold over the weakest residual of the verdict, 0..1", variability="discrete"
+    ),
+    output_signal("speed", "m/s", "Speed that is believed", variability="discrete", display_unit="km/h"),
+    output_signal("position", "m", "Position by dead reckoning from the last balise used"),
+    output_signal("traction_efficiency", "1", "Share of traction that reaches the train", variability="discrete"),
+    output_signal("brake_performance", "1", "Share of brake force, by the measured pressure", variability="discrete"),
+    output_signal("brake_by_demand", "1", "Share of brake force, by the demand", variability="discrete"),
+    output_signal(
+        "isolation_limited",
+        "1",
+        "1 where a sensor is missing that isolation needs",
+        variability="discrete",
+        warning=OutputWarning(
+            "of two odometers, radar and satellites fewer than three were connected, or no brake pressure: faults are "
+            "detected, but not all are told apart; TrainDiagnosis.isolability(sensors) says which",
+            ("isolation_limited",),
+        ),
+    ),
+    output_signal(
+        "shares_unknown",
+        "1",
+        "1 until a share of traction or brake was found",
+        variability="discrete",
+        warning=OutputWarning(
+            "no share of traction or brake was found: the run is shorter than the window of force_window coarse steps, "
+            "or no effort changed the speed by least_excitation within one; shorten the window, or let the run go on",
+            ("shares_unknown",),
+            at_end=True,
+        ),
+    ),
+    *(
+        output_signal(f"ratio_{name}", "1", f"Residual {name} over its threshold", variability="discrete")
+        for name in RESIDUALS
+    ),
+)
+
+_BRAKES = {
+    "pipe_pressure_released",
+    "pipe_depression_full",
+    "cylinder_pressure_full",
+    "cylinder_pressure_idle",
+    "filling_time",
+    "venting_time",
+}
+
+PARAMETERS: tuple[Signal, ...] = (
+    parameter("sample_period", "s", 0.1, "Time between two samples", min=1e-3),
+    parameter("mass", "kg", 166e3, "Mass of the train", min=1.0),
+    parameter("rotating_mass", "kg", 2.7e3, "Inertia of the wheels as a mass", min=0.0),
+    parameter("davis_a", "N", 1660.0, "Running resistance, constant part", min=0.0),
+    parameter("davis_b", "N.s/m", 59.6, "Running resistance, viscous part"),
+    parameter("davis_c", "N.s2/m2", 10.85, "Running resistance, aerodynamic part"),
+    parameter("full_brake_force", "N", 164e3, "Air brake force of the whole train at full pressure", min=1.0),
+    *(s for s in BRAKE_PARAMETERS if s.name in _BRAKES),
+    parameter("speed_floor", "m/s", 0.2, "Difference of two speeds that counts as one, at standstill", min=1e-3),
+    parameter("speed_share", "1", 0.02, "The same as a share of the speed", min=0.0),
+    parameter("threshold_wheels", "1", 0.5, "Of the two odometers, in such differences", min=1e-6),
+    parameter("threshold_radar", "1", 0.8, "Of odometer and radar, in such differences", min=1e-6),
+    parameter("threshold_gps", "1", 1.35, "Of satellites and any other speed, in such differences", min=1e-6),
+    parameter("threshold_position", "m", 5.0, "Of satellite position and dead reckoning, at a balise", min=1e-6),
+    parameter("balise_floor", "m", 1.5, "Of the distance of two balises and a way, constant part", min=1e-6),
+    parameter("balise_share", "1", 0.01, "The same as a share of the distance", min=0.0),
+    parameter("threshold_pressure", "Pa", 2e4, "Of measured and modelled pressure", min=1e-3, display_unit="bar"),
+    parameter("threshold_traction", "1", 0.14, "Of the share of traction, from 1", min=1e-6),
+    parameter("threshold_brake", "1", 0.17, "Of the share of brake force, from 1", min=1e-6),
+    parameter("raise_samples", "1", 3.0, "Samples in a row above the threshold that raise an alarm", min=1.0),
+    parameter("clear_samples", "1", 20.0, "Samples in a row below it that clear it", min=1.0),
+    parameter("isolation_delay", "s", 2.5, "From an alarm until a fault is isolated; before it is suspected", min=0.0),
+    parameter("slip_effort", "N", 20e3, "Effort of the train below which no wheel slips or jams", min=0.0),
+    parameter("release_time", "s", 1.0, "How long a wheel may slip after its effort is gone", min=0.0),
+    parameter("contrary_time", "s", 1.0, "Time that no wheel explains, until the sensor is at fault", min=0.0),
+    parameter("stuck_speed", "m/s", 0.7, "Change of speed that a sensor must show", min=1e-3, display_unit="km/h"),
+    parameter("stuck_way", "m", 5.0, "Way that the satellites must show", min=1e-3),
+    parameter("stuck_pressure", "Pa", 3e4, "Change of pressure that its sensor must show", min=1e-3),
+    parameter("coarse_step", "s", 1.0, "Length of the steps of the window of forces", min=1e-3),
+    parameter("least_excitation", "m/s", 1.0, "Change of speed by a force within the window that tells it", min=1e-6),
+    parameter("least_speed", "m/s", 1.0, "Speed below which no share is found", min=0.0, display_unit="km/h"),
+    parameter("smoothing", "1", 0.2, "Weight of the last share", min=0.0, max=0.999),
+)
+
+EVENTS = (
+    TriggeredEvent(
+        "balise",
+        (input_signal("balise_position", "m", 0.0, "Position of the balise just passed", variability="discrete"),),
+        "A balise is passed, at its own time stamp",
+        verdict="telegram_verdict",
+    ),
+    PeriodicEvent("sampling", "sample_period", description="The sensors are compared"),
+)

@@ -1,0 +1,136 @@
+"""How much of the traction and of the brake reaches the train: window inversion on the train as one point.
+
+Pure functions that trace; the formulas of the inversion are those of `fmu_observer.diagnosis`.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fmu_observer.diagnosis.window_inversion import grid_around, invert, smoothed
+from plant_models.hybrid.system import Array
+
+GRID = 5  # values of the parameter, as in the thesis
+LEAST, MOST = 0.05, 1.5
+
+
+class MotionWindow(NamedTuple):
+    """Means over the coarse steps of a window, oldest first, each a list of M.
+
+    Attributes:
+        speed: [m/s]. drive: acceleration that traction would give [m/s2]. measured: deceleration by the measured brake
+            pressure [m/s2]. demanded: deceleration by the pressure that was asked for [m/s2]. other: acceleration by
+            the electric brake and the gradient [m/s2].
+    """
+
+    speed: list[Array]
+    drive: list[Array]
+    measured: list[Array]
+    demanded: list[Array]
+    other: list[Array]
+
+
+class Share(NamedTuple):
+    """Share of a force that arrives.
+
+    Attributes:
+        value: smoothed [1]. found: 1 where this window told something, else 0.
+    """
+
+    value: Array
+    found: Array
+
+
+def between(means: list[Array]) -> list[Array]:
+    """What acts between the middles of neighbouring steps.
+
+    Args:
+        means: over the steps, M of them.
+
+    Returns:
+        M - 1 values.
+    """
+    return [0.5 * (a + b) for a, b in pairwise(means)]
+
+
+def simulated_change(start: Array, forces: list[Array], step: Array, mass: Array, p: Any) -> Array:
+    """Speed at the end of the window [m/s], by Euler steps from middle to middle.
+
+    Args:
+        start: speed at its start [m/s]. forces: accelerations without resistance [m/s2]. step: [s].
+        mass: with the rotating masses [kg]. p: with ``davis_a``, ``davis_b``, ``davis_c``.
+    """
+    speed = start
+    for force in forces:
+        resistance = p.davis_a + p.davis_b * speed + p.davis_c * speed * np.abs(speed)
+        speed = np.maximum(speed + step * (force - resistance / mass), 0.0)
+    return speed
+
+
+def share_of(
+    parts: list[Array], rest: list[Array], window: MotionWindow, previous: Array, step: Array, mass: Array, p: Any
+) -> Array:
+    """Share of a force at which the simulated speed at the end of the window is the measured one [1].
+
+    Args:
+        parts: acceleration by the whole force [m/s2], signed. rest: all others [m/s2]. window: for the speeds.
+        previous: share found last [1]. step: [s]. mass: [kg]. p: with the Davis coefficients and `smoothing`.
+
+    Source:
+        Omar 2012, 7.7.7, (7.7.7)-(7.7.8), for the train as one point.
+    """
+    grid = grid_around(previous, GRID, least=LEAST, most=MOST)
+    differences = []
+    for share in grid:
+        forces = [share * part + other for part, other in zip(parts, rest, strict=True)]
+        differences.append(simulated_change(window.speed[0], forces, step, mass, p) - window.speed[-1])
+    return smoothed(previous, invert(grid, differences, previous).value, p.smoothing)
+
+
+def traction_share(window: MotionWindow, previous: Array, step: Array, mass: Array, p: Any) -> Share:
+    """Share of the traction effort that reaches the train.
+
+    Told where traction alone changes the speed by `least_excitation`, and the brake by less than a fifth of that.
+
+    Args:
+        window: means. previous: share found last [1]. step: of the window [s]. mass: [kg]. p: parameters.
+    """
+    drive, brake, other = between(window.drive), between(window.demanded), between(window.other)
+    pulled, braked = step * sum(drive), step * sum(brake)
+    enough = np.where(pulled > p.least_excitation, np.where(braked < 0.2 * pulled, 1.0, 0.0), 0.0)
+    rest = [o - b for o, b in zip(other, brake, strict=True)]
+    found = enough * moving(window, p)
+    return Share(np.where(found > 0.0, share_of(drive, rest, window, previous, step, mass, p), previous), found)
+
+
+def brake_share(
+    decelerations: list[Array], window: MotionWindow, previous: Array, step: Array, mass: Array, p: Any
+) -> Share:
+    """Share of the brake force that reaches the train.
+
+    Told where the brake that was asked for alone changes the speed by `least_excitation`, and traction by less than a
+    fifth of that.
+
+    Args:
+        decelerations: by the pressure, measured or demanded [m/s2], M of them. window: means. previous: share found
+            last [1]. step: of the window [s]. mass: [kg]. p: parameters.
+    """
+    drive, brake, other = between(window.drive), between(decelerations), between(window.other)
+    pulled, braked = step * sum(drive), step * sum(between(window.demanded))
+    enough = np.where(braked > p.least_excitation, np.where(pulled < 0.2 * braked, 1.0, 0.0), 0.0)
+    rest = [o + d for o, d in zip(other, drive, strict=True)]
+    found = enough * moving(window, p)
+    parts = [-b for b in brake]
+    return Share(np.where(found > 0.0, share_of(parts, rest, window, previous, step, mass, p), previous), found)
+
+
+def moving(window: MotionWindow, p: Any) -> Array:
+    """1 where the train moved faster than `least_speed` at both ends of the window, else 0.
+
+    Args:
+        window: means. p: parameters.
+    """
+    return np.where(np.minimum(window.speed[0], window.speed[-1]) > p.least_speed, 1.0, 0.0)

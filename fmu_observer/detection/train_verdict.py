@@ -1,0 +1,230 @@
+"""From residuals to fault codes: alarms, the table of isolation, and whether wheel or sensor is at fault. Pure
+functions that trace.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fmu_observer.detection.train_isolation import (
+    BRAKE,
+    FAULTS,
+    LOSS,
+    MOTION,
+    RESIDUALS,
+    SENSOR,
+    STUCK,
+    SUSPECTED,
+    TRACTION,
+    WHEEL,
+)
+from fmu_observer.detection.train_memory import Memory
+from fmu_observer.detection.train_residuals import Readings, tolerance
+from fmu_observer.diagnosis.isolation_table import largest
+from fmu_observer.diagnosis.windowed_residual import Alarm, judge
+from plant_models.hybrid.system import Array
+
+GROUPS = (MOTION, BRAKE, TRACTION)
+OF_ODOMETER = (("odometers", "odometer_1_radar", "odometer_1_gps"), ("odometers", "odometer_2_radar", "odometer_2_gps"))
+
+
+class Availability(NamedTuple):
+    """Which residuals and which faults there can be, 1 or 0, in the order of `RESIDUALS` and `FAULTS`.
+
+    Attributes:
+        residuals: one for each. faults: one for each.
+    """
+
+    residuals: list[Array]
+    faults: list[Array]
+
+
+class Wheels(NamedTuple):
+    """What a wheel may do.
+
+    Attributes:
+        slow: 1 while it may turn too slowly, else 0. fast: 1 while it may turn too fast, else 0.
+    """
+
+    slow: Array
+    fast: Array
+
+
+def availability(read: Readings, gps_full: Array, telegrams: Array) -> Availability:
+    """Which residuals can be computed, and what can fail.
+
+    Args:
+        read: of the sensors. gps_full: 1 where the window of satellite positions is full. telegrams: balises so far.
+    """
+    first, second, radar = read.fitted
+    gps, some, two = gps_full, np.where(telegrams > 0.5, 1.0, 0.0), np.where(telegrams > 1.5, 1.0, 0.0)
+    source = largest([first, second, radar])
+    motion = [
+        first * second,
+        first * radar,
+        second * radar,
+        first * gps,
+        second * gps,
+        radar * gps,
+        gps * some,
+        first * two * largest([second, radar]),
+        second * two,
+        radar * two,
+        source * two,
+    ]
+    faults = [first, second, radar, read.has_gps, some, first]
+    brake = [read.has_pressure, read.has_pressure * source, source]
+    return Availability([*motion, *brake, source], [*faults, read.has_pressure, source, source, source])
+
+
+def alarms_after(m: Memory, t: Array, ratios: Sequence[Array], p: Any) -> None:
+    """Raise and clear the alarms of a sample; those of balises and shares follow at once.
+
+    Args:
+        m: memory, changed in place. t: time [s]. ratios: of all residuals. p: parameters.
+    """
+    raised, contrary, since = [], [], []
+    before = zip(m.each("raised"), m.each("contrary"), m.each("since"), strict=True)
+    for name, ratio, (on, against, when) in zip(RESIDUALS, ratios, before, strict=True):
+        slow = name.startswith(("odometer", "radar", "gps", "pressure"))
+        exceeds = np.where(ratio > 1.0, 1.0, 0.0)
+        counts = (p.raise_samples, p.clear_samples) if slow else (1.0, 1.0)
+        now = judge(Alarm(on, against, when), t, exceeds, *counts)
+        raised.append(now.raised)
+        contrary.append(now.contrary)
+        since.append(now.since)
+    m.put(ratio=list(ratios), raised=raised, contrary=contrary, since=since)
+
+
+def wheels(m: Memory, u: Any, brake_force: Array, p: Any) -> Wheels:
+    """Whether an effort acts, or acted until `release_time` ago, that can jam or spin a wheel.
+
+    Args:
+        m: memory, changed in place. u: inputs. brake_force: of the whole train [N]. p: parameters.
+    """
+    pulls = np.where(u.effort > p.slip_effort, 1.0, 0.0)
+    brakes = np.where(np.maximum(-u.effort, brake_force) > p.slip_effort, 1.0, 0.0)
+    since_pull = np.where(pulls > 0.0, 0.0, m["since_pull"] + p.sample_period)
+    since_brake = np.where(brakes > 0.0, 0.0, m["since_brake"] + p.sample_period)
+    m.put(since_pull=since_pull, since_brake=since_brake)
+    slow, fast = (np.where(since <= p.release_time, 1.0, 0.0) for since in (since_brake, since_pull))
+    return Wheels(slow, fast)
+
+
+def contradicted_wheels(m: Memory, read: Readings, wheel: Wheels, p: Any) -> list[Array]:
+    """For each odometer 1 where it is off for so long that no wheel explains it: the sensor is at fault.
+
+    Args:
+        m: memory, changed in place. read: of the sensors. wheel: what wheels may do. p: parameters.
+    """
+    times, wrong = [], []
+    raised = dict(zip(RESIDUALS, m.each("raised"), strict=True))
+    for k, before in enumerate(m.each("against_wheel")):
+        ahead = read.speeds[k] - m["voted_speed"]
+        may_be = np.where(ahead < 0.0, wheel.slow, wheel.fast)
+        quick, way = largest([raised[name] for name in OF_ODOMETER[k]]), raised[f"way_{k + 1}"]
+        off = np.where(np.maximum(quick, way) > 0.0, read.fitted[k], 0.0)
+        now = np.where(np.abs(ahead) > tolerance(m["voted_speed"], p), 1.0 - may_be, 0.0)
+        # Once a wheel cannot explain it the verdict stays until the alarm ends: the same fault goes on under effort.
+        known = np.where(before >= p.contrary_time - 1e-9, p.contrary_time, before + p.sample_period * now)
+        # What only a way between balises shows is small and lasts: a scale, no slip.
+        small = np.where(quick > 0.0, 0.0, np.where(m["code"][k] > 0.0, 0.0, way))
+        known = np.where(small > 0.0, p.contrary_time, known)
+        times.append(np.where(off > 0.0, known, 0.0))
+        wrong.append(np.where(times[k] >= p.contrary_time - 1e-9, 1.0, 0.0))
+    m.put(against_wheel=times)
+    return wrong
+
+
+def stuck_sensors(m: Memory, read: Readings, wheel: Wheels, p: Any) -> list[Array]:
+    """For odometers, radar, satellites and pressure 1 where a reading has not changed although it should have.
+
+    A wheel that is locked reads zero: that is no sensor that stands still while the brake may lock it.
+
+    Args:
+        m: memory, changed in place. read: of the sensors. wheel: what wheels may do. p: parameters.
+    """
+    values = [*read.speeds, read.gps, read.pressure]
+    believed = [m["voted_speed"]] * 3 + [m["estimated_position"], m["modelled_pressure"]]
+    limits = [p.stuck_speed] * 3 + [p.stuck_way, p.stuck_pressure]
+    fitted = [*read.fitted, read.has_gps, read.has_pressure]
+    then, stuck = [], []
+    last = zip(values, m.each("last_reading"), m.each("then"), believed, limits, fitted, strict=True)
+    for k, (value, before, reference, now, limit, there) in enumerate(last):
+        same = np.where(value == before, there, 0.0)
+        then.append(np.where(same > 0.0, reference, now))
+        locked = np.where(np.abs(value) < p.least_speed, wheel.slow, 0.0) if k < 2 else 0.0
+        stuck.append(np.where(np.abs(now - then[k]) > limit, same * (1.0 - locked), 0.0))
+    m.put(last_reading=values, then=then)
+    return stuck
+
+
+def codes_after(
+    m: Memory, t: Array, can: Availability, wrong: list[Array], stuck: list[Array], before: list[Array], p: Any
+) -> None:
+    """Fault codes, instant of the detection, confidence.
+
+    Until `isolation_delay` after the first alarm of a group a fault is suspected only: residuals are not equally quick.
+    Nor are they to clear: an isolated fault is kept while alarms only go.
+
+    Args:
+        m: memory, changed in place. t: time [s]. can: what there can be. wrong: odometers that no wheel explains.
+        stuck: sensors that stand still. before: alarms of the sample before. p: parameters.
+    """
+    raised, ratios = m.each("raised"), m.each("ratio")
+    codes: list[Array] = []
+    begun, unexplained, trusts, counted = [], [], [], []
+    place = first = 0
+    for group, since in zip(GROUPS, m.each("group_since"), strict=True):
+        own = slice(place, place + len(group.residuals))
+        possible = can.faults[first : first + len(group.faults)]
+        any_alarm = largest([a * b for a, b in zip(raised[own], can.residuals[own], strict=True)])
+        start = np.where(any_alarm > 0.0, np.where(since < 0.0, t, since), -1.0)
+        said = group.judge(raised[own], can.residuals[own], possible)
+        sure = np.where(t - start >= p.isolation_delay - 1e-9, 1.0, 0.0)
+        known = m.each("code")[first : first + len(group.faults)]
+        fresh = largest([now * (1.0 - old) for now, old in zip(raised[own], before[own], strict=True)])
+        kept = any_alarm * (1.0 - fresh) * np.where(largest(known) >= WHEEL, 1.0, 0.0)
+        for fault, isolated, suspected, code in zip(group.faults, said.isolated, said.suspected, known, strict=True):
+            told = np.where(kept > 0.0, np.where(code >= WHEEL, 1.0, 0.0), isolated * sure)
+            maybe = (1.0 - kept) * (suspected + isolated * (1.0 - sure))
+            codes.append(told * _isolated_code(fault, wrong) + SUSPECTED * maybe)
+            trusts.append((isolated + suspected) * _margin(group, fault, ratios[own], can.residuals[own]))
+            counted.append(isolated + suspected)
+        begun.append(start)
+        unexplained.append(said.unexplained)
+        place, first = own.stop, first + len(group.faults)
+    for fault, still in zip(("odometer_1", "odometer_2", "radar", "gps", "pressure_sensor"), stuck, strict=True):
+        k = FAULTS.index(fault)
+        codes[k] = np.where(still > 0.0, STUCK, codes[k])
+    newest = m["detected_at"]
+    for old, now in zip(m.each("group_since"), begun, strict=True):
+        newest = np.where(now >= 0.0, np.where(old < 0.0, now, newest), newest)
+    trust = sum(trusts, 0.0) / np.maximum(sum(counted, 0.0), 1.0)
+    slips = codes[FAULTS.index("adhesion")]
+    bad = [np.maximum(codes[0], slips), np.maximum(codes[1], slips), codes[2]]
+    faulty = [np.maximum(old, np.where(now > 0.0, 1.0, 0.0)) for old, now in zip(m.each("faulty"), bad, strict=True)]
+    m.put(faulty=faulty)
+    m.put(code=codes, group_since=begun, several=largest(unexplained), trust=trust, detected_at=newest)
+
+
+def _isolated_code(fault: str, wrong: list[Array]) -> Array:
+    """Code of an isolated fault: of an odometer the wheel unless it is contradicted."""
+    if fault.startswith("odometer"):
+        return np.where(wrong[int(fault[-1]) - 1] > 0.0, SENSOR, WHEEL)
+    if fault == "adhesion":
+        return WHEEL
+    return LOSS if fault in ("cylinder", "friction", "traction") else SENSOR
+
+
+def _margin(group: Any, fault: str, ratios: list[Array], available: list[Array]) -> Array:
+    """How far the weakest residual that the fault must move is above its threshold: 1 - threshold / residual, or 0."""
+    margin = 1.0
+    for name, ratio, there in zip(group.residuals, ratios, available, strict=True):
+        if name in group.must[fault]:
+            own = 1.0 - 1.0 / np.maximum(ratio, 1.0)
+            margin = np.minimum(margin, np.where(there > 0.0, own, 1.0))
+    return margin

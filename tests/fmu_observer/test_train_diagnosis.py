@@ -1,0 +1,151 @@
+"""The diagnosis of a train: its table of isolation, wheel or sensor, shares of force, sensors that are not fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fmu_observer.detection.train_diagnosis import TrainDiagnosis
+from fmu_observer.detection.train_efficiency import MotionWindow, brake_share, traction_share
+from fmu_observer.detection.train_isolation import BRAKE, MOTION, SENSORS, isolability
+from fmu_observer.diagnosis.isolation_table import IsolationTable
+from plant_models.hybrid import Runtime
+
+NONE, SUSPECTED, WHEEL, SENSOR, STUCK, LOSS = range(6)
+Signals = dict[str, Callable[[float], float]]
+
+
+def constant(value: float) -> Callable[[float], float]:
+    """A signal that does not change."""
+    return lambda _: value
+
+
+def judged(table: IsolationTable, *alarms: str, without: tuple[str, ...] = ()) -> tuple[set[str], set[str], float]:
+    """Isolated and suspected faults of a set of alarms, and whether it is unexplained."""
+    raised = [float(name in alarms) for name in table.residuals]
+    said = table.judge(raised, [float(name not in without) for name in table.residuals], [1.0] * len(table.faults))
+    names = [{f for f, on in zip(table.faults, told, strict=True) if on} for told in said[:2]]
+    return names[0], names[1], float(said.unexplained)
+
+
+@pytest.mark.parametrize("table", [MOTION, BRAKE])
+def test_the_residuals_that_a_fault_must_move_isolate_it(table: IsolationTable) -> None:
+    for fault in table.faults:
+        assert judged(table, *table.must[fault]) == ({fault}, set(), 0.0)
+
+
+def test_alarms_say_what_they_can() -> None:
+    assert judged(MOTION) == (set(), set(), 0.0)
+    assert judged(MOTION, "odometers") == (set(), {"odometer_1", "odometer_2"}, 0.0)
+    # Satellites are less fine: while they are quiet radar and rail are equals.
+    assert judged(MOTION, "odometer_1_radar", "odometer_2_radar") == (set(), {"radar", "adhesion"}, 0.0)
+    assert judged(MOTION, "odometers", "radar_gps") == (set(), set(), 1.0)
+    assert judged(MOTION, "way_1") == ({"odometer_1"}, set(), 0.0)
+    assert judged(BRAKE, "pressure") == (set(), {"pressure_sensor", "cylinder"}, 0.0)
+
+
+def test_a_table_names_residuals_that_there_are() -> None:
+    with pytest.raises(ValueError, match="'f' moves c; the residuals are a, b"):
+        IsolationTable(("a", "b"), {"f": ("a", "c")}, {})
+
+
+def test_fewer_sensors_tell_less() -> None:
+    assert all(others == () for others in isolability(SENSORS).values())
+    few = isolability(("odometer_1", "radar", "balise"))
+    assert few["odometer_1"] == ("adhesion",)
+    assert few["radar"] == ()  # at the next balise
+    assert few["friction"] == ("cylinder",)
+    with pytest.raises(ValueError, match="odometer_1 is missing"):
+        isolability(("radar",))
+    with pytest.raises(ValueError, match="unknown sensors sonar"):
+        isolability(("odometer_1", "sonar"))
+
+
+def told(stop: float, signals: Signals) -> list[dict[str, float]]:
+    """Outputs at each sample; signals are functions of time."""
+    system = TrainDiagnosis()
+    runtime = Runtime(system)
+    inputs = [s.name for s in system.inputs]
+    runtime.start(0.0)
+    rows = []
+    for k in range(1, round(stop / 0.1) + 1):
+        for name, signal in signals.items():
+            runtime.u[inputs.index(name)] = signal(0.1 * (k - 1))
+        runtime.advance(0.1 * k)
+        values = runtime.update_outputs()
+        rows.append(dict(zip((s.name for s in system.outputs), map(float, values), strict=True)))
+    return rows
+
+
+def cruise(speed: float = 10.0, **others: Any) -> Signals:
+    """All sensors of a train at a constant speed."""
+    same: Signals = dict.fromkeys(("odometer_1", "odometer_2", "radar"), constant(speed))
+    return same | {"gps_position": lambda t: speed * t, "cylinder_pressure": constant(0.0)} | others
+
+
+def test_an_odometer_that_is_off_without_an_effort_is_a_sensor() -> None:
+    rows = told(12.0, cruise(odometer_1=lambda t: 9.0 if t > 5.0 else 10.0))
+    codes = [row["odometer_1_fault"] for row in rows]
+    assert set(codes[:50]) == {NONE}
+    assert codes[-1] == SENSOR
+    assert SUSPECTED in codes
+    assert all(row[f"{name}_fault"] == NONE for row in rows[60:] for name in ("odometer_2", "radar", "gps", "adhesion"))
+    assert rows[-1]["speed"] == 10.0
+    assert 5.0 <= rows[-1]["detection_time"] < 5.6
+    assert rows[-1]["confidence"] > 0.3
+
+
+def test_under_the_brake_the_same_reading_is_a_wheel() -> None:
+    low = cruise(odometer_1=lambda t: 9.0 if t > 5.0 else 10.0, effort=lambda t: -40e3 if t < 14.0 else 0.0)
+    rows = told(20.0, low)
+    assert {row["odometer_1_fault"] for row in rows[90:140]} == {WHEEL}
+    assert rows[-1]["odometer_1_fault"] == SENSOR  # the brake is released, and it goes on
+    high = told(12.0, cruise(odometer_1=lambda t: 11.0 if t > 5.0 else 10.0, effort=constant(-40e3)))
+    assert high[-1]["odometer_1_fault"] == SENSOR  # no brake makes a wheel fast
+
+
+def test_a_sensor_that_stands_still_is_stuck() -> None:
+    def speed(t: float) -> float:
+        return 10.0 + 0.2 * t
+
+    moving: Signals = dict.fromkeys(("odometer_1", "odometer_2", "radar"), speed)
+    moving |= {"gps_position": lambda t: 10.0 * t + 0.1 * t * t, "radar": lambda t: speed(min(t, 5.0))}
+    assert told(16.0, moving)[-1]["radar_fault"] == STUCK
+
+
+def test_without_a_third_source_both_are_suspected() -> None:
+    two: Signals = {"odometer_1": lambda t: 9.0 if t > 5.0 else 10.0, "odometer_2": constant(10.0)}
+    last = told(12.0, two)[-1]
+    assert (last["odometer_1_fault"], last["odometer_2_fault"]) == (SUSPECTED, SUSPECTED)
+    assert last["isolation_limited"] == 1.0
+    assert told(1.0, cruise())[-1]["isolation_limited"] == 0.0
+
+
+def test_a_threshold_of_zero_is_refused() -> None:
+    system = TrainDiagnosis()
+    p = system.unpack_parameters(system.start_parameters())
+    assert all(system.requirements(p).values())
+    broken = {text: ok for text, ok in system.requirements(p._replace(threshold_radar=0.0)).items() if not ok}
+    assert any("threshold_radar" in text for text in broken)
+    with pytest.raises(ValueError, match="force_window"):
+        TrainDiagnosis(force_window=2)
+
+
+@pytest.mark.parametrize("share", [0.4, 0.75, 1.0])
+def test_the_share_of_a_constant_force_is_found(share: float) -> None:
+    # Without resistance the speed grows by share a per step, so the simulated and the measured end agree exactly.
+    system = TrainDiagnosis()
+    p = system.unpack_parameters(system.start_parameters())
+    p = p._replace(davis_a=0.0, davis_b=0.0, davis_c=0.0, smoothing=0.0)
+    steps, none = range(8), [0.0] * 8
+    pulls = MotionWindow([5.0 + share * 0.5 * k for k in steps], [0.5] * 8, none, none, none)
+    found = traction_share(pulls, 0.8 * np.ones(()), 1.0, 1e5, p)
+    assert (float(found.value), float(found.found)) == (pytest.approx(max(share, 0.56), abs=1e-12), 1.0)  # 0.7 of 0.8
+    brakes = MotionWindow([15.0 - share * 0.5 * k for k in steps], none, [0.5] * 8, [0.5] * 8, none)
+    stops = brake_share(brakes.measured, brakes, 0.8 * np.ones(()), 1.0, 1e5, p)
+    assert float(stops.value) == pytest.approx(max(share, 0.56), abs=1e-12)
+    coasts = MotionWindow([5.0] * 8, none, none, none, none)
+    assert float(traction_share(coasts, 0.8 * np.ones(()), 1.0, 1e5, p).found) == 0.0
