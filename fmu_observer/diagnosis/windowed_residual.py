@@ -66,7 +66,7 @@ def judge(before: Alarm, t: Array, exceeds: Array, raise_after: Array = 1.0, cle
     """
     speaks_against: Array = np.where(exceeds > 0.0, 1.0 - before.raised, before.raised)
     contrary = speaks_against * (before.contrary + 1.0)
-    needed = np.where(before.raised > 0.0, clear_after, raise_after)
+    needed: Array = np.where(before.raised > 0.0, clear_after, raise_after)
     changes: Array = np.where(contrary >= needed - 0.5, speaks_against, 0.0)
-    raised = np.where(changes > 0.0, 1.0 - before.raised, before.raised)
+    raised: Array = np.where(changes > 0.0, 1.0 - before.raised, before.raised)
     return Alarm(raised, (1.0 - changes) * contrary, np.where(changes > 0.0, t, before.since))
