@@ -34,7 +34,7 @@ def torsion_gains(drive: DriveTrain, sample_period: float, samples: int = WINDOW
     Raises:
         ValueError: the window does not show the torsion.
     """
-    A = np.array(drive.matrix())
+    A: np.ndarray = np.array(drive.matrix())
     B = np.array([[1.0 / drive.rotor_inertia, 0.0], [0.0, -1.0 / drive.generator_inertia], [0.0, 0.0]])
     observer = finite_window_observer(*sampled(A, B, sample_period), np.eye(2, 3), samples)
     if observer.rank < 3:
@@ -112,7 +112,7 @@ def sample_speeds(
         name: [np.where(starts > 0.0, value, getattr(m, name)[i]) for i in range(WINDOW - 1)] + [value]
         for name, value in zip(_HISTORIES, now, strict=True)
     }
-    gains = (p.rotor_speed_gain, p.rotor_speed_gain, p.generator_speed_gain, p.generator_speed_gain)
+    gains: tuple[Array, ...] = (p.rotor_speed_gain, p.rotor_speed_gain, p.generator_speed_gain, p.generator_speed_gain)
     gains += (p.rotor_torque_gain, p.generator_torque_gain)
     r1, r2, g1, g2, driving, braking = (
         _weighted(gain, histories[name]) for name, gain in zip(_HISTORIES, gains, strict=True)
@@ -120,7 +120,8 @@ def sample_speeds(
     torsions = _beside(r1, r2, g1, g2, 1.0)
     rates = _beside(rotor[0], rotor[1], generator[0], generator[1], -1.0 / p.gear_ratio)
     coefficients = residual_filter(p.speed_filter_time, p.sample_period)
-    filters, squares, residuals = [], [], []
+    filters: list[Array] = []
+    squares, residuals = [], []
     for i, (torsion, rate) in enumerate(zip(torsions, rates, strict=True)):
         before = (m.speed_filter[2 * i], m.speed_filter[2 * i + 1])
         out = rate_residual(coefficients, before, torsion + driving + braking, rate, starts)

@@ -41,10 +41,10 @@ from plant_models.hybrid.system import Array
 
 
 class _Group(NamedTuple):
-    """Alarms of one kind: name of the output, how many, whose persistence, and what the output says."""
+    """Alarms of one kind: name of the output, how many, by whose persistence, and what the output says."""
 
     output: str
-    count: int
+    size: int
     kind: str
     text: str
 
@@ -57,8 +57,8 @@ _GROUPS = (
     _Group("pitch_actuator_fault", BLADES, "actuator", "pitch actuators of the blades"),
     _Group("efficiency_fault", 1, "efficiency", "drive train, by its efficiency"),
 )
-ALARMS = sum(group.count for group in _GROUPS)
-ALARM_NAMES = tuple(f"{g.output}[{i + 1}]" if g.count > 1 else g.output for g in _GROUPS for i in range(g.count))
+ALARMS = sum(group.size for group in _GROUPS)
+ALARM_NAMES = tuple(f"{g.output}[{i + 1}]" if g.size > 1 else g.output for g in _GROUPS for i in range(g.size))
 """Which alarm stands at which place of `alarm_time`."""
 
 _LIMITS = (
@@ -145,7 +145,7 @@ class WindTurbineDiagnosis(HybridSystem):
                 "1",
                 f"1 for a fault of {g.text}",
                 variability="discrete",
-                size=g.count if g.count > 1 else None,
+                size=g.size if g.size > 1 else None,
             )
             for g in _GROUPS
         ),
@@ -158,6 +158,7 @@ class WindTurbineDiagnosis(HybridSystem):
         parameter("sample_period", "s", 0.01, "Time between two samples", min=1e-6),
         parameter("block_period", "s", 0.5, "Blocks of the long window, of which it has ten", min=1e-6),
         parameter("settling_time", "s", 10.0, "Time from the start on in which nothing is judged", min=0.0),
+        parameter("sensor_hold", "s", 5.0, "After an alarm of a pitch sensor, its blade's actuator waits", min=0.0),
         *PITCH_PARAMETERS,
         *DRIVE_PARAMETERS,
         *EFFICIENCY_PARAMETERS,
@@ -209,7 +210,7 @@ class WindTurbineDiagnosis(HybridSystem):
         )
         new |= sample_torques(m, generator, driving, u.torque)
         settled = np.where(m.samples * p.sample_period > p.settling_time, 1.0, 0.0)
-        exceeds, undecided = _judged(m, p)
+        exceeds, undecided = _judged(m, t, p)
         alarms = _alarms(m, [settled * value for value in exceeds], t, p)
         new |= {name: [getattr(alarm, field) for alarm in alarms] for name, field in _ALARM_FIELDS}
         return MEMORY.pack(m, **new, undecided_pairs=settled * undecided)
@@ -220,8 +221,8 @@ class WindTurbineDiagnosis(HybridSystem):
         found: dict[str, Array] = {}
         at = 0
         for group in _GROUPS:
-            found[group.output] = m.raised[at] if group.count == 1 else m.raised[at : at + group.count]
-            at += group.count
+            found[group.output] = m.raised[at] if group.size == 1 else m.raised[at : at + group.size]
+            at += group.size
         any_raised = m.raised[0]
         for i in range(1, ALARMS):
             any_raised = np.maximum(any_raised, m.raised[i])
@@ -232,7 +233,7 @@ class WindTurbineDiagnosis(HybridSystem):
 _ALARM_FIELDS = (("raised", "raised"), ("contrary", "contrary"), ("since", "since"))
 
 
-def _judged(m: Any, p: Any) -> tuple[list[Array], Array]:
+def _judged(m: Any, t: Array, p: Any) -> tuple[list[Array], Array]:
     """Which residuals speak for each alarm, in the order of `_GROUPS`, and how many pairs stay undecided."""
     sizes = [
         np.maximum(m.held_pitch_single[i] / p.pitch_single_limit, m.held_pitch_triple[i] / p.pitch_triple_limit)
@@ -253,7 +254,7 @@ def _judged(m: Any, p: Any) -> tuple[list[Array], Array]:
     actuators = [
         np.where(
             np.maximum(m.held_pitch_brief[i] / p.pitch_brief_limit, m.held_pitch_long[i] / p.pitch_long_limit) > 1.0,
-            1.0 - disagree[i],
+            (1.0 - disagree[i]) * _believed(m, 2 * i, t, p) * _believed(m, 2 * i + 1, t, p),
             0.0,
         )
         for i in range(BLADES)
@@ -262,8 +263,14 @@ def _judged(m: Any, p: Any) -> tuple[list[Array], Array]:
     return [*sensors, torque, *actuators, np.where(deviation > p.efficiency_limit, 1.0, 0.0)], undecided
 
 
+def _believed(m: Any, sensor: int, t: Array, p: Any) -> Array:
+    """1 where no alarm of a pitch sensor is raised or was a short while ago: a fault that comes and goes in noise."""
+    calm = np.where(t - m.since[sensor] > p.sensor_hold, 1.0, np.where(m.since[sensor] > 0.0, 0.0, 1.0))
+    return calm * (1.0 - m.raised[sensor])
+
+
 def _alarms(m: Any, exceeds: Sequence[Array], t: Array, p: Any) -> list[Alarm]:
-    kinds = [group.kind for group in _GROUPS for _ in range(group.count)]
+    kinds = [group.kind for group in _GROUPS for _ in range(group.size)]
     return [
         judge(
             Alarm(m.raised[i], m.contrary[i], m.since[i]),

@@ -33,7 +33,7 @@ class FiniteWindowObserver:
     @property
     def rank(self) -> int:
         """Number of directions of the state that the window shows."""
-        return len(self.singular_values) - self.unobservable.shape[1]
+        return int(len(self.singular_values) - self.unobservable.shape[1])
 
     def estimate(self, measurements: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """State, shape (n,).
@@ -41,7 +41,7 @@ class FiniteWindowObserver:
         Args:
             measurements: of the window, oldest first, shape (N, p). inputs: held after each sample, shape (N, m).
         """
-        return self.gain_y @ np.ravel(measurements) + self.gain_u @ np.ravel(inputs)
+        return np.asarray(self.gain_y @ np.ravel(measurements) + self.gain_u @ np.ravel(inputs))
 
 
 def sampled(A: np.ndarray, B: np.ndarray, sample_period: float) -> tuple[np.ndarray, np.ndarray]:

@@ -19,7 +19,8 @@ class NamedMemory:
 
     def __init__(self, signals: Sequence[Signal]) -> None:
         self.signals = tuple(signals)
-        self._type: Any = namedtuple("Memory", [s.name for s in signals])
+        made: Any = namedtuple("Memory", [s.name for s in signals])
+        self._type = made
 
     def unpack(self, x: Array) -> Any:
         """Named tuple of the parts.

@@ -95,7 +95,7 @@ def outvoted(readings: Sequence[Array], thresholds: Sequence[Sequence[Array]]) -
     }
     found = []
     for k in range(n):
-        vote = 1.0
+        vote: Array = 1.0
         for pair, value in differ.items():
             vote = vote * (value if k in pair else 1.0 - value)
         found.append(vote)

@@ -67,8 +67,9 @@ def invert(grid: Sequence[Array], differences: Sequence[Array], previous: Array)
     """
     if len(grid) != len(differences) or len(grid) < 2:
         raise ValueError(f"{len(grid)} values and {len(differences)} differences; expected equally many, at least 2.")
-    ends = np.where(np.abs(differences[0]) <= np.abs(differences[-1]), grid[0], grid[-1])
-    value, distance, crossings = ends, 0.0 * ends + np.inf, 0.0 * ends
+    ends: Array = np.where(np.abs(differences[0]) <= np.abs(differences[-1]), grid[0], grid[-1])
+    value: Array = ends
+    distance, crossings = 0.0 * ends + np.inf, 0.0 * ends
     for i in range(len(grid) - 1):
         d0, d1 = differences[i], differences[i + 1]
         # A zero belongs to the interval on its left; that at the first value to the first.

@@ -20,19 +20,6 @@ class Windowed(NamedTuple):
     memory: Array
 
 
-class BlockWindow(NamedTuple):
-    """A long window in blocks: what is carried from sample to sample.
-
-    Attributes:
-        sums: of the blocks that are complete, oldest first, shape (blocks,). partial: sum of the block that grows.
-        count: samples in it [1].
-    """
-
-    sums: Array
-    partial: Array
-    count: Array
-
-
 class Alarm(NamedTuple):
     """An alarm with its persistence: what is carried from sample to sample.
 
@@ -63,29 +50,6 @@ def windowed_square(memory: Array, residual: Array) -> Windowed:
     return Windowed(value, vector(*kept[1:], square) if kept else memory)
 
 
-def block_windowed_square(before: BlockWindow, residual: Array, block: Array) -> tuple[Array, BlockWindow]:
-    """The same sum over a long window, of so many blocks of so many samples; it moves on by whole blocks.
-
-    The window ends at the last complete block, so its sum is that of (7.6.10) there, up to ``block - 1`` samples late.
-    In return it carries a number for each block and not for each sample.
-
-    Args:
-        before: what the last sample left. residual: x(k). block: samples in a block, a whole number [1].
-
-    Returns:
-        The sum over the complete blocks, and what is carried on.
-    """
-    partial = before.partial + residual * residual
-    count = before.count + 1.0
-    complete = np.where(count >= block - 0.5, 1.0, 0.0)
-    sums = [before.sums[i] for i in range(before.sums.shape[0])]
-    moved = [np.where(complete > 0.0, later, sum_) for sum_, later in zip(sums, [*sums[1:], partial], strict=True)]
-    value = moved[0]
-    for later in moved[1:]:
-        value = value + later
-    return value, BlockWindow(vector(*moved), (1.0 - complete) * partial, (1.0 - complete) * count)
-
-
 def judge(before: Alarm, t: Array, exceeds: Array, raise_after: Array = 1.0, clear_after: Array = 1.0) -> Alarm:
     """One sample of an alarm: raised after so many samples in a row above the threshold, cleared after so many below.
 
@@ -100,9 +64,9 @@ def judge(before: Alarm, t: Array, exceeds: Array, raise_after: Array = 1.0, cle
     Source:
         Omar 2012, 7.5.1 (iii) asks for a persistence and prints none.
     """
-    speaks_against = np.where(exceeds > 0.0, 1.0 - before.raised, before.raised)
+    speaks_against: Array = np.where(exceeds > 0.0, 1.0 - before.raised, before.raised)
     contrary = speaks_against * (before.contrary + 1.0)
-    needed = np.where(before.raised > 0.0, clear_after, raise_after)
-    changes = np.where(contrary >= needed - 0.5, speaks_against, 0.0)
-    raised = np.where(changes > 0.0, 1.0 - before.raised, before.raised)
+    needed: Array = np.where(before.raised > 0.0, clear_after, raise_after)
+    changes: Array = np.where(contrary >= needed - 0.5, speaks_against, 0.0)
+    raised: Array = np.where(changes > 0.0, 1.0 - before.raised, before.raised)
     return Alarm(raised, (1.0 - changes) * contrary, np.where(changes > 0.0, t, before.since))

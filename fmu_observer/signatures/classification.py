@@ -91,10 +91,11 @@ class Stage:
     margin: float
 
 
-class Classified(NamedTuple):
+@dataclass(frozen=True)
+class Classified:
     """Verdicts on experiments.
 
-    Attributes:
+    Args:
         index: of the label in `SignatureClassifier.labels`, -1 where a point lies in the strip between two clouds,
             shape (n,). score: distance to the decision line that was nearest, in units of the ranges, shape (n,).
     """

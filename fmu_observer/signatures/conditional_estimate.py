@@ -168,13 +168,13 @@ def train_conditional(
     Raises:
         ValueError: the first quantity has fewer than two classes, or there is not one value a record.
     """
-    records, second = np.asarray(records, dtype=float), np.asarray(second, dtype=float)
+    records, other = np.asarray(records, dtype=float), np.asarray(second, dtype=float)
     curve, margin = train_curve(records, first, space)
     margins, stages = {"first": margin}, dict[float, ClassCurve | float]()
     for value in curve.values:
         here = np.asarray(first) == value
-        if len(np.unique(second[here])) < 2:
-            stages[float(value)] = float(second[here][0])
+        if len(np.unique(other[here])) < 2:
+            stages[float(value)] = float(other[here][0])
             continue
-        stages[float(value)], margins[f"second at {value:g}"] = train_curve(records[:, here], list(second[here]), space)
+        stages[float(value)], margins[f"second at {value:g}"] = train_curve(records[:, here], list(other[here]), space)
     return ConditionalEstimator(curve, stages), margins

@@ -35,7 +35,7 @@ def dynamic_signature(
         raise ValueError(f"sample {first} of the record is not finite; cut the record or mend it first.")
     windows = np.lib.stride_tricks.sliding_window_view(samples, order + 1, axis=0)  # shape (M, ..., N + 1)
     ordered = np.moveaxis(windows, -1, 0)
-    return pencil_point(ordered[:-1], ordered[-1], eps, next_scaling)
+    return np.asarray(pencil_point(ordered[:-1], ordered[-1], eps, next_scaling))
 
 
 def signature_window(order: int, points: int) -> int:

@@ -55,7 +55,8 @@ def slope(signature: np.ndarray) -> np.ndarray:
     """
     xi, eta = signature - signature.mean(axis=1, keepdims=True)
     spread = (xi * xi).sum(axis=0)
-    return np.divide((xi * eta).sum(axis=0), spread, out=np.zeros_like(spread), where=spread > 0.0)
+    found = np.divide((xi * eta).sum(axis=0), spread, out=np.zeros_like(spread), where=spread > 0.0)
+    return np.asarray(found)
 
 
 def branch_tips(signature: Array, interpolate: bool = False) -> tuple[Array, Array]:

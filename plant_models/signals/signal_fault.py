@@ -21,6 +21,7 @@ from plant_models.hybrid import (
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
+from plant_models.hybrid.units import parse_unit
 
 
 class SignalFault(HybridSystem):
@@ -49,7 +50,7 @@ class SignalFault(HybridSystem):
         losses: whether samples can be lost.
 
     Raises:
-        ValueError: channels or faults below one.
+        ValueError: channels or faults below one, or a unit that cannot be read.
 
     Source: Omar 2012, section 7.4 and (7.6.12); the wheel of a train has faults of its own, see `WheelFault`.
     """
@@ -67,6 +68,7 @@ class SignalFault(HybridSystem):
 
     def __init__(self, *, channels: int = 1, fault_count: int = 1, unit: str = "1", losses: bool = False) -> None:
         require_whole("signal_fault", channels=channels, fault_count=fault_count)
+        parse_unit(unit)
         self.channels, self.fault_count, self.losses = channels, fault_count, losses
         size = None if channels == 1 else channels
         self.inputs = (input_signal("healthy", unit, 0.0, "The signal without its faults", size=size, optional=True),)

@@ -7,7 +7,7 @@ import scipy
 from fmu_observer.diagnosis.redundancy import isolate, larger, outvoted
 from fmu_observer.diagnosis.residual_filters import filtered, residual_filter, settled
 from fmu_observer.diagnosis.window_inversion import grid_around, invert, smoothed
-from fmu_observer.diagnosis.windowed_residual import Alarm, BlockWindow, block_windowed_square, judge, windowed_square
+from fmu_observer.diagnosis.windowed_residual import Alarm, judge, windowed_square
 
 ROUNDING = 1e-12  # relative, of some tens of operations
 
@@ -41,13 +41,10 @@ def test_a_settled_filter_has_no_transient() -> None:
 @pytest.mark.parametrize("samples", [1, 2, 3, 7])
 def test_windows_sum_the_last_squares(samples: int) -> None:
     residual = np.random.default_rng(samples).normal(size=50)
-    window, blocks = np.zeros(samples - 1), BlockWindow(np.zeros(3), 0.0, 0.0)
+    window = np.zeros(samples - 1)
     for k, x in enumerate(residual):
         value, window = windowed_square(window, x)
         assert value == pytest.approx(np.sum(residual[max(0, k - samples + 1) : k + 1] ** 2), rel=ROUNDING)
-        total, blocks = block_windowed_square(blocks, x, samples)
-        end = (k + 1) // samples * samples
-        assert total == pytest.approx(np.sum(residual[max(0, end - 3 * samples) : end] ** 2), rel=ROUNDING)
 
 
 def test_an_alarm_waits_for_samples_in_a_row() -> None:

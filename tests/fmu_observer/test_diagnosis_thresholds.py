@@ -43,6 +43,10 @@ def test_the_smallest_threshold_for_a_rate(allowed: float) -> None:
     assert checked(recordings, threshold, 1.0).rate <= allowed
 
 
+def test_a_rise_in_steps_is_one_alarm_at_each_threshold_below() -> None:
+    assert rate_threshold([np.array([0.0, 1.0, 2.0, 0.0])], 1.0, 0.0) == 2.0
+
+
 def test_a_threshold_is_worth_less_where_it_was_not_made() -> None:
     rng = np.random.default_rng(5)
     rates = []

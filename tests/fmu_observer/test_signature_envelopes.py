@@ -56,6 +56,9 @@ def test_a_turned_bar_has_its_area_at_its_own_angle():
     found = best_envelope(points, 10)
     # 200 points a slab leave 1 % of the height empty at each end, the edges less.
     assert 0.97 * LENGTH * THICKNESS < found.area < LENGTH * THICKNESS
+    corners = found.corners
+    assert found.contains(corners.mean(axis=2)).all()  # the middle of each slab
+    np.testing.assert_allclose(rotated(corners, found.angle)[1, :, 2], found.upper, atol=1e-12)
     # Lying along the abscissa or standing on it, the sum is the same: both are the bar.
     assert min(abs(found.angle - np.radians(a)) for a in (60.0, 150.0)) < np.radians(2.0)
     assert envelope_areas(points, 10, np.array([0.0]))[0] > 1.5 * found.area

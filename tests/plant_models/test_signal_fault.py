@@ -91,3 +91,5 @@ def test_lost_samples_leave_the_last_one() -> None:
 def test_options_are_checked() -> None:
     with pytest.raises(ValueError, match="channels must be at least 1"):
         SignalFault(channels=0)
+    with pytest.raises(ValueError, match="unknown unit symbol"):
+        SignalFault(unit="furlong")

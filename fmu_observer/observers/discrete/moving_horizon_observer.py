@@ -222,7 +222,7 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         names, q = [s.name for s in model.states], len(model.measurements)
         losses = self._losses = _losses(self.name, self._loss, q)
         for name, pair in bounds.items():
-            if name not in names or isinstance(pair, str) or len(pair) != 2:
+            if name not in names or len(pair) != 2:
                 raise ValueError(
                     f"{self.name}: bounds of {name!r} are {pair!r}; expected [lowest, highest] of one of the states "
                     f"{', '.join(names)}."

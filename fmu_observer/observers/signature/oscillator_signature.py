@@ -34,7 +34,9 @@ class OscillatorSignature(SignatureObserver):
     0.1 with ``literal`` scaling and 10 with ``norm``, mu = 200 [ours], none is validated. Polygonal lines replace
     splines.
 
-    The table belongs to the parameters it was built with: set what `tabulated` returns together with others.
+    The table belongs to the parameters it was built with: set what `tabulated` returns together with others. Presets,
+    each with its table: `fits_set` (default) and `chapter_2`, as those of the plant; in the second one two states may
+    have one signature, and the error of x1 is five times as large.
 
     Args:
         nodes: grid values an axis, printed 7 and 13. next_scaling: ``literal`` (default) tells both states, ``norm`` x1
@@ -47,6 +49,8 @@ class OscillatorSignature(SignatureObserver):
     name = "oscillator_signature"
     description = "Signature observer of the braked oscillator"
     source = "Omar 2012, (4.6.1)-(4.6.8)"
+    default_preset = "fits_set"
+    presets: Mapping[str, Mapping[str, Any]] = {"fits_set": {}}
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {
         "nodes": range(4, 22),
         "next_scaling": ("literal", "norm"),
@@ -73,7 +77,9 @@ class OscillatorSignature(SignatureObserver):
             ),
         )
         super().__init__(nodes=nodes, next_scaling=next_scaling, variant=variant)
-        self._fill_table()
+        self._fill_table(self.tabulated()["table"])
+        other = {"rate_factor": 1.5, "braking": 2.25}
+        self.presets = {"fits_set": {}, "chapter_2": other | {"table": tuple(self.tabulated(other)["table"])}}
 
     def tabulated(
         self, parameters: Mapping[str, Value] | None = None, preset: str | None = None

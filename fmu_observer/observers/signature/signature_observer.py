@@ -279,9 +279,9 @@ class SignatureObserver(HybridSystem):
         names = [s.name for s in self.plant.parameters if s.name not in NO_MODEL]
         return namedtuple("Model", [*names, "sample_period"])
 
-    def _fill_table(self) -> None:
-        """Start values of `table`, for the parameters at theirs; the end of the constructor."""
-        start = tuple(map(float, self.tabulated()["table"]))
+    def _fill_table(self, table: np.ndarray) -> None:
+        """Make a table, which needs a system that is made, the start value of `table`."""
+        start = tuple(map(float, table))
         self.parameters = tuple(replace(s, start=start) if s.name == "table" else s for s in self.parameters)
         self.__dict__.pop("parameter_signals", None)
 

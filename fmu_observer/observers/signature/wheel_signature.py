@@ -97,7 +97,7 @@ def record_class(classes: SignatureClassifier, record: Sequence[Array]) -> Array
     verdict = CODES[str(classes.last)] + 0.0 * record[-1]
     for stage in reversed(classes.stages):
         abscissa, ordinate = _point(stage.plane, record)
-        inside = 1.0
+        inside: Array = 1.0
         for rival in stage.rivals.values():
             beyond = rival.normal[0] * abscissa + rival.normal[1] * ordinate - rival.threshold
             inside = inside * np.where(beyond > 0.0, 1.0, 0.0)

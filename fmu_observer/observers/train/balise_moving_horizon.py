@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections import namedtuple
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -53,11 +52,23 @@ WINDOW_PARAMETERS = (
     parameter("disturbance_limit", "m/s2", 1.0, "Largest unknown acceleration, either way", min=1e-6),
     parameter("loss_scale", "1", SCALES["geman_mcclure"], "Deviations at which the loss begins to doubt", min=1e-3),
 )
-Shared = namedtuple(
-    "Shared",
-    "mass davis_b davis_c creep_time creep_share acceleration_density disturbance_density odometer_deviation "
-    "balise_deviation speed_limit disturbance_limit loss_scale",
-)
+
+
+class Shared(NamedTuple):
+    """Parameters that all rows of the window share, by their names."""
+
+    mass: Array
+    davis_b: Array
+    davis_c: Array
+    creep_time: Array
+    creep_share: Array
+    acceleration_density: Array
+    disturbance_density: Array
+    odometer_deviation: Array
+    balise_deviation: Array
+    speed_limit: Array
+    disturbance_limit: Array
+    loss_scale: Array
 
 
 class BaliseMovingHorizon(BaliseOdometerEkf):
@@ -126,7 +137,7 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
             bounded=(V, D),
             limits=_limits,
             losses=(self.loss,),
-            loss_scale=lambda shared: Shared(*shared).loss_scale,
+            loss_scale=lambda shared: _shared(shared).loss_scale,
         )
 
     def requirements(self, p: Any) -> dict[str, Array]:
@@ -169,18 +180,22 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
         return WindowRow(1.0 + 0.0 * x[V], period, t + 0.0 * x[V], inputs, vector(measured), vector(1.0 + 0.0 * x[V]))
 
 
+def _shared(flat: Array) -> Shared:
+    return Shared(*(flat[i] for i in range(len(Shared._fields))))
+
+
 def _moved(x: Array, row: WindowRow, shared: Array) -> Moved:
-    F, noise = transition(row.period, row.inputs[SPEED], Shared(*shared))
+    F, noise = transition(row.period, row.inputs[SPEED], _shared(shared))
     return Moved(F @ x + row.inputs[OFFSETS], F, noise)
 
 
 def _seen(x: Array, row: WindowRow, shared: Array) -> Seen:
-    p, balise = Shared(*shared), row.inputs[IS_BALISE]
+    p, balise = _shared(shared), row.inputs[IS_BALISE]
     H = balise * BALISE_ROW + (1.0 - balise) * ODOMETER_ROW
     deviation = np.where(balise > 0.5, p.balise_deviation, p.odometer_deviation)
     return Seen(H @ x, H, np.reshape(deviation * deviation, (1, 1)))
 
 
 def _limits(shared: Array) -> Limits:
-    p = Shared(*shared)
+    p = _shared(shared)
     return Limits(vector(0.0 * p.mass, -p.disturbance_limit), vector(p.speed_limit, p.disturbance_limit))

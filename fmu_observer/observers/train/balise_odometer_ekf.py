@@ -97,7 +97,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
         input_signal("effort", "N", 0.0, "Applied effort at the wheel rim: traction positive, brake negative"),
         input_signal("odometer", "m/s", 0.0, "Odometer speed"),
     )
-    outputs = (
+    outputs: tuple[Signal, ...] = (
         output_signal("position", "m", "Estimated position"),
         output_signal("speed", "m/s", "Estimated speed", display_unit="km/h"),
         output_signal("disturbance", "m/s2", "Estimated acceleration that effort and resistance do not explain"),
@@ -115,7 +115,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
         BALISE,
         PeriodicEvent("odometer_sample", "odometer_period", description="The odometer is read"),
     )
-    parameters = OWN_PARAMETERS
+    parameters: tuple[Signal, ...] = OWN_PARAMETERS
     presets: Mapping[str, Mapping[str, Any]] = {
         # ours: for the position error on the line Amsterdam - Utrecht with drawn faults, see docs/tuning_the_train.md
         "tuned": {
