@@ -38,6 +38,7 @@ PAGE = Path(__file__).parents[1] / "moving_horizon.md"
 WINDOW = 80  # rows: 40 s, more than the longest gap lasts
 PERIOD = 0.5  # [s] between two readings, for all filters
 MAP_DEVIATION, ACCURACY = 2.5, 5.0  # [m] by which balises lie beside the map; told location accuracy
+TINY = 1e-9  # variance that GTSAM needs of every transition
 FALSE = ((122.0, 60.0), (260.0, -45.0), (405.0, 150.0), (612.0, 35.0), (700.0, -400.0))  # [s], [m]
 TRAIN = {"mass": 873e3, "davis_a": 4320.0, "davis_b": 160.0, "davis_c": 9.6}
 START = {"estimated_position": 3100.0, "estimated_speed": 27.778}
@@ -68,31 +69,21 @@ class FactorGraphSmoother(BaliseMovingHorizon):
     def __init__(self, lag: float = WINDOW * PERIOD) -> None:
         super().__init__(window=1, loss="geman_mcclure")
         self.options = {"lag": lag}
-        self._smoother = gtsam.BatchFixedLagSmoother(lag)
+        search = gtsam.LevenbergMarquardtParams()
+        search.setLinearSolverType("MULTIFRONTAL_QR")
+        self._smoother = gtsam.BatchFixedLagSmoother(lag, search)
         self._count = 0
 
     def iterate(self, problem: Any, passes: int, *arrays: Any) -> Iterated:  # type: ignore[override]
         """A row more in the graph."""
         arrival, _, points, row_flat, point, shared = (np.asarray(a, dtype=float) for a in arrays)
         row, graph, values = LAYOUT.unpacked(row_flat), gtsam.NonlinearFactorGraph(), gtsam.Values()
-        stamps, key = {}, self._count + 1
-        if self._count == 0:
+        stamps, key = {self._count + 1: float(row.time)}, self._count + 1
+        if self._count == 0:  # the first reading comes at once: the arrival cost is its own prior
             prior = gtsam.noiseModel.Gaussian.Covariance(arrival[2 * ORDER :].reshape(ORDER, ORDER))
-            graph.add(gtsam.PriorFactorVector(0, arrival[ORDER : 2 * ORDER], prior))
-            values.insert(0, arrival[ORDER : 2 * ORDER])
-            stamps[0] = float(row.time - row.period)
-        moved = _moved(points[-ORDER:], row, shared)
-        noise = np.asarray(moved.noise) + 1e-12 * np.eye(ORDER)
-        whitened = np.linalg.inv(np.asarray(factor(noise)))
-        linear = gtsam.JacobianFactor(
-            key - 1,
-            -whitened @ moved.F,
-            key,
-            whitened,
-            whitened @ row.inputs[:ORDER],
-            gtsam.noiseModel.Unit.Create(ORDER),
-        )
-        graph.add(gtsam.LinearContainerFactor(linear, gtsam.Values()))
+            graph.add(gtsam.PriorFactorVector(key, arrival[ORDER : 2 * ORDER], prior))
+        else:
+            graph.add(_transition(key, row, points[-ORDER:], shared))
         seen = _seen(point, row, shared)
         robust = gtsam.noiseModel.Robust.Create(
             gtsam.noiseModel.mEstimator.GemanMcClure.Create(float(shared[-1])),
@@ -100,13 +91,22 @@ class FactorGraphSmoother(BaliseMovingHorizon):
         )
         graph.add(gtsam.CustomFactor(robust, [key], _residual(np.asarray(seen.H), float(row.measured[0]))))
         values.insert(key, point)
-        stamps[key] = float(row.time)
         self._smoother.update(graph, values, stamps)
         self._count = key
         estimate = np.asarray(self._smoother.calculateEstimate().atVector(key))
         last = [float(name == "rows_in_window") for name in TOLD]
         remembered = np.hstack([arrival, row_flat, estimate, last])
         return Iterated(estimate, arrival[2 * ORDER :], remembered)
+
+
+def _transition(key: int, row: Any, before: np.ndarray, shared: np.ndarray) -> Any:
+    moved = _moved(before, row, shared)
+    whitened = np.linalg.inv(np.asarray(factor(moved.noise + TINY * np.eye(ORDER))))
+    offset = whitened @ row.inputs[:ORDER]
+    linear = gtsam.JacobianFactor(
+        key - 1, -whitened @ moved.F, key, whitened, offset, gtsam.noiseModel.Unit.Create(ORDER)
+    )
+    return gtsam.LinearContainerFactor(linear, gtsam.Values())
 
 
 def _residual(H: np.ndarray, measured: float) -> Callable[..., np.ndarray]:

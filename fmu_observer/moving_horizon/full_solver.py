@@ -27,8 +27,9 @@ SMALLEST_SHARE = 1.0 / 64.0
 LEAST_CURVATURE = 0.25
 """Of a loss, as a share of its weight: where it is less, steps would be too long."""
 
-KEPT = 1e-6
-"""How well a trajectory keeps the transitions to be called feasible, in its own standard deviations."""
+KEPT, NEAR = 1e-4, 1e-6
+"""How well a trajectory keeps the transitions to be called feasible, and how near a bound it touches it, in its own
+standard deviations."""
 
 
 class WindowError(ValueError):
@@ -83,7 +84,7 @@ class FullSolution:
     @property
     def estimate(self) -> np.ndarray:
         """State in the last row, shape (n,)."""
-        return self.states[-1]
+        return np.asarray(self.states[-1])
 
 
 class _Point(NamedTuple):
@@ -205,7 +206,7 @@ class _Search:
             if share <= SMALLEST_SHARE and size > effort.tolerance:
                 reason = "no part of the last step makes the cost smaller"
                 break
-        return self.told(kept, size, iterations, began, reason)
+        return self.told(kept if reason else point, size, iterations, began, reason)
 
     # -- a step -----------------------------------------------------------------------------------------------------
 
@@ -226,7 +227,7 @@ class _Search:
             variances = np.where(self.used[-1] > 0.0, point.stages.variances[-1], 1.0)
             squares[-1] *= variances / (variances + spread)
         found = [robust_loss.weight(loss, squares[:, j], self.doubts) for j, loss in enumerate(self.problem.losses)]
-        return self.used * np.stack(found, axis=1)
+        return np.asarray(self.used * np.stack(found, axis=1))
 
     def curvatures(self, point: _Point) -> np.ndarray:
         """Second derivatives of the losses where they are convex enough, else the weights; shape (N, q).
@@ -290,7 +291,7 @@ class _Search:
     def missing(self, point: _Point) -> np.ndarray:
         """What the transitions are off, shape (N, n)."""
         stages = point.stages
-        return point.states - stages.moved - np.einsum("kir,kr->ki", stages.G, point.noises)
+        return np.asarray(point.states - stages.moved - np.einsum("kir,kr->ki", stages.G, point.noises))
 
     def cost(self, point: _Point) -> float:
         """Half the squares of the noises, and the losses."""
@@ -313,7 +314,7 @@ class _Search:
 
     def active(self, states: np.ndarray) -> int:
         """How many bounds are touched."""
-        near = KEPT * self.scale
+        near = NEAR * self.scale
         return int(((states <= self.lower + near) | (states >= self.upper - near)).sum())
 
     def broken(self, start: np.ndarray) -> str:

@@ -64,7 +64,7 @@ class WindowProgram:
             [place.ravel()[self._kept], np.repeat(first + within, order, axis=0).ravel()],
             size,
         )
-        told = {"print_time": False, "error_on_fail": False, solver: dict(options)}
+        told: dict[str, Any] = {"print_time": False, "error_on_fail": False, solver: dict(options)}
         self._solver = ca.conic("window", solver, {"h": self.cost, "a": self.transitions}, told)
         self._call = BufferedCall(self._solver)
         self._rest = [np.zeros(self._solver.nnz_in(i)) for i in range(10, self._solver.n_in())]

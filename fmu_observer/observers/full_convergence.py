@@ -68,7 +68,7 @@ class FullMovingHorizonObserver(MovingHorizonObserver):
         super().__init__(model, **options)
         self.options |= told_effort(self.effort)
 
-    def iterate(self, problem: WindowProblem, passes: int, *arrays: Array) -> Iterated:  # type: ignore[override]
+    def iterate(self, problem: WindowProblem, passes: int, *arrays: Array) -> Iterated:
         """See `iterated_fully`."""
         return iterated_fully(problem, self.effort, *arrays)
 
@@ -119,7 +119,7 @@ class FullBaliseMovingHorizon(BaliseMovingHorizon):
         """States of the observer, then how the last search ended."""
         return (*super().own_states(), LAST_SEARCH)
 
-    def iterate(self, problem: WindowProblem, passes: int, *arrays: Array) -> Iterated:  # type: ignore[override]
+    def iterate(self, problem: WindowProblem, passes: int, *arrays: Array) -> Iterated:
         """See `iterated_fully`."""
         return iterated_fully(problem, self.effort, *arrays)
 

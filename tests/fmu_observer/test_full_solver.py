@@ -203,3 +203,27 @@ def test_a_search_that_is_cut_short_keeps_the_last_feasible_answer():
     assert (late.converged, late.timed_out, late.feasible, late.iterations) == (False, True, True, 0)
     assert late.reason == "deadline of 0 s after 0 steps"
     assert late.states == pytest.approx(whole.states, abs=1e-9)
+
+
+def test_a_factor_graph_of_others_comes_to_the_same():
+    gtsam = pytest.importorskip("gtsam", reason="extra `benchmark`: the factor graphs of others")
+    rows, problem = _rows(25, seed=12), _problem(moved=_shaken)
+    graph = gtsam.GaussianFactorGraph()
+    graph.add(gtsam.JacobianFactor(0, np.eye(2), START, gtsam.noiseModel.Gaussian.Covariance(SPREAD)))
+    for k, row in enumerate(rows):
+        told = LAYOUT.unpacked(row)
+        moved = _shaken(START, told, None)
+        noise = gtsam.noiseModel.Gaussian.Covariance(moved.noise)
+        graph.add(gtsam.JacobianFactor(k, -moved.F, k + 1, np.eye(2), moved.state - moved.F @ START, noise))
+        for j in np.flatnonzero(told.used):
+            read = gtsam.noiseModel.Isotropic.Sigma(1, float(np.sqrt(READ[j, j])))
+            graph.add(gtsam.JacobianFactor(k + 1, SEES[j : j + 1], told.measured[j : j + 1], read))
+    smoothed = graph.optimize()
+    found = _solve(problem, rows)
+    wanted = np.array([smoothed.at(k + 1) for k in range(len(rows))])
+    assert found.states == pytest.approx(wanted, abs=SOLVED)
+
+
+def _shaken(x, row, shared):
+    moved = _moved(x, row, shared)
+    return moved._replace(noise=moved.noise + 0.01 * row.period * np.eye(2))  # they know no noise of rank one
