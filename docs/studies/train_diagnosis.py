@@ -24,7 +24,7 @@ from fmu_observer.detection.train_isolation import FAULTS
 from fmu_observer.diagnosis.thresholds import alarm_rate, checked, count_alarms, proportion_interval, rate_threshold
 
 PAGE = Path(__file__).resolve().parents[1] / "train_diagnosis.md"
-PER_HOUR = 0.05  # alarms that each threshold may raise [1/h]
+PER_HOUR = 0.05  # alarms that each residual may raise [1/h]
 SEEDS, FAULTY = 120, 20
 SETTLED = 50  # samples left out at the start
 WHEEL = 2.0  # smallest code of an isolated fault
@@ -76,7 +76,7 @@ def threshold_table(free: Outputs) -> str:
     for name, shared in SHARED.items():
         used = float(getattr(p, name))
         kept = {title: residual_recordings(outs, name) for title, outs in free.items()}
-        asked = used * rate_threshold(kept[IN_SAMPLE], PERIOD, PER_HOUR * len(shared))
+        asked = used * rate_threshold(kept[IN_SAMPLE], PERIOD, PER_HOUR)
         rates = " | ".join(_rate(rows, len(shared)) for rows in kept.values())
         lines.append(f"| `{name}` | {used:.4g} | {asked:.3g} | {rates} |")
     return "\n".join(lines)

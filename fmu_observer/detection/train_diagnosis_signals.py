@@ -51,7 +51,7 @@ OUTPUTS = (
     output_signal("several_faults", "1", "1 while no single fault explains the alarms", variability="discrete"),
     output_signal("detection_time", "s", "Instant of the last detection; -1 none", variability="discrete"),
     output_signal(
-        "confidence", "1", "1 less threshold over the weakest residual of the verdict, 0..1", variability="discrete"
+        "confidence", "1", "1 less threshold over the weakest alarm of the verdict, 0..1", variability="discrete"
     ),
     output_signal("speed", "m/s", "Speed that is believed", variability="discrete", display_unit="km/h"),
     output_signal("position", "m", "Position by dead reckoning from the last balise used"),

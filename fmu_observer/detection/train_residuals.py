@@ -145,7 +145,8 @@ def way_ratios(errors: list[Array], fitted: list[Array], distance: Array, p: Any
     """
     limit = p.balise_floor + p.balise_share * np.abs(distance)
     ratios = [f * np.abs(error) / limit for error, f in zip(errors, fitted, strict=True)]
-    most, least = largest(ratios), HUGE
+    most = largest(ratios)
+    least: Array = HUGE
     for ratio, there_is in zip(ratios, fitted, strict=True):
         least = np.minimum(least, np.where(there_is > 0.0, ratio, HUGE))
     alike = np.where(least < HUGE, np.where(least > ALIKE * most, 1.0, 0.0), 0.0)

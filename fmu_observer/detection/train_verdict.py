@@ -23,7 +23,7 @@ from fmu_observer.detection.train_isolation import (
 )
 from fmu_observer.detection.train_memory import Memory
 from fmu_observer.detection.train_residuals import Readings, tolerance
-from fmu_observer.diagnosis.isolation_table import largest
+from fmu_observer.diagnosis.isolation_table import IsolationTable, largest
 from fmu_observer.diagnosis.windowed_residual import Alarm, judge
 from plant_models.hybrid.system import Array
 
@@ -124,10 +124,10 @@ def contradicted_wheels(m: Memory, read: Readings, wheel: Wheels, p: Any) -> lis
     raised = dict(zip(RESIDUALS, m.each("raised"), strict=True))
     for k, before in enumerate(m.each("against_wheel")):
         ahead = read.speeds[k] - m["voted_speed"]
-        may_be = np.where(ahead < 0.0, wheel.slow, wheel.fast)
+        may_be: Array = np.where(ahead < 0.0, wheel.slow, wheel.fast)
         quick, way = largest([raised[name] for name in OF_ODOMETER[k]]), raised[f"way_{k + 1}"]
         off = np.where(np.maximum(quick, way) > 0.0, read.fitted[k], 0.0)
-        now = np.where(np.abs(ahead) > tolerance(m["voted_speed"], p), 1.0 - may_be, 0.0)
+        now: Array = np.where(np.abs(ahead) > tolerance(m["voted_speed"], p), 1.0 - may_be, 0.0)
         # Once a wheel cannot explain it the verdict stays until the alarm ends: the same fault goes on under effort.
         known = np.where(before >= p.contrary_time - 1e-9, p.contrary_time, before + p.sample_period * now)
         # What only a way between balises shows is small and lasts: a scale, no slip.
@@ -220,11 +220,11 @@ def _isolated_code(fault: str, wrong: list[Array]) -> Array:
     return LOSS if fault in ("cylinder", "friction", "traction") else SENSOR
 
 
-def _margin(group: Any, fault: str, ratios: list[Array], available: list[Array]) -> Array:
-    """How far the weakest residual that the fault must move is above its threshold: 1 - threshold / residual, or 0."""
-    margin = 1.0
+def _margin(group: IsolationTable, fault: str, ratios: list[Array], available: list[Array]) -> Array:
+    """How far the weakest alarm of a fault is above its threshold: 1 - threshold / residual."""
+    margin: Array = 1.0
+    moved = {*group.must[fault], *group.may.get(fault, ())}
     for name, ratio, there in zip(group.residuals, ratios, available, strict=True):
-        if name in group.must[fault]:
-            own = 1.0 - 1.0 / np.maximum(ratio, 1.0)
-            margin = np.minimum(margin, np.where(there > 0.0, own, 1.0))
+        if name in moved:
+            margin = np.minimum(margin, np.where(there * ratio > 1.0, 1.0 - 1.0 / np.maximum(ratio, 1.0), 1.0))
     return margin

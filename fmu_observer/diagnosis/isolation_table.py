@@ -82,10 +82,10 @@ class IsolationTable:
             groups = [[quiet.pop(name) for name in group if name in quiet] for group in self.together]
             missing.append(sum(quiet.values(), 0.0) + sum((largest(group) for group in groups if group), 0.0))
         none = len(self.residuals) + 1.0
-        best = none
-        for cover, quiet in zip(covers, missing, strict=True):
-            best = np.minimum(best, np.where(cover > 0.5, quiet, none))
-        bests = [c * np.where(quiet < best + 0.5, 1.0, 0.0) for c, quiet in zip(covers, missing, strict=True)]
+        best: Array = none
+        for cover, lacking in zip(covers, missing, strict=True):
+            best = np.minimum(best, np.where(cover > 0.5, lacking, none))
+        bests = [c * np.where(lacking < best + 0.5, 1.0, 0.0) for c, lacking in zip(covers, missing, strict=True)]
         alone = np.where(sum(bests) < 1.5, 1.0, 0.0)
         return Verdict(
             [one * alone for one in bests],

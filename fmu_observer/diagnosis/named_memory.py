@@ -19,8 +19,7 @@ class NamedMemory:
 
     def __init__(self, signals: Sequence[Signal]) -> None:
         self.signals = tuple(signals)
-        made: Any = namedtuple("Memory", [s.name for s in signals])
-        self._type = made
+        self._type = _named(self.signals)
 
     def unpack(self, x: Array) -> Any:
         """Named tuple of the parts.
@@ -55,3 +54,7 @@ class NamedMemory:
                 raise ValueError(f"Memory {signal.name!r} was given {len(part)} values; expected {signal.size}.")
             scalars.extend(part[i] for i in range(signal.size))
         return vector(*scalars)
+
+
+def _named(signals: Sequence[Signal]) -> Any:
+    return namedtuple("Memory", [*(s.name for s in signals)])

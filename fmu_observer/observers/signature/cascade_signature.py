@@ -52,7 +52,7 @@ class CascadeSignature(SignatureObserver):
 
     Ours: lines are polygonal and interpolated between the classes of x2. x3 comes of the chord from the first to the
     last point; the thesis takes its slope, which is monotone in 19 of 49 pairs (x1, x2) only. ``literal`` scaling with
-    eps = 1 is the default: with ``norm``, which has the sign rule too, the errors are three times as large.
+    eps = 1 is the default: with ``norm``, which has the sign rule too, the errors are two to six times as large.
 
     The tables are part of the equations, and hold for the printed plant with samples each 0.001 s. x3 leaves the set of
     the tables after 0.46 s of the printed run; the look-up then ends at its border, and the estimate goes astray.
