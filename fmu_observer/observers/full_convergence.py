@@ -88,8 +88,8 @@ class FullBaliseMovingHorizon(BaliseMovingHorizon):
     See `FullMovingHorizonObserver` for what `converged`, `deadline_missed` and `feasible` say.
 
     Args:
-        window, loss: those of `BaliseMovingHorizon`. tolerance, max_iterations, deadline: those of
-            `FullMovingHorizonObserver`.
+        tolerance, max_iterations, deadline: those of `FullMovingHorizonObserver`.
+        options: `window` and `loss`, those of `BaliseMovingHorizon`.
 
     Raises:
         ValueError: an option is not legal; the message says which.

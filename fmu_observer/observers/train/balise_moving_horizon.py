@@ -192,7 +192,7 @@ def _moved(x: Array, row: WindowRow, shared: Array) -> Moved:
 def _seen(x: Array, row: WindowRow, shared: Array) -> Seen:
     p, balise = _shared(shared), row.inputs[IS_BALISE]
     H = balise * BALISE_ROW + (1.0 - balise) * ODOMETER_ROW
-    deviation = np.where(balise > 0.5, p.balise_deviation, p.odometer_deviation)
+    deviation: Array = np.where(balise > 0.5, p.balise_deviation, p.odometer_deviation)
     return Seen(H @ x, H, np.reshape(deviation * deviation, (1, 1)))
 
 
