@@ -443,6 +443,26 @@ def test_covariances_that_are_none_are_refused(values: dict[str, float], words: 
         started(PENDULUM, **values).start(0.0)
 
 
+@pytest.mark.parametrize(
+    ("start", "told"),
+    [
+        ([1.0, 0.0, 0.0, 1.0], 0.0),
+        ([-1.0, 0.0, 0.0, 1.0], 1.0),
+        ([1.0, 2.0, 2.0, 1.0], 1.0),
+        ([1.0, 1.0, 1.0, 1.0], 0.0),
+    ],
+)
+def test_a_start_covariance_that_is_none_is_told(start: list[float], told: float) -> None:
+    runtime = Runtime(ExtendedKalmanFilter("pendulum"))
+    place = scalar_names(runtime.system.states).index("estimate_covariance[1]")
+    runtime.x[place : place + 4] = start
+    runtime.start(0.0)
+    outputs = dict(zip(scalar_names(runtime.system.outputs), runtime.update_outputs(), strict=True))
+    assert outputs["covariance_not_positive"] == told
+    (warned,) = [s for s in runtime.system.outputs if s.warning is not None]
+    assert warned.name == "covariance_not_positive"
+
+
 def test_the_square_root_form_needs_positive_weights() -> None:
     system = UnscentedKalmanFilter(form="square_root")
     with pytest.raises(ValueError, match="beta must be at least alpha squared"):

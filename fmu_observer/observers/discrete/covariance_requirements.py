@@ -9,6 +9,7 @@ from fmu_observer.observers.model_observer import as_matrix
 from plant_models.hybrid.system import Array
 
 ROUNDING = 1e-9  # share of the product of two deviations that is taken for zero
+CARRIED_ROUNDING = 1e-6  # likewise, of a covariance that went through many steps
 
 
 def positive(name: str, flat: Array, size: int, *, definite: bool) -> dict[str, Array]:
@@ -49,6 +50,21 @@ def positive(name: str, flat: Array, size: int, *, definite: bool) -> dict[str, 
     return needed
 
 
-def _small(value: Array, matrix: Array, i: int, j: int) -> Array:
+def is_positive(matrix: Array) -> Array:
+    """Whether a covariance that a filter carries is one: 1 where it is positive semidefinite, else 0.
+
+    Args:
+        matrix: symmetric, shape (n, n).
+    """
+    lower, fits, size = factor(matrix), 1.0 + 0.0 * matrix[0, 0], matrix.shape[0]
+    rest = matrix - lower @ lower.T
+    for i in range(size):
+        fits = fits * np.where(matrix[i, i] >= 0.0, 1.0, 0.0)
+        for j in range(i + 1):
+            fits = fits * _small(rest[i, j], matrix, i, j, CARRIED_ROUNDING)
+    return fits
+
+
+def _small(value: Array, matrix: Array, i: int, j: int, rounding: float = ROUNDING) -> Array:
     """1 where a value is rounding beside the deviations of two entries, else 0."""
-    return np.where(value * value <= ROUNDING * ROUNDING * np.abs(matrix[i, i] * matrix[j, j]), 1.0, 0.0)
+    return np.where(value * value <= rounding * rounding * np.abs(matrix[i, i] * matrix[j, j]), 1.0, 0.0)

@@ -8,8 +8,19 @@ import numpy as np
 
 from fmu_observer.models.filter_model import FilterModel
 from fmu_observer.observers.discrete.arrivals import Arrivals
-from plant_models.hybrid import Signal, output_signal
+from plant_models.hybrid import OutputWarning, Signal, output_signal
 from plant_models.hybrid import memory as memory_signal
+
+NOT_POSITIVE = output_signal(
+    "covariance_not_positive",
+    "1",
+    "1 once the covariance was not positive semidefinite",
+    variability="discrete",
+    warning=OutputWarning(
+        "its covariance is no covariance, so its estimates mean nothing. Give a positive semidefinite "
+        "estimate_covariance to start with; where it becomes so later, the form joseph or square_root"
+    ),
+)
 
 
 @dataclass(frozen=True)
@@ -43,6 +54,8 @@ class SignalsOf:
             memory_signal("last_nis", "1", 0.0, "Last normalised innovation squared"),
             memory_signal("log_likelihood", "1", 0.0, "Logarithm of the likelihood of all innovations so far"),
         ]
+        if not self.rooted:
+            found.append(memory_signal("covariance_lapsed", "1", 0.0, "1 once P was not positive semidefinite"))
         if self.arrivals.apart:
             found.append(memory_signal("last_count", "1", 0.0, "How many measurements arrived last together"))
         if self.arrivals.timed:
@@ -67,6 +80,8 @@ class SignalsOf:
         told("innovation_likelihood", "1", "Logarithm of the likelihood of all innovations so far")
         if self.arrivals.apart:
             told("nis_degrees", "1", "Degrees of freedom of the last normalised innovation squared")
+        if not self.rooted:
+            found.append(NOT_POSITIVE)
         if self.covariances:
             told("covariance", "1", "Covariance of the estimate, row by row, SI units", n * n)
         return tuple(found)

@@ -20,9 +20,9 @@ from fmu_observer.models.system_model import SUBSTEPS, Source, find_filter_model
 from fmu_observer.models.unknown_values import with_unknown
 from fmu_observer.observers.discrete.arrivals import PERIODIC, Arrivals
 from fmu_observer.observers.discrete.belief import Belief, chosen
-from fmu_observer.observers.discrete.covariance_requirements import positive
+from fmu_observer.observers.discrete.covariance_requirements import is_positive, positive
 from fmu_observer.observers.discrete.filter_condition import steady_condition
-from fmu_observer.observers.discrete.filter_signals import SignalsOf
+from fmu_observer.observers.discrete.filter_signals import NOT_POSITIVE, SignalsOf
 from fmu_observer.observers.discrete.sampling import PRIMED
 from fmu_observer.observers.gated_observer import GATED_EVENT, GatedObserver
 from fmu_observer.observers.model_observer import as_matrix
@@ -240,10 +240,18 @@ class GaussianFilter(GatedObserver):
             *flattened(S),
             kept["last_nis"],
             kept["log_likelihood"],
+            *self._lapsed(x),
             *counted,
             *timed,
             1.0 + 0.0 * kept["primed"],
         )
+
+    def _lapsed(self, x: Array) -> tuple[Array, ...]:
+        """Whether the covariance is none, or was none before; a correction may hide that."""
+        if self.rooted:
+            return ()
+        before = x[self._places["covariance_lapsed"]]
+        return (np.maximum(before, 1.0 - is_positive(self.belief(x).spread)),)
 
     def output(self, t: Array, x: Array, u: Any, p: Any) -> dict[str, Array]:
         """Estimates, their standard deviations, and what is known of the last innovation."""
@@ -258,6 +266,8 @@ class GaussianFilter(GatedObserver):
         values |= {"nis": x[places["last_nis"]], "innovation_likelihood": x[places["log_likelihood"]]}
         if self.arrivals.apart:
             values["nis_degrees"] = x[places["last_count"]]
+        if not self.rooted:
+            (values[NOT_POSITIVE.name],) = self._lapsed(x)
         if self.covariances:
             values["covariance"] = np.reshape(P, (n * n,))
         return values
