@@ -1,8 +1,8 @@
 """Moving-horizon observers beside filters, continuous-discrete observers and a factor graph of others, on one recorded
 run.
 
-``python docs/studies/moving_horizon_comparison.py`` prints the tables of docs/moving_horizon.md, with ``--write`` it
-puts them there. The train runs Amsterdam - Utrecht with its jams, skids and wet stretches; to that come balises that do
+``python docs/studies/moving_horizon_comparison.py`` prints the table of docs/moving_horizon.md, with ``--write`` it
+puts it there; that takes some three minutes. The train runs Amsterdam - Utrecht with its jams, skids and wet stretches; to that come balises that do
 not lie where the map says, and false telegrams.
 """
 
