@@ -2,8 +2,8 @@
 run.
 
 ``python docs/studies/moving_horizon_comparison.py`` prints the table of docs/moving_horizon.md, with ``--write`` it
-puts it there; that takes some three minutes. The train runs Amsterdam - Utrecht with its jams, skids and wet stretches; to that come balises that do
-not lie where the map says, and false telegrams.
+puts it there; that takes some three minutes. The train runs Amsterdam - Utrecht with its jams, skids and wet stretches;
+to that come balises that do not lie where the map says, and false telegrams.
 """
 
 from __future__ import annotations
