@@ -77,10 +77,11 @@ def step(
         return x
     sign = _friction_sign(system, x)
     switches = system.switch_vector(t, x, u, p)
-    rest = [x[i] for i in range(count, system.state_count)]
 
     def derivative(time: Array, continuous: Array) -> Array:
-        whole = _stack([*(continuous[i] for i in range(count)), *rest]) if rest else continuous
+        whole = continuous
+        if system.state_count > count:
+            whole = _before_memory([continuous[i] for i in range(count)], x, system)
         return effective_flow(system, time, whole, u, p, sign, switches)
 
     if system.method == "rk4":
@@ -99,7 +100,7 @@ def step(
     if sign is not None:
         for j, i in enumerate(system.friction_indices()):
             parts[i] = np.where(sign[j] * parts[i] < 0.0, 0.0, parts[i])
-    return _stack([*parts, *rest])
+    return _before_memory(parts, x, system)
 
 
 def rk4_step(derivative: Derivative, t: Array, h: Array, x: Array) -> Array:
@@ -210,6 +211,14 @@ def _at_rest(system: HybridSystem, t: Array, x: Array, u: Array, p: Array, sign:
     for j, i in enumerate(indices):
         parts[i] = np.where(sign[j] == 0.0, np.where(friction[j] > 0.0, 1.0, 0.0), 0.0)
     return _stack(parts)
+
+
+def _before_memory(parts: list[Array], x: Array, system: HybridSystem) -> Array:
+    """Continuous states, and behind them the memory of `x`: in one piece where all are numbers."""
+    count = system.continuous_count
+    if isinstance(x, np.ndarray) and all(isinstance(part, np.ndarray | np.generic) for part in parts):
+        return np.concatenate([np.stack(parts), x[count : system.state_count]])
+    return _stack([*parts, *(x[i] for i in range(count, system.state_count))])
 
 
 def _stack(parts: list[Array]) -> Array:

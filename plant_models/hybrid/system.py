@@ -16,7 +16,7 @@ import numpy as np
 
 from plant_models.hybrid.event import CommunicationEvent, Event, PeriodicEvent, TriggeredEvent
 from plant_models.hybrid.resource import Resource
-from plant_models.hybrid.signal import Signal, parameter, scalar_names, width
+from plant_models.hybrid.signal import Signal, parameter, width
 
 Array = Any  # a NumPy array, or a symbolic array with NumPy's shapes and broadcasting
 Method = Literal["rk4", "rosenbrock", "euler"]
@@ -291,12 +291,11 @@ class HybridSystem:
 
     def friction_indices(self) -> list[int]:
         """Positions in `x` of the states with dry friction."""
-        names = scalar_names(self.states)
-        return [names.index(name) for name in self.frictions]
+        return [self._place(name) for name in self.frictions]
 
     def verdict_index(self, event: TriggeredEvent) -> int:
         """Position in `x` of the verdict on an event; -1 where there is none."""
-        return scalar_names(self.states).index(event.verdict) if event.verdict else -1
+        return self._place(event.verdict) if event.verdict else -1
 
     def stiff_mask(self) -> np.ndarray | None:
         """1 for continuous states that `rosenbrock` treats implicitly, else 0, shape (nc,); None where it treats all
@@ -308,6 +307,15 @@ class HybridSystem:
         return np.array([float(s.name in self.stiff) for s in continuous for _ in range(s.width)])
 
     # -- internals --------------------------------------------------------------------------------------------------
+
+    def _place(self, name: str) -> int:
+        """Position in `x` of a scalar state; the names of thousands of others are not written for it."""
+        first, whole = 0, name.partition("[")[0]
+        for signal in self.states:
+            if signal.name == whole:
+                return first + signal.scalar_names.index(name)
+            first += signal.width
+        raise ValueError(f"{self.name}: there is no state {name!r}.")
 
     def _starts_under(self, preset: str | None, signals: Sequence[Signal]) -> np.ndarray:
         values = self.preset_values(preset)
