@@ -29,6 +29,30 @@ arrays.
 """
 
 
+def _option(value: Any) -> Any:
+    if isinstance(value, str | int | float) and value == value:  # noqa: PLR0124 # not-a-number is not itself
+        return value
+    if isinstance(value, list | tuple) and all(isinstance(entry, str) for entry in value):
+        return list(value)
+    if isinstance(value, dict) and all(isinstance(name, str) and _is_row(row) for name, row in value.items()):
+        return {name: list(row) for name, row in value.items()}
+    raise ValueError(
+        "expected a text, a number, true or false, a list of texts, or a table of lists of finite numbers as in "
+        f"{{ x2 = [0.0, 1.0] }} (got {value!r})"
+    )
+
+
+def _is_row(given: Any) -> bool:
+    return isinstance(given, list | tuple) and all(
+        entry is None or (isinstance(entry, int | float) and not isinstance(entry, bool) and math.isfinite(entry))
+        for entry in given
+    )
+
+
+Option = Annotated[Any, PlainValidator(_option)]
+"""A number, truth value, text or list of texts; or lists of numbers by name, bounds of states say."""
+
+
 def _tolerance(value: Any) -> float | str:
     if value == "none":
         return str(value)
@@ -53,7 +77,7 @@ class ComponentTable(Table):
     interpolation: Literal["linear", "hold"] = "linear"
     backend: Backend | None = Field(default=None, alias="as")
     preset: str | None = None
-    options: dict[str, str | int | float | bool | list[str]] = {}
+    options: dict[str, Option] = {}
     parameters: dict[str, Start] = {}
     tolerance: Tolerance | None = None
     late_policy: LatePolicy = "replay"

@@ -17,7 +17,7 @@ import numpy as np
 
 from fmu_observer.moving_horizon import robust_loss
 from fmu_observer.moving_horizon.arrival_cost import ArrivalCost
-from fmu_observer.moving_horizon.gauss_newton import WindowProblem
+from fmu_observer.moving_horizon.gauss_newton import FAR, WindowProblem
 from fmu_observer.moving_horizon.window_program import Step, WindowProgram, window_program
 from fmu_observer.moving_horizon.window_stages import Stages, WindowStages
 
@@ -59,7 +59,9 @@ class FullSolution:
         weights: how much each measurement counts, 1 fully, 0 not at all or absent, shape (N, q).
         covariance: of the last row, bounds left out, shape (n, n).
         cost: half the sum of the losses. residual: root of the mean square of the weighted residuals, in their
-            deviations. step: largest change in the last step, in standard deviations of the last row.
+            deviations. step: largest change in the last step, in standard deviations of the last row; infinite where
+            there was none.
+        far: share of the measurements that are more than `gauss_newton.FAR` of their deviations off [1].
         iterations: steps done. seconds: time that they took. active: bounds that are touched in the last row.
         converged: whether the step fell below the tolerance, or met no curvature, so that another would be zero.
         timed_out: whether the deadline came first.
@@ -73,6 +75,7 @@ class FullSolution:
     cost: float
     residual: float
     step: float
+    far: float
     iterations: int
     seconds: float
     active: int
@@ -338,6 +341,7 @@ class _Search:
             cost=self.cost(point),
             residual=float(np.sqrt((residuals**2).sum() / max(self.used.sum(), 1.0))),
             step=size,
+            far=float((point.squares > FAR**2).sum() / max(self.used.sum(), 1.0)),
             iterations=iterations,
             seconds=perf_counter() - began,
             active=self.active(point.states[-1:]),

@@ -109,6 +109,7 @@ class Solution(NamedTuple):
         step: largest change of an estimate in the last pass, in its standard deviations [1].
         moved: passes after which an estimate had changed by more than `SETTLED` of its deviation.
         bounds: bounds that are active in the last row.
+        far: share of the measurements that are more than `FAR` of their deviations off, whatever they weigh [1].
     """
 
     estimates: Array
@@ -117,9 +118,11 @@ class Solution(NamedTuple):
     step: Array
     moved: Array
     bounds: Array
+    far: Array
 
 
 KEPT = 8  # problems whose sweeps are known as functions, so that they are traced once
+FAR = 5.0  # of a measurement's own deviations: noise is not that far off [ours]
 SETTLED = 1e-3  # of a standard deviation: a pass that changes less has nothing left to do
 
 
@@ -141,7 +144,7 @@ def solve(
     for _ in range(passes):
         table = (rows, points, active, fresh)
         _, swept = scan_table(_forwards(problem), tuple(arrival), table, (shared,))
-        behind = (np.zeros(n), np.zeros(3))
+        behind = (np.zeros(n), np.zeros(4))
         (_, sums), (points, active) = scan_table(
             _backwards(problem), behind, (*table, *swept), (shared,), backwards=True
         )
@@ -149,7 +152,8 @@ def solve(
         used = used + np.where(sums[1:2] > SETTLED, 1.0, 0.0)
     held = np.reshape(np.sum(np.abs(active[-1])), (1,))
     residual = np.sqrt(sums[0:1] / np.maximum(sums[2:3], 1.0))
-    return Solution(points, swept[1][-1], residual, sums[1:2], used, held)
+    far = sums[3:4] / np.maximum(sums[2:3], 1.0)
+    return Solution(points, swept[1][-1], residual, sums[1:2], used, held, far)
 
 
 def passed(problem: WindowProblem, arrival: ArrivalCost, row: Array, point: Array, shared: Array) -> ArrivalCost:
@@ -189,7 +193,9 @@ def _forwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tupl
         mean, P, gains, pulls = _held(problem, after.estimate, after.covariance, active, shared)
         handed = (point, mean, np.reshape(P, (n * n,)))
         kept = (*(np.reshape(m, (m.shape[0] * m.shape[1],)) for m in (F, H, after.gain, noise)), forces, gains, pulls)
-        return handed, (mean, handed[2], *kept)
+        off = row.measured - seen.measured
+        beyond = [np.where(off[j] * off[j] > FAR * FAR * seen.noise[j, j], row.used[j], 0.0) for j in range(q)]
+        return handed, (mean, handed[2], *kept, vector(*beyond))
 
     return body
 
@@ -201,7 +207,7 @@ def _backwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tup
 
     def body(carry: Arrays, given: Arrays, known: Arrays) -> tuple[Arrays, Arrays]:
         (adjoint, sums), (shared,) = carry, known
-        row_flat, point, active, _, mean, flat, F, H, K, noise, forces, gains, pulls = given
+        row_flat, point, active, _, mean, flat, F, H, K, noise, forces, gains, pulls, beyond = given
         row = problem.layout.unpacked(row_flat)
         P = np.reshape(flat, (n, n))
         x = mean - P @ adjoint
@@ -223,7 +229,8 @@ def _backwards(problem: WindowProblem) -> Callable[[Arrays, Arrays, Arrays], tup
         spread = vector(*(P[i, i] for i in range(n)))
         off = np.where(spread > 0.0, np.abs(x - point) / np.sqrt(np.where(spread > 0.0, spread, 1.0)), 0.0)
         exists = np.max(np.hstack([row.used, np.reshape(row.moves, (1,))]))
-        sums = vector(sums[0] + square, np.maximum(sums[1], exists * np.max(off)), sums[2] + np.sum(row.used))
+        most = np.maximum(sums[1], exists * np.max(off))
+        sums = vector(sums[0] + square, most, sums[2] + np.sum(row.used), sums[3] + np.sum(beyond))
         return (adjoint, sums), (x, vector(*taken))
 
     return body

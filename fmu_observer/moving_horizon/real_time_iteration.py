@@ -13,7 +13,7 @@ import numpy as np
 
 from fmu_observer.moving_horizon.arrival_cost import arrival_cost_from
 from fmu_observer.moving_horizon.gauss_newton import KEPT, WindowProblem, passed, solve
-from plant_models.hybrid import Signal, memory, output_signal
+from plant_models.hybrid import OutputWarning, Signal, memory, output_signal
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.scan import enclosed
 from plant_models.hybrid.system import Array, vector
@@ -26,8 +26,17 @@ TOLD = {
     "passes_used": "Passes that changed an estimate by more than 0.001 of its deviation",
     "rows_in_window": "Rows of the window with a measurement",
     "bounds_active": "Bounds at which the estimate is held",
+    "bounds_contradicted": "1 while a bound is active and most measurements of the window are far off",
 }
 """What is told of a window, outputs by name."""
+WARNINGS = {
+    "bounds_contradicted": OutputWarning(
+        "a bound holds its estimate while more than half of the measurements in its window are over 5 deviations off. "
+        "Check the bounds, and the deviations of the measurements",
+        ("bounds_active", "rows_in_window"),
+    )
+}
+"""What of it warns."""
 
 
 class Iterated(NamedTuple):
@@ -76,14 +85,17 @@ def window_memory(start: Array, covariance: Array, row_width: int, window: int) 
 
 def told_outputs() -> tuple[Signal, ...]:
     """The outputs `TOLD`."""
-    return tuple(output_signal(name, "1", text, variability="discrete") for name, text in TOLD.items())
+    return tuple(
+        output_signal(name, "1", text, variability="discrete", warning=WARNINGS.get(name))
+        for name, text in TOLD.items()
+    )
 
 
 def told(last_pass: Array) -> dict[str, Array]:
     """Values of the outputs `TOLD`.
 
     Args:
-        last_pass: the memory of that name, shape (5,).
+        last_pass: the memory of that name, shape (6,).
     """
     return {name: last_pass[i] for i, name in enumerate(TOLD)}
 
@@ -122,11 +134,22 @@ def _iteration(problem: WindowProblem, passes: int) -> Callable[..., tuple[Array
         rows = np.reshape(np.hstack([table[width:], new]), (count, width))
         estimates = np.reshape(np.hstack([states[n:], predicted]), (count, n))
         found = solve(problem, before, rows, estimates, known, passes)
-        last = (found.residual, found.step, found.moved, problem.layout.count(rows), found.bounds)
+        against = contradicted(found.bounds, found.far)
+        last = (found.residual, found.step, found.moved, problem.layout.count(rows), found.bounds, against)
         kept = (np.reshape(rows, (count * width,)), np.reshape(found.estimates, (count * n,)))
         return found.estimates[-1], found.covariance, np.hstack([*before, *kept, *last])
 
     return iterated
+
+
+def contradicted(bounds: Array, far: Array) -> Array:
+    """1 where bounds hold an estimate against most of what was measured, shape (1,).
+
+    Args:
+        bounds: that are active in the last row, shape (1,). far: share of the measurements of the window that are far
+            off, shape (1,) [1].
+    """
+    return np.where(far > 0.5, np.where(bounds > 0.5, 1.0, 0.0), 0.0)
 
 
 def joined(*parts: Array) -> Array:

@@ -16,17 +16,38 @@ import numpy as np
 from fmu_observer.moving_horizon.arrival_cost import arrival_cost_from
 from fmu_observer.moving_horizon.full_solver import Effort, FullSolver
 from fmu_observer.moving_horizon.gauss_newton import WindowProblem, passed
-from fmu_observer.moving_horizon.real_time_iteration import Iterated
+from fmu_observer.moving_horizon.real_time_iteration import Iterated, contradicted
 from fmu_observer.observers.discrete.moving_horizon_observer import MovingHorizonObserver
 from fmu_observer.observers.train.balise_moving_horizon import BaliseMovingHorizon
-from plant_models.hybrid import Signal, memory, output_signal, width
-from plant_models.hybrid.option import require_whole
+from plant_models.hybrid import OutputWarning, Signal, memory, output_signal, width
+from plant_models.hybrid.option import is_number, require_whole
 from plant_models.hybrid.system import Array
 
 TOLERANCE, MAX_ITERATIONS = 1e-4, 30  # of a standard deviation: nobody sees it, and one step less is done [ours]
 ENDED = (
     output_signal("converged", "1", "1 where the last window was solved to the tolerance", variability="discrete"),
-    output_signal("deadline_missed", "1", "1 where the deadline came first", variability="discrete"),
+    output_signal(
+        "deadline_missed",
+        "1",
+        "1 where the deadline came first",
+        variability="discrete",
+        warning=OutputWarning(
+            "the deadline came before the solution of its window, and the last feasible answer stands, at worst the "
+            "prediction. Allow more time, or a smaller window",
+            ("passes_used", "last_step"),
+        ),
+    ),
+    output_signal(
+        "stopped_early",
+        "1",
+        "1 where the search ended above the tolerance, but not by the deadline",
+        variability="discrete",
+        warning=OutputWarning(
+            "the search in its window ended above the tolerance, and its last feasible answer stands. Allow more steps "
+            "(max_iterations), or a larger tolerance",
+            ("passes_used", "last_step"),
+        ),
+    ),
     output_signal("feasible", "1", "1 where the answer keeps bounds and transitions", variability="discrete"),
 )
 LAST_SEARCH = memory("last_search", "1", 0.0, "How the last search ended", size=len(ENDED))
@@ -150,8 +171,11 @@ def iterated_fully(
     before = passed(problem, arrival_cost_from(arrival, n), rows[0], states[0], shared)
     rows, guesses = np.vstack([rows[1:], row]), np.vstack([states[1:], point])
     found = _solver(problem).solve(before, rows, guesses, shared, effort)
-    last = [found.residual, found.step, float(found.iterations), *layout.count(rows), float(found.active)]
-    ended = [float(said) for said in (found.converged, found.timed_out, found.feasible)]
+    step = found.step if found.iterations else 0.0  # no step, no change: the prediction is the answer
+    against = contradicted(np.array([found.active]), np.array([found.far]))
+    last = [found.residual, step, float(found.iterations), *layout.count(rows), float(found.active), *against]
+    early = not found.converged and not found.timed_out
+    ended = [float(said) for said in (found.converged, found.timed_out, early, found.feasible)]
     remembered = np.hstack([*before, rows.ravel(), found.states.ravel(), last, ended])
     return Iterated(found.estimate, found.covariance.ravel(), remembered)
 
@@ -167,9 +191,9 @@ def checked_effort(who: str, tolerance: float, max_iterations: int, deadline: fl
         ValueError: one of them is not legal.
     """
     require_whole(who, 1, 1000, max_iterations=max_iterations)
-    if not tolerance > 0.0:
+    if not (is_number(tolerance) and tolerance > 0.0):
         raise ValueError(f"{who}: tolerance must be above 0 standard deviations, got {tolerance!r}.")
-    if deadline is not None and not deadline >= 0.0:
+    if deadline is not None and not (is_number(deadline) and deadline >= 0.0):
         raise ValueError(f"{who}: deadline must be at least 0 s, got {deadline!r}.")
     return Effort(float(tolerance), int(max_iterations), inf if deadline is None else float(deadline))
 

@@ -1,8 +1,18 @@
-"""Options of hybrid systems that are whole numbers, checked where equations are built from them."""
+"""Options of hybrid systems that are numbers, checked where equations are built from them."""
 
 from __future__ import annotations
 
 import numpy as np
+
+
+def is_number(value: object) -> bool:
+    """Whether an option is a real number, infinite ones included; truth values and not-a-number are none.
+
+    Args:
+        value: of the option.
+    """
+    real = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    return real and value == value  # noqa: PLR0124 # not-a-number is not itself
 
 
 def require_whole(where: str, low: int = 1, high: int | None = None, **options: object) -> None:

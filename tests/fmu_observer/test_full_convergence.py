@@ -80,6 +80,20 @@ def test_a_deadline_that_is_missed_is_told_and_bounds_are_kept():
     assert 0.0 <= speed <= 10.0
 
 
+def test_a_deadline_before_the_first_row_gives_the_prediction():
+    system = FullBaliseMovingHorizon(window=3, deadline=0.0)
+    full = _followed(system)
+    assert np.isfinite(full.update_outputs()).all()
+    assert _told(full, "last_step", "passes_used", "deadline_missed", "stopped_early") == [0.0, 0.0, 1.0, 0.0]
+    warned = {s.name for s in system.outputs if s.warning}
+    assert warned == {"bounds_contradicted", "deadline_missed", "stopped_early"}
+
+
+def test_a_search_that_ends_before_its_tolerance_is_told():
+    full = _followed(FullBaliseMovingHorizon(window=4, tolerance=1e-300, max_iterations=1))
+    assert _told(full, "converged", "deadline_missed", "stopped_early") == [0.0, 0.0, 1.0]
+
+
 def test_a_restored_block_does_the_same_again():
     block = make_block(FullBaliseMovingHorizon(window=3), fmi_version=2)
     block.instantiate()
@@ -102,4 +116,8 @@ def test_options_are_refused_in_words():
         FullBaliseMovingHorizon(tolerance=0.0)
     with pytest.raises(ValueError, match=r"deadline must be at least 0 s, got -1\.0"):
         FullMovingHorizonObserver("pendulum", deadline=-1.0)
+    with pytest.raises(ValueError, match="deadline must be at least 0 s, got 'soon'"):
+        FullBaliseMovingHorizon(deadline="soon")
+    with pytest.raises(ValueError, match="tolerance must be above 0 standard deviations, got 'x'"):
+        FullBaliseMovingHorizon(tolerance="x")
     assert FullBaliseMovingHorizon(window=7, deadline=0.5).options["deadline"] == 0.5

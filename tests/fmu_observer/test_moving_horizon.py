@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -19,7 +20,7 @@ from fmu_observer.models.filter_model import Known, filter_model
 from fmu_observer.moving_horizon import robust_loss
 from fmu_observer.moving_horizon.arrival_cost import arrival_cost_at
 from fmu_observer.moving_horizon.gauss_newton import Limits, Moved, Seen, WindowProblem, solve
-from fmu_observer.moving_horizon.real_time_iteration import iterate
+from fmu_observer.moving_horizon.real_time_iteration import contradicted, iterate
 from fmu_observer.moving_horizon.window import RowLayout, WindowRow
 from fmu_observer.moving_horizon.window_observability import window_observability
 from fmu_observer.observers.discrete.moving_horizon_observer import MovingHorizonObserver
@@ -260,7 +261,8 @@ def test_with_squares_and_no_active_bound_it_is_the_filter() -> None:
 
 
 def test_contradictory_bounds_are_refused_in_words() -> None:
-    runtime = Runtime(MovingHorizonObserver("linear_pendulum", bounds={"rate": [1.0, -1.0]}))
+    runtime = Runtime(MovingHorizonObserver("linear_pendulum", bounds={"rate": [-1.0, 1.0]}))
+    runtime.p[scalar_names(runtime.system.parameter_signals).index("lower_bounds[1]")] = 2.0
     with pytest.raises(ValueError, match=r"lower_bounds\[1\] must be below upper_bounds\[1\], the bounds of rate"):
         runtime.start(0.0)
 
@@ -270,6 +272,10 @@ def test_contradictory_bounds_are_refused_in_words() -> None:
     [
         ({"bounds": {"y": [0, 1]}}, "expected .lowest, highest. of one of the states angle, rate"),
         ({"bounds": {"angle": [0, 1, 2]}}, "expected .lowest, highest."),
+        ({"bounds": {"rate": [1.0, -1.0]}}, "bounds of 'rate' are .1.0, -1.0.; the lowest must be below the highest"),
+        ({"bounds": {"rate": [0.0, float("nan")]}}, "bounds of 'rate' are .0.0, nan.; expected .lowest, highest."),
+        ({"bounds": {"rate": 3.0}}, "bounds of 'rate' are 3.0; expected .lowest, highest."),
+        ({"bounds": "rate"}, "bounds = 'rate'; expected .lowest, highest. by name of a state"),
         ({"loss": "tukey"}, "expected one of squares, huber, geman_mcclure"),
         ({"window": 0}, "window must be 1 to 1000"),
         ({"passes": 0}, "passes must be 1 to 20"),
@@ -358,3 +364,25 @@ def test_a_traced_loop_is_the_loop(count: int, backwards: bool) -> None:
     traced = ca.Function("f", symbols, [ca.SX(v) for v in enclosed(looped, *arrays)])
     for expected, found in zip(looped(*values), traced(*values), strict=True):
         assert np.abs(expected - np.asarray(found).ravel()).max() == 0.0
+
+
+@pytest.mark.parametrize("loss", ["squares", "geman_mcclure"])
+def test_bounds_that_most_measurements_contradict_are_told(loss: Any) -> None:
+    """A speed of 1 is held at 0.5 while all say 10: what a robust loss lets go is counted all the same."""
+    counted = {}
+    for measured in (0.0, 10.0):
+        row = WindowRow(1.0, 0.5, 0.0, np.zeros(1), np.full(2, measured), np.ones(2))
+        rows, points = np.tile(vector(*LAYOUT.packed(row)), (4, 1)), np.zeros((4, N))
+        judged = replace(problem((1,)), losses=(loss,) * 2, loss_scale=lambda _shared: 3.0)
+        found = solve(judged, arrival_cost_at(START, 1e-3 * P0), rows, points, np.zeros(1), 3)
+        counted[measured] = contradicted(found.bounds, found.far)[0]
+    assert counted == {0.0: 0.0, 10.0: 1.0}
+
+
+def test_under_a_robust_loss_no_nis_is_told() -> None:
+    for make in (
+        lambda loss: MovingHorizonObserver("linear_pendulum", loss=loss),
+        lambda loss: BaliseMovingHorizon(loss=loss),
+    ):
+        assert "nis" in {s.name for s in make("squares").outputs}
+        assert "nis" not in {s.name for s in make("geman_mcclure").outputs}

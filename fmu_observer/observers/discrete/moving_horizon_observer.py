@@ -35,6 +35,7 @@ from fmu_observer.observers.discrete.gaussian_filter import Form
 from fmu_observer.observers.innovation_gate import OFF
 from fmu_observer.observers.model_observer import as_matrix
 from plant_models.hybrid import parameter, vector
+from plant_models.hybrid.option import is_number
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.signal import width
 from plant_models.hybrid.system import Array
@@ -60,14 +61,14 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
 
     An unknown parameter is a state without noise, an unknown input one that noise alone drives. The estimate keeps its
     bounds at every instant, whatever is measured. Innovations, NIS and likelihood are those of the step from the
-    estimate before, as of the extended filter. Where a robust loss judges telegrams, the gate of balises is off unless
-    it is set.
+    estimate before, as of the extended filter; under a robust loss there is no output `nis`, since what it doubts would
+    be judged with the rest. Where a robust loss judges telegrams, the gate of balises is off unless it is set.
 
     Args:
         model: name of an observer model or of a plant, or one itself.
         window: rows in the window, 1 to 1000. passes: Gauss-Newton passes at a row, 1 to 20.
-        bounds: lowest and highest value by name of a state; None where there is none, ``{"x2": [0.0, None]}``. They are
-            starts of the parameters `lower_bounds` and `upper_bounds`.
+        bounds: lowest and highest value by name of a state; None or an infinite one where there is none,
+            ``{"x2": [0.0, None]}``. They are starts of the parameters `lower_bounds` and `upper_bounds`.
         loss: ``squares``, ``huber`` or ``geman_mcclure``, for all measurements or for each in a list.
         options: those of `GaussianFilter`.
 
@@ -100,7 +101,7 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         **options: Any,
     ) -> None:
         require_window(self.name, window, passes)
-        self.window, self.passes, self.bounds, self._loss = window, passes, dict(bounds or {}), loss
+        self.window, self.passes, self.bounds, self._loss = window, passes, _bounds(self.name, bounds), loss
         given = {"bounds": {name: list(pair) for name, pair in self.bounds.items()}} if self.bounds else {}
         listed = loss if isinstance(loss, str) else list(loss)
         super().__init__(model, window=window, passes=passes, loss=listed, **given, **options)
@@ -130,7 +131,10 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         """Estimates within their bounds, what is known of the last innovation, and what the window looks like."""
         shared, n = _flat(self, p), self.model.order
         inside = self.problem.clipped(x[:n], shared)
-        values = super().output(t, x, u, p) | {s.name: inside[i] for i, s in enumerate(self.model.states)}
+        values = super().output(t, x, u, p)
+        if self.robust:
+            values.pop("nis")
+        values |= {s.name: inside[i] for i, s in enumerate(self.model.states)}
         first = self._places["last_pass"]
         return values | told(x[first : first + len(TOLD)])
 
@@ -222,15 +226,16 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         names, q = [s.name for s in model.states], len(model.measurements)
         losses = self._losses = _losses(self.name, self._loss, q)
         for name, pair in bounds.items():
-            if name not in names or len(pair) != 2:
+            if name not in names:
                 raise ValueError(
                     f"{self.name}: bounds of {name!r} are {pair!r}; expected [lowest, highest] of one of the states "
                     f"{', '.join(names)}."
                 )
-        if any(loss != "squares" for loss in losses):
+        self.robust = any(loss != "squares" for loss in losses)
+        if self.robust:
             self.gate_start = OFF
-        lower = tuple(-UNBOUNDED if low is None else float(low) for low, _ in bounds.values())
-        upper = tuple(UNBOUNDED if high is None else float(high) for _, high in bounds.values())
+        lower = tuple(-UNBOUNDED if low is None else max(float(low), -UNBOUNDED) for low, _ in bounds.values())
+        upper = tuple(UNBOUNDED if high is None else min(float(high), UNBOUNDED) for _, high in bounds.values())
         listed = ", ".join(bounds)
         self.own_parameters = () if all(loss == "squares" for loss in losses) else (_loss_scale(losses),)
         if bounds:
@@ -242,13 +247,29 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         row_width = RowLayout(len(model.inputs), q).width
         self.states += window_memory(model.start, np.eye(model.order), row_width, self.window)
         self._places = {s.name: width(self.states[:i]) for i, s in enumerate(self.states)}
-        self.outputs += told_outputs()
+        self.outputs = (*(s for s in self.outputs if not (self.robust and s.name == "nis")), *told_outputs())
 
     def _limits(self, shared: Array) -> Limits:
         if not self.bounds:
             return Limits(np.zeros(0), np.zeros(0))
         p = self.unpack_parameters(shared)
         return Limits(p.lower_bounds, p.upper_bounds)
+
+
+def _bounds(who: str, given: Bounds | None) -> dict[str, Sequence[float | None]]:
+    """Bounds by name of a state, each a pair of numbers or None, the lowest below the highest."""
+    if given is not None and not isinstance(given, Mapping):
+        raise ValueError(
+            f"{who}: bounds = {given!r}; expected [lowest, highest] by name of a state, as in {{'x2': [0.0, 1.0]}}."
+        )
+    for name, pair in (given or {}).items():
+        legal = isinstance(pair, Sequence) and not isinstance(pair, str) and len(pair) == 2
+        if not legal or not all(bound is None or is_number(bound) for bound in pair):
+            raise ValueError(f"{who}: bounds of {name!r} are {pair!r}; expected [lowest, highest], both numbers.")
+        low, high = pair
+        if low is not None and high is not None and not low < high:
+            raise ValueError(f"{who}: bounds of {name!r} are {pair!r}; the lowest must be below the highest.")
+    return dict(given or {})
 
 
 def _losses(who: str, loss: Loss | Sequence[Loss], count: int) -> tuple[Loss, ...]:

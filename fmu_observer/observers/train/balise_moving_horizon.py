@@ -83,7 +83,8 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
     Speed is never below zero nor above `speed_limit`, the unknown acceleration within `disturbance_limit`. The loss
     ``geman_mcclure`` doubts a false balise, and readings of a wheel that slides, by what the other rows of the window
     say before and after, and takes its doubt back where later rows agree with it: no gate has to decide at once. So the
-    gate of balises is off unless it is set. `odometer_fault`, NIS and likelihood are those of the filter's step.
+    gate of balises is off unless it is set. `odometer_fault` and likelihood are those of the filter's step. So is the
+    output `nis`, which only the loss ``squares`` has: under another one what it doubts would be judged with the rest.
 
     With the loss ``squares``, no bound active and every reading within its gate it is `BaliseOdometerEkf` at every
     window.
@@ -114,6 +115,8 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
             raise ValueError(f"{self.name}: loss = {loss!r}; expected one of {', '.join(LOSSES)}.")
         self.window, self.passes, self.loss = window, passes, loss
         self.gate_start = OFF
+        if loss != "squares":
+            self.outputs = tuple(s for s in self.outputs if s.name != "nis")
         super().__init__()
         self.options = {"window": window, "passes": passes, "loss": loss}
 
@@ -167,6 +170,8 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
         shared = vector(*(getattr(p, name) for name in Shared._fields))
         inside = self.problem.clipped(x[:ORDER], shared)
         values = super().output(t, x, u, p) | {"speed": inside[V], "disturbance": inside[D]}
+        if self.loss != "squares":
+            values.pop("nis")
         return values | told(x[self._places[3] : self._places[4]])
 
     # -- internals --------------------------------------------------------------------------------------------------

@@ -35,6 +35,10 @@ SETTINGS: dict[str, tuple[dict[str, Any], str]] = {
         {"locomotive.options.zone_count": True},
         "zone_count = True of locomotive; choose 1 to 64",
     ),
+    "option that is a table of no lists": (
+        {"observer.options.premise": {"x2": 3}},
+        r"observer.options.premise: expected a text, .* or a table of lists of finite numbers .*got {'x2': 3}",
+    ),
     "bad option": ({"observer.options.premise": "dead"}, "'dead'.*'frozen'"),
     "unknown parameter": ({"locomotive.mas": 1.0}, "locomotive: no variable 'mas'.*'mass'"),
     "list shorter than its vector": (

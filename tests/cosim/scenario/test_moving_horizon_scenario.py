@@ -1,21 +1,44 @@
-"""The shipped scenario moving_horizon: what is false pulls least squares and a filter with gates, not the window."""
+"""The shipped scenario moving_horizon: what a false telegram does to a window and to a filter's gate, by its place."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from cosim import Scenario
+from cosim.scenario.outcome import Outcome
+
+WINDOW, SQUARES, FILTER = "moving_horizon", "squares", "ekf"
 
 
-def test_a_false_balise_and_a_sliding_wheel_do_not_pull_the_window():
-    outcome = Scenario.load("moving_horizon").run(warn=lambda _text: None)
+def _run(*times: float) -> Outcome:
+    told = [{"time": time, "offset": 25.0} for time in times]
+    outcome = Scenario.load("moving_horizon").run(warn=lambda _text: None, overrides={"balises.false_telegrams": told})
     assert outcome.failure is None
+    return outcome
+
+
+def _off(outcome: Outcome, name: str, start: float = 6.0, end: float = 90.0) -> float:
+    judged = (outcome.result.time > start) & (outcome.result.time < end)
+    return float(np.abs(outcome[f"{name}.position"] - outcome["train.position"])[judged].max())
+
+
+def test_a_false_balise_before_the_gate_is_open_pulls_the_filter_and_not_the_window() -> None:
+    outcome = _run(40.0)
     assert all(judged.passed for judged in outcome.expectations)
-    judged = outcome.result.time > 6.0
-    off = {
-        name: np.abs(outcome[f"{name}.position"] - outcome["train.position"])[judged].max()
-        for name in ("moving_horizon", "squares", "ekf")
-    }
-    assert off["moving_horizon"] < 3.0
-    assert off["squares"] > 20.0, "25 m, less what the readings hold against it"
-    assert off["ekf"] > 20.0, "it takes the skid for an acceleration"
+    assert _off(outcome, WINDOW) < 3.0
+    assert _off(outcome, SQUARES) > 20.0, "25 m, less what the readings hold against it"
+    assert _off(outcome, FILTER, end=39.9) < 3.0, "the skid from 12 s to 14 s does not pull it"
+    assert _off(outcome, FILTER, 40.0, 45.0) > 20.0, "the third telegram, before the gate judges"
+
+
+def test_a_false_balise_after_that_pulls_neither() -> None:
+    outcome = _run(60.0)
+    assert _off(outcome, WINDOW) < 3.0
+    assert _off(outcome, FILTER) < 3.0
+    assert _off(outcome, SQUARES) > 20.0
+
+
+def test_a_false_balise_that_comes_first_pulls_both_and_the_window_for_long() -> None:
+    outcome = _run(8.0)
+    assert _off(outcome, FILTER) > 20.0
+    assert _off(outcome, WINDOW, 65.0) > 20.0 > _off(outcome, FILTER, 65.0)
