@@ -86,7 +86,7 @@ def statement(result: Result) -> str:
         factor = duration / wall
     scenario = result.summary.get("scenario")
     text = f"Scenario {scenario}" if isinstance(scenario, str) else "This run"
-    text += f" covers {number(duration)} s of train time"
+    text += f" covers {number(duration)} s of simulated time"
     text += f" in communication steps of {number(1000 * step)} ms" if step is not None else ""
     text += f"; it took {number(wall)} s of wall time" if wall is not None else ""
     text += f", {number(factor)} times as fast as real time" if factor is not None else ""

@@ -42,6 +42,8 @@ NO_BALISES = ExpectedGap(None, "no balise instant lies within the run")
 
 WALKING = 1.0
 """Who is certified for the gaps of a train at this speed [m/s] is certified for all that a moving train meets."""
+DETECTORS = "fmu_observer.detection."
+"""Room of the models that correct no state by a gain, so that there is nothing to certify."""
 ROUNDING = 1e-9  # relative, of distances between positions
 ASKED_FOR_LIMITS_ONLY = 0.5
 """A gap to ask for [s] where only the limits of a certificate are of interest; they do not depend on it."""
@@ -100,6 +102,8 @@ def check_certificates(
         return certificates, warnings
     for name, table in components.items():
         system = make_system(table, where)
+        if type(system).__module__.startswith(DETECTORS):
+            continue  # it has no gain that a gap could make unstable
         if not hasattr(system, "certify"):
             warnings.append(
                 f"{name}: not checked against the balise gaps; an FMU or a model without certificate cannot tell its "

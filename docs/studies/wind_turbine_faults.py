@@ -114,7 +114,7 @@ def limits_table() -> str:
     for i, (name, _) in enumerate(PEAKS):
         limit, unit = limits[name]
         peaks = [f"{outcome.peaks[:, i].max():.3g}" for outcome in (made, judged, sine, strong)]
-        rows.append([name.replace("_", " "), f"{limit:g} {unit}", *peaks])
+        rows.append([name.replace("_", " "), f"{limit:g} {unit}".removesuffix(" 1"), *peaks])
     false = []
     for text, outcome, hours in (
         ("ten other seeds, 4400 s each", judged, len(JUDGES) * STOP / 3600.0),

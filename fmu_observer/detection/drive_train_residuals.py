@@ -42,7 +42,9 @@ def torsion_gains(drive: DriveTrain, sample_period: float, samples: int = WINDOW
     return np.vstack([observer.gain_y[2].reshape(samples, 2).T, observer.gain_u[2].reshape(samples, 2).T])
 
 
-_GAINS = torsion_gains(DriveTrain(), 0.01)
+GAINS_PERIOD = 0.01  # [s]
+GAINS = torsion_gains(DriveTrain(), GAINS_PERIOD)
+"""Default gains; they hold for samples `GAINS_PERIOD` apart."""
 
 DRIVE_PARAMETERS = (
     *(
@@ -51,7 +53,7 @@ DRIVE_PARAMETERS = (
             ("rotor_speed", "generator_speed", "rotor_torque", "generator_torque"),
             ("s", "s", "rad/(N.m)", "rad/(N.m)"),
             ("rotor speed", "generator speed", "torque on the rotor", "torque of the generator"),
-            _GAINS,
+            GAINS,
             strict=True,
         )
     ),

@@ -39,6 +39,7 @@ EFFICIENCY_MEMORY = (
     memory("full_blocks", "1", 0.0, "Blocks since the start"),
     memory("held_efficiency_estimate", "1", 0.97, "Efficiency, smoothed, eta_p"),
     memory("held_efficiency_crossings", "1", 1.0, "Intervals of the grid that bracket the measurement"),
+    memory("outside_updates", "1", 0.0, "Updates in a row whose grid did not bracket the measurement"),
     memory("last_generator", "rad/s", 0.0, "Generator speed of the last sample"),
 )
 
@@ -126,4 +127,5 @@ def update_efficiency(m: Any, p: Any) -> dict[str, Any]:
         "full_blocks": full_blocks,
         "held_efficiency_estimate": np.where(full, smoothed(previous, found.value, p.smoothing), p.nominal_efficiency),
         "held_efficiency_crossings": np.where(full, found.crossings, 1.0),
+        "outside_updates": np.where(full, np.where(found.crossings > 0.0, 0.0, m.outside_updates + 1.0), 0.0),
     }

@@ -126,9 +126,9 @@ class TrainDiagnosis(HybridSystem):
         """The declared outputs."""
         m, read = Memory(self.states, x), readings(u)
         codes = dict(zip(FAULTS, m.each("code"), strict=True))
-        sources = sum(read.fitted) + read.has_gps
+        enough = read.fitted[0] * read.fitted[1] * read.fitted[2] * read.has_pressure
         told = {f"{fault}_fault": code for fault, code in codes.items()}
-        shares, known = m.each("share"), largest(m.each("share_found"))
+        shares, unknown = m.each("share"), [1.0 - found for found in m.each("share_found")]
         return {
             **told,
             "odometer_fault": np.where(codes["odometer_1"] > 0.0, 1.0, 0.0),
@@ -141,8 +141,11 @@ class TrainDiagnosis(HybridSystem):
             "traction_efficiency": shares[0],
             "brake_performance": shares[1],
             "brake_by_demand": shares[2],
-            "isolation_limited": np.where(sources < 2.5, 1.0, 1.0 - read.has_pressure),
-            "shares_unknown": 1.0 - known,
+            "isolation_limited": 1.0 - enough,
+            "traction_efficiency_unknown": unknown[0],
+            "brake_performance_unknown": unknown[1],
+            "brake_by_demand_unknown": unknown[2],
+            "shares_unknown": sum(unknown),
             **{f"ratio_{name}": ratio for name, ratio in zip(RESIDUALS, m.each("ratio"), strict=True)},
         }
 
@@ -211,15 +214,16 @@ class TrainDiagnosis(HybridSystem):
             brake_share(window.measured, window, before[1], step, mass, p),
             brake_share(window.demanded, window, before[2], step, mass, p),
         ]
-        found[1] = Share(found[1].value, found[1].found * read.has_pressure)
+        found[1] = Share(found[1].value, found[1].found * read.has_pressure, found[1].bracketed)
         told = [usable * one.found for one in found]
         shares = [np.where(on > 0.0, one.value, old) for on, one, old in zip(told, found, before, strict=True)]
+        known = zip(told, found, m.each("share_found"), strict=True)
         m.put(
             coarse_sum=[(1.0 - full) * total for total in sums],
             coarse_samples=(1.0 - full) * count,
             quiet_steps=quiet,
             share=shares,
-            share_found=[np.maximum(old, on) for old, on in zip(m.each("share_found"), told, strict=True)],
+            share_found=[np.where(on > 0.0, one.bracketed, old) for on, one, old in known],
             **dict(zip(names, rings, strict=True)),
         )
         pulls, measured, demanded = (np.abs(1.0 - share) for share in shares)

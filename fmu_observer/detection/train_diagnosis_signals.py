@@ -16,6 +16,7 @@ from plant_models.hybrid import (
 from plant_models.railway.vehicle.pneumatic_brake import BRAKE_PARAMETERS
 
 _FIT = "-1e9: not fitted"
+SHARES = ("traction_efficiency", "brake_performance", "brake_by_demand")
 
 INPUTS = (
     input_signal("odometer_1", "m/s", 0.0, "First odometer"),
@@ -64,20 +65,31 @@ OUTPUTS = (
         "1 where a sensor is missing that isolation needs",
         variability="discrete",
         warning=OutputWarning(
-            "of two odometers, radar and satellites fewer than three were connected, or no brake pressure: faults are "
-            "detected, but not all are told apart; TrainDiagnosis.isolability(sensors) says which",
+            "a sensor was not connected that isolation needs: without the second odometer a fault of the first is not "
+            "told from slip of all wheels, without the radar a false balise is not told from that slip, without the "
+            "brake pressure cylinders are not told from friction; TrainDiagnosis.isolability(sensors) says more",
             ("isolation_limited",),
         ),
+    ),
+    *(
+        output_signal(
+            f"{share}_unknown",
+            "1",
+            f"1 until {share} was found, and while it lies outside of what is looked through",
+            variability="discrete",
+        )
+        for share in SHARES
     ),
     output_signal(
         "shares_unknown",
         "1",
-        "1 until a share of traction or brake was found",
+        "How many of the three shares of traction and brake are unknown",
         variability="discrete",
         warning=OutputWarning(
-            "no share of traction or brake was found: the run is shorter than the window of force_window coarse steps, "
-            "or no effort changed the speed by least_excitation within one; shorten the window, or let the run go on",
-            ("shares_unknown",),
+            "not every share of traction and brake is known: the run is shorter than the window of force_window coarse "
+            "steps, no such effort changed the speed by least_excitation within one while the speeds agreed, or the "
+            "share lies outside of least_share to most_share, and what is told is the end",
+            ("shares_unknown", *(f"{share}_unknown" for share in SHARES)),
             at_end=True,
         ),
     ),
@@ -109,12 +121,12 @@ PARAMETERS: tuple[Signal, ...] = (
     parameter("speed_share", "1", 0.02, "The same as a share of the speed", min=0.0),
     parameter("threshold_wheels", "1", 0.5, "Of the two odometers, in such differences", min=1e-6),
     parameter("threshold_radar", "1", 0.8, "Of odometer and radar, in such differences", min=1e-6),
-    parameter("threshold_gps", "1", 1.35, "Of satellites and any other speed, in such differences", min=1e-6),
+    parameter("threshold_gps", "1", 1.43, "Of satellites and any other speed, in such differences", min=1e-6),
     parameter("threshold_position", "m", 5.0, "Of satellite position and dead reckoning, at a balise", min=1e-6),
     parameter("balise_floor", "m", 1.5, "Of the distance of two balises and a way, constant part", min=1e-6),
     parameter("balise_share", "1", 0.01, "The same as a share of the distance", min=0.0),
     parameter("threshold_pressure", "Pa", 2e4, "Of measured and modelled pressure", min=1e-3, display_unit="bar"),
-    parameter("threshold_traction", "1", 0.14, "Of the share of traction, from 1", min=1e-6),
+    parameter("threshold_traction", "1", 0.142, "Of the share of traction, from 1", min=1e-6),
     parameter("threshold_brake", "1", 0.17, "Of the share of brake force, from 1", min=1e-6),
     parameter("raise_samples", "1", 3.0, "Samples in a row above the threshold that raise an alarm", min=1.0),
     parameter("clear_samples", "1", 20.0, "Samples in a row below it that clear it", min=1.0),
@@ -128,6 +140,8 @@ PARAMETERS: tuple[Signal, ...] = (
     parameter("coarse_step", "s", 1.0, "Length of the steps of the window of forces", min=1e-3),
     parameter("least_excitation", "m/s", 1.0, "Change of speed by a force within the window that tells it", min=1e-6),
     parameter("least_speed", "m/s", 1.0, "Speed below which no share is found", min=0.0, display_unit="km/h"),
+    parameter("least_share", "1", 0.05, "Smallest share of a force that is looked for", min=1e-3, max=0.999),
+    parameter("most_share", "1", 1.5, "Largest share of a force that is looked for", min=1.001),
     parameter("smoothing", "1", 0.2, "Weight of the last share", min=0.0, max=0.999),
 )
 

@@ -10,11 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fmu_observer.diagnosis.window_inversion import grid_around, invert, smoothed
+from fmu_observer.diagnosis.window_inversion import Inverted, grid_around, invert, smoothed
 from plant_models.hybrid.system import Array
 
 GRID = 5  # values of the parameter, as in the thesis
-LEAST, MOST = 0.05, 1.5
 
 
 class MotionWindow(NamedTuple):
@@ -37,11 +36,13 @@ class Share(NamedTuple):
     """Share of a force that arrives.
 
     Attributes:
-        value: smoothed [1]. found: 1 where this window told something, else 0.
+        value: smoothed [1]. found: 1 where this window told something, else 0. bracketed: 1 where the share lies within
+            the grid that was looked through, else 0: then `value` goes to the nearer end.
     """
 
     value: Array
     found: Array
+    bracketed: Array
 
 
 def between(means: list[Array]) -> list[Array]:
@@ -72,22 +73,27 @@ def simulated_change(start: Array, forces: list[Array], step: Array, mass: Array
 
 def share_of(
     parts: list[Array], rest: list[Array], window: MotionWindow, previous: Array, step: Array, mass: Array, p: Any
-) -> Array:
+) -> Inverted:
     """Share of a force at which the simulated speed at the end of the window is the measured one [1].
 
     Args:
         parts: acceleration by the whole force [m/s2], signed. rest: all others [m/s2]. window: for the speeds.
-        previous: share found last [1]. step: [s]. mass: [kg]. p: with the Davis coefficients and `smoothing`.
+        previous: share found last [1]. step: [s]. mass: [kg]. p: with the Davis coefficients,
+            `least_share`, `most_share` and `smoothing`.
+
+    Returns:
+        The share, smoothed, and by how many intervals of the grid it was bracketed.
 
     Source:
         Omar 2012, 7.7.7, (7.7.7)-(7.7.8), for the train as one point.
     """
-    grid = grid_around(previous, GRID, least=LEAST, most=MOST)
+    grid = grid_around(previous, GRID, least=p.least_share, most=p.most_share)
     differences = []
     for share in grid:
         forces = [share * part + other for part, other in zip(parts, rest, strict=True)]
         differences.append(simulated_change(window.speed[0], forces, step, mass, p) - window.speed[-1])
-    return smoothed(previous, invert(grid, differences, previous).value, p.smoothing)
+    found = invert(grid, differences, previous)
+    return Inverted(smoothed(previous, found.value, p.smoothing), found.crossings)
 
 
 def traction_share(window: MotionWindow, previous: Array, step: Array, mass: Array, p: Any) -> Share:
@@ -103,7 +109,7 @@ def traction_share(window: MotionWindow, previous: Array, step: Array, mass: Arr
     enough = np.where(pulled > p.least_excitation, np.where(braked < 0.2 * pulled, 1.0, 0.0), 0.0)
     rest = [o - b for o, b in zip(other, brake, strict=True)]
     found = enough * moving(window, p)
-    return Share(np.where(found > 0.0, share_of(drive, rest, window, previous, step, mass, p), previous), found)
+    return _told(share_of(drive, rest, window, previous, step, mass, p), found, previous)
 
 
 def brake_share(
@@ -124,7 +130,13 @@ def brake_share(
     rest = [o + d for o, d in zip(other, drive, strict=True)]
     found = enough * moving(window, p)
     parts = [-b for b in brake]
-    return Share(np.where(found > 0.0, share_of(parts, rest, window, previous, step, mass, p), previous), found)
+    return _told(share_of(parts, rest, window, previous, step, mass, p), found, previous)
+
+
+def _told(share: Inverted, found: Array, previous: Array) -> Share:
+    """A share where the window tells one, else the last."""
+    value = np.where(found > 0.0, share.value, previous)
+    return Share(value, found, found * np.where(share.crossings > 0.5, 1.0, 0.0))
 
 
 def moving(window: MotionWindow, p: Any) -> Array:

@@ -65,7 +65,7 @@ def remembered(speed_window: int, gps_window: int, force_window: int) -> tuple[S
         memory("mean_demanded", "m/s2", 0.0, "Deceleration by the pressure asked for", size=force_window),
         memory("mean_other", "m/s2", 0.0, "Acceleration by electric brake and gradient", size=force_window),
         memory("share", "1", 1.0, "Shares of traction, brake by measured, brake by demanded pressure", size=3),
-        memory("share_found", "1", 0.0, "1 where the share was ever found", size=3),
+        memory("share_found", "1", 0.0, "1 where the grid held the share that was found last", size=3),
     )
 
 

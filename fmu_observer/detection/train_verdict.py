@@ -176,7 +176,7 @@ def codes_after(
     """
     raised, ratios = m.each("raised"), m.each("ratio")
     codes: list[Array] = []
-    begun, unexplained, trusts, counted = [], [], [], []
+    begun, unexplained, trusts, counted, named = [], [], [], [], []
     place = first = 0
     for group, since in zip(GROUPS, m.each("group_since"), strict=True):
         own = slice(place, place + len(group.residuals))
@@ -192,8 +192,10 @@ def codes_after(
             told = np.where(kept > 0.0, np.where(code >= WHEEL, 1.0, 0.0), isolated * sure)
             maybe = (1.0 - kept) * (suspected + isolated * (1.0 - sure))
             codes.append(told * _isolated_code(fault, wrong) + SUSPECTED * maybe)
-            trusts.append((isolated + suspected) * _margin(group, fault, ratios[own], can.residuals[own]))
-            counted.append(isolated + suspected)
+            named.append(told + maybe)
+            margin, seen = _margin(group, fault, ratios[own], can.residuals[own])
+            trusts.append(named[-1] * seen * margin)
+            counted.append(named[-1] * seen)
         begun.append(start)
         unexplained.append(said.unexplained)
         place, first = own.stop, first + len(group.faults)
@@ -203,7 +205,10 @@ def codes_after(
     newest = m["detected_at"]
     for old, now in zip(m.each("group_since"), begun, strict=True):
         newest = np.where(now >= 0.0, np.where(old < 0.0, now, newest), newest)
-    trust = sum(trusts, 0.0) / np.maximum(sum(counted, 0.0), 1.0)
+    seen = sum(counted, 0.0)
+    # An alarm outlasts its residual: while it does the confidence is the last that a residual gave.
+    trust = np.where(seen > 0.5, sum(trusts, 0.0) / np.maximum(seen, 1.0), m["trust"])
+    trust = np.where(largest(named) > 0.5, trust, 0.0)
     slips = codes[FAULTS.index("adhesion")]
     bad = [np.maximum(codes[0], slips), np.maximum(codes[1], slips), codes[2]]
     faulty = [np.maximum(old, np.where(now > 0.0, 1.0, 0.0)) for old, now in zip(m.each("faulty"), bad, strict=True)]
@@ -220,11 +225,14 @@ def _isolated_code(fault: str, wrong: list[Array]) -> Array:
     return LOSS if fault in ("cylinder", "friction", "traction") else SENSOR
 
 
-def _margin(group: IsolationTable, fault: str, ratios: list[Array], available: list[Array]) -> Array:
-    """How far the weakest alarm of a fault is above its threshold: 1 - threshold / residual."""
+def _margin(group: IsolationTable, fault: str, ratios: list[Array], available: list[Array]) -> tuple[Array, Array]:
+    """1 - threshold / residual of the weakest alarm of a fault, and 1 where there is one above its threshold"""
     margin: Array = 1.0
+    seen: Array = 0.0
     moved = {*group.must[fault], *group.may.get(fault, ())}
     for name, ratio, there in zip(group.residuals, ratios, available, strict=True):
         if name in moved:
-            margin = np.minimum(margin, np.where(there * ratio > 1.0, 1.0 - 1.0 / np.maximum(ratio, 1.0), 1.0))
-    return margin
+            above = np.where(there * ratio > 1.0, 1.0, 0.0)
+            margin = np.minimum(margin, np.where(above > 0.0, 1.0 - 1.0 / np.maximum(ratio, 1.0), 1.0))
+            seen = np.maximum(seen, above)
+    return margin, seen

@@ -31,11 +31,18 @@ from fmu_observer.detection.pitch_residuals import (
     trusted,
     trusted_pitches,
 )
+from fmu_observer.detection.wind_turbine_limits import (
+    WARNINGS,
+    grid_requirements,
+    period_requirements,
+    repeats,
+    warned,
+)
 from fmu_observer.diagnosis.named_memory import NamedMemory
 from fmu_observer.diagnosis.redundancy import larger
 from fmu_observer.diagnosis.windowed_residual import Alarm, judge
 from plant_models.benchmarks.wind_turbine.rotor import Rotor
-from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter
+from plant_models.hybrid import HybridSystem, PeriodicEvent, input_signal, memory, output_signal, parameter, vector
 from plant_models.hybrid.requirements import within_bounds
 from plant_models.hybrid.system import Array
 
@@ -59,7 +66,7 @@ _GROUPS = (
 )
 ALARMS = sum(group.size for group in _GROUPS)
 ALARM_NAMES = tuple(f"{g.output}[{i + 1}]" if g.size > 1 else g.output for g in _GROUPS for i in range(g.size))
-"""Which alarm stands at which place of `alarm_time`."""
+"""The alarms by name, in the order of the outputs."""
 
 _LIMITS = (
     ("pitch_difference_limit", "deg", 1.9, "Difference of two pitch sensors"),
@@ -72,6 +79,14 @@ _LIMITS = (
     ("speed_limit", "rad2/s2", 8.5e-3, "Residual of a sensor of rotor or generator speed"),
     ("torque_limit", "N2.m2", 1.2e5, "Residual of the generator torque"),
     ("efficiency_limit", "1", 0.1, "Deviation of the efficiency from the nominal one"),
+)
+_RATIOS = (
+    ("ratio_pitch_sensors", BLADES, "Difference of the two pitch sensors of each blade over its limit"),
+    ("ratio_rotor_sensors", None, "Difference of the sensors of the rotor speed over its limit"),
+    ("ratio_generator_sensors", None, "Difference of the sensors of the generator speed over its limit"),
+    ("ratio_torque", None, "Residual of the generator torque over its limit"),
+    ("ratio_pitch_actuators", BLADES, "Larger residual of each pitch actuator over its limit"),
+    ("ratio_efficiency", None, "Deviation of the efficiency over its limit"),
 )
 _PERSISTENCE = (("sensor", 1.0, 5.0), ("torque", 1.0, 1.0), ("actuator", 1.0, 1.0), ("efficiency", 1.0, 1.0))
 
@@ -93,6 +108,7 @@ _RESIDUALS = (
 MEMORY = NamedMemory(
     (
         memory("samples", "1", 0.0, "Samples since the start"),
+        memory("repeated", "1", 0.0, "Samples at which no reading of speeds and torque was a new one"),
         *PITCH_MEMORY,
         *DRIVE_MEMORY,
         *EFFICIENCY_MEMORY,
@@ -151,7 +167,18 @@ class WindTurbineDiagnosis(HybridSystem):
         ),
         output_signal("fault", "1", "1 while any alarm is raised", variability="discrete"),
         output_signal("undecided", "1", "Pairs of sensors of which one is at fault, not known which"),
-        output_signal("alarm_time", "s", "Last change of each alarm, in the order of these outputs", size=ALARMS),
+        *(
+            output_signal(
+                f"{g.output}_time",
+                "s",
+                f"Last change of the alarm of {g.text}",
+                variability="discrete",
+                size=g.size if g.size > 1 else None,
+            )
+            for g in _GROUPS
+        ),
+        *(output_signal(name, "1", text, variability="discrete", size=n) for name, n, text in _RATIOS),
+        *WARNINGS,
         *(output_signal(name, unit, text, variability="discrete", size=n) for name, unit, n, text in _RESIDUALS),
     )
     parameters = (
@@ -180,12 +207,14 @@ class WindTurbineDiagnosis(HybridSystem):
     )
 
     def requirements(self, p: Any) -> dict[str, Array]:
-        """Parameters keep their bounds, and limits of zero are refused: everything would be a fault."""
+        """Parameters keep their bounds; limits of zero, grids that do not rise, and gains of the torsion that belong to
+        another sample period are refused.
+        """
         limits: Mapping[str, Array] = {
             f"{name} must be above zero: any reading would be a fault": np.where(getattr(p, name) > 0.0, 1.0, 0.0)
             for name, *_ in _LIMITS
         }
-        return within_bounds(self.parameters, p) | dict(limits)
+        return within_bounds(self.parameters, p) | dict(limits) | grid_requirements(p) | period_requirements(p)
 
     def jump(self, event: str, t: Array, x: Array, u: Any, p: Any) -> Array:
         """New residuals and alarms; or the long window, or the window of the efficiency moves on."""
@@ -195,7 +224,7 @@ class WindTurbineDiagnosis(HybridSystem):
         if event == "efficiency_update":
             return MEMORY.pack(m, **update_efficiency(m, p))
         starts = np.where(m.samples > 0.0, 0.0, 1.0)
-        new = {"samples": m.samples + 1.0}
+        new = {"samples": m.samples + 1.0, "repeated": m.repeated + repeats(m, u, starts)}
         new |= sample_pitch(m, u.pitch, u.pitch_reference, p, starts)
         m = m._replace(**new)
         pitches = trusted_pitches(u.pitch, p.pitch_difference_limit, m.held_pitch_triple)
@@ -209,7 +238,7 @@ class WindTurbineDiagnosis(HybridSystem):
             *_pair(u.generator_speed, 0), p.generator_difference_limit, *_pair(m.held_speed_residual, 2)
         )
         new |= sample_torques(m, generator, driving, u.torque)
-        settled = np.where(m.samples * p.sample_period > p.settling_time, 1.0, 0.0)
+        settled = _settled(m, p)
         exceeds, undecided = _judged(m, t, p)
         alarms = _alarms(m, [settled * value for value in exceeds], t, p)
         new |= {name: [getattr(alarm, field) for alarm in alarms] for name, field in _ALARM_FIELDS}
@@ -221,13 +250,15 @@ class WindTurbineDiagnosis(HybridSystem):
         found: dict[str, Array] = {}
         at = 0
         for group in _GROUPS:
-            found[group.output] = m.raised[at] if group.size == 1 else m.raised[at : at + group.size]
+            place = at if group.size == 1 else slice(at, at + group.size)
+            found |= {group.output: m.raised[place], f"{group.output}_time": m.since[place]}
             at += group.size
         any_raised = m.raised[0]
         for i in range(1, ALARMS):
             any_raised = np.maximum(any_raised, m.raised[i])
         residuals = {name: getattr(m, f"held_{name}") for name, *_ in _RESIDUALS}
-        return found | residuals | {"fault": any_raised, "undecided": m.undecided_pairs, "alarm_time": m.since}
+        told = {"fault": any_raised, "undecided": m.undecided_pairs}
+        return found | residuals | told | _ratios(m, p) | warned(m, p)
 
 
 _ALARM_FIELDS = (("raised", "raised"), ("contrary", "contrary"), ("since", "since"))
@@ -261,6 +292,28 @@ def _judged(m: Any, t: Array, p: Any) -> tuple[list[Array], Array]:
     ]
     deviation = np.abs(m.held_efficiency_estimate - p.nominal_efficiency)
     return [*sensors, torque, *actuators, np.where(deviation > p.efficiency_limit, 1.0, 0.0)], undecided
+
+
+def _ratios(m: Any, p: Any) -> dict[str, Array]:
+    """Residuals over their limits, by name of the output; zero while nothing is judged yet."""
+    actuators = [
+        np.maximum(m.held_pitch_brief[i] / p.pitch_brief_limit, m.held_pitch_long[i] / p.pitch_long_limit)
+        for i in range(BLADES)
+    ]
+    values = (
+        m.held_pitch_difference / p.pitch_difference_limit,
+        m.held_speed_difference[0] / p.rotor_difference_limit,
+        m.held_speed_difference[1] / p.generator_difference_limit,
+        m.held_torque_residual / p.torque_limit,
+        vector(*actuators),
+        np.abs(m.held_efficiency_estimate - p.nominal_efficiency) / p.efficiency_limit,
+    )
+    settled = _settled(m, p)
+    return {name: settled * value for (name, *_), value in zip(_RATIOS, values, strict=True)}
+
+
+def _settled(m: Any, p: Any) -> Array:
+    return np.where(m.samples * p.sample_period > p.settling_time, 1.0, 0.0)
 
 
 def _believed(m: Any, sensor: int, t: Array, p: Any) -> Array:

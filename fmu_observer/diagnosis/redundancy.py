@@ -5,7 +5,6 @@ Pure functions that trace. All of them rest on the assumption of a single fault 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -36,30 +35,12 @@ def disagreement(first: Array, second: Array) -> Array:
     return np.abs(first - second)
 
 
-def isolate(disagree: Array, first: Array, second: Array) -> Isolation:
-    """A fault of a sensor or of the system: Omar 2012, 7.5.1 (i), (7.6.9), (7.6.13).
-
-    Sensors that disagree tell a fault of a sensor, and the model tells which. Sensors that agree tell, where both
-    contradict the model, a fault of the actuator or of the system.
-
-    Args:
-        disagree: 1 where the sensors differ by more than their threshold, else 0.
-        first: 1 where the residual of the model with the first sensor is above its threshold, else 0.
-        second: the same with the second sensor.
-    """
-    both = first * second
-    return Isolation(
-        first * (1.0 - second) * disagree,
-        second * (1.0 - first) * disagree,
-        np.where(first == second, disagree, 0.0),
-        both * (1.0 - disagree),
-    )
-
-
 def larger(disagree: Array, first: Array, second: Array) -> Isolation:
-    """Like `isolate`, from the sizes of the residuals: where sensors disagree, the one with the larger residual is it.
+    """A fault of a sensor or of the system: Omar 2012, 7.5.1 (i), (7.6.9), (7.6.13), from the sizes of the residuals.
 
-    A fault that moves the model's state moves the residuals of both sensors; their order still tells.
+    Where sensors disagree, the one with the larger residual is at fault. Sensors that agree tell, where both contradict
+    the model, a fault of the actuator or of the system. A fault that moves the model's state moves the residuals of
+    both sensors; their order still tells.
 
     Args:
         disagree: 1 where the sensors differ by more than their threshold, else 0.
@@ -70,33 +51,3 @@ def larger(disagree: Array, first: Array, second: Array) -> Isolation:
     decided = np.where(above, disagree, 0.0)
     is_first = np.where(first > second, decided, 0.0)
     return Isolation(is_first, decided - is_first, disagree - decided, system)
-
-
-def outvoted(readings: Sequence[Array], thresholds: Sequence[Sequence[Array]]) -> list[Array]:
-    """Which of three or more sensors is contradicted by all others, which agree with one another.
-
-    Args:
-        readings: of n sensors of one quantity, n at least 3.
-        thresholds: n rows of n, the most that sensors i and j may differ without a fault; those with i < j count.
-
-    Returns:
-        For each sensor 1 where it alone is at fault, else 0.
-
-    Raises:
-        ValueError: there are fewer than three sensors.
-    """
-    n = len(readings)
-    if n < 3:
-        raise ValueError(f"A vote needs at least three sensors, got {n}; use isolate() or larger() with a model.")
-    differ = {
-        (i, j): np.where(np.abs(readings[i] - readings[j]) > thresholds[i][j], 1.0, 0.0)
-        for i in range(n)
-        for j in range(i + 1, n)
-    }
-    found = []
-    for k in range(n):
-        vote: Array = 1.0
-        for pair, value in differ.items():
-            vote = vote * (value if k in pair else 1.0 - value)
-        found.append(vote)
-    return found

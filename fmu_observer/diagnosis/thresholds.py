@@ -106,18 +106,6 @@ def largest_threshold(recordings: Sequence[np.ndarray], margin: float = 1.05) ->
     return margin * max(float(np.max(values)) for values in _checked(recordings))
 
 
-def quantile_threshold(recordings: Sequence[np.ndarray], quantile: float) -> float:
-    """Residual that a fraction of all fault-free samples stays below.
-
-    Args:
-        recordings: residuals without a fault, each of shape (samples,). quantile: fraction, between 0 and 1.
-
-    Raises:
-        ValueError: there is no recording, an empty one, or a value that is not finite.
-    """
-    return float(np.quantile(np.concatenate(_checked(recordings)), quantile))
-
-
 def rate_threshold(recordings: Sequence[np.ndarray], sample_period: float, alarms_per_hour: float) -> float:
     """Smallest threshold at which fault-free recordings have no more alarms per hour than allowed.
 

@@ -36,12 +36,3 @@ def dynamic_signature(
     windows = np.lib.stride_tricks.sliding_window_view(samples, order + 1, axis=0)  # shape (M, ..., N + 1)
     ordered = np.moveaxis(windows, -1, 0)
     return np.asarray(pencil_point(ordered[:-1], ordered[-1], eps, next_scaling))
-
-
-def signature_window(order: int, points: int) -> int:
-    """Samples that a signature takes, N_O: as many as its points and its order together, Omar 2012, section 4.4.1.
-
-    Args:
-        order: past samples a point, N. points: M.
-    """
-    return order + points

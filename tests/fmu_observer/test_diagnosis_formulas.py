@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy
 
-from fmu_observer.diagnosis.redundancy import isolate, larger, outvoted
+from fmu_observer.diagnosis.redundancy import larger
 from fmu_observer.diagnosis.residual_filters import filtered, residual_filter, settled
 from fmu_observer.diagnosis.window_inversion import grid_around, invert, smoothed
 from fmu_observer.diagnosis.windowed_residual import Alarm, judge, windowed_square
@@ -59,23 +59,9 @@ def test_an_alarm_waits_for_samples_in_a_row() -> None:
 
 
 def test_sensors_that_disagree_are_told_apart_by_the_model() -> None:
-    assert isolate(1.0, 1.0, 0.0) == (1.0, 0.0, 0.0, 0.0)
-    assert isolate(1.0, 0.0, 1.0) == (0.0, 1.0, 0.0, 0.0)
-    assert isolate(1.0, 1.0, 1.0) == isolate(1.0, 0.0, 0.0) == (0.0, 0.0, 1.0, 0.0)
-    assert isolate(0.0, 1.0, 1.0) == (0.0, 0.0, 0.0, 1.0)
-    assert isolate(0.0, 1.0, 0.0) == (0.0, 0.0, 0.0, 0.0)
     assert larger(1.0, 9.0, 2.0) == (1.0, 0.0, 0.0, 0.0)
     assert larger(1.0, 0.5, 0.7) == (0.0, 0.0, 1.0, 0.0)
     assert larger(0.0, 9.0, 2.0) == (0.0, 0.0, 0.0, 1.0)
-
-
-def test_three_sensors_vote() -> None:
-    limits = [[1.0] * 3] * 3
-    assert outvoted([5.0, 5.5, 9.0], limits) == [0.0, 0.0, 1.0]
-    assert outvoted([5.0, 5.5, 5.9], limits) == [0.0, 0.0, 0.0]
-    assert outvoted([0.0, 5.0, 9.0], limits) == [0.0, 0.0, 0.0]  # two faults: no vote
-    with pytest.raises(ValueError, match="at least three"):
-        outvoted([1.0, 2.0], limits)
 
 
 @pytest.mark.parametrize("true", [0.35, 0.5, 0.62, 0.8])

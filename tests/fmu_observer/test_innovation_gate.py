@@ -142,6 +142,8 @@ def test_doubted_telegrams_agree_by_either_way(told: dict[str, float], count: fl
 def test_every_observer_of_balises_has_the_gate() -> None:
     told = {name: OBSERVERS[name]() for name in OBSERVERS}
     told = {n: s for n, s in told.items() if any(e.name == "balise" for e in s.triggered_events)}
+    # a detector judges telegrams by its own residuals
+    told = {n: s for n, s in told.items() if not type(s).__module__.startswith("fmu_observer.detection.")}
     assert len(told) >= len(SYSTEMS)
     for name, system in told.items():
         assert isinstance(system, GatedObserver), name

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+import cosim
 from fmu_observer.detection.train_diagnosis import TrainDiagnosis
+from fmu_observer.detection.train_diagnosis_signals import SHARES
 from fmu_observer.detection.train_efficiency import MotionWindow, brake_share, traction_share
 from fmu_observer.detection.train_isolation import BRAKE, MOTION, SENSORS, isolability
 from fmu_observer.diagnosis.isolation_table import IsolationTable
@@ -149,3 +153,50 @@ def test_the_share_of_a_constant_force_is_found(share: float) -> None:
     assert float(stops.value) == pytest.approx(max(share, 0.56), abs=1e-12)
     coasts = MotionWindow([5.0] * 8, none, none, none, none)
     assert float(traction_share(coasts, 0.8 * np.ones(()), 1.0, 1e5, p).found) == 0.0
+
+
+@pytest.mark.parametrize("missing", ["odometer_2", "radar", "cylinder_pressure"])
+def test_each_missing_sensor_that_isolation_needs_is_told(missing: str) -> None:
+    signals = cruise()
+    del signals[missing]
+    assert told(0.5, signals)[-1]["isolation_limited"] == 1.0
+    del (without := cruise())["gps_position"]
+    assert told(0.5, without)[-1]["isolation_limited"] == 0.0  # the table isolates all without satellites
+
+
+def test_an_alarm_that_outlasts_its_residual_keeps_its_confidence() -> None:
+    rows = told(13.0, cruise(odometer_1=lambda t: 9.0 if 5.0 < t < 9.0 else 10.0))
+    names = ("odometers", "odometer_1_radar", "odometer_1_gps")
+    gone = [r for r in rows if r["fault_count"] > 0 and max(r[f"ratio_{n}"] for n in names) <= 1.0]
+    assert gone
+    assert all(0.0 < row["confidence"] < 0.99 for row in gone)
+    assert rows[-1]["confidence"] == 0.0
+
+
+def test_a_share_outside_of_the_grid_is_unknown() -> None:
+    system = TrainDiagnosis()
+    p = system.unpack_parameters(system.start_parameters())._replace(davis_a=0.0, davis_b=0.0, davis_c=0.0)
+    none = [0.0] * 8
+    for share, bracketed in ((1.2, 1.0), (1.9, 0.0)):
+        stops = MotionWindow([15.0 - share * 0.5 * k for k in range(8)], none, [0.5] * 8, [0.5] * 8, none)
+        found = brake_share(stops.demanded, stops, 1.5 * np.ones(()), 1.0, 1e5, p)
+        assert (float(found.found), float(found.bracketed)) == (1.0, bracketed)
+    assert float(found.value) == pytest.approx(float(p.most_share))
+    last = told(2.0, cruise())[-1]
+    assert last["shares_unknown"] == 3.0 == sum(last[f"{s}_unknown"] for s in SHARES)
+
+
+@pytest.mark.parametrize("case", ["fault_free", "radar_gain", "pressure_low"])
+def test_a_case_of_the_scenario_meets_its_own_expectations(case: str) -> None:
+    outcome = cosim.Scenario.load("train_diagnosis").set("case", case).run().check()
+    assert len(outcome.expectations) == (1 if case == "fault_free" else 3)
+    assert not any("not checked against the balise gaps" in warning for warning in outcome.warnings)
+
+
+def test_only_faults_of_the_first_odometer_are_judged_as_its_faults() -> None:
+    tables = tomllib.loads(Path(cosim.__file__).with_name("scenarios").joinpath("train_diagnosis.toml").read_text())
+    judged = {case: values["report"]["true_fault"] for case, values in tables["cases"].items() if "report" in values}
+    assert judged == {"jam": "wheel.active", "skid": "wheel.active"}
+    assert tables["report"]["true_fault"] == "first_odometer.active"
+    own = {"odometer_1_gain"}  # that of the scenario itself
+    assert all("expect" in values for case, values in tables["cases"].items() if case not in own)

@@ -7,6 +7,7 @@ import fmus
 from fmu_observer.detection.drive_train_residuals import torsion_gains
 from fmu_observer.detection.efficiency_inversion import BLOCKS, simulated_speed
 from fmu_observer.detection.wind_turbine_diagnosis import ALARM_NAMES, MEMORY, WindTurbineDiagnosis
+from fmu_observer.detection.wind_turbine_limits import WARNINGS
 from fmu_observer.diagnosis.finite_window_observer import sampled
 from plant_models.benchmarks.wind_turbine.drive_train import DriveTrain
 from plant_models.benchmarks.wind_turbine.rotor import Rotor
@@ -179,7 +180,17 @@ def test_a_lost_efficiency_is_found_within_its_window(batch: fmus.Batch) -> None
     readings = {"wind_speed": wind_read, "torque": braking_read, "torque_reference": braking_read}
     readings |= {"pitch_reference": zero, **{f"pitch[{i + 1}]": zero for i in range(6)}}
     readings |= {f"rotor_speed[{i}]": rotor for i in (1, 2)} | {f"generator_speed[{i}]": generator for i in (1, 2)}
-    found = diagnosed(batch, [readings], ["efficiency_estimate", "efficiency_fault", "efficiency_crossings"], period)[0]
+    gains = dict(
+        zip(
+            ("rotor_speed", "generator_speed", "rotor_torque", "generator_torque"),
+            torsion_gains(DriveTrain(), period),
+            strict=True,
+        )
+    )
+    values = {f"{name}_gain[{i + 1}]": float(value) for name, row in gains.items() for i, value in enumerate(row)}
+    results = ["efficiency_estimate", "efficiency_fault", "efficiency_crossings", "efficiency_unknown"]
+    found = diagnosed(batch, [readings], results, period, **values)[0]
+    np.testing.assert_array_equal(found[[299, -1], 3], [1.0, 0.0])  # the window is full after 310 s
     assert found[switch - 1, 0] == pytest.approx(0.97, abs=0.01)
     assert not found[:switch, 1].any()
     assert found[switch + 330 :, 0] == pytest.approx(0.25, abs=0.01)
@@ -187,12 +198,33 @@ def test_a_lost_efficiency_is_found_within_its_window(batch: fmus.Batch) -> None
     assert found[-1, 2] == 1.0
 
 
-def test_limits_of_zero_are_refused(batch: fmus.Batch) -> None:
+@pytest.mark.parametrize(
+    ("name", "value", "text"),
+    [
+        ("torque_limit", 0.0, "torque_limit must be above zero"),
+        ("grid_highest", 0.5, "grid_highest must be above grid_lowest"),
+        ("most_efficiency", 0.01, "most_efficiency must be above least_efficiency"),
+        ("sample_period", 0.02, "sample_period must be 0.01 s"),
+    ],
+)
+def test_settings_that_mean_nothing_are_refused(batch: fmus.Batch, name: str, value: float, text: str) -> None:
     batch.reset()
-    batch.set("torque_limit", 0.0)
+    batch.set(name, value)
     batch.start()
     batch.run([PERIOD])
-    assert "torque_limit must be above zero" in batch.failures[0]
+    assert text in batch.failures[0]
+
+
+def test_an_efficiency_that_is_not_known_is_warned_of(batch: fmus.Batch) -> None:
+    """Sensors read half as often, wind believed too weak, a grid above the efficiency, a window not yet full."""
+    results = [warning.name for warning in WARNINGS]
+    halved = {name: np.repeat(values[::2], 2) for name, values in steady(1.0, 2.0).items()}
+    assert diagnosed(batch, [halved], results)[0, -1].tolist() == [1.0, 0.0, 0.0, 1.0]
+    assert diagnosed(batch, [steady(1.0, 2.0)], results)[0, -1].tolist() == [1.0, 0.0, 0.0, 0.0]
+    still, fast = steady(0.0, 25.0), {"update_period": 0.5, "smoothing": 0.0}
+    assert diagnosed(batch, [still], results, wind_bias=3.0, **fast)[0, -1, :3].tolist() == [0.0, 0.0, 1.0]
+    above = diagnosed(batch, [still], results, grid_lowest=1.2, least_efficiency=1.05, most_efficiency=1.09, **fast)
+    assert above[0, -1, :3].tolist() == [0.0, 1.0, 0.0]
 
 
 def test_a_memory_by_name_refuses_another_width() -> None:

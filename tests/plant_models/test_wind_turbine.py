@@ -4,6 +4,8 @@ loop.
 
 from __future__ import annotations
 
+import tomllib
+from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -203,7 +205,20 @@ def _short(**changes: Any) -> Any:
     scenario = cosim.Scenario.load("wind_turbine")
     for name, value in changes.items():
         scenario.set(name.replace("__", "."), value)
-    return scenario.set("master.record_every", 1).run()
+    return scenario.set("master.record_every", 1).set("expect", []).run()  # too short for what is expected
+
+
+def test_a_case_expects_the_alarm_of_its_own_fault() -> None:
+    scenario = cosim.Scenario.load("wind_turbine").set("stop", 30.0).set("master.record_every", 1)
+    stuck = {"fault_channel": 5, "fault_gain": 0.0, "fault_offset": 10.0, "fault_onset": 20.0, "fault_length": 5.0}
+    for name, value in stuck.items():
+        scenario.set(f"pitch_sensors.{name}", value)
+    raw = tomllib.loads((files("cosim") / "scenarios" / "wind_turbine.toml").read_text(encoding="utf-8"))
+    own = [e for e in raw["cases"]["F1"]["expect"] if e["check"] == "on"]
+    scenario.set("expect", [{**e, "from": 20.0, "before": 20.05} for e in own])
+    assert [judged.passed for judged in scenario.run().expectations] == [True]
+    missed = scenario.set("diagnosis.pitch_difference_limit", 1e3).run()
+    assert [judged.passed for judged in missed.expectations] == [False]
 
 
 def test_a_run_with_the_printed_drive_train_is_warned() -> None:

@@ -91,6 +91,7 @@ def report_page(
         The page.
     """
     metrics, details, counts = phase_metrics(result, spec), phase_details(result, spec), count_events(result.events)
+    shown = metrics if spec.true_speed or spec.true_position else []  # a turbine has no errors of speed
     judged = [Judged.from_data(data) for data in list_entry(result, "expectations")]
     certificates, explained = run_tables.certificates(result, spec)
     return render(
@@ -104,8 +105,8 @@ def report_page(
         judged=judged,
         expectations=run_tables.expectations_table(sorted(judged, key=lambda j: j.passed)),
         warnings=all_warnings(result, spec),
-        metrics=metrics,
-        errors=errors_table(metrics, spec),
+        metrics=shown,
+        errors=errors_table(shown, spec),
         seed_count=len(mapping_entry(result, "seed_study").get("seeds", [])),
         seeds=run_tables.seeds_table(result),
         zooms=zooms,

@@ -23,14 +23,19 @@ TIMES = (
     "the two sensors disagree at the first faulty sample, and the model of each tells which; the alarm clears after "
     "five samples without it, our persistence. Thresholds and wind are not printed"
 )
-NOISE_ONLY = "at zero pitch a gain of 5 shows in the noise alone: the alarm waits for a large sample"
+NOISE_ONLY = (
+    "median of three seeds, fault from 30 to 40 s. At zero pitch a gain of 5 shows in the noise alone: the alarm waits "
+    "for a large sample. Over ten seeds at the instant of the benchmark the median is 12 samples, the largest 33, and "
+    "the limit of 10 is not kept (docs/wind_turbine.md)"
+)
 TORQUE = (
     "readings are compared half a sample late, as Tustin's rule has a held reference: what a step of the reference "
     "leaves, and with it the threshold, falls to a twentieth"
 )
 ACTUATOR = (
     "excitation decides: here 14 m/s with turbulence and a controller that the fault disturbs; the wind of the thesis "
-    "is not available"
+    "is not available. Three seeds, fault from 60 to 160 s; with ten seeds and the fault from 500 to 600 s the medians "
+    "are 18.5 s and 18 s, the largest 97.1 s and 28.9 s (docs/wind_turbine.md): the alarm waits until the pitch moves"
 )
 STRONG = {"mean_from": 14.0, "mean_to": 14.0, "sine_amplitude": 0.0}
 

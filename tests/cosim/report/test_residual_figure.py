@@ -6,6 +6,7 @@ import numpy as np
 
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.residual_figure import FLOOR, ResidualsPanel, residual_figure
+from cosim.report.page.report import report_page
 from cosim.results.formats.format import bare
 from cosim.results.result import Result
 
@@ -32,3 +33,8 @@ def test_a_run_without_such_outputs_has_no_figure() -> None:
     assert ResidualsPanel.available(run(), ReportSpec(observers=["a"]))
     assert not ResidualsPanel.available(run(), ReportSpec(observers=["b"]))
     assert not ResidualsPanel.available(run(), ReportSpec())
+
+
+def test_a_run_without_a_train_has_no_table_of_its_errors() -> None:
+    assert "speed error" not in report_page(run(), ReportSpec(observers=["a"]), {})
+    assert "speed error" in report_page(run(), ReportSpec(observers=["a"], true_speed="a.speed"), {})

@@ -96,3 +96,7 @@ def test_a_probe_that_saw_nothing_is_made_again(monkeypatch: pytest.MonkeyPatch)
     for _ in range(2):
         assert balise_service.known_probe(plant(), {}, 0.0, 0.01) is nothing
     assert len(made) == 2
+
+
+def test_a_detector_is_not_asked_for_a_certificate() -> None:
+    assert check_certificates({"it": table("train_diagnosis")}, GAP, "require", "here") == ({}, [])
