@@ -263,7 +263,7 @@ def _bounds(who: str, given: Bounds | None) -> dict[str, Sequence[float | None]]
             f"{who}: bounds = {given!r}; expected [lowest, highest] by name of a state, as in {{'x2': [0.0, 1.0]}}."
         )
     for name, pair in (given or {}).items():
-        legal = isinstance(pair, Sequence) and not isinstance(pair, str) and len(pair) == 2
+        legal = isinstance(pair, list | tuple) and len(pair) == 2
         if not legal or not all(bound is None or is_number(bound) for bound in pair):
             raise ValueError(f"{who}: bounds of {name!r} are {pair!r}; expected [lowest, highest], both numbers.")
         low, high = pair
