@@ -230,7 +230,7 @@ def _limit(bound: Gt | Ge | Le) -> str:
     return f">= {bound.ge:g}" if isinstance(bound, Ge) else f"<= {bound.le:g}"  # type: ignore[str-format]
 
 
-SIMPLE = {float: "number", int: "whole number", str: "text", ModelName: "text", bool: "true or false"}
+SIMPLE = {float: "number", int: "whole number", str: "text", ModelName: "text", bool: "true or false", Any: "values"}
 
 
 def _kind(annotation: Any) -> str:
