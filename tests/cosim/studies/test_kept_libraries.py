@@ -28,6 +28,7 @@ def none_kept() -> Iterator[None]:
 def short(name: str) -> Scenario:
     scenario = Scenario.load(name)
     scenario._data.pop("expect", None)
+    scenario._data.get("balises", {}).pop("false_telegrams", None)  # they come later than the run ends
     return scenario.set("stop", 8.0).set("certificates", "ignore").set("report.phases", [])
 
 
