@@ -180,6 +180,7 @@ def test_standard_deviations_are_outputs() -> None:
         "innovation_covariance": [16.0],
         "nis": 5.0,
         "innovation_likelihood": 6.0,
+        "covariance_not_positive": 0.0,
     }
 
 
