@@ -1,7 +1,7 @@
 """Benchmark: the wind turbine over 4400 s in 440 000 steps, by the compiled stepper, and what each part of it costs.
 
-``python tests/benchmarks/wind_turbine.py``. Nothing is asserted. Times are CPU seconds of this process, after a run
-that builds the FMUs; the turbine alone has wind and controller beside it and no faults.
+``python tests/benchmarks/wind_turbine.py``. Nothing is asserted. Times are seconds by the clock and CPU seconds of
+this process, after a run that builds the FMUs; the turbine alone has wind and controller beside it and no faults.
 """
 
 from __future__ import annotations
@@ -43,8 +43,10 @@ def main() -> None:
 
 
 def scenario() -> Scenario:
-    """The shipped scenario without its expectations."""
-    return Scenario.load("wind_turbine").set("expect", [])
+    """The shipped scenario without its expectations and its report."""
+    made = Scenario.load("wind_turbine").set("expect", [])
+    made._data.pop("report", None)
+    return made
 
 
 def without(names: tuple[str, ...]) -> Scenario:
@@ -71,8 +73,9 @@ def without(names: tuple[str, ...]) -> Scenario:
 
 def seconds(call: Callable[[], Any]) -> tuple[float, Any]:
     """CPU seconds of a call, and what it returns."""
-    started = time.process_time()
+    started, begun = time.process_time(), time.perf_counter()
     made = call()
+    print(f"{'by the clock':32s}{time.perf_counter() - begun:6.2f} s")
     return time.process_time() - started, made
 
 
