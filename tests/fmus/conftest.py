@@ -278,8 +278,8 @@ OF_EACH_KIND = {
     kind(make_system(name)): name
     for name in sorted(SHIPPED, key=lambda name: make_system(name).state_count, reverse=True)
 }
-"""Of each kind the shipped system of the fewest states. Both interfaces of FMI stand on one model code: every shipped
-system is tested as FMI 3.0, those of this table as FMI 2.0 too.
+"""Of each kind the shipped system of the fewest states. The runtime in C is one for all, so the first tier builds these
+and the small systems of this file; the second tier builds every system that ships as FMI 3.0, and these as FMI 2.0 too.
 """
 KEPT = tuple(
     line.removeprefix("! ")
@@ -290,18 +290,19 @@ KEPT = tuple(
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Of shipped systems, leave out those that are none of `OF_EACH_KIND`: in FMI 2.0, which belongs to the second
-    tier, and in laws of ``each_kind``, where those stay that the list of the second tier names.
+    """Shipped systems that are none of `OF_EACH_KIND` belong to the second tier. Leave them out in FMI 2.0, which belongs
+    there too, and in laws of ``each_kind``, where those stay that the list of the second tier names.
     """
     kinds = set(OF_EACH_KIND.values())
     shipped = {item: _shipped(item) for item in items}
     beside = set()
     for item, names in shipped.items():
         as_fmi2 = names and item.callspec.params.get("version") == 2  # type: ignore[attr-defined]
-        by_kind = item.get_closest_marker("each_kind") and not item.nodeid.startswith(KEPT)
-        if names and not names & kinds and (as_fmi2 or by_kind):
+        kept = item.nodeid.startswith(KEPT)
+        other = names and not names & kinds
+        if other and (as_fmi2 or (item.get_closest_marker("each_kind") and not kept)):
             beside.add(item)
-        elif as_fmi2:
+        elif as_fmi2 or (other and not kept):
             item.add_marker(pytest.mark.slow)
     if beside:
         config.hook.pytest_deselected(items=list(beside))
