@@ -290,8 +290,8 @@ KEPT = tuple(
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Shipped systems that are none of `OF_EACH_KIND` belong to the second tier. Leave them out in FMI 2.0, which belongs
-    there too, and in laws of ``each_kind``, where those stay that the list of the second tier names.
+    """Shipped systems that are none of `OF_EACH_KIND` belong to the second tier. Leave them out in FMI 2.0, which
+    belongs there too, and in laws of ``each_kind``, where those stay that the list of the second tier names.
     """
     kinds = set(OF_EACH_KIND.values())
     shipped = {item: _shipped(item) for item in items}
