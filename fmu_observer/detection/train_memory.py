@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from fmu_observer.detection.train_isolation import FAULTS, RESIDUALS
+from fmu_observer.diagnosis.named_memory import NamedMemory
 from plant_models.hybrid import Signal, memory, state, vector
 from plant_models.hybrid.system import Array
 
@@ -77,15 +78,12 @@ class Memory:
     """
 
     def __init__(self, signals: Sequence[Signal], x: Array) -> None:
-        self._places: dict[str, slice | int] = {}
-        place = 0
-        for signal in signals:
-            self._places[signal.name] = place if signal.size is None else slice(place, place + signal.width)
-            place += signal.width
-        self._values: dict[str, Any] = {name: x[where] for name, where in self._places.items()}
+        self._parts = NamedMemory(signals)
+        self._values = self._parts.unpack(x)
 
     def __getitem__(self, name: str) -> Array:
-        return self._values[name]
+        value: Array = getattr(self._values, name)
+        return value
 
     def each(self, name: str) -> list[Array]:
         """Elements of a vector.
@@ -93,7 +91,7 @@ class Memory:
         Args:
             name: of it.
         """
-        return [self._values[name][i] for i in range(self._values[name].shape[0])]
+        return [self[name][i] for i in range(self[name].shape[0])]
 
     def put(self, **values: Any) -> None:
         """Replace some.
@@ -101,18 +99,9 @@ class Memory:
         Args:
             values: by name, a number, or an array or list for a vector.
         """
-        unknown = set(values) - set(self._values)
-        if unknown:
-            raise KeyError(", ".join(sorted(unknown)))
-        self._values |= {name: vector(*v) if isinstance(v, list) else v for name, v in values.items()}
+        arrays = {name: vector(*v) if isinstance(v, list) else v for name, v in values.items()}
+        self._values = self._values._replace(**arrays)
 
     def joined(self) -> Array:
         """The whole state again."""
-        parts: list[Array] = []
-        for name, where in self._places.items():
-            value = self._values[name]
-            if isinstance(where, int):
-                parts.append(value)
-            else:
-                parts.extend(value[i] for i in range(where.stop - where.start))
-        return vector(*parts)
+        return self._parts.pack(self._values)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import namedtuple
 from collections.abc import Sequence
+from functools import cache
 from typing import Any
 
 from plant_models.hybrid.signal import Signal
@@ -19,7 +20,7 @@ class NamedMemory:
 
     def __init__(self, signals: Sequence[Signal]) -> None:
         self.signals = tuple(signals)
-        self._type = _named(self.signals)
+        self._type = _named(tuple(s.name for s in self.signals))
 
     def unpack(self, x: Array) -> Any:
         """Named tuple of the parts.
@@ -56,5 +57,6 @@ class NamedMemory:
         return vector(*scalars)
 
 
-def _named(signals: Sequence[Signal]) -> Any:
-    return namedtuple("Memory", [*(s.name for s in signals)])
+@cache
+def _named(names: tuple[str, ...]) -> Any:
+    return namedtuple("Memory", names)

@@ -101,38 +101,9 @@ class SignatureObserver(HybridSystem):
         self.state_names = tuple(s.name for s in named)
         self.measured_names = tuple(s.name for s in measured)
         pairs = list(zip(plant.moving, named, strict=True))
-        self.states = (
-            *(memory(f"estimated_{s.name}", s.unit, m.start, f"Estimate: {s.description}") for m, s in pairs),
-            *(memory(f"looked_up_{s.name}", s.unit, m.start, f"Of the signature: {s.description}") for m, s in pairs),
-            *(memory(f"past_{s.name}", s.unit, 0.0, f"{s.description}, oldest first", size=window) for s in measured),
-            memory("samples_held", "1", 0.0, "Samples in the window"),
-            memory("windows_inverted", "1", 0.0, "Full windows so far"),
-            memory("windows_outside", "1", 0.0, "Full windows beyond the table so far"),
-            *own_memory,
-        )
+        self.states = (*_remembered(pairs, measured, window), *own_memory)
         self.inputs = tuple(input_signal(s.name, s.unit, 0.0, s.description) for s in measured)
-        self.outputs = (
-            *(output_signal(s.name, s.unit, f"Estimate: {s.description}", variability="discrete") for s in named),
-            *(
-                output_signal(
-                    f"{s.name}_look_up", s.unit, f"Of the signature alone: {s.description}", variability="discrete"
-                )
-                for s in named
-            ),
-            output_signal(
-                "window_full", "1", "1 once the window is full, and estimates are corrected", variability="discrete"
-            ),
-            output_signal("window_count", "1", "Full windows so far", variability="discrete"),
-            output_signal("outside_count", "1", "Full windows beyond the table so far", variability="discrete"),
-            output_signal(
-                "mostly_outside",
-                "1",
-                "1 where most windows were beyond the table",
-                variability="discrete",
-                warning=MOSTLY,
-            ),
-            *own_outputs,
-        )
+        self.outputs = (*_told(named), *own_outputs)
         self._own_outputs = tuple(s.name for s in own_outputs)
         period = next(s for s in plant.parameters if s.name == "sample_period")
         self.parameters = (
@@ -288,3 +259,40 @@ class SignatureObserver(HybridSystem):
     def _counts(self, x: Array) -> tuple[Array, Array, Array, list[Array]]:
         first = self._places["samples_held"]
         return x[first], x[first + 1], x[first + 2], [x[i] for i in range(first + 3, len(scalar_names(self.states)))]
+
+
+def _remembered(pairs: Sequence[tuple[Signal, Signal]], measured: Sequence[Signal], window: int) -> tuple[Signal, ...]:
+    """Estimates, look-ups, the window and its counts; `pairs` are states of the plant with the outputs showing them."""
+    return (
+        *(memory(f"estimated_{s.name}", s.unit, m.start, f"Estimate: {s.description}") for m, s in pairs),
+        *(memory(f"looked_up_{s.name}", s.unit, m.start, f"Of the signature: {s.description}") for m, s in pairs),
+        *(memory(f"past_{s.name}", s.unit, 0.0, f"{s.description}, oldest first", size=window) for s in measured),
+        memory("samples_held", "1", 0.0, "Samples in the window"),
+        memory("windows_inverted", "1", 0.0, "Full windows so far"),
+        memory("windows_outside", "1", 0.0, "Full windows beyond the table so far"),
+    )
+
+
+def _told(named: Sequence[Signal]) -> tuple[Signal, ...]:
+    """Estimates, look-ups, and how full the window is and how often it was beyond the table."""
+    return (
+        *(output_signal(s.name, s.unit, f"Estimate: {s.description}", variability="discrete") for s in named),
+        *(
+            output_signal(
+                f"{s.name}_look_up", s.unit, f"Of the signature alone: {s.description}", variability="discrete"
+            )
+            for s in named
+        ),
+        output_signal(
+            "window_full", "1", "1 once the window is full, and estimates are corrected", variability="discrete"
+        ),
+        output_signal("window_count", "1", "Full windows so far", variability="discrete"),
+        output_signal("outside_count", "1", "Full windows beyond the table so far", variability="discrete"),
+        output_signal(
+            "mostly_outside",
+            "1",
+            "1 where most windows were beyond the table",
+            variability="discrete",
+            warning=MOSTLY,
+        ),
+    )

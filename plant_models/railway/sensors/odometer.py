@@ -12,7 +12,6 @@ import numpy as np
 
 from plant_models.hybrid import (
     HybridSystem,
-    PeriodicEvent,
     input_signal,
     memory,
     output_signal,
@@ -22,6 +21,7 @@ from plant_models.hybrid import (
 )
 from plant_models.hybrid.system import Array
 from plant_models.railway.sensors.pulses import counted_pulses, pulse_length, pulses_in_window
+from plant_models.railway.sensors.sampling import sampling
 
 
 class Odometer(HybridSystem):
@@ -65,19 +65,7 @@ class Odometer(HybridSystem):
         parameter("teeth", "1", 0.0, "Pulses in one revolution; 0 for no quantisation", min=0.0),
         parameter("wheel_radius", "m", 0.575, "Radius of the wheel", min=1e-3),
     )
-    events = (
-        PeriodicEvent(
-            "sampling",
-            "sample_period",
-            "sample_offset",
-            noises=(
-                input_signal(
-                    "reading_noise", "1", 0.0, "Standard normal number of this reading", variability="discrete"
-                ),
-            ),
-            description="The odometer is read",
-        ),
-    )
+    events = (sampling("The odometer is read", "sample_offset"),)
     presets: Mapping[str, Mapping[str, Any]] = {
         "ideal": {},
         "10_hz": {"sample_period": 0.1},
